@@ -17,12 +17,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain, repeat
 from math import inf
 from os import PathLike
 from typing import Any
 
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.files.section import Section
+from linkage_ros.files.units import ANGLES, LENGTHS, Units
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
@@ -39,7 +43,18 @@ from linkage_ros.kinematics.linkage import (
 from linkage_ros.kinematics.sweep_analysis import check_limits
 from linkage_ros.resources import named_file
 
-_KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'masses')
+_KEYS = (
+    'units',
+    'angles',
+    'links',
+    'input',
+    'assembly',
+    'sliders',
+    'joints',
+    'traced',
+    'pose',
+    'masses',
+)
 _MOST_LINKS, _MOST_POINTS = 400, 10_000
 """Bounds on the links, and on the points of all links; at these a check takes seconds."""
 
@@ -107,18 +122,27 @@ def read_closure(content: Section, name: str = '', *, publish_inputs: bool = Fal
         The file is wrong; the error has file, line and key.
 
     """
+    linkage, shorthand = written_linkage(content, publish_inputs=publish_inputs)
+    return closable(content, linkage, name, shorthand)
+
+
+def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[Linkage, str]:
+    """Return a linkage as it is written, and the shorthand that it is written in, or ''."""
+    content.units = Units(
+        content.choice('units', tuple(LENGTHS), 'm'),
+        content.choice('angles', ANGLES, ANGLES[0]),
+    )
     for shorthand, expand in _SHORTHANDS.items():
         if shorthand in content:
             short = content.section(shorthand)
             written_out = Section(content.file, '', _limited(expand(short), short))
             short.finish()
             content.finish()
-            linkage = _linkage(written_out, publish_inputs)
-            return _closable(content, linkage, name, shorthand)
+            return _linkage(written_out, publish_inputs), shorthand
     for key in _KEYS:
         content.taken(key)
     content.finish(tuple(_SHORTHANDS))
-    return _closable(content, _linkage(content, publish_inputs), name)
+    return _linkage(content, publish_inputs), ''
 
 
 def _linkage(content: Section, publish_inputs: bool) -> Linkage:
@@ -127,7 +151,7 @@ def _linkage(content: Section, publish_inputs: bool) -> Linkage:
     points = {}
     for name in links:
         link = links.section(name)
-        points[name] = {point: link.point(point, most=FARTHEST) for point in link}
+        points[name] = {point: link.point(point, most=FARTHEST, unit='m') for point in link}
 
     count = sum(map(len, points.values()))
     if count > _MOST_POINTS:
@@ -135,14 +159,17 @@ def _linkage(content: Section, publish_inputs: bool) -> Linkage:
             'links', f'have {count} points', f'write at most {_MOST_POINTS} points'
         )
 
+    if 'input' not in content:
+        raise content.error('', "the key 'input' is missing", f'add {_input_line(points)}')
     inputs = tuple(_input(driven) for driven in content.sections('input'))
 
+    sliders = content.section('sliders', required=False)
     assembly = content.section('assembly', required=False)
     sides = {
-        name: assembly.choice(name, ('left', 'right', 'ahead', 'behind')) for name in assembly
+        name: assembly.choice(name, ('ahead', 'behind') if name in sliders else ('left', 'right'))
+        for name in assembly
     }
 
-    sliders = content.section('sliders', required=False)
     joints = content.section('joints')
     _bound(content, sliders, 'sliders', _MOST_LINKS)
     _bound(content, joints, 'joints', _MOST_LINKS)
@@ -161,7 +188,7 @@ def _linkage(content: Section, publish_inputs: bool) -> Linkage:
         published,
         {name: _slider(sliders.section(name)) for name in sliders},
         tuple(content.texts('traced')),
-        _pose(content.section('pose')) if 'pose' in content else None,
+        _pose(content.section('pose'), inputs) if 'pose' in content else None,
         _masses(content.section('masses', required=False), tuple(points)),
     )
 
@@ -172,13 +199,19 @@ def _bound(content: Section, named: Section, key: str, most: int) -> None:
         raise content.error(key, f'there are {count}', f'write at most {most}')
 
 
+def _input_line(points: Mapping[str, Collection[str]]) -> str:
+    """Return the line of an input for a file without one."""
+    pins = {*points.get(GROUND, ())}
+    crank = next((link for link in points if link != GROUND and pins & {*points[link]}), 'crank')
+    return f'input: {{joint: {crank}_joint, parent: {GROUND}, child: {crank}}}'
+
+
 def _input(content: Section) -> Input:
-    limits = _limits(content)
+    joint = content.text('joint', expected='a name for the driven joint, as in crank messages')
     if 'slider' in content:
-        driven = Input(content.text('joint'), slider=content.text('slider'), limits=limits)
+        driven = Input(joint, slider=content.text('slider'), limits=_limits(content, slides=True))
     else:
-        ends = content.text('parent'), content.text('child')
-        driven = Input(content.text('joint'), *ends, limits=limits)
+        driven = Input(joint, *_ends(content), limits=_limits(content))
     content.finish(('slider',))
     return driven
 
@@ -189,9 +222,18 @@ def _published(driven: Input) -> RevoluteJoint | SlideJoint:
     return RevoluteJoint(driven.parent, driven.child)
 
 
-def _limits(content: Section) -> Limits:
+def _ends(content: Section) -> tuple[str, str]:
+    """Return parent and child of a joint."""
+    return (
+        content.text('parent', expected='the link from which the angle is measured'),
+        content.text('child', expected='the link whose angle it is'),
+    )
+
+
+def _limits(content: Section, *, slides: bool = False) -> Limits:
     """Return the limits of a joint; `kinematics.checks` decides whether they are possible."""
-    low, high = content.interval('limits', most=FARTHEST)
+    content.units = replace(content.units, slides=slides)
+    low, high = content.interval('limits', most=FARTHEST, unit='rad or m')
     return Limits(
         low,
         high,
@@ -204,10 +246,13 @@ def _limits(content: Section) -> Limits:
     )
 
 
-def _pose(content: Section) -> Pose:
-    inputs = tuple(content.numbers('inputs', most=FARTHEST))
+def _pose(content: Section, driven: Sequence[Input]) -> Pose:
+    # A wrong number of values is refused with the other parts that do not match.
+    values = content.numbers('inputs', most=FARTHEST)
+    units = chain((given.unit for given in driven), repeat(''))
+    inputs = tuple(map(content.units.read, values, units))
     points = content.section('points', required=False)
-    pose = Pose(inputs, {name: points.point(name, most=FARTHEST) for name in points})
+    pose = Pose(inputs, {name: points.point(name, most=FARTHEST, unit='m') for name in points})
     content.finish()
     return pose
 
@@ -225,7 +270,7 @@ def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
         link = content.section(name)
         masses[name] = Mass(
             link.number('mass', above=0.0, most=HEAVIEST, unit='kg'),
-            link.point('center', most=FARTHEST),
+            link.point('center', most=FARTHEST, unit='m'),
             link.number('inertia', least=0.0, most=HEAVIEST, unit='kg·m²'),
         )
         link.finish()
@@ -235,9 +280,9 @@ def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
 def _slider(content: Section) -> Slider:
     block = content.text('block', '')
     slider = Slider(
-        content.text('point'),
-        content.text('along'),
-        content.text('through'),
+        content.text('point', expected='the point that stays on the line'),
+        content.text('along', expected='the link that carries the line'),
+        content.text('through', expected='a point of that link on the line'),
         content.point('direction', most=FARTHEST),
         block,
         content.number('angle', 0.0, least=-FARTHEST, most=FARTHEST, unit='rad') if block else 0.0,
@@ -248,16 +293,16 @@ def _slider(content: Section) -> Slider:
 
 def _joint(content: Section) -> RevoluteJoint | SlideJoint:
     joint: RevoluteJoint | SlideJoint
-    limits = _limits(content)
     if 'slider' in content:
-        joint = SlideJoint(content.text('slider'), limits)
+        joint = SlideJoint(content.text('slider'), _limits(content, slides=True))
     else:
-        joint = RevoluteJoint(content.text('parent'), content.text('child'), limits)
+        joint = RevoluteJoint(*_ends(content), _limits(content))
     content.finish(('slider',))
     return joint
 
 
-def _closable(content: Section, linkage: Linkage, name: str, shorthand: str = '') -> Closure:
+def closable(content: Section, linkage: Linkage, name: str, shorthand: str = '') -> Closure:
+    """Return a linkage of a file as a closure, and check that it closes."""
     try:
         closure = Closure(linkage, name)
         if len(linkage.inputs) == 1 and not closure.closing_ranges:
@@ -272,7 +317,10 @@ def _closable(content: Section, linkage: Linkage, name: str, shorthand: str = ''
         if shorthand:
             # Of the expanded file, the author of a shorthand wrote only the limits.
             where = f'{shorthand}.{where}' if where.endswith('.limits') else shorthand
-        raise content.error(where, error.reason, error.remedy) from None
+        remedy = error.remedy
+        if where == 'assembly':
+            remedy += f'; linkage draw {content.file} --assemblies draws the choices'
+        raise content.located(DefinitionError(where, error.reason, remedy)) from None
     return closure
 
 
@@ -288,9 +336,14 @@ def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
     places = [(driven, content.section('input', required=False))]
     places += [(joints[name], limited.section(name)) for name in limited]
     for joint, of in places:
-        _limits(of)
+        limits = _limits(of, slides='slider' in joint)
         of.finish()
-        joint.update(of.mapping)
+        in_si = {
+            'limits': [limits.low, limits.high],
+            'velocity': limits.velocity,
+            'effort': limits.effort,
+        }
+        joint.update({key: value for key, value in in_si.items() if key in of})
     return written_out
 
 
@@ -317,7 +370,7 @@ def _four_bar(content: Section) -> dict[str, Any]:
 def _inverted_slider_crank(content: Section) -> dict[str, Any]:
     """Expand crank a and the position of the swivel relative to the crank's pivot."""
     a = content.number('a', above=0.0, most=FARTHEST, unit='m')
-    swivel = content.point('swivel', most=FARTHEST)
+    swivel = content.point('swivel', most=FARTHEST, unit='m')
     if swivel == (0.0, 0.0):
         raise content.error(
             'swivel', "[0, 0] is the crank's pivot", 'give the swivel another place'

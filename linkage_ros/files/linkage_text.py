@@ -35,7 +35,7 @@ import re
 from textwrap import wrap
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.atomic_write import atomic_write
+from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure

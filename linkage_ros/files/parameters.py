@@ -25,20 +25,21 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, Field, field, fields, is_dataclass, MISSING
+from dataclasses import asdict, dataclass, Field, field, fields, is_dataclass, MISSING, replace
 from math import inf
 from os.path import join
 from typing import Any, ClassVar
 
 from linkage_ros.errors import did_you_mean, listed, quoted
 from linkage_ros.files.section import Section
+from linkage_ros.files.units import most_in_one, unit_of
 
 _KEY = 'parameter'
 
 Schema = dict[str, Any]
 
 Parts = Mapping[str, Sequence[str]]
-"""The existing names for each kind of part."""
+"""The existing names for each kind of part; those of 'slide' are joints that slide."""
 
 KINDS = {
     'joint': 'published joint',
@@ -104,19 +105,16 @@ class Number(Kind):
     whole: bool = False
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> float | int:
-        """Read a number."""
         if self.whole:
             return content.whole(key, least=self.least, most=self.most, unit=self.unit)
         bounds = {'least': self.least, 'most': self.most, 'above': self.above}
         return content.number(key, **bounds, unit=self.unit)
 
     def schema(self) -> Schema:
-        """Return the schema of a number within bounds."""
         kind = 'integer' if self.whole else 'number'
-        return self._described(type=kind, **_bounds(self.least, self.most, self.above))
+        return self._described(type=kind, **_bounds(self.least, self.most, self.above, self.unit))
 
     def values(self) -> str:
-        """Return the bounds."""
         least, most, above = map(written, (self.least, self.most, self.above))
         if self.above > -inf:
             bounds = f'more than {above}' + (f', to {most}' if self.most < inf else '')
@@ -127,7 +125,6 @@ class Number(Kind):
         return f'whole: {bounds}' if self.whole else bounds
 
     def shown(self, default: Any) -> str:
-        """Return the number in its usual notation."""
         return written(default)
 
 
@@ -139,16 +136,13 @@ class Numbers(Kind):
     most: float = inf
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, ...]:
-        """Read a list as a tuple."""
-        return tuple(content.numbers(key, most=self.most))
+        return tuple(content.numbers(key, most=self.most, unit=self.unit))
 
     def schema(self) -> Schema:
-        """Return the schema of a list."""
-        items = {'type': 'number', **_bounds(-self.most, self.most)}
+        items = {'type': 'number', **_bounds(-self.most, self.most, unit=self.unit)}
         return self._described(type='array', items=items)
 
     def values(self) -> str:
-        """Return the bound."""
         return f'a list of numbers{_each_at_most(self.most)}'
 
 
@@ -157,15 +151,12 @@ class Point(Numbers):
     """Two finite numbers [x, y], each within ±most."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, float]:
-        """Read a point as a tuple."""
-        return content.point(key, most=self.most)
+        return content.point(key, most=self.most, unit=self.unit)
 
     def schema(self) -> Schema:
-        """Return the schema of two numbers."""
         return {**Numbers.schema(self), 'minItems': 2, 'maxItems': 2}
 
     def values(self) -> str:
-        """Return the bound."""
         return f'[x, y]{_each_at_most(self.most)}'
 
 
@@ -185,18 +176,21 @@ class Rows(Kind):
     most: float = inf
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
-        """Read rows as a tuple of tuples."""
         return content.rows(key, self.columns, most=self.most)
 
     def schema(self) -> Schema:
-        """Return the schema of a list of lists."""
         row, count = f'[{", ".join(self.columns)}]', len(self.columns)
-        items = {**Numbers(row, most=self.most).schema(), 'minItems': count, 'maxItems': count}
+        bounds = _bounds(-self.most, self.most, unit=' or '.join(map(unit_of, self.columns)))
+        items = {
+            **Numbers(row).schema(),
+            'items': {'type': 'number', **bounds},
+            'minItems': count,
+            'maxItems': count,
+        }
         description = f'{self.meaning}: rows of {row}'
         return {'description': description, 'type': 'array', 'minItems': 1, 'items': items}
 
     def values(self) -> str:
-        """Return the columns and the bound."""
         return f'rows of [{", ".join(self.columns)}]{_each_at_most(self.most)}'
 
 
@@ -205,19 +199,15 @@ class Flag(Kind):
     """True or false."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> bool:
-        """Read a boolean."""
         return content.flag(key)
 
     def schema(self) -> Schema:
-        """Return the schema of a boolean."""
         return self._described(type='boolean')
 
     def values(self) -> str:
-        """Return both values."""
         return 'true or false'
 
     def shown(self, default: Any) -> str:
-        """Return a boolean as YAML has it."""
         return 'true' if default else 'false'
 
 
@@ -228,15 +218,12 @@ class Choice(Kind):
     words: tuple[str, ...]
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
-        """Read a word."""
         return content.choice(key, self.words)
 
     def schema(self) -> Schema:
-        """Return the schema of these words."""
         return self._described(enum=list(self.words))
 
     def values(self) -> str:
-        """Return the words."""
         return ' or '.join(self.words)
 
 
@@ -247,15 +234,12 @@ class Text(Kind):
     pattern: str = f'^{CHARACTER}+$'
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
-        """Read a text."""
         return content.text(key)
 
     def schema(self) -> Schema:
-        """Return the schema of a text."""
         return self._described(type='string', pattern=self.pattern)
 
     def values(self) -> str:
-        """Return that it is a string."""
         return 'a text'
 
 
@@ -264,11 +248,9 @@ class File(Text):
     """A path, relative to the folder of the scene file."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
-        """Read a path, and prepend the scene's folder."""
         return join(folder, content.text(key))  # noqa: PTH118 (Path's raises on a NUL)
 
     def values(self) -> str:
-        """Return that it is a file."""
         return 'a file'
 
 
@@ -279,15 +261,13 @@ class Name(Kind):
     kind: str
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
-        """Read the name of an existing part."""
         return self._known(content, key, content.text(key), parts)
 
     def schema(self) -> Schema:
-        """Return the schema of a name; a schema cannot know the existing names."""
+        # It cannot know the existing names.
         return Text(f'{self.meaning} (name of a {KINDS[self.kind]})').schema()
 
     def values(self) -> str:
-        """Return the kind."""
         return f'a {KINDS[self.kind]}'
 
     def _known(self, content: Section, key: str, name: str, parts: Parts) -> str:
@@ -307,20 +287,16 @@ class Names(Name):
     """A list of names of parts of the linkage."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
-        """Read names as a tuple."""
         return tuple(self._known(content, key, name, parts) for name in content.texts(key))
 
     def schema(self) -> Schema:
-        """Return the schema of a list of names."""
         description = f'{self.meaning} (names, each of a {KINDS[self.kind]})'
         return {'description': description, 'type': 'array', 'items': Text('a name').schema()}
 
     def values(self) -> str:
-        """Return the kind."""
         return f'names, each of a {KINDS[self.kind]}'
 
     def shown(self, default: Any) -> str:
-        """Return the names; none stands for all."""
         return ', '.join(default) or 'all'
 
 
@@ -343,25 +319,28 @@ class Each(Name):
         return Group('', self.of) if isinstance(self.of, type) else self.of
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
-        """Read values by name of the part."""
-        inner = content.section(key)
-        return {
-            self._known(inner, name, name, parts): self._value.read(inner, name, parts, folder)
-            for name in inner
-        }
+        inner, values = content.section(key), {}
+        for name in inner:
+            part = self._known(inner, name, name, parts)
+            if self.kind in {'joint', 'input'}:
+                inner.units = replace(inner.units, slides=name in parts.get('slide', ()))
+            values[part] = self._value.read(inner, name, parts, folder)
+        return values
 
     def schema(self) -> Schema:
-        """Return the schema of a mapping whose keys are names."""
         of = parameters_schema(self.of) if isinstance(self.of, type) else self.of.schema()
         return named(f'{self.meaning} (by the name of a {KINDS[self.kind]})', of)
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Return the keys of each part; none if it has a single value."""
+        return tuple(e.name for e in fields(self.of)) if isinstance(self.of, type) else ()
+
     def values(self) -> str:
-        """Return the kind."""
         return f'for each {KINDS[self.kind]}'
 
     def shown(self, default: Any) -> str:
-        """Return an empty text: a table has the defaults of the values."""
-        return ''
+        return ''  # its own rows have the defaults
 
     def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
         """Yield one row, and the rows of the values."""
@@ -380,20 +359,16 @@ class Group(Kind):
     of: Any
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
-        """Read parameters."""
         return read_parameters(content.section(key), self.of, parts, folder)
 
     def schema(self) -> Schema:
-        """Return the schema of the parameters."""
         return {**parameters_schema(self.of), 'description': self.meaning}
 
     def values(self) -> str:
-        """Return that it is a mapping."""
         return 'a mapping'
 
     def shown(self, default: Any) -> str:
-        """Return an empty text: a table has the defaults of the parameters."""
-        return ''
+        return ''  # its own rows have the defaults
 
     def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
         """Yield one row, and the rows of the parameters."""
@@ -530,6 +505,7 @@ def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -
 
     """
     entries = declared(of)
+    _refuse_misplaced(content, entries, parts)
     values = {
         entry.name: kind.read(content, entry.name, parts, folder)
         for entry, kind in entries
@@ -537,6 +513,41 @@ def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -
     }
     content.finish([entry.name for entry, _ in entries])
     return of(**values)
+
+
+def _refuse_misplaced(
+    content: Section, entries: Sequence[tuple[Field[Any], Kind]], parts: Parts
+) -> None:
+    """Refuse a key that belongs under the name of a part, and say where to write it."""
+    known = [entry.name for entry, _ in entries]
+    for key in content:
+        for entry, kind in entries:
+            if key in known or not isinstance(kind, Each):
+                continue
+            if remedy := under_part(key, entry.name, kind.keys, parts.get(kind.kind, ())):
+                raise content.error(key, f'is for each {KINDS[kind.kind]}', remedy)
+
+
+def under_part(key: str, section: str, keys: Sequence[str], names: Sequence[str]) -> str:
+    """
+    Return the remedy for a key that belongs into a section of named parts; '' for another key.
+
+    Parameters
+    ----------
+    key
+        The key.
+    section
+        Key of the section.
+    keys
+        The keys that each of its parts has; none if a part has a single value.
+    names
+        Names of the parts.
+
+    """
+    if key in keys:
+        name = names[0] if names else 'NAME'
+        return f'write it under {section}, as {section}: {{{name}: {{{key}: …}}}}'
+    return f'write it under {section}, as {section}: {{{key}: …}}' if key in names else ''
 
 
 def parameters_schema(of: Any) -> Schema:
@@ -587,7 +598,10 @@ def _each_at_most(most: float) -> str:
     return f', each of at most {written(most)}' if most < inf else ''
 
 
-def _bounds(least: float, most: float, above: float = -inf) -> Schema:
+def _bounds(least: float, most: float, above: float = -inf, unit: str = '') -> Schema:
+    # A schema does not know the file's units: the reader alone has the exact bounds.
+    scale = most_in_one(unit)
+    least, most, above = least * scale, most * scale, above * scale
     bounds = (('minimum', least), ('maximum', most), ('exclusiveMinimum', above))
     return {word: _plain(bound) for word, bound in bounds if abs(bound) < inf}
 

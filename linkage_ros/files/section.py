@@ -17,12 +17,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import repeat
 from math import inf, isfinite, isnan
 from re import fullmatch
 from typing import Any, cast
 
-from linkage_ros.errors import did_you_mean, FileError, listed, quoted
+from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed, quoted
+from linkage_ros.files.units import unit_of, Units
 
 
 class LinedDict(dict[str, Any]):
@@ -33,6 +35,9 @@ class LinedDict(dict[str, Any]):
     def __init__(self) -> None:
         super().__init__()
         self.lines: dict[str, int] = {}
+
+
+SI = Units()
 
 
 class Section:
@@ -51,14 +56,24 @@ class Section:
         The mapping.
     line
         Line of the mapping.
+    units
+        Units of its lengths and angles; the getters return SI.
 
     """
 
-    def __init__(self, file: str, path: str, content: Mapping[str, Any], line: int = 0) -> None:
+    def __init__(
+        self,
+        file: str,
+        path: str,
+        content: Mapping[str, Any],
+        line: int = 0,
+        units: Units = SI,
+    ) -> None:
         self.file = file
         self._path = path
         self._content = content
         self._line = line
+        self.units = units
         self._taken: set[str] = set()
 
     def __contains__(self, key: str) -> bool:
@@ -77,6 +92,11 @@ class Section:
         path = '.'.join(filter(None, (self._path, key)))
         return FileError(self.file, path, reason, remedy, self._line_of(key))
 
+    def located(self, error: DefinitionError) -> FileError:
+        """Return an error of this content as one of its file, in the file's units."""
+        told = self.units.told
+        return self.error(error.where, told(error.reason), told(error.remedy))
+
     def number(
         self,
         key: str,
@@ -88,25 +108,23 @@ class Section:
         unit: str = '',
     ) -> float:
         """Return a finite number within bounds: least ≤ value ≤ most, and value > above."""
-        value = self._take(key, default, f'a number{unit and f" in [{unit}]"}')
+        name = self.units.name(unit)
+        value = self._take(key, default, f'a number{_in(name)}')
         if not _is_number(value):
-            raise self.error(key, f'{quoted(value)} is not a number', 'write a number')
-        if not isfinite(value) or not least <= value <= most or value <= above:
+            raise self.error(key, f'{quoted(value)} is not a number', f'write a number{_in(name)}')
+        found = self._si(key, value, unit)
+        if not isfinite(found) or not least <= found <= most or found <= above:
             bounds = ' and '.join(
-                text
-                for text in (
-                    f'more than {above:g}' if above > -inf else '',
-                    f'at least {least:g}' if least > -inf else '',
-                    f'at most {most:g}' if most < inf else '',
-                )
-                if text
+                f'{word} {self.units.shown(bound, unit):g}'
+                for word, bound in (('more than', above), ('at least', least), ('at most', most))
+                if isfinite(bound)
             )
             raise self.error(
                 key,
                 f'{quoted(value)} is out of bounds',
-                f'write a finite number{bounds and f", {bounds}"}{unit and f" [{unit}]"}',
+                f'write a finite number{bounds and f", {bounds}"}{name and f" [{name}]"}',
             )
-        return float(value)
+        return found
 
     def whole(
         self,
@@ -130,9 +148,9 @@ class Section:
             raise self.error(key, f'{quoted(value)} is not a flag', 'write true or false')
         return value
 
-    def text(self, key: str, default: str | None = None) -> str:
-        """Return a string that is not empty, or the default."""
-        value = self._take(key, default, 'a text')
+    def text(self, key: str, default: str | None = None, *, expected: str = 'a text') -> str:
+        """Return a string that is not empty, or the default; ``expected`` tells its meaning."""
+        value = self._take(key, default, expected)
         if value == default and default is not None:
             return default
         if not isinstance(value, str) or not value.isprintable() or not value:
@@ -153,50 +171,61 @@ class Section:
         """Return one of a set of words."""
         value = self._take(key, default, listed(choices, ' or '))
         if value not in choices:
-            raise self.error(key, f'{quoted(value)} is none', f'write {listed(choices, " or ")}')
+            raise self.error(
+                key, f'{quoted(value)} is not a choice', f'write {listed(choices, " or ")}'
+            )
         return cast(str, value)
 
-    def point(self, key: str, *, most: float = inf) -> tuple[float, float]:
-        """Return two finite numbers, each within ±most."""
-        value = self._take(key, None, 'two numbers [x, y]')
-        if (
-            not isinstance(value, list)
-            or len(value) != 2
-            or any(not _is_number(v) for v in value)
-            or not all(map(isfinite, value))
-        ):
-            raise self.error(
-                key, f'{quoted(value)} is not a point', 'write two finite numbers: [x, y]'
-            )
-        if max(map(abs, value)) > most:
-            raise self.error(
-                key, f'{quoted(value)} is out of bounds', f'write numbers of at most {most:g}'
-            )
-        return float(value[0]), float(value[1])
+    def words(self, key: str, groups: Sequence[Sequence[str]]) -> list[str]:
+        """
+        Return a word of each group: of those that the file names, else the group's first.
 
-    def interval(self, key: str, *, most: float = inf) -> tuple[float, float]:
+        The file names one word, or a list of words of different groups.
+        """
+        value = self._take(key, [], 'a word')
+        named = value if isinstance(value, list) else [value]
+        found = [[word for word in named if word in group] for group in groups]
+        if sum(map(len, found)) != len(named) or any(len(words) > 1 for words in found):
+            choices = ', '.join(' or '.join(group) for group in groups)
+            both = ', '.join(group[-1] for group in groups)
+            raise self.error(
+                key,
+                f'{quoted(value)} is not a choice',
+                f'write {choices}, or one of each: [{both}]',
+            )
+        return [
+            words[0] if words else group[0] for words, group in zip(found, groups, strict=True)
+        ]
+
+    def point(self, key: str, *, most: float = inf, unit: str = '') -> tuple[float, float]:
+        """Return two finite numbers, each within ±most."""
+        name = self.units.name(unit)
+        value = self._take(key, None, f'two numbers [x, y]{_in(name)}')
+        if not _is_pair(value) or not all(map(isfinite, value)):
+            remedy = 'write two finite numbers: [x, y]'
+            if isinstance(value, list) and len(value) > 2 and all(map(_is_number, value)):
+                remedy += '; a decimal has a point, not a comma: [0.040, 0]'
+            raise self.error(key, f'{quoted(value)} is not a point', remedy)
+        x, y = (self._si(key, part, unit) for part in value)
+        self._check_most(key, value, (x, y), most, unit)
+        return x, y
+
+    def interval(self, key: str, *, most: float = inf, unit: str = '') -> tuple[float, float]:
         """
         Return two numbers [low, high]; infinite for no limit, and if the key is absent.
 
         The caller checks their order.
         """
         value = self._take(key, [-inf, inf], 'two numbers [low, high]')
-        if (
-            not isinstance(value, list)
-            or len(value) != 2
-            or any(not _is_number(v) for v in value)
-            or any(map(isnan, value))
-        ):
+        if not _is_pair(value) or any(map(isnan, value)):
             raise self.error(
                 key,
                 f'{quoted(value)} is not two numbers',
                 'write [low, high]; -.inf or .inf for none on a side',
             )
-        if any(most < abs(v) < inf for v in value):
-            raise self.error(
-                key, f'{quoted(value)} is out of bounds', f'write numbers of at most {most:g}'
-            )
-        return float(value[0]), float(value[1])
+        low, high = (self._si(key, end, unit) for end in value)
+        self._check_most(key, value, filter(isfinite, (low, high)), most, unit)
+        return low, high
 
     def section(self, key: str, *, required: bool = True) -> Section:
         """Return a nested mapping; an empty one if it is absent and not required."""
@@ -205,7 +234,7 @@ class Section:
         if not isinstance(value, dict):
             raise self.error(key, f'{quoted(value)} is not a mapping', f'write {key}: {{…}}')
         path = '.'.join(filter(None, (self._path, key)))
-        return Section(self.file, path, value, line)
+        return Section(self.file, path, value, line, self.units)
 
     def sections(self, key: str) -> list[Section]:
         """Return one mapping, or a list of them."""
@@ -217,40 +246,51 @@ class Section:
             path = '.'.join(filter(None, (self._path, f'{key}[{i}]')))
             if not isinstance(item, dict):
                 raise self.error(key, f'{quoted(item)} is not a mapping', 'write {…}')
-            found.append(Section(self.file, path, item, self._line_of(key)))
+            found.append(Section(self.file, path, item, self._line_of(key), self.units))
         if not found:
             raise self.error(key, 'the list is empty', 'name one at least')
         return found
 
-    def numbers(self, key: str, *, most: float = inf) -> list[float]:
+    def numbers(self, key: str, *, most: float = inf, unit: str = '') -> list[float]:
         """Return a list of finite numbers, each within ±most."""
         value = self._take(key, None, 'a list of numbers')
-        if not isinstance(value, list) or any(
-            not _is_number(v) or not abs(v) <= most for v in value
-        ):
+        found = None
+        if isinstance(value, list) and all(map(_is_number, value)):
+            found = [self._si(key, v, unit) for v in value]
+        if found is None or not all(abs(v) <= most for v in found):
             raise self.error(
                 key, f'{quoted(value)} is no list of finite numbers', 'write [0.1, 0.2]'
             )
-        return [float(v) for v in value]
+        return found
 
     def rows(
         self, key: str, columns: Sequence[str], *, most: float = inf
     ) -> tuple[tuple[float, ...], ...]:
         """Return a list of rows of finite numbers, each within ±most."""
         value = self._take(key, None, 'a list of rows of numbers')
-        row = f'[{", ".join(columns)}]'
+        units = list(map(unit_of, columns))
+        names = [
+            column.replace(f'[{unit}]', f'[{self.units.name(unit)}]')
+            for column, unit in zip(columns, units, strict=True)
+        ]
+        row = f'[{", ".join(names)}]'
+        table = []
         if not isinstance(value, list) or not value:
             raise self.error(key, f'{quoted(value)} is no list of rows', f'write [{row}, …]')
         for number, found in enumerate(value, 1):
+            values = None
             if (
-                not isinstance(found, list)
-                or len(found) != len(columns)
-                or any(not _is_number(v) or not abs(v) <= most for v in found)
+                isinstance(found, list)
+                and len(found) == len(units)
+                and all(map(_is_number, found))
             ):
+                values = tuple(map(self._si, repeat(key), found, units))
+            if values is None or not all(abs(v) <= most for v in values):
                 raise self.error(
                     key, f'row {number}, {quoted(found)}, is not {row}', 'write finite numbers'
                 )
-        return tuple(tuple(map(float, found)) for found in value)
+            table.append(values)
+        return tuple(table)
 
     def texts(self, key: str) -> list[str]:
         """Return a list of names; empty if the key is absent."""
@@ -292,6 +332,27 @@ class Section:
             key = key.removeprefix(part).removeprefix('.')
         return line
 
+    def _si(self, key: str, value: float, unit: str) -> float:
+        """Return a number of the file in SI."""
+        if value and self.units.ambiguous(unit):
+            raise self.error(
+                key,
+                f'{quoted(value)} is for joints that turn and joints that slide, '
+                f'in {self.units.name(unit)}',
+                'leave units and angles out of this file',
+            )
+        return float(self.units.read(value, unit))
+
+    def _check_most(
+        self, key: str, value: Any, found: Iterable[float], most: float, unit: str
+    ) -> None:
+        if any(abs(one) > most for one in found):
+            raise self.error(
+                key,
+                f'{quoted(value)} is out of bounds',
+                f'write numbers of at most {self.units.shown(most, unit):g}',
+            )
+
     def _take(self, key: str, default: Any, expected: str) -> Any:
         self._taken.add(key)
         if key not in self._content:
@@ -303,3 +364,11 @@ class Section:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+
+
+def _in(unit: str) -> str:
+    return unit and f' in [{unit}]'

@@ -16,8 +16,7 @@
 Write tables of numbers to CSV and Parquet files, block by block.
 
 Numbers keep every bit: CSV has the shortest text that reads as the same number. A missing value is
-an empty cell, or null. A file appears as a whole: it is written under another name beside the
-target, and renamed.
+an empty cell, or null. A file appears as a whole.
 """
 
 from __future__ import annotations
@@ -32,8 +31,8 @@ import os
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from linkage_ros.errors import FileError, LinkageError, listed, quoted
-from linkage_ros.files.regular_file import read_regular
+from linkage_ros.errors import FileError, LinkageError, quoted
+from linkage_ros.files.file_access import check_suffix, read_regular, replaced
 
 Row = Sequence[float | int | None]
 Write = Callable[[Sequence[Row]], None]
@@ -62,23 +61,14 @@ def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterat
         It cannot be written.
 
     """
-    opened = KINDS[file.suffix.lower()]
     # A link is followed: its target is replaced, not the link.
     target = Path(os.path.realpath(file))
-    temporary = target.with_name(f'.linkage_export_{os.getpid()}{target.suffix}')
     try:
         if target.exists() and not target.is_file():
             raise LinkageError(str(file), 'exists, and is no file', 'name another file')
-        with temporary.open('wb') as stream:
-            try:
-                with opened(stream, heads, whole) as write:
-                    yield write
-                stream.flush()
-                os.fsync(stream.fileno())
-                temporary.replace(target)
-            except BaseException:
-                temporary.unlink(missing_ok=True)
-                raise
+        kind = KINDS[file.suffix.lower()]
+        with replaced(target) as stream, kind(stream, heads, whole) as write:
+            yield write
     except OSError as error:
         raise LinkageError(
             str(file), f'cannot be written: {error.strerror or error}', 'name another file'
@@ -95,14 +85,8 @@ def check_kind(file: Path) -> None:
         Its suffix is unknown, or the library for it is not installed or does not run here.
 
     """
-    ending = file.suffix.lower()
-    if ending not in KINDS:
-        raise LinkageError(
-            str(file),
-            f'ends in {ending!r}' if ending else 'has no ending',
-            f'name a file that ends in {listed(KINDS, " or ")}',
-        )
-    if ending == '.parquet':
+    check_suffix(file, KINDS)
+    if file.suffix.lower() == '.parquet':
         _check_pyarrow()
 
 

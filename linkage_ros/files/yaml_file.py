@@ -27,7 +27,7 @@ import re
 from typing import Any, cast, ClassVar
 
 from linkage_ros.errors import FileError, quoted
-from linkage_ros.files.regular_file import read_regular
+from linkage_ros.files.file_access import read_regular
 from linkage_ros.files.section import LinedDict, Section
 import yaml
 

@@ -14,13 +14,14 @@
 
 
 """
-Read the numbers of messages about joints, by joint and quantity, for three message types.
+Read three types of messages about joints, by joint and quantity, and write two of them.
 
 A message is parsed only if its layout differs from that of the previous one; else one call unpacks
 it. A ``sensor_msgs/msg/JointState`` is read completely. A ``trajectory_msgs/msg/JointTrajectory``
 must have one point, as in ``~/motion``: the state at an instant. A
 ``sensor_msgs/msg/MultiDOFJointState`` must have wrenches only, as in ``~/pin_forces``; the planar
-components are read: forces in x and y, moment about z.
+components are read: forces in x and y, moment about z. These are the messages of
+common_interfaces that have fields for accelerations, and for the wrenches of several joints.
 """
 
 from __future__ import annotations
@@ -31,16 +32,18 @@ from typing import NamedTuple
 
 from linkage_ros.messages import joint_state as declaration
 from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.messages.joint_trajectory import JOINT_TRAJECTORY
 from linkage_ros.messages.layout import (
+    ArrayWriter,
+    declared,
     MalformedError,
     NANOSECONDS,
     Numbers,
+    packed,
+    packing,
     parsed,
     Pattern,
     pattern,
 )
-from linkage_ros.messages.multi_dof_joint_state import MULTI_DOF_JOINT_STATE
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
@@ -208,3 +211,82 @@ TYPES = tuple(_PARSERS)
 
 def _texts(names: Sequence[bytes]) -> list[str]:
     return [name.decode('utf-8', 'backslashreplace') for name in names]
+
+
+JOINT_TRAJECTORY = declared(
+    'Time stamp, string frame_id, string[] joint_names, JointTrajectoryPoint[] points',
+    JointTrajectoryPoint=declared(
+        'float64[] positions, float64[] velocities, float64[] accelerations, float64[] effort, '
+        'Duration time_from_start'
+    ),
+)
+
+
+class JointTrajectoryWriter(ArrayWriter):
+    """
+    Writes a JointTrajectory of a single point, the state of the joints at one instant.
+
+    Positions are in [rad] or [m], rates and accelerations per [s] and [s²].
+
+    Parameters
+    ----------
+    names
+        The joints, in the order of the message.
+
+    """
+
+    __slots__ = ()
+
+    def __init__(self, names: Sequence[str]) -> None:
+        arrays = {
+            'positions': 'positions',
+            'rates': 'velocities',
+            'accelerations': 'accelerations',
+        }
+        super().__init__(JOINT_TRAJECTORY, {'joint_names': names}, arrays, 'points')
+
+
+MULTI_DOF_JOINT_STATE = declared(
+    'Time stamp, string frame_id, string[] joint_names, '
+    'Transform[] transforms, Twist[] twist, Wrench[] wrench'
+)
+
+
+class PlanarWrenchWriter:
+    """
+    Writes a MultiDOFJointState with wrenches only, for a fixed list of joints.
+
+    Parameters
+    ----------
+    names
+        The joints, in the order of the message.
+
+    """
+
+    __slots__ = ('_constants', '_pack')
+
+    def __init__(self, names: Sequence[str]) -> None:
+        values = {'joint_names': names, 'wrench': [(0.0,) * 6] * len(names)}
+        message = packed(MULTI_DOF_JOINT_STATE, values)
+        wrenches = parsed(message, MULTI_DOF_JOINT_STATE)['wrench']
+        # Force z and torque x, y of a wrench are zeros between the changing numbers.
+        self._pack, self._constants = packing(message, [(wrenches.first, 'dd24xd' * len(names))])
+
+    def write(self, stamp: int, wrenches: Sequence[tuple[float, float, float]]) -> bytes:
+        """
+        Return a message.
+
+        Parameters
+        ----------
+        stamp
+            Time of the state, in [ns].
+        wrenches
+            One for each joint: force in x and y, in [N], and torque about z, in [N·m].
+
+        """
+        seconds, nanoseconds = divmod(stamp, NANOSECONDS)
+        numbers: tuple[float, ...] = ()
+        for wrench in wrenches:
+            numbers += wrench
+        encapsulation, head = self._constants
+        return self._pack(encapsulation, seconds, nanoseconds, head, *numbers)

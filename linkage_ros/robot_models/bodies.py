@@ -31,7 +31,7 @@ from typing import NamedTuple
 from linkage_ros.drawing.shapes import hull
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, SlideJoint
-from linkage_ros.kinematics.ranges import reach
+from linkage_ros.kinematics.ranges import link_lengths, reach
 from linkage_ros.robot_models.orientation import named_joints, Span
 
 _COLOURS = (
@@ -115,13 +115,9 @@ def bodies(closure: Closure, ranges: Mapping[str, Span], first_layer: int = 0) -
 
 def bar_width(closure: Closure) -> float:
     """Return the width of bars, in [m]: a fraction of the typical length of links."""
-    lengths = [
-        max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
-        for points in closure.linkage.links.values()
-        if len(points) > 1
-    ]
+    lengths = [length for length in link_lengths(closure.linkage.links) if length > 0.0]
     longest = max(lengths, default=0.0) or reach(closure) or 1.0
-    common = median([length for length in lengths if length > 0.0] or [longest])
+    common = median(lengths or [longest])
     return min(0.12 * common, 0.05 * longest)
 
 
@@ -175,7 +171,7 @@ def _rails(
         low, high = travel(closure, name, ranges)
         if link != GROUND:
             low, high = min(low, 0.0), max(high, 0.0)  # the rail must reach the link's bars
-        unit = complex(*slider.direction) / abs(complex(*slider.direction))
+        unit = slider.unit
         start = complex(*closure.linkage.links[link][slider.through])
         centre = start + 0.5 * (low + high) * unit
         length = high - low + 3.0 * width

@@ -211,7 +211,7 @@ class _Import:
                 if name not in moving:
                     raise self._error(
                         f'{option} {name}',
-                        'is no joint that moves',
+                        'is not a moving joint',
                         did_you_mean(name, moving, f'name one of {listed(moving)}'),
                     )
         self._inputs = tuple(inputs) or urdf.inputs
@@ -269,7 +269,7 @@ class _Import:
     def _input(self, name: str) -> Input:
         joint = self._skeleton.joints.get(name)
         if joint is None:
-            raise self._error(f'--input {name}', 'moves nothing of a loop', self._one_of())
+            raise self._error(f'--input {name}', 'is not part of a loop', self._one_of())
         if not isinstance(joint, RevoluteJoint):
             return Input(name, slider=joint.slider)
         links = self._skeleton.links

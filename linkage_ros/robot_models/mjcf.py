@@ -31,6 +31,7 @@ from xml.etree import ElementTree as ET
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
+    carriers,
     GROUND,
     Limits,
     Mass,
@@ -151,11 +152,7 @@ def _edges(closure: Closure) -> Iterator[_Edge]:
 
 
 def _cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]:
-    carriers: dict[str, list[str]] = {}
-    for link, points in closure.structure.links.items():
-        for point in points:
-            carriers.setdefault(point, []).append(link)
-    for point, carried in carriers.items():
+    for point, carried in carriers(closure.structure.links).items():
         part_of = {link: link for link in carried}
         for edge in kept:
             if edge.kind == 'R' and edge.name == point:
@@ -347,7 +344,7 @@ def _held(closure: Closure, branch: Branch) -> tuple[complex, float, complex, co
         place, own = links[branch.parent][branch.name], links[branch.child][branch.name]
         return complex(*place), 0.0, 0j, complex(*own)
     slider = closure.linkage.sliders[branch.name]
-    unit = complex(*slider.direction) / abs(complex(*slider.direction))
+    unit = slider.unit
     if branch.parent == slider.along:
         place, own = links[branch.parent][slider.through], links[branch.child][slider.point]
         turn, axis = slider.angle, unit * rect(1.0, -slider.angle)
@@ -496,8 +493,9 @@ def _gravity(parts: Sequence[Part]) -> tuple[float, float]:
 def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> None:
     """Write the connections that are not joints: cut pins and springs."""
     linkage = part.closure.linkage
+    links = carriers(linkage.links)
     for point in linkage.traced:
-        bodies.site(next(a for a, points in linkage.links.items() if point in points), point)
+        bodies.site(links[point][0], point)
     for point, one, other in bodies.cuts:
         ends = {'site1': bodies.site(one, point), 'site2': bodies.site(other, point)}
         name = f'{ends["site1"]} = {ends["site2"]}'

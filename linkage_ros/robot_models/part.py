@@ -114,15 +114,11 @@ class Names:
 
     def frame(self, name: str) -> str:
         """Return a free name for a frame, similar to this one."""
-        free = free_name(name, self._frames)
-        self._frames.add(free)
-        return free
+        return _taken(name, self._frames)
 
     def joint(self, name: str) -> str:
         """Return a free name for a joint, similar to this one."""
-        free = free_name(name, self._joints)
-        self._joints.add(free)
-        return free
+        return _taken(name, self._joints)
 
 
 class PrefixedNames:
@@ -165,4 +161,10 @@ def free_name(name: str, taken: Collection[str]) -> str:
     while free in taken:
         number += 1
         free = f'{name}_{number}'
+    return free
+
+
+def _taken(name: str, taken: set[str]) -> str:
+    free = free_name(name, taken)
+    taken.add(free)
     return free

@@ -300,11 +300,12 @@ def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
 
 def _together(parts: list[tuple[float, complex, float]]) -> Mass:
     """Return the total of masses fixed to each other (parallel axis theorem)."""
-    mass = sum(each for each, _, _ in parts)
-    centre = sum(each * place for each, place, _ in parts) / mass
-    inertia = sum(own + each * abs(place - centre) ** 2 for each, place, own in parts)
-    if len(parts) == 1:
-        (_, centre, inertia), mass = parts[0], parts[0][0]
+    if len(parts) == 1:  # every digit as given
+        ((mass, centre, inertia),) = parts
+    else:
+        mass = sum(each for each, _, _ in parts)
+        centre = sum(each * place for each, place, _ in parts) / mass
+        inertia = sum(own + each * abs(place - centre) ** 2 for each, place, own in parts)
     return Mass(mass, (centre.real, centre.imag), max(inertia, 0.0))
 
 
@@ -327,19 +328,14 @@ def _basis(urdf: UrdfFile, turns: dict[str, Array], loops: Loops) -> Array:
     largest = int(np.argmax(np.abs(normal)))
     normal = normal * np.sign(normal[largest])
     for joint in moving:
-        found = axis(joint)
-        off = (
-            float(np.linalg.norm(np.cross(found, normal)))
-            if joint.kind != 'prismatic'
-            else abs(float(found @ normal))
-        )
+        found, first = axis(joint), turning[0].name
+        if joint.kind == 'prismatic':
+            off = abs(float(found @ normal))
+            reason = f'does not slide in the plane that {first} turns in'
+        else:
+            off = float(np.linalg.norm(np.cross(found, normal)))
+            reason = f'turns about another direction than {first}'
         if off > _PARALLEL:
-            how = 'does not slide in the plane' if joint.kind == 'prismatic' else 'turns about'
-            reason = (
-                f'{how} that {turning[0].name} turns in'
-                if joint.kind == 'prismatic'
-                else f'{how} another direction than {turning[0].name}'
-            )
             raise FileError(
                 urdf.file,
                 f'joint {joint.name}',

@@ -283,9 +283,8 @@ class _Growth:
         slide = None
         if way.slider:
             slider = self._linkage.sliders[way.slider]
-            unit = complex(*slider.direction) / abs(complex(*slider.direction))
             along = way.on == slider.along
-            axis = unit * rect(1.0, -constant) if along else -unit
+            axis = slider.unit * rect(1.0, -constant) if along else -slider.unit
             slide = TreeJoint(way.slide, 'prismatic', '', '', 0j, constant, axis)
             if along:
                 yield slide

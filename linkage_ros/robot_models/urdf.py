@@ -29,7 +29,14 @@ from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.errors import DefinitionError, quoted
-from linkage_ros.kinematics.linkage import GROUND, Limits, Linkage, Mass, NO_LIMITS, RevoluteJoint
+from linkage_ros.kinematics.linkage import (
+    carriers,
+    GROUND,
+    Limits,
+    Mass,
+    NO_LIMITS,
+    RevoluteJoint,
+)
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.robot_models.bodies import bodies, Body
 from linkage_ros.robot_models.orientation import named_joints, Span, spans
@@ -83,8 +90,8 @@ class _Adding:
 
     def pins(self) -> list[LoopJoint]:
         cuts = []
-        for point, carriers in _carriers(self._tree.linkage).items():
-            apart = {link: link for link in carriers}
+        for point, links in carriers(self._tree.linkage.links).items():
+            apart = {link: link for link in links}
             for pin, on, link in self._tree.pins:
                 if pin == point:
                     joined, kept = apart[link], apart[on]
@@ -98,12 +105,12 @@ class _Adding:
 
     def sliders(self) -> list[LoopJoint]:
         linkage, cuts = self._tree.linkage, []
-        carriers = _carriers(linkage)
+        links = carriers(linkage.links)
         for name, slider in linkage.sliders.items():
             if name in self._tree.slides:
                 continue
-            shown = f'{name}_slider' if name in carriers else name
-            end = slider.block or carriers[slider.point][0]
+            shown = f'{name}_slider' if name in links else name
+            end = slider.block or links[slider.point][0]
             slides = [s for s in self._spare if getattr(self._joints[s], 'slider', '') == name]
             if slides:
                 self._spare.remove(slides[0])
@@ -129,21 +136,20 @@ class _Adding:
                 self._slide(name, frame)
 
     def traced(self) -> None:
-        carriers = _carriers(self._tree.linkage)
+        links = carriers(self._tree.linkage.links)
         there = {joint.child for joint in self._tree.joints}
         for point in self._tree.linkage.traced:
-            if not any(self._names.text_on(point, link) in there for link in carriers[point]):
-                self._fixed(point, carriers[point][0], point)
+            if not any(self._names.text_on(point, link) in there for link in links[point]):
+                self._fixed(point, links[point][0], point)
 
     def _slide(self, name: str, frame: str) -> str:
         joint = self._joints[name]
         assert not isinstance(joint, RevoluteJoint)
         slider = self._tree.linkage.sliders[joint.slider]
-        unit = complex(*slider.direction) / abs(complex(*slider.direction))
         place = self._tree.place(slider.along, slider.through)
         parent = self._names.own(slider.along)
         own = self._names.own(name)
-        return self._add(TreeJoint(own, 'prismatic', parent, frame, place, 0.0, unit))
+        return self._add(TreeJoint(own, 'prismatic', parent, frame, place, 0.0, slider.unit))
 
     def _fixed(self, name: str, link: str, point: str, turn: float = 0.0) -> str:
         frame = self._names.on(name, link)
@@ -154,15 +160,6 @@ class _Adding:
     def _add(self, joint: TreeJoint) -> str:
         self._tree.joints.append(joint)
         return joint.child
-
-
-def _carriers(linkage: Linkage) -> dict[str, list[str]]:
-    """Return the links that carry each point, in the order of the file."""
-    carriers: dict[str, list[str]] = {}
-    for link, points in linkage.links.items():
-        for point in points:
-            carriers.setdefault(point, []).append(link)
-    return carriers
 
 
 EFFORT, VELOCITY = 1000.0, 100.0

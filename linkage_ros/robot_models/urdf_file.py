@@ -200,7 +200,7 @@ class _Reader:
         if not name or not name.isprintable():
             raise self._error('', f'a {kind} has the name {quoted(name)}', 'give it a name')
         if name in taken:
-            raise self._error(f'{kind} {name}', 'is there twice', 'rename one')
+            raise self._error(f'{kind} {name}', 'is a duplicate name', 'rename one')
         return name
 
     def _value(self, element: ET.Element, key: str, where: str, default: str = '') -> float:
@@ -217,7 +217,7 @@ class _Reader:
             values = ()
         if len(values) != count or not all(isfinite(v) and abs(v) <= _FARTHEST for v in values):
             numbers = 'a finite number' if count == 1 else f'{count} finite numbers'
-            raise self._error(where, f'{key}={quoted(text)} is not {numbers}', 'put it right')
+            raise self._error(where, f'{key}={quoted(text)} is not {numbers}', 'correct it')
         return values
 
     def _vector(self, element: ET.Element | None, key: str, where: str, default: str) -> Vector:
@@ -258,7 +258,9 @@ class _Reader:
         where, kind = f'joint {name}', element.get('type', '')
         if kind not in _KINDS:
             raise self._error(
-                where, f'type={quoted(kind)} is none', f'write {listed(MOVING)} or fixed'
+                where,
+                f'type={quoted(kind)} is not a joint type',
+                f'write {listed(MOVING)} or fixed',
             )
         if kind in ('floating', 'planar'):
             raise self._error(
@@ -353,7 +355,7 @@ class _Reader:
             if joint.child in held:
                 raise self._error(
                     f'link {joint.child}',
-                    f'hangs on two joints, {held[joint.child].name} and {joint.name}',
+                    f'is the child of two joints, {held[joint.child].name} and {joint.name}',
                     'end one of them in a frame of its own, and close it by --close',
                 )
             held[joint.child] = joint

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from re import fullmatch
 from typing import NamedTuple
@@ -46,11 +46,6 @@ class Chain(NamedTuple):
     parent: str
     child: str
     joints: tuple[PlanarJoint, ...]
-
-    @property
-    def kinds(self) -> str:
-        """R for each turn, P for each slide."""
-        return ''.join(joint.kind for joint in self.joints)
 
     @property
     def slide(self) -> PlanarJoint | None:
@@ -115,13 +110,12 @@ def symbols(planar: Planar) -> dict[str, Symbol]:
 
 def plus(symbol: Symbol, joint: PlanarJoint) -> Symbol:
     """Return the angle after a revolute joint."""
-    terms: Mapping[str, float] = dict(symbol[0])
+    terms = dict(symbol[0])
     sign = joint.axis.real
-    factor = sign * (joint.multiplier if joint.mimics else 1.0)
     name = joint.mimics or joint.name
-    more = {**terms, name: terms.get(name, 0.0) + factor}
+    terms[name] = terms.get(name, 0.0) + sign * (joint.multiplier if joint.mimics else 1.0)
     constant = symbol[1] + (sign * joint.offset if joint.mimics else 0.0)
-    return tuple(sorted((each, of) for each, of in more.items() if of)), constant
+    return tuple(sorted((each, of) for each, of in terms.items() if of)), constant
 
 
 # Points of bodies by position: a pin is one point that several bodies share.

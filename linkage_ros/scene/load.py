@@ -30,11 +30,12 @@ from linkage_ros.drives.drive import DRIVES
 from linkage_ros.dynamics.loads import Loads, Spring
 from linkage_ros.effects.dispatch import in_order, module_of
 from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
+from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed, quoted
 from linkage_ros.faults.fault import Fault, FAULTS
 from linkage_ros.files.linkage_file import looks_like_linkage, read_closure
-from linkage_ros.files.parameters import declared, Parts, read_parameters
+from linkage_ros.files.parameters import declared, is_required, Parts, read_parameters
 from linkage_ros.files.section import Section
+from linkage_ros.files.units import ANGLES, LENGTHS, Units
 from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
@@ -66,13 +67,16 @@ FINEST_ACCURACY, COARSEST_ACCURACY = 1e-12, 1e-2
 STRONGEST_SPRING, STIFFEST = 1e9, 1e12
 """Bounds on loads, in [N], [m], [kg·m²], and on stiffness, in [N/m] or [N·s/m]."""
 
+PUBLISHED_ANGLES = ('continuous', 'wrapped')
+"""How angles are published; see `Scene.wrapped`."""
+
 _WHEN = ('at', 'seconds')
 
 Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
 
 
-def load_scene(file: str | PathLike[str]) -> Scene:
+def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene:
     """
     Read a scene and the linkages that it names; for a linkage file, a default scene.
 
@@ -80,7 +84,10 @@ def load_scene(file: str | PathLike[str]) -> Scene:
     ----------
     file
         The scene file; paths in it are relative to its folder. Or a linkage file; or the name of
-        a scene that comes with the package, such as ``'demo'``.
+        a scene or a linkage that comes with the package, such as ``'demo'``.
+    settings
+        Keys to set beside the file, as ``drive.sine.amplitude=0.3``; they are part of
+        `Scene.files`.
 
     Raises
     ------
@@ -90,11 +97,11 @@ def load_scene(file: str | PathLike[str]) -> Scene:
         The argument is neither a path nor a name.
 
     """
-    file = named_file(file, 'scenes')
+    file = named_file(file, 'scenes', 'linkages')
     content, data = read_yaml(file)
     name, folder = file.stem, str(file.parent)
     if kind_of(content) == 'linkage':
-        return _stand_in(name, content, data, folder)
+        return _stand_in(name, content, data, folder, settings)
 
     def open_linkage(where: Section) -> tuple[Section, bytes]:
         linkage = file.parent / where.text('linkage')
@@ -106,7 +113,7 @@ def load_scene(file: str | PathLike[str]) -> Scene:
             )
         return read_yaml(linkage)
 
-    return _scene(name, content, open_linkage, data, folder)
+    return _scene(name, content, open_linkage, data, folder, settings=settings)
 
 
 def kind_of(content: Section) -> Literal['scene', 'linkage']:
@@ -138,7 +145,9 @@ def kind_of(content: Section) -> Literal['scene', 'linkage']:
     return 'scene'
 
 
-def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
+def _stand_in(
+    name: str, content: Section, data: bytes, folder: str, settings: Sequence[str]
+) -> Scene:
     """Return the default scene of a linkage file."""
     from linkage_ros.files.linkage_text import scene_text_for  # local import: not for scenes
 
@@ -146,7 +155,7 @@ def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
         closure = read_closure(content, publish_inputs=True)
         text = scene_text_for(closure, LINKAGE_FILE).encode()
     except DefinitionError as error:
-        raise content.error(error.where, error.reason, error.remedy) from None
+        raise content.located(error) from None
 
     def open_linkage(where: Section) -> tuple[Section, bytes]:
         where.text('linkage')
@@ -154,8 +163,8 @@ def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
 
     scene = parse_yaml(text, f'{content.file}, as a scene')
     # A drive moves one input, which is then published; several inputs come from a topic.
-    closed = closure if len(closure.linkage.inputs) == 1 else None
-    return _scene(name, scene, open_linkage, text, folder, closed=closed)
+    closed = closure if len(closure.linkage.inputs) == 1 and not settings else None
+    return _scene(name, scene, open_linkage, text, folder, closed=closed, settings=settings)
 
 
 def parse_scene(
@@ -167,6 +176,7 @@ def parse_scene(
     seed: int | None = None,
     *,
     trust_effects: bool = False,
+    settings: Sequence[str] = (),
 ) -> Scene:
     """
     Read a scene from the files in a bag.
@@ -187,6 +197,8 @@ def parse_scene(
     trust_effects
         Whether to import user-defined effects, which executes them. If not, their names are in
         `SceneLinkage.not_imported`.
+    settings
+        As for `load_scene`.
 
     Raises
     ------
@@ -205,9 +217,16 @@ def parse_scene(
         return parse_yaml(files[part], f'{where}: {part}'), files[part]
 
     scene = _scene(
-        name, content, open_linkage, files[SCENE_FILE], folder, seed, trust_effects=trust_effects
+        name,
+        content,
+        open_linkage,
+        files[SCENE_FILE],
+        folder,
+        seed,
+        trust_effects=trust_effects,
+        settings=settings,
     )
-    if not solvers:
+    if not solvers or any(setting.startswith('accuracy=') for setting in settings):
         return scene
     return replace(scene, members=tuple(_as_chosen(one, solvers) for one in scene.members))
 
@@ -217,7 +236,7 @@ def _as_chosen(member: SceneLinkage, solvers: Mapping[str, Any]) -> SceneLinkage
     if member.accuracy is None or member.name not in solvers:
         return member
     where = Section(member.content.file, '', {'solver': solvers[member.name]})
-    return replace(member, solver=read_solver(where, {}), accuracy=None)
+    return replace(member, solver=_read_solver(where, {}), accuracy=None)
 
 
 def seed_of(name: str) -> int:
@@ -235,7 +254,19 @@ def _scene(
     *,
     trust_effects: bool = True,
     closed: Closure | None = None,
+    settings: Sequence[str] = (),
 ) -> Scene:
+    if settings:
+        from linkage_ros.scene import settings as given  # local import: few scenes need it
+
+        scene_bytes = given.apply_settings(content, settings)
+        try:
+            return _scene(
+                name, content, open_linkage, scene_bytes, folder, seed, trust_effects=trust_effects
+            )
+        except FileError as error:
+            raise given.blamed(error, content, settings) from None
+    wrapped = _read_units(content)
     files = {SCENE_FILE: scene_bytes}
     members: list[SceneLinkage] = []
     if 'linkages' in content:
@@ -265,9 +296,9 @@ def _scene(
         name=name,
         members=tuple(members),
         rate=_rate(content),
-        wrapped=content.choice('angles', ('continuous', 'wrapped'), 'continuous') == 'wrapped',
+        wrapped=wrapped,
         seed=content.whole('seed', seed_of(name) if seed is None else seed, least=0, most=2**53),
-        faults=read_faults(content, members),
+        faults=_read_faults(content, members),
         record=_record(content.section('record')) if 'record' in content else None,
         files=files,
         folder=folder,
@@ -299,7 +330,7 @@ _OF_A_MEMBER = (
 )
 """Keys of an entry of ``linkages``; the scene has them for the entries without."""
 
-_OF_A_SCENE = ('rate', 'angles', 'seed', 'faults', 'record', 'robot_description', *_OF_A_MEMBER)
+_OF_A_SCENE = ('rate', 'seed', 'faults', 'record', 'robot_description', *_OF_A_MEMBER)
 """Keys of a scene beside the linkages."""
 
 
@@ -342,6 +373,10 @@ def _member(
             'leave backlash out, or name another drive than torque',
         )
     parts = parts_of(linkage)
+    kinds = {bool(given.slider) for given in linkage.inputs}
+    slides = kinds.pop() if len(kinds) == 1 else None
+    for section in (drives, effects, own, scene):
+        section.units = replace(section.units, slides=slides)
     not_imported = () if trust_effects else tuple(name for name in effects if '.' in name)
     for effect in not_imported:
         effects.section(effect)
@@ -360,12 +395,12 @@ def _member(
             ),
         ),
         effects={e: read_parameters(effects.section(e), of, parts) for e, of in types.items()},
-        loads=read_loads(loads) if loads is not None else None,
+        loads=_read_loads(loads) if loads is not None else None,
         content=own,
         linkage_content=linkage_content,
         silent_beyond_limits=_silent(where('beyond_limits'), linkage),
         not_imported=not_imported,
-        **read_solving(own, scene, parts),
+        **_read_solving(own, scene, parts),
     )
     effects.finish(tuple(EFFECTS))
     return member
@@ -378,7 +413,7 @@ def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
         named = in_order([name for name in known if name not in left_out])
         return {name: module_of(name).PARAMETERS for name in named}
     except DefinitionError as error:
-        raise effects.error(error.where, error.reason, error.remedy) from None
+        raise effects.located(error) from None
 
 
 def _silent(content: Section, linkage: Linkage) -> bool:
@@ -397,6 +432,13 @@ def _silent(content: Section, linkage: Linkage) -> bool:
     return policy == 'silent'
 
 
+def _read_units(content: Section) -> bool:
+    """Set the units of a scene; return whether it publishes wrapped angles."""
+    words = content.words('angles', (PUBLISHED_ANGLES, ANGLES))
+    content.units = Units(content.choice('units', tuple(LENGTHS), 'm'), words[1])
+    return words[0] == 'wrapped'
+
+
 def _rate(content: Section) -> float:
     rate = content.number('rate', 1000.0, least=0.0, most=HIGHEST_RATE, unit='Hz')
     if 0.0 < rate < LOWEST_RATE:
@@ -413,7 +455,7 @@ def _record(content: Section) -> RecordParameters:
         directory=content.text('directory', 'runs'),
         name=content.text('name', ''),
         queue=content.whole('queue', 20_000, least=100, most=10_000_000),
-        storage=read_storage(content),
+        storage=_read_storage(content),
     )
     if record.name != Path(record.name).name or record.name == '..':
         raise content.error(
@@ -422,36 +464,20 @@ def _record(content: Section) -> RecordParameters:
     return record
 
 
-def read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
-    """
-    Return the solver, or the required accuracy, as fields of `SceneLinkage`.
-
-    Raises
-    ------
-    FileError
-        Either is invalid, or both are given.
-
-    """
+def _read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
+    """Return the solver, or the required accuracy, as fields of `SceneLinkage`."""
     # An entry of the linkage replaces both entries of the scene.
     where = own if 'solver' in own or 'accuracy' in own else scene
     if 'accuracy' not in where:
-        return {'solver': read_solver(where, parts) if 'solver' in where else None}
+        return {'solver': _read_solver(where, parts) if 'solver' in where else None}
     if 'solver' in where:
         raise where.error('accuracy', 'stands beside solver', 'write one of the two')
     bounds = {'least': FINEST_ACCURACY, 'most': COARSEST_ACCURACY}
-    return {'accuracy': where.number('accuracy', unit='rad or m', **bounds)}
+    return {'accuracy': where.number('accuracy', unit='rad and m', **bounds)}
 
 
-def read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
-    """
-    Return a solver's name and parameters; the file may give the name alone.
-
-    Raises
-    ------
-    FileError
-        There is no such solver, or its parameters cannot be read.
-
-    """
+def _read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
+    """Return a solver's name and parameters; the file may give the name alone."""
     if isinstance(where.mapping['solver'], str):
         return _named(where)
     solvers = where.section('solver')
@@ -484,19 +510,13 @@ def _named(where: Section) -> tuple[str, Any]:
     return name, parameters()
 
 
-def read_loads(content: Section) -> Loads:
-    """
-    Read gravity, springs and the inertia of the drive.
-
-    Raises
-    ------
-    FileError
-        An entry is wrong; the error has its line and key.
-
-    """
+def _read_loads(content: Section) -> Loads:
+    """Read gravity, springs and the inertia of the drive."""
     springs = content.section('springs', required=False)
     loads = Loads(
-        gravity=content.point('gravity', most=1e3) if 'gravity' in content else (0.0, 0.0),
+        gravity=content.point('gravity', most=1e3, unit='m/s²')
+        if 'gravity' in content
+        else (0.0, 0.0),
         springs=tuple(_spring(name, springs.section(name)) for name in springs),
         drive_inertia=content.number(
             'drive_inertia', 0.0, least=0.0, most=STRONGEST_SPRING, unit='kg·m², or kg of a slide'
@@ -527,32 +547,34 @@ def _end(content: Section, key: str) -> tuple[str, str]:
     return link, point
 
 
-def read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str, Fault]:
-    """
-    Return the faults of a scene, by name.
-
-    Raises
-    ------
-    FileError
-        A fault is invalid.
-
-    """
+def _read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str, Fault]:
+    """Return the faults of a scene, by name."""
     section = content.section('faults', required=False)
     parts: dict[str, tuple[str, ...]] = {}
     for member in members:
         for kind, names in parts_of(member.linkage).items():
             parts[kind] = (*parts.get(kind, ()), *(member.prefix + name for name in names))
-    return {section.ros_name(name): _fault(section.section(name), parts) for name in section}
+    return {section.ros_name(name): _fault(name, section.section(name), parts) for name in section}
 
 
-def _fault(content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
+def kinds_of_fault(name: str, kinds: Sequence[str]) -> tuple[str, str]:
+    """Return reason and remedy for a fault that names no kind, or several."""
+    if kinds:
+        return f'names {len(kinds)} kinds of fault', f'leave all but one of {listed(kinds)} out'
+    kind = name if name in FAULTS else 'freeze'
+    needed = declared(import_module(FAULTS[kind]).PARAMETERS)
+    parameters = ', '.join(f'{entry.name}: …' for entry, _ in needed if is_required(entry))
+    shape = f'{name}: {{{kind}: {{{parameters}}}, at: [1], seconds: 2}}'
+    return 'names no kind of fault', f'write {shape}; kinds: {listed(FAULTS)}'
+
+
+def _fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
     kinds = [key for key in content if key in FAULTS]
+    for key in () if kinds else content:
+        if remedy := did_you_mean(key, FAULTS, ''):
+            raise content.error(key, 'unknown key', remedy)
     if len(kinds) != 1:
-        for key in content:
-            if key in (*_WHEN, *FAULTS):
-                content.taken(key)
-        content.finish((*_WHEN, *FAULTS))
-        raise content.error('', f'{len(kinds)} kinds', f'name one of {listed(FAULTS)}')
+        raise content.error('', *kinds_of_fault(name, kinds))
     parameters: Any = read_parameters(
         content.section(kinds[0]), import_module(FAULTS[kinds[0]]).PARAMETERS, parts
     )
@@ -564,7 +586,7 @@ def _fault(content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
     return Fault(kinds[0], parameters, tuple(at), seconds)
 
 
-def read_storage(content: Section) -> StorageParameters:
+def _read_storage(content: Section) -> StorageParameters:
     """Read the storage of a bag from the ``record`` section."""
     storage: StorageParameters = read_parameters(content, StorageParameters, {})
     for key, least in LEASTS.items():

@@ -27,7 +27,7 @@ from linkage_ros.faults.fault import Fault
 from linkage_ros.files.parameters import choice, number, Parts, whole
 from linkage_ros.files.section import Section
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Linkage
+from linkage_ros.kinematics.linkage import GROUND, Linkage, SlideJoint
 
 SPLITS = {'split_bytes': 1_000_000, 'split_seconds': 1.0}
 """
@@ -263,5 +263,9 @@ def parts_of(linkage: Linkage) -> Parts:
         'pin': (*pins, *linkage.sliders),
         'link': tuple(link for link in linkage.links if link != GROUND),
         'body': tuple(linkage.links),
+        'slide': (
+            *(given.joint for given in linkage.inputs if given.slider),
+            *(name for name, joint in linkage.joints.items() if isinstance(joint, SlideJoint)),
+        ),
         'point': tuple(f'{link}.{p}' for link, carried in linkage.links.items() for p in carried),
     }

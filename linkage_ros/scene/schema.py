@@ -45,11 +45,13 @@ from linkage_ros.files.parameters import (
     Schema,
     Text,
 )
+from linkage_ros.files.units import ANGLES, LENGTHS
 from linkage_ros.scene.load import (
     COARSEST_ACCURACY,
     FINEST_ACCURACY,
     HIGHEST_RATE,
     LOWEST_RATE,
+    PUBLISHED_ANGLES,
     STIFFEST,
     STRONGEST_SPRING,
 )
@@ -63,7 +65,7 @@ ROS_NAME = '^[A-Za-z][A-Za-z0-9_]*$'
 DOTTED = r'^[^.\s]+(\.[^.\s]+)+$'
 """Pattern of the name of a module within a package."""
 
-_RATE = 'Ticks a second [Hz]; 0: one for every crank sample.'
+_RATE = 'ticks a second; 0: one for every crank sample'
 _ONE_SOLVER: Schema = {'not': {'required': ['solver', 'accuracy']}}
 _NO_PLAY_UNDER_TORQUE: Schema = {
     'if': {
@@ -91,13 +93,18 @@ def _text(description: str, pattern: str = f'^{CHARACTER}+$') -> Schema:
 
 
 def _number(
-    description: str, *, least: float = -inf, most: float = inf, above: float = -inf
+    description: str,
+    unit: str = '',
+    *,
+    least: float = -inf,
+    most: float = inf,
+    above: float = -inf,
 ) -> Schema:
-    return Number(description, '', least, most, above).schema()
+    return Number(description, unit, least, most, above).schema()
 
 
-def _point(description: str, most: float) -> Schema:
-    return Point(description, '', most).schema()
+def _point(description: str, unit: str, most: float) -> Schema:
+    return Point(description, unit, most).schema()
 
 
 def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
@@ -114,16 +121,13 @@ def scene_schema() -> Schema:
             'linkage': _text('path of the linkage file, relative to the folder of this file'),
             'linkages': _linkages(own),
             'rate': {
-                **_number(_RATE, least=0.0, most=HIGHEST_RATE),
-                'if': {'exclusiveMinimum': 0},
-                'then': _number(_RATE, least=LOWEST_RATE),
+                **_number(_RATE, 'Hz', least=0.0, most=HIGHEST_RATE),
+                'if': {'type': 'number', 'exclusiveMinimum': 0},
+                'then': _number(_RATE, 'Hz', least=LOWEST_RATE),
                 'default': 1000,
             },
-            'angles': {
-                'description': 'Whether published angles run on, or lie in (−π, π].',
-                'enum': ['continuous', 'wrapped'],
-                'default': 'continuous',
-            },
+            'units': _units(),
+            'angles': _angles(),
             'seed': {
                 'description': 'From which everything random comes; if not said, a number that '
                 'follows from the name of the scene.',
@@ -154,6 +158,28 @@ def scene_schema() -> Schema:
         'else': {'required': ['linkage'], **_NO_PLAY_UNDER_TORQUE},
         **_ONE_SOLVER,
         '$defs': _of_a_linkage(),
+    }
+
+
+def _units() -> Schema:
+    return {
+        'description': 'Unit of the lengths in this file: of all values whose unit is m, m/s or '
+        'm/s². All other units are SI.',
+        'enum': list(LENGTHS),
+        'default': 'm',
+    }
+
+
+def _angles() -> Schema:
+    one = {'enum': [*PUBLISHED_ANGLES, *ANGLES]}
+    return {
+        'description': 'Whether published angles run on or lie in (−π, π]; and the unit of the '
+        'angles in this file, of all values whose unit is rad, rad/s or rad/s². One word, or '
+        'one of each: [wrapped, degrees].',
+        'if': {'type': 'array'},
+        'then': {'items': one, 'maxItems': 2, 'uniqueItems': True},
+        'else': one,
+        'default': [PUBLISHED_ANGLES[0], ANGLES[0]],
     }
 
 
@@ -209,18 +235,20 @@ def _of_a_linkage() -> dict[str, Schema]:
         },
         'solver': _solver(),
         'accuracy': _number(
-            'Of the positions [rad or m]: the cheapest solver that proves it is chosen.',
+            'Of the positions: the cheapest solver that proves it is chosen.',
+            'rad and m',
             least=FINEST_ACCURACY,
             most=COARSEST_ACCURACY,
         ),
         'loads': mapping(
             'The forces that act on the links, where effects or the drive ask for them.',
             {
-                'gravity': {**_point('gravity: [x, y] [m/s²]', 1e3), 'default': [0, 0]},
+                'gravity': {**_point('gravity: [x, y]', 'm/s²', 1e3), 'default': [0, 0]},
                 'springs': named('springs between points of links, by name', _spring()),
                 'drive_inertia': {
                     **_number(
-                        'of the motor, at the input [kg·m², or kg of a slide]',
+                        'of the motor, at the input',
+                        'kg·m², or kg of a slide',
                         least=0.0,
                         most=STRONGEST_SPRING,
                     ),
@@ -254,14 +282,14 @@ def _solver() -> Schema:
 
 def _spring() -> Schema:
     end = _text('where it ends: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
-    free = _number('length without a force [m]', least=0.0, most=STRONGEST_SPRING)
-    damping = _number('damping along it [N·s/m]', least=0.0, most=STIFFEST)
+    free = _number('length without a force', 'm', least=0.0, most=STRONGEST_SPRING)
+    damping = _number('damping along it', 'N·s/m', least=0.0, most=STIFFEST)
     return mapping(
         'A spring, with a damper beside it.',
         {
             'from': end,
             'to': end,
-            'stiffness': _number('stiffness [N/m]', least=0.0, most=STIFFEST),
+            'stiffness': _number('stiffness', 'N/m', least=0.0, most=STIFFEST),
             'free_length': {**free, 'default': 0},
             'damping': {**damping, 'default': 0},
         },
@@ -279,9 +307,9 @@ def _fault() -> Schema:
                 'at': {
                     'description': 'when it is injected by itself, from the first tick on [s]',
                     'type': 'array',
-                    'items': _number('a time [s]', least=0.0, most=1e9),
+                    'items': _number('a time', 's', least=0.0, most=1e9),
                 },
-                'seconds': _number('how long it lasts then [s]', least=1e-6, most=1e9),
+                'seconds': _number('how long it lasts then', 's', least=1e-6, most=1e9),
             },
         ),
         'oneOf': [{'required': [kind]} for kind in kinds],
@@ -350,19 +378,23 @@ def _wanted(key: str) -> Schema:
 
 def linkage_schema() -> Schema:
     """Return the schema of a linkage file."""
-    whole = mapping('A planar linkage.', {**_keys(), **_shorthands()})
+    units = {'units': _units(), 'angles': _choice('Unit of the angles.', ANGLES, ANGLES[0])}
+    whole = mapping('A planar linkage.', {**units, **_keys(), **_shorthands()})
     return {
         '$schema': DIALECT,
         'title': 'Linkage',
         **whole,
         'if': {'anyOf': [{'required': [shorthand]} for shorthand in _SHORTHANDS]},
-        'then': {'maxProperties': 1},
+        'then': {
+            'propertyNames': {'enum': [*units, *_SHORTHANDS]},
+            'not': {'required': list(_SHORTHANDS)},
+        },
         'else': {'required': list(_WRITTEN_OUT)},
     }
 
 
 def _keys() -> dict[str, Schema]:
-    place = _point('where the point lies in the frame of its link: [x, y] [m]', FARTHEST)
+    place = _point('where the point lies in the frame of its link: [x, y]', 'm', FARTHEST)
     return {
         'links': named(
             'Links, each with its points; a point on two links is a pin; one link is the ground.',
@@ -390,7 +422,7 @@ def _keys() -> dict[str, Schema]:
 
 def _shorthands() -> dict[str, Schema]:
     lengths = {
-        key: _number(f'{link} [m]', above=0.0, most=FARTHEST)
+        key: _number(link, 'm', above=0.0, most=FARTHEST)
         for key, link in zip('abcd', ('crank', 'coupler', 'rocker', 'ground'), strict=True)
     }
     left, ahead = ('left', 'right'), ('ahead', 'behind')
@@ -407,8 +439,8 @@ def _shorthands() -> dict[str, Schema]:
         'inverted_slider_crank': mapping(
             'A crank whose rod slides through a swivel; stands for a file written out.',
             {
-                'a': _number('crank [m]', above=0.0, most=FARTHEST),
-                'swivel': _point("the swivel from the crank's pivot: [x, y] [m]", FARTHEST),
+                'a': _number('crank', 'm', above=0.0, most=FARTHEST),
+                'swivel': _point("the swivel from the crank's pivot: [x, y]", 'm', FARTHEST),
                 'assembly': _choice('side of B on which the swivel lies', ahead, ahead[0]),
                 **_limits_of('rod_joint', 'rod_slide'),
             },
@@ -468,8 +500,8 @@ def _limits() -> dict[str, Schema]:
             # The bounds may be -.inf and .inf: JSON Schema accepts these as numbers.
             'items': {'type': 'number'},
         },
-        'velocity': _number('its greatest rate [rad/s or m/s]', above=0.0, most=FARTHEST),
-        'effort': _number('its greatest torque or force [N·m or N]', above=0.0, most=STRONGEST),
+        'velocity': _number('its greatest rate', 'rad/s or m/s', above=0.0, most=FARTHEST),
+        'effort': _number('its greatest torque or force', 'N·m or N', above=0.0, most=STRONGEST),
     }
 
 
@@ -499,14 +531,15 @@ def _slider() -> Schema:
                 'point': _text('the point; no point of `along`'),
                 'along': _text('the link that carries the line'),
                 'through': _text('point of `along` on the line; the slide is measured from it'),
-                'direction': _point('of the line, in the frame of `along`: [x, y]', FARTHEST),
+                'direction': _point('of the line, in the frame of `along`: [x, y]', '', FARTHEST),
                 'block': {
                     **_text('the link that slides without turning', f'^{CHARACTER}*$'),
                     'default': '',
                 },
                 'angle': {
                     **_number(
-                        'angle of the block less that of `along` [rad]',
+                        'angle of the block less that of `along`',
+                        'rad',
                         least=-FARTHEST,
                         most=FARTHEST,
                     ),
@@ -528,11 +561,11 @@ def _pose() -> Schema:
             'inputs': {
                 'description': 'a value for each input [rad or m]',
                 'type': 'array',
-                'items': _number('a value', least=-FARTHEST, most=FARTHEST),
+                'items': _number('a value', 'rad or m', least=-FARTHEST, most=FARTHEST),
             },
             'points': named(
                 'points of iterated links in the frame of the ground, roughly',
-                _point('[x, y] [m]', FARTHEST),
+                _point('[x, y]', 'm', FARTHEST),
             ),
         },
         required=('inputs',),
@@ -543,10 +576,10 @@ def _mass() -> Schema:
     return mapping(
         'What a link weighs.',
         {
-            'mass': _number('mass [kg]', above=0.0, most=HEAVIEST),
-            'center': _point("centre of mass in the link's frame: [x, y] [m]", FARTHEST),
+            'mass': _number('mass', 'kg', above=0.0, most=HEAVIEST),
+            'center': _point("centre of mass in the link's frame: [x, y]", 'm', FARTHEST),
             'inertia': _number(
-                'moment of inertia about the centre of mass [kg·m²]', least=0.0, most=HEAVIEST
+                'moment of inertia about the centre of mass', 'kg·m²', least=0.0, most=HEAVIEST
             ),
         },
         required=('mass', 'center', 'inertia'),

@@ -23,8 +23,10 @@ from typing import Any, TYPE_CHECKING
 
 from jsonschema import Draft202012Validator
 from linkage_ros.errors import did_you_mean, FileError, listed, quoted
-from linkage_ros.files.parameters import Schema
+from linkage_ros.files.parameters import Schema, under_part
 from linkage_ros.files.section import LinedDict, Section
+from linkage_ros.files.units import ANGLES, LENGTHS, most_in_one, unit_of, Units
+from linkage_ros.scene.load import kinds_of_fault
 
 if TYPE_CHECKING:
     from jsonschema import ValidationError
@@ -44,7 +46,7 @@ _BOUNDS = {
 }
 
 _Path = tuple[str | int, ...]
-_Said = tuple[_Path, str, str]
+_Problem = tuple[_Path, str, str]
 
 
 def violations(content: Section, schema: Schema) -> list[FileError]:
@@ -63,16 +65,26 @@ def violations(content: Section, schema: Schema) -> list[FileError]:
     broken = list(Draft202012Validator(schema).iter_errors(whole))
     # A value of the wrong type breaks further rules, which are not worth reporting.
     mistyped = {tuple(error.absolute_path) for error in broken if error.validator == 'type'}
+    units = _units(whole)
     errors = [
-        FileError(content.file, _dotted(path), reason, remedy, _line(whole, path))
+        FileError(content.file, _dotted(path), reason, units.bracketed(remedy), _line(whole, path))
         for error in broken
         if error.validator == 'type' or tuple(error.absolute_path) not in mistyped
-        for path, reason, remedy in _said(error, schema)
+        for path, reason, remedy in _problems(error, schema)
     ]
     return sorted(errors, key=lambda error: (error.line, error.key))
 
 
-def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
+def _units(whole: Mapping[str, Any]) -> Units:
+    """Return the units of a file; where they are wrong themselves, SI."""
+    length, angle = whole.get('units'), whole.get('angles')
+    degrees = angle == ANGLES[1] or (isinstance(angle, list) and ANGLES[1] in angle)
+    if not isinstance(length, str) or length not in LENGTHS:
+        length = 'm'
+    return Units(length, ANGLES[1] if degrees else ANGLES[0])
+
+
+def _problems(error: ValidationError, whole: Schema) -> Iterator[_Problem]:
     """Yield path, reason and remedy for one broken rule."""
     path = tuple(error.absolute_path)
     value: Any = error.instance
@@ -85,7 +97,7 @@ def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
             others = '|'.join(schema.get('patternProperties', ())) or '$^'
             for key in value:
                 if key not in known and not search(others, key):
-                    yield (*path, key), 'unknown key', _near(key, known)
+                    yield (*path, key), 'unknown key', _below(key, schema) or _near(key, known)
         case 'required':
             # Each missing key is a separate error, which names the key in its message only.
             missing = next(key for key in wanted if error.message.startswith(repr(key)))
@@ -99,7 +111,7 @@ def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
         case 'oneOf':
             kinds = [kind['required'][0] for kind in wanted]
             named = [kind for kind in kinds if kind in value]
-            yield path, f'{len(named)} kinds', f'name one of {listed(kinds)}'
+            yield path, *kinds_of_fault(str(path[-1]), named)
         case 'not':
             one, other = wanted['required']
             yield (*path, other), f'stands beside {one}', 'write one of the two'
@@ -146,8 +158,12 @@ def _expected(error: ValidationError) -> str:
 
 
 def _bounds(schema: Mapping[str, Any]) -> str:
+    # Of a length or an angle the schema has the bound in the smallest unit, not in the file's.
+    unit = unit_of(schema.get('description', ''))
     bounds = ' and '.join(
-        f'{word} {schema[key]:g}' for key, word in _BOUNDS.items() if key in schema
+        f'{word} {schema[key]:g}'
+        for key, word in _BOUNDS.items()
+        if key in schema and (schema[key] == 0 or most_in_one(unit) == 1.0)
     )
     return f', {bounds}' if bounds else ''
 
@@ -156,6 +172,15 @@ def _meaning(schema: Schema, whole: Schema) -> str:
     if '$ref' in schema:
         schema = whole['$defs'][schema['$ref'].rpartition('/')[2]]
     return str(schema.get('description', ''))
+
+
+def _below(key: str, schema: Schema) -> str:
+    """Return the remedy for a key of the parts in a section beside it; '' for another key."""
+    for section, of in schema['properties'].items():
+        part = of.get('additionalProperties') if isinstance(of, dict) else None
+        if isinstance(part, dict) and key in part.get('properties', ()):
+            return under_part(key, section, (key,), ())
+    return ''
 
 
 def _near(key: str, known: Sequence[str]) -> str:

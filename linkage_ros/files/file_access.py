@@ -1,0 +1,160 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Read regular files only, and write files atomically.
+
+Opening a named pipe waits for a writer, a device may never end, and opening either may have an
+effect. So the file type is checked first. Of a file that
+is written, at every instant the whole old one is there, or the whole new one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from errno import EINVAL, EISDIR
+import os
+from pathlib import Path
+from secrets import token_hex
+import stat
+from typing import BinaryIO
+
+from linkage_ros.errors import LinkageError, listed
+
+_KINDS = (
+    (stat.S_ISFIFO, 'is a pipe'),
+    (stat.S_ISSOCK, 'is a socket'),
+    (stat.S_ISCHR, 'is a device'),
+    (stat.S_ISBLK, 'is a device'),
+)
+
+
+def open_regular(file: str | Path) -> BinaryIO:
+    """
+    Open a file for reading.
+
+    Raises
+    ------
+    OSError
+        It cannot be opened, or is no regular file; the message names its type.
+    ValueError
+        Its name contains a NUL.
+
+    """
+    _check(Path(file).stat(), file)
+    # The file may have been replaced since the check.
+    descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
+    try:
+        _check(os.fstat(descriptor), file)
+        return os.fdopen(descriptor, 'rb')
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def read_regular(file: str | Path, largest: int) -> bytes:
+    """
+    Read a file; if it exceeds a number of bytes, read one byte more than that.
+
+    Raises
+    ------
+    OSError, ValueError
+        As in `open_regular`.
+
+    """
+    with open_regular(file) as stream:
+        return stream.read(largest + 1)
+
+
+def _check(status: os.stat_result, file: str | Path) -> None:
+    if stat.S_ISREG(status.st_mode):
+        return
+    if stat.S_ISDIR(status.st_mode):
+        raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(file))
+    what = next((reason for kind, reason in _KINDS if kind(status.st_mode)), 'is no file')
+    raise OSError(EINVAL, f'{what}, not a regular file', str(file))
+
+
+def check_suffix(file: Path, suffixes: Collection[str]) -> None:
+    """
+    Check that the name of a file to write has one of some suffixes, whatever its case.
+
+    Raises
+    ------
+    LinkageError
+        It has another, or none.
+
+    """
+    ending = file.suffix.lower()
+    if ending not in suffixes:
+        raise LinkageError(
+            file,
+            f'ends in {ending!r}' if ending else 'has no ending',
+            f'name a file that ends in {listed(suffixes, " or ")}',
+        )
+
+
+def atomic_write(file: str | Path, data: bytes) -> None:
+    """
+    Write or replace a file: write it beside the target, then rename it.
+
+    Parameters
+    ----------
+    file
+        Target; a symbolic link is followed.
+    data
+        Its content.
+
+    Raises
+    ------
+    LinkageError
+        The file cannot be written.
+
+    """
+    try:
+        target = Path(file).resolve()
+        if target.exists() and not target.is_file():
+            raise LinkageError(file, 'is there already and is no file', 'name another file')
+        if target.exists() and not os.access(target, os.W_OK):
+            raise PermissionError(0, 'Permission denied')
+        with replaced(target) as stream:
+            stream.write(data)
+    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a circle of links
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise LinkageError(file, f'cannot be written ({reason})', 'name another file') from None
+
+
+@contextmanager
+def replaced(target: Path) -> Iterator[BinaryIO]:
+    """
+    Yield a stream for the new content of a file, whatever exists there; do not follow a link.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; the old file stays, and nothing is left beside it.
+
+    """
+    temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
+    try:
+        with temporary.open('xb') as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(target)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,148 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Units of the lengths and angles of a file: ``units: mm``, ``angles: degrees``.
+
+Values are converted to SI once, when they are read. The number that the file shows, a decimal, is
+multiplied exactly and rounded once: 40 mm is the same double as 0.040 m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Context, Decimal
+from math import isfinite
+import re
+
+LENGTHS = {
+    'm': Decimal(1),
+    'cm': Decimal('0.01'),
+    'mm': Decimal('0.001'),
+    'in': Decimal('0.0254'),
+}
+"""The units of length that a file can name, in [m]."""
+
+ANGLES = ('radians', 'degrees')
+"""The units of angle that a file can name."""
+
+_DEGREE = Decimal('0.017453292519943295769236907684886127134428718885417')
+"""π/180."""
+
+_EXACT = Context(prec=80)
+"""No product of a double's shortest text and a factor above is longer."""
+
+_CONVERTED = re.compile(r'(rad|m)(/s²|/s|/√s|)')
+_NUMBER = r'-?(?:inf|\d[\d.]*(?:e[-+]?\d+)?)'
+_QUANTITY = re.compile(rf'({_NUMBER}|\[[^][]*\]) ((?:rad|m)(?:/s²|/s)?)(?![\w·/²])')
+
+
+def unit_of(column: str) -> str:
+    """Return the unit in the heading of a column: 's' for 'time [s]'."""
+    return column.partition('[')[2].rstrip(']')
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """
+    The units of a file.
+
+    Units of parameters are named in SI. Converted are m and rad, and these by time: m/s, m/s²,
+    m/√s. All others (N·m/rad, kg·m²) stay as they are.
+
+    Attributes
+    ----------
+    length, angle
+        A key of `LENGTHS`, and one of `ANGLES`.
+    slides
+        Whether a value for a joint ('rad or m') is that of a slide; None if it is for joints of
+        both kinds.
+
+    """
+
+    length: str = 'm'
+    angle: str = 'radians'
+    slides: bool | None = None
+
+    @property
+    def si(self) -> bool:
+        """Whether nothing is converted."""
+        return (self.length, self.angle) == ('m', 'radians')
+
+    def name(self, unit: str) -> str:
+        """Return the file's unit for a unit in SI: 'mm/s' for 'm/s'."""
+        if self.si:
+            return unit
+        return ' or '.join(map(self._converted, self._chosen(unit)))
+
+    def ambiguous(self, unit: str) -> bool:
+        """Return whether the same number would be two quantities, of an angle and of a slide."""
+        return len({self._factor(one) for one in self._chosen(unit)}) > 1
+
+    def read(self, value: float, unit: str) -> float:
+        """Return a value of the file in SI, correctly rounded."""
+        factor = self._factor(self._chosen(unit)[0])
+        if factor == 1 or not isfinite(value):
+            return value
+        return float(_EXACT.multiply(Decimal(repr(value)), factor))
+
+    def shown(self, value: float, unit: str) -> float:
+        """Return a value in SI in the file's unit, for messages."""
+        factor = self._factor(self._chosen(unit)[0])
+        return value if factor == 1 or not isfinite(value) else value / float(factor)
+
+    def bracketed(self, text: str) -> str:
+        """Return a text whose units in brackets, ``[m]``, are those of the file."""
+        return re.sub(r'\[([^][]*)\]', lambda unit: f'[{self.name(unit[1])}]', text)
+
+    def told(self, text: str) -> str:
+        """Return a text whose quantities in SI, ``1.5 rad`` or ``[0, 2] m``, have these units."""
+        return text if self.si else _QUANTITY.sub(self._converted_quantity, text)
+
+    def _converted_quantity(self, found: re.Match[str]) -> str:
+        numbers, unit = found.groups()
+        # One digit less than the text has: 1.5708 rad are 90 deg.
+        values = re.sub(_NUMBER, lambda one: f'{self.shown(float(one[0]), unit):.5g}', numbers)
+        return f'{values} {self.name(unit)}'
+
+    def _chosen(self, unit: str) -> Sequence[str]:
+        """Return the alternatives of a unit that a value can have: of an angle, and of a slide."""
+        both = unit.split(' or ')
+        if self.slides is None or not all(map(_CONVERTED.fullmatch, both)):
+            return both
+        return both[-1:] if self.slides else both[:1]
+
+    def _factor(self, unit: str) -> Decimal:
+        found = _CONVERTED.fullmatch(unit)
+        if found is None:
+            return Decimal(1)
+        if found[1] == 'm':
+            return LENGTHS[self.length]
+        return _DEGREE if self.angle == 'degrees' else Decimal(1)
+
+    def _converted(self, unit: str) -> str:
+        found = _CONVERTED.fullmatch(unit)
+        if found is None:
+            return unit
+        angle = 'deg' if self.angle == 'degrees' else 'rad'
+        return (self.length if found[1] == 'm' else angle) + found[2]
+
+
+_SMALLEST = Units('mm', 'degrees')
+
+
+def most_in_one(unit: str) -> float:
+    """Return how many of the smallest units that a file can name make one unit in SI."""
+    return max(_SMALLEST.shown(1.0, one) for one in unit.split(' or '))

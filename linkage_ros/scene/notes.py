@@ -1,0 +1,87 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Notes on a scene: values that are allowed, but look like those of another unit.
+
+A note has the form of an error; whoever reads the scene shows it and goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from math import dist, hypot, tau
+from typing import TYPE_CHECKING
+
+from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.kinematics.linkage import carriers, Linkage
+
+if TYPE_CHECKING:
+    from linkage_ros.scene.scene import Scene, SceneLinkage
+
+_OTHER_UNIT = 300.0
+"""Ratio of two links above which a unit was probably mistaken; mm for m make it 1000."""
+
+_WEAK = 0.1
+"""Gravity below which its unit was probably mistaken, in [m/s²]; 9.81 mm/s² is 0.01."""
+
+
+def scene_notes(scene: Scene) -> Iterator[FileError]:
+    """Yield the notes on a scene and its linkages."""
+    for member in scene.members:
+        yield from map(member.linkage_content.located, linkage_notes(member.linkage))
+        yield from map(member.content.located, _of_member(member))
+
+
+def linkage_notes(linkage: Linkage) -> Iterator[DefinitionError]:
+    """Yield the notes on a linkage."""
+    pins = {name for name, links in carriers(linkage.links).items() if len(links) > 1}
+    lengths = {}
+    for link, points in linkage.links.items():
+        joined = [place for name, place in points.items() if name in pins]
+        if len(joined) > 1:
+            lengths[link] = max(dist(one, other) for one, other in combinations(joined, 2))
+    if not lengths:
+        return
+    shortest, longest = (of(lengths, key=lengths.__getitem__) for of in (min, max))
+    if lengths[longest] > _OTHER_UNIT * lengths[shortest]:
+        ratio = float(f'{min(lengths[longest] / lengths[shortest], 1e300):.3g}')
+        yield DefinitionError(
+            f'links.{longest}',
+            f'is {ratio:g} times as long as {shortest!r}',
+            'write all lengths in metres, or all in millimetres with units: mm',
+        )
+
+
+def _of_member(member: SceneLinkage) -> Iterator[DefinitionError]:
+    drive, parameters = member.drive
+    if member.content.units.angle == 'radians' and hasattr(parameters, 'amplitude'):
+        for given in member.linkage.inputs:
+            own = given.joint in parameters.inputs
+            amplitude = (parameters.inputs[given.joint] if own else parameters).amplitude
+            if not given.slider and amplitude > tau:
+                key = f'drive.{drive}{f".inputs.{given.joint}" if own else ""}.amplitude'
+                yield DefinitionError(
+                    key,
+                    f'{amplitude:g} rad is more than a turn',
+                    'if it is in degrees, write angles: degrees',
+                )
+    if member.loads is not None and 0.0 < hypot(*member.loads.gravity) < _WEAK:
+        x, y = member.loads.gravity
+        yield DefinitionError(
+            'loads.gravity',
+            f'[{x:g}, {y:g}] m/s² is hardly any',
+            'write it in the unit of the file: 9.81 [m/s²] is 9810 [mm/s²]',
+        )

@@ -1,0 +1,95 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Set keys of a scene beside its file: ``rate=500``, ``drive.sine.amplitude=0.3``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from linkage_ros.errors import FileError, quoted
+from linkage_ros.files.section import LinedDict, Section
+from linkage_ros.files.yaml_file import BoundedLoader, parse_yaml
+import yaml
+
+
+class _Dumper(yaml.SafeDumper):
+    """A dumper that quotes what our reader would not take for a text."""
+
+    yaml_implicit_resolvers = BoundedLoader.yaml_implicit_resolvers
+
+
+_Dumper.add_representer(LinedDict, yaml.SafeDumper.represent_dict)
+
+
+def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
+    """
+    Set keys of a scene; return the scene as text, which a bag then holds.
+
+    Parameters
+    ----------
+    content
+        The scene, which is changed; no key of it may have been taken.
+    settings
+        One ``KEY=VALUE`` each: a dotted key, and a value in YAML.
+
+    Raises
+    ------
+    FileError
+        A setting is no ``KEY=VALUE``, or its key lies within something other than a mapping.
+
+    """
+    for setting in settings:
+        key, equal, text = setting.partition('=')
+        *outer, last = key.split('.')
+        # On one line no value can add further keys.
+        if not equal or not all((*outer, last)) or not setting.isprintable():
+            raise _error(setting, f'{quoted(setting)} is no setting', 'write KEY=VALUE: rate=500')
+        within: Any = content.mapping
+        for part in outer:
+            within.lines.setdefault(part, 0)
+            within = within.setdefault(part, LinedDict())
+            if not isinstance(within, LinedDict):
+                raise _error(setting, f'{part} is {quoted(within)}', 'name a key in a mapping')
+        within.lines.setdefault(last, 0)
+        within[last] = _value(setting, text)
+    head = ''.join(f'# --set {setting}\n' for setting in settings)
+    return (head + yaml.dump(content.mapping, Dumper=_Dumper, sort_keys=False)).encode()
+
+
+def _value(setting: str, text: str) -> Any:
+    try:
+        return parse_yaml(f'value: {text}'.encode(), setting).mapping['value']
+    except FileError as error:
+        raise _error(setting, error.reason, 'write its value as YAML') from None
+
+
+def blamed(error: FileError, content: Section, settings: Sequence[str]) -> FileError:
+    """Return an error of a scene; it names the setting that it is about instead of the file."""
+    for setting in reversed(settings):
+        key, _, _ = setting.partition('=')
+        if error.file == content.file and _is_within(error.key, key):
+            return _error(setting, f'{error.key}: {error.reason}', error.remedy)
+    return error
+
+
+def _is_within(key: str, other: str) -> bool:
+    """Return whether one key lies within the other, or is the same."""
+    short, long = sorted((key, other), key=len)
+    return bool(key) and f'{long}.'.startswith(f'{short}.')
+
+
+def _error(setting: str, reason: str, remedy: str) -> FileError:
+    return FileError(f'--set {setting}', '', reason, remedy)
