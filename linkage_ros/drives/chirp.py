@@ -34,11 +34,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import cos, exp, expm1, inf, log, sin, tau
 from typing import NamedTuple
 
-from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
-from linkage_ros.drives.drive import Context
+from linkage_ros.drives.clocked import as_integers, build_clocked, Curve, LARGEST
 from linkage_ros.files.parameters import choice, each, flag, number
 from linkage_ros.messages.layout import NANOSECONDS
 
@@ -50,9 +50,9 @@ class Chirp:
     amplitude: float = number('amplitude', unit='rad or m', least=0.0, most=LARGEST)
     start_frequency: float = number('frequency at the start', unit='Hz', above=0.0, most=1e6)
     end_frequency: float = number('frequency at the end', unit='Hz', above=0.0, most=1e6)
-    seconds: float = number('how long the sweep takes', unit='s', least=1e-6, most=1e9)
+    seconds: float = number('duration of the sweep', unit='s', least=1e-6, most=1e9)
     mean: float = number('mean', 0.0, unit='rad or m', least=-LARGEST, most=LARGEST)
-    sweep: str = choice('how the frequency goes on', ('linear', 'logarithmic'), 'linear')
+    sweep: str = choice('growth of the frequency', ('linear', 'logarithmic'), 'linear')
     repeat: bool = flag('at the end sweep back, and so on; else rest there', False)
 
 
@@ -60,15 +60,10 @@ class Chirp:
 class ChirpParameters(Chirp):
     """A sine of the inputs whose frequency sweeps through a range, from the first tick on."""
 
-    inputs: Mapping[str, Chirp] = each('inputs that have a chirp of their own', 'input', Chirp)
+    inputs: Mapping[str, Chirp] = each('inputs with a different chirp', 'input', Chirp)
 
 
 PARAMETERS = ChirpParameters
-
-
-def build(parameters: ChirpParameters, context: Context) -> ClockedDrive:
-    """Build the drive."""
-    return build_clocked('drive.chirp', parameters, parameters.inputs, context, curve, extent)
 
 
 def extent(parameters: Chirp) -> tuple[float, float]:
@@ -159,3 +154,6 @@ def _logarithmic(start: float, end: float, length: int) -> _Sweep:
         return f, f * growth / seconds
 
     return _Sweep(periods, _FINEST, frequency)
+
+
+build = partial(build_clocked, 'drive.chirp', curve, extent)

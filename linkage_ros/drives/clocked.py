@@ -21,8 +21,8 @@ no digit is lost before the multiplication by a rate or a frequency.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TypeVar
+from collections.abc import Callable
+from typing import Any
 
 from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.errors import DefinitionError, listed, quoted
@@ -62,12 +62,13 @@ def refuse_beyond(
     """
     given = closure.linkage.inputs[number]
     low, high = extent
-    goes = f'takes {quoted(given.joint)} from {low:.6g} to {high:.6g}'
+    unit = given.unit
+    goes = f'takes {quoted(given.joint)} from {low:.6g} {unit} to {high:.6g} {unit}'
     for bound in closure.bounds.inputs:
         if bound.number == number and (bound.beyond(low) or bound.beyond(high)):
             raise DefinitionError(
                 where,
-                f'{goes}, beyond its limits {given.limits}',
+                f'{goes}, beyond its limits {given.limits} {unit}',
                 'stay within them, or widen them in the linkage file',
             )
     if not closure.bounds.joints or len(closure.linkage.inputs) > 1:
@@ -77,7 +78,9 @@ def refuse_beyond(
     if interval is None:
         if beyond := closure.beyond(way.position(start)):
             raise DefinitionError(
-                where, f'starts at {start:.6g}, beyond limits: {beyond}', 'start within them'
+                where,
+                f'starts at {start:.6g} {unit}, beyond limits: {beyond}',
+                'start within them',
             )
         return
     for value, end, outward, by in zip(
@@ -86,7 +89,7 @@ def refuse_beyond(
         if by and outward * (value - end) > 1e-12 * (abs(end) + 1.0):
             raise DefinitionError(
                 where,
-                f'{goes}, beyond {end:.6g}, where {quoted(by)} is at its limit',
+                f'{goes}, beyond {end:.6g} {unit}, where {quoted(by)} is at its limit',
                 'stay within it, or widen it in the linkage file',
             )
 
@@ -101,8 +104,6 @@ Value, rate and acceleration of an input at a time since the first tick, in [ns]
 In [rad], [rad/s] and [rad/s²]; of an input that slides in [m], [m/s] and [m/s²]. Each is the
 derivative by time of the one before it.
 """
-
-P = TypeVar('P')
 
 
 class ClockedDrive(Drive):
@@ -154,11 +155,10 @@ class ClockedDrive(Drive):
 
 def build_clocked(
     where: str,
-    common: P,
-    inputs: Mapping[str, P],
+    curve: Callable[[Any, str], Curve],
+    extent: Callable[[Any], tuple[float, float]],
+    use: Any,
     context: Context,
-    curve: Callable[[P, str], Curve],
-    extent: Callable[[P], tuple[float, float]],
 ) -> ClockedDrive:
     """
     Build a drive from curves.
@@ -167,35 +167,34 @@ def build_clocked(
     ----------
     where
         Key of the drive, for error messages.
-    common
-        Parameters of the inputs that have none in `inputs`.
-    inputs
-        Parameters of single inputs, by name.
-    context
-        Context of the drive.
     curve
         Makes a curve from parameters and their key for error messages.
     extent
         Returns the least and the greatest value of a curve, in [rad] or [m]; infinite for a motion
         without bound.
+    use
+        Parameters of an input, and of those that differ by name in its ``inputs``.
+    context
+        Context of the drive.
 
     Raises
     ------
     DefinitionError
-        Every input has its own parameters, so that ``common`` has no effect; or an input leaves
-        the limits of a joint.
+        Every input has its own parameters, so that the common ones have no effect; or an input
+        leaves the limits of a joint.
 
     """
     names = [given.joint for given in context.closure.linkage.inputs]
+    inputs = use.inputs
     if inputs and len(inputs) == len(names):
         raise DefinitionError(
             f'{where}.inputs',
-            f'names every input ({listed(names)}), so that what stands beside it has no part',
-            f'leave one of them out: it follows what stands beside {where}.inputs',
+            f'names every input ({listed(names)}), so the values beside it are unused',
+            f'leave one of them out: it then takes the values beside {where}.inputs',
         )
     curves = []
     for number, name in enumerate(names):
-        of, key = (inputs[name], f'{where}.inputs.{name}') if name in inputs else (common, where)
+        of, key = (inputs[name], f'{where}.inputs.{name}') if name in inputs else (use, where)
         curves.append(curve(of, key))
         if context.closure.bounds:
             refuse_beyond(context.closure, number, key, curves[-1](0)[0], extent(of))

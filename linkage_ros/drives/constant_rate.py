@@ -25,10 +25,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 
-from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
-from linkage_ros.drives.drive import Context
+from linkage_ros.drives.clocked import as_integers, build_clocked, Curve, LARGEST
 from linkage_ros.files.parameters import each, number
 from linkage_ros.messages.layout import NANOSECONDS
 
@@ -48,18 +48,11 @@ class ConstantRateParameters(ConstantRate):
     """A constant rate of the inputs, from the first tick on."""
 
     inputs: Mapping[str, ConstantRate] = each(
-        'inputs that have a rate and a start of their own', 'input', ConstantRate
+        'inputs with a different rate and start', 'input', ConstantRate
     )
 
 
 PARAMETERS = ConstantRateParameters
-
-
-def build(parameters: ConstantRateParameters, context: Context) -> ClockedDrive:
-    """Build the drive."""
-    return build_clocked(
-        'drive.constant_rate', parameters, parameters.inputs, context, curve, extent
-    )
 
 
 def extent(parameters: ConstantRate) -> tuple[float, float]:
@@ -79,3 +72,6 @@ def curve(parameters: ConstantRate, _where: str = '') -> Curve:
         return (start + per_second * time) / below, rate, 0.0
 
     return constant_rate
+
+
+build = partial(build_clocked, 'drive.constant_rate', curve, extent)

@@ -35,11 +35,11 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from math import copysign, inf, sqrt
 
-from linkage_ros.drives.clocked import build_clocked, ClockedDrive, Curve, LARGEST
-from linkage_ros.drives.drive import Context
+from linkage_ros.drives.clocked import build_clocked, Curve, LARGEST
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import choice, each, flag, rows
 from linkage_ros.messages.layout import NANOSECONDS
@@ -50,37 +50,24 @@ class Profile:
     """A table of one input."""
 
     table: tuple[tuple[float, float], ...] = rows(
-        'when it is where, counted from the first tick',
+        'times, counted from the first tick, and values',
         ('time [s]', 'value [rad or m]'),
         most=LARGEST,
     )
     interpolation: str = choice(
-        'what leads from row to row', ('linear', 'cubic', 'minimum_jerk'), 'cubic'
+        'interpolation between the rows', ('linear', 'cubic', 'minimum_jerk'), 'cubic'
     )
-    repeat: bool = flag('go on with the first row after the last; else rest there', False)
+    repeat: bool = flag('continue with the first row after the last; else rest there', False)
 
 
 @dataclass(frozen=True, slots=True)
 class ProfileParameters(Profile):
     """A table of times and values that the inputs follow, from the first tick on."""
 
-    inputs: Mapping[str, Profile] = each('inputs that have a table of their own', 'input', Profile)
+    inputs: Mapping[str, Profile] = each('inputs with a different table', 'input', Profile)
 
 
 PARAMETERS = ProfileParameters
-
-
-def build(parameters: ProfileParameters, context: Context) -> ClockedDrive:
-    """
-    Build the drive.
-
-    Raises
-    ------
-    DefinitionError
-        A table has less than two rows, or times that do not increase.
-
-    """
-    return build_clocked('drive.profile', parameters, parameters.inputs, context, curve, extent)
 
 
 def extent(parameters: Profile) -> tuple[float, float]:
@@ -111,7 +98,15 @@ def _turns_at(c1: float, c2: float, c3: float) -> list[float]:
 
 
 def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
-    """Return value, rate and acceleration as a function of time, in [ns]."""
+    """
+    Return value, rate and acceleration as a function of time, in [ns].
+
+    Raises
+    ------
+    DefinitionError
+        The table has less than two rows, or times that do not increase.
+
+    """
     times = _times(parameters.table, f'{where}.table')
     values = [value for _, value in parameters.table]
     begin, length = times[0], times[-1] - times[0]
@@ -215,3 +210,6 @@ def _slopes(seconds: Sequence[float], chords: Sequence[float], ends: float) -> l
     for i in range(len(slopes) - 2, 0, -1):
         slopes[i] -= upper[i] * slopes[i + 1]
     return slopes
+
+
+build = partial(build_clocked, 'drive.profile', curve, extent)

@@ -24,10 +24,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import cos, sin, tau
 
-from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
-from linkage_ros.drives.drive import Context
+from linkage_ros.drives.clocked import as_integers, build_clocked, Curve, LARGEST
 from linkage_ros.files.parameters import each, number
 from linkage_ros.messages.layout import NANOSECONDS
 
@@ -46,15 +46,10 @@ class Sine:
 class SineParameters(Sine):
     """A sine of the inputs, from the first tick on."""
 
-    inputs: Mapping[str, Sine] = each('inputs that have a sine of their own', 'input', Sine)
+    inputs: Mapping[str, Sine] = each('inputs with a different sine', 'input', Sine)
 
 
 PARAMETERS = SineParameters
-
-
-def build(parameters: SineParameters, context: Context) -> ClockedDrive:
-    """Build the drive."""
-    return build_clocked('drive.sine', parameters, parameters.inputs, context, curve, extent)
 
 
 def extent(parameters: Sine) -> tuple[float, float]:
@@ -77,3 +72,6 @@ def curve(parameters: Sine, _where: str = '') -> Curve:
         return mean + A * s, Aw * cos(angle), -Aw2 * s
 
     return sine
+
+
+build = partial(build_clocked, 'drive.sine', curve, extent)

@@ -48,7 +48,11 @@ class TopicParameters:
         most=3600.0,
     )
     max_lead: float = number(
-        'how far ahead of the clock a stamp may be', 0.1, unit='s', least=0.0, most=3600.0
+        'longest time by which a stamp may be ahead of the clock',
+        0.1,
+        unit='s',
+        least=0.0,
+        most=3600.0,
     )
 
 

@@ -25,18 +25,16 @@ of the same method, which is then discarded.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from math import copysign, inf, isfinite
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
-from linkage_ros.dynamics.integrators.method import METHODS
+from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import choice, number
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
-from linkage_ros.messages.joint_effort import EffortCommand, JointEffortReader
-from linkage_ros.messages.joint_state import Rejection
+from linkage_ros.messages.joint_state import EffortCommand, JointEffortReader, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
 
 TOPIC = 'crank_commands'
@@ -60,18 +58,20 @@ class TorqueParameters:
     )
     step: float = number('length of a step', 1e-3, unit='s', least=1e-6, most=0.1)
     timeout: float = number(
-        'how long a command holds, unless another comes', 0.1, unit='s', least=1e-6, most=3600.0
+        'validity of a command, unless another one comes', 0.1, unit='s', least=1e-6, most=3600.0
     )
     on_timeout: str = choice(
-        'what acts while no command holds: nothing, or a brake', ('zero', 'brake'), 'zero'
+        'while no command is valid: no effort, or a brake', ('zero', 'brake'), 'zero'
     )
-    brake: float = number('what the brake holds', 0.0, unit='N·m or N', least=0.0, most=LARGEST)
+    brake: float = number(
+        'holding torque or force of the brake', 0.0, unit='N·m or N', least=0.0, most=LARGEST
+    )
     restitution: float = number(
-        'rate after an impact on a stop, by that before', 0.0, least=0.0, most=1.0
+        'ratio of the rates after and before an impact on a stop', 0.0, least=0.0, most=1.0
     )
     stop_margin: float = number(
-        'how far before a toggle at an end of its range the input is stopped, as a share of the '
-        'range: at the toggle the inertia is without bounds; a limit is a stop itself',
+        'distance of the stop from a toggle at an end of the range, as a fraction of the range: '
+        'at the toggle the inertia is unbounded; a limit is itself a stop',
         1e-3,
         above=0.0,
         most=0.49,
@@ -102,23 +102,23 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     if n_inputs > 1:
         raise DefinitionError(
             'drive.torque',
-            f'the linkage has {n_inputs} inputs, and a torque moves one',
+            f'the linkage has {n_inputs} inputs, and the torque drive moves one',
             'use a linkage with one input, or another drive',
         )
     brakes = parameters.on_timeout == 'brake'
     if brakes and parameters.brake == 0.0:
         raise DefinitionError(
             'drive.torque.brake',
-            'a brake that holds nothing',
-            'say what it holds, in [N·m] or [N]',
+            'the brake is 0 and holds nothing',
+            'write its torque or force, in [N·m] or [N]',
         )
     if parameters.brake and not brakes:
         raise DefinitionError(
-            'drive.torque.brake', 'a brake that is never set', 'add on_timeout: brake'
+            'drive.torque.brake', 'the brake is never applied', 'add on_timeout: brake'
         )
     motion = OneFreedom(
         context.mechanics.equation,
-        import_module(METHODS[parameters.method]).step,
+        METHODS[parameters.method].step,
         _stops(closure, parameters.start, parameters.stop_margin),
         parameters.restitution,
     )

@@ -277,7 +277,12 @@ class Mechanics:
         velocities = follower.velocities(position, velocity, places)
         accelerations = follower.accelerations(position, velocity, acceleration, places)
         v, a = velocity.state.coordinates, acceleration.state.coordinates
-        pulls = self._spring_pulls(places, velocities)
+        pulls = [
+            spring.tension(*stretched(places, velocities, start, end))
+            for spring, (_, _, _, start, end) in zip(
+                self.loads.springs, self._springs, strict=True
+            )
+        ]
         drags = [resistance(rubbing, v) for rubbing in self.rubbing]
         efforts: tuple[float, ...] = ()
         for i, unit in enumerate(self._units):
@@ -297,15 +302,6 @@ class Mechanics:
                 effort += drag * factor * (w[one] - w[other])
             efforts += (effort,)
         return efforts
-
-    def _spring_pulls(self, places: list[complex], velocities: list[complex]) -> list[float]:
-        """Return the force with which each spring pulls its ends together, in [N]."""
-        return [
-            spring.tension(*stretched(places, velocities, start, end))
-            for spring, (_, _, _, start, end) in zip(
-                self.loads.springs, self._springs, strict=True
-            )
-        ]
 
     def _rubbing_joints(self) -> Iterator[Rubbing]:
         closure = self.closure

@@ -41,11 +41,12 @@ with Friction and Impact, SIAM Review 42, 2000.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum
 from math import copysign, inf
 from typing import NamedTuple, TypeVar
 
-from linkage_ros.dynamics.integrators.method import Step
+from linkage_ros.dynamics.integrators import Step
 from linkage_ros.dynamics.mechanics import Terms
 
 _NARROWINGS = 80
@@ -164,11 +165,12 @@ class _Event(Enum):
     KINK = 'slip zero'
 
 
+@dataclass(frozen=True, slots=True)
 class OneFreedom:
     """
     A mechanism with one input that is moved by a force.
 
-    Parameters
+    Attributes
     ----------
     terms
         The equation of motion at a value of the input; None if there is none.
@@ -181,23 +183,14 @@ class OneFreedom:
 
     """
 
-    __slots__ = ('_restitution', '_step', '_stops', '_terms')
-
-    def __init__(
-        self,
-        terms: Callable[[float], Terms | None],
-        step: Step,
-        stops: tuple[float, float] = (-inf, inf),
-        restitution: float = 0.0,
-    ) -> None:
-        self._terms = terms
-        self._step = step
-        self._stops = stops
-        self._restitution = restitution
+    terms: Callable[[float], Terms | None]
+    step: Step
+    stops: tuple[float, float] = (-inf, inf)
+    restitution: float = 0.0
 
     def at(self, value: float, rate: float) -> Motion | None:
         """Return a state, or None if it cannot exist."""
-        low, high = self._stops
+        low, high = self.stops
         return self._reached(value, rate) if low <= value <= high else None
 
     def acceleration(self, motion: Motion, force: float, brake: float = 0.0) -> float:
@@ -267,7 +260,7 @@ class OneFreedom:
         if rate:
             return copysign(1.0, rate)
         push = force - terms.potential_slope
-        low, high = self._stops
+        low, high = self.stops
         held = abs(push) <= terms.coulomb + brake
         if held or (value >= high and push > 0.0) or (value <= low and push < 0.0):
             return 0.0
@@ -283,7 +276,7 @@ class OneFreedom:
     ) -> Callable[[float], Motion | None]:
         """Return a function that gives the state after some seconds of one step."""
         value, rate, here = motion
-        terms, step, reached = self._terms, self._step, self._reached
+        terms, step, reached = self.terms, self.step, self._reached
         start = _acceleration(here, rate, force, braking, sense)
 
         def field(q: float, w: float) -> float | None:
@@ -305,7 +298,7 @@ class OneFreedom:
     def _reached(self, value: float, rate: float) -> Motion | None:
         if not (-LARGEST <= value <= LARGEST and -LARGEST <= rate <= LARGEST):
             return None
-        terms = self._terms(value)
+        terms = self.terms(value)
         if terms is None or terms.inertia < _LEAST:
             return None
         return Motion(value, rate, terms)
@@ -315,7 +308,7 @@ class OneFreedom:
     ) -> _Event | None:
         """Return the event that has happened before a state, or None."""
         value, rate, terms = motion
-        low, high = self._stops
+        low, high = self.stops
         if sticks and sense * rate < 0.0:
             return _Event.TURN
         if value > high:
@@ -328,7 +321,7 @@ class OneFreedom:
         self, event: _Event, sense: float, slips: tuple[float, ...]
     ) -> Callable[[Motion], float]:
         """Return a function that gives the margin of a state to an event."""
-        low, high = self._stops
+        low, high = self.stops
         if event is _Event.TURN:
             return lambda motion: sense * motion.rate
         if event is _Event.HIGH:
@@ -343,14 +336,14 @@ class OneFreedom:
 
     def _stopped(self, motion: Motion, event: _Event) -> Motion:
         """Return the state after an impact."""
-        low, high = self._stops
+        low, high = self.stops
         stop, outward = (high, 1.0) if event is _Event.HIGH else (low, -1.0)
         at_stop = self._reached(stop, motion.rate) or motion
         return self._bounced(at_stop) if outward * motion.rate > 0.0 else _at_rest(at_stop)
 
     def _bounced(self, motion: Motion) -> Motion:
         value, rate, terms = motion
-        return Motion(value, 0.0 - self._restitution * rate, terms)
+        return Motion(value, 0.0 - self.restitution * rate, terms)
 
 
 def _at_rest(motion: Motion) -> Motion:

@@ -304,11 +304,6 @@ class Reactions:
             )
             for joint in linkage.joints.values()
         )
-        # The matrix divides moments by the scale; the closure divides lengths by it.
-        self._drives = tuple(
-            (1.0, closure.scale) if given.slider else (closure.scale, 1.0)
-            for given in linkage.inputs
-        )
 
     def solve(
         self, position: Position, velocity: Velocity, acceleration: Acceleration
@@ -340,25 +335,6 @@ class Reactions:
                 reaction = Reaction(one, other, 0.0 - resisting)
             reactions += (reaction,)
         return reactions
-
-    def efforts(
-        self, position: Position, velocity: Velocity, acceleration: Acceleration
-    ) -> tuple[float, ...] | None:
-        """
-        Return the effort of each drive, from the forces; `Mechanics.drive_efforts` uses work.
-
-        Return None at a toggle and where the linkage does not close.
-        """
-        balance = self._balance(position, velocity, acceleration)
-        if balance is None:
-            return None
-        forces, _ = balance
-        a, inertia = acceleration.state.coordinates, self._mechanics.loads.drive_inertia
-        first = 2 * len(self.joints)
-        drives = zip(forces[first:], a[1:], self._drives, strict=False)
-        return tuple(
-            effort * moment + inertia * pull * length for effort, pull, (moment, length) in drives
-        )
 
     def shift(self, position: Position, offsets: Sequence[complex]) -> tuple[float, ...] | None:
         """

@@ -61,9 +61,9 @@ def stage(_parameters: AccelerationParameters, context: Context) -> Stage:
 
 def writer(_parameters: AccelerationParameters, context: Context) -> Writer:
     """Build the writer of the message: the reading as a trajectory of one point."""
-    from linkage_ros.messages import joint_trajectory  # local import: if published
+    from linkage_ros.messages import joint_values  # local import: if published
 
-    write = joint_trajectory.JointTrajectoryWriter(context.joints_in_messages).write
+    write = joint_values.JointTrajectoryWriter(context.joints_in_messages).write
 
     def write_motion(_now: int, _motion: MechanismState | None, reading: SensorReading) -> bytes:
         return write(reading.stamp, reading.joints, reading.rates, reading.accelerations)

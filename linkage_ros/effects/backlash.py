@@ -54,13 +54,13 @@ _LARGEST = 6.0
 
 @dataclass(frozen=True, slots=True)
 class BacklashParameters:
-    """Play between motor and crank: the crank stays until the motor has passed it."""
+    """Play between motor and crank: the crank rests until the motor has crossed the play."""
 
     play: float = number(
         'from one end to the other, of every input', unit='rad or m', least=0.0, most=_LARGEST
     )
     inputs: Mapping[str, float] = each(
-        'of inputs that have another one',
+        'inputs with a different play',
         'input',
         Number('from one end to the other', 'rad or m', least=0.0, most=_LARGEST),
     )

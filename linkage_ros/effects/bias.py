@@ -38,12 +38,12 @@ from linkage_ros.files.parameters import each, Number
 
 @dataclass(frozen=True, slots=True)
 class BiasParameters:
-    """What is read of a joint is off by a constant."""
+    """A constant error of measured joint positions."""
 
     joints: Mapping[str, float] = each(
-        'what is added to the position of a joint',
+        'constant error of a joint',
         'joint',
-        Number('added to the position', 'rad or m', -1e6, 1e6),
+        Number('error, added to the position', 'rad or m', -1e6, 1e6),
         required=True,
     )
 

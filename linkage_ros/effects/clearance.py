@@ -53,10 +53,10 @@ _SMALLEST = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class ClearanceParameters:
-    """Pins that lean by their radial play along the force that they carry."""
+    """Pins displaced by their radial play, along the force that they carry."""
 
     pins: Mapping[str, float] = each(
-        'radial play of each pin, half of what hole and pin differ by in diameter',
+        'radial play of each pin: half the difference of the diameters of hole and pin',
         'pin',
         Number('radial play', 'm', least=0.0, most=1e6),
         required=True,
@@ -82,7 +82,7 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
         if name not in pins:
             raise DefinitionError(
                 f'effects.clearance.pins.{name}',
-                f'{name!r} is a slider, and what leans is a pin in its hole',
+                f'{name!r} is a slider, and clearance is a property of pins',
                 f'name pins: {listed(sorted(pins))}',
             )
     plays = tuple(

@@ -51,7 +51,7 @@ class ComplianceParameters:
     """Links that stretch under their axial force."""
 
     links: Mapping[str, float] = each(
-        'axial stiffness of links that lie between two pins; the others are rigid',
+        'axial stiffness of links with two pins; the other links are rigid',
         'link',
         Number('axial stiffness E·A/L', 'N/m', above=0.0, most=_STIFFEST),
         required=True,
@@ -154,6 +154,6 @@ def _check(link: str, joint: Joint) -> None:
 def _error(link: str, reason: str) -> DefinitionError:
     return DefinitionError(
         f'effects.compliance.links.{link}',
-        f'{link!r} {reason}, and is no bar between two',
-        'leave it out; what stretches is a link with two pins and nothing else',
+        f'{link!r} {reason}, so it is not a bar between two pins',
+        'leave it out: only a link with exactly two pins stretches',
     )

@@ -34,7 +34,6 @@ After a sensor that is silent at times (a slow one, a lossy one) the line carrie
 of a signal. The first silence also arrives d later: from the last reading before it on, each
 reading arrives once, unchanged, at the first tick that is d later; if several are due between two
 ticks, one at each tick.
-ticks, one with each tick.
 
 With ``stamp: arrival`` the message has the stamp of its tick, as from a driver that does not know
 the delay; with ``measured`` the time of measurement, t − d, or that of the reading.
@@ -58,14 +57,12 @@ _AUTOMATIC = 'automatic'
 
 @dataclass(frozen=True, slots=True)
 class DelayParameters:
-    """Transport delay: what is read arrives later."""
+    """Transport delay: readings arrive later."""
 
-    seconds: float = number(
-        'how much later, rounded to nanoseconds', unit='s', least=0.0, most=10.0
-    )
+    seconds: float = number('delay, rounded to nanoseconds', unit='s', least=0.0, most=10.0)
     between: str = choice(
         'between two ticks: the value at exactly that time, or the newest that is old enough; '
-        'automatic: sampled behind an encoder, else interpolated',
+        'automatic: sampled after an encoder, else interpolated',
         ('interpolated', 'sampled', _AUTOMATIC),
         _AUTOMATIC,
     )

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Effects by their names: those of this package, and modules of users by a dotted name."""
+"""Effects by name: those of this package, and user-defined modules by their dotted names."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def module_of(effect: str) -> ModuleType:
-    """Import an effect: one of this package, or a module of one's own by its dotted name."""
+    """Import an effect: one of this package, or a user-defined module by its dotted name."""
     if '.' not in effect:
         return import_module(EFFECTS[effect])
     from linkage_ros.effects.user_effects import (
@@ -58,7 +58,7 @@ def in_order(named: Collection[str]) -> tuple[str, ...]:
 
 
 def needs(effect: str) -> tuple[str, ...]:
-    """Return what an effect starts from."""
+    """Return the effects that an effect starts from."""
     if '.' not in effect:
         return NEEDS.get(effect, ())
     from linkage_ros.effects.user_effects import user_needs  # local import: as above
@@ -67,12 +67,12 @@ def needs(effect: str) -> tuple[str, ...]:
 
 
 def dependencies(effect: str) -> tuple[str, ...]:
-    """Return what an effect brings in."""
+    """Return the effects that an effect adds to a scene."""
     return *needs(effect), *PUBLISHED_WITH.get(effect, ())
 
 
 def bringing(name: str, named: Collection[str]) -> tuple[str, ...]:
-    """Return the effects, of those named, that bring another in."""
+    """Return those of the named effects that add another one to the scene."""
     own = [other for other in named if '.' in other or other in EFFECTS]
     return tuple(other for other in in_order(own) if name in dependencies(other))
 
@@ -80,16 +80,16 @@ def bringing(name: str, named: Collection[str]) -> tuple[str, ...]:
 @dataclass(frozen=True, slots=True)
 class Effect:
     """
-    An effect: what its module has, and None or '' for what it has not.
+    An effect: the contents of its module, with None or '' for optional ones that it lacks.
 
     Attributes
     ----------
     name, parameters
-        As a scene names it, and the type of its parameters.
+        Its name in a scene, and the type of its parameters.
     alter, drive_stage, stage, sensor, writer
-        Its functions; see above.
+        Its functions; see `linkage_ros.effects.stage`.
     topic, message
-        Of its own message.
+        Topic and type of its own message.
     of_reading
         Whether that message is made of the reading alone.
 

@@ -54,7 +54,7 @@ from linkage_ros.files.parameters import choice, number
 class DropoutParameters:
     """Samples are lost, one by one or in bursts."""
 
-    probability: float = number('part of all samples that is lost', least=0.0, most=1.0)
+    probability: float = number('fraction of all samples that is lost', least=0.0, most=1.0)
     burst: float = number(
         'mean length of a burst, 1 or more; 0: each is lost independently',
         0.0,
@@ -63,7 +63,7 @@ class DropoutParameters:
         most=1e9,
     )
     hold: str = choice(
-        'in the place of a lost sample: be silent, or repeat the last one that arrived',
+        'instead of a lost sample: publish nothing, or repeat the last one that arrived',
         ('silent', 'repeat'),
         'silent',
     )

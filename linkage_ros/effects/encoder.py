@@ -67,10 +67,10 @@ class JointEncoder:
     )
     offset: float = number('where count 0 begins', 0.0, unit='rad or m', least=-1e6, most=1e6)
     incremental: bool = flag(
-        'counts from where it is switched on, until it passes its index mark', False
+        'counts from the position at power-on, until it passes its index mark', False
     )
     index: bool = flag('has an index mark, where count 0 begins', True)
-    multi_turn: bool = flag('an absolute encoder that counts turns, too', False)
+    multi_turn: bool = flag('an absolute encoder that also counts turns', False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,7 +50,7 @@ class OneJoint:
 
 @dataclass(frozen=True, slots=True)
 class FrictionParameters:
-    """Friction in pins and sliders, for all that works with forces."""
+    """Friction in pins and sliders, for all effects and drives that use forces."""
 
     joints: Mapping[str, OneJoint] = each('of each pin or slider', 'pin', OneJoint, required=True)
 

@@ -46,11 +46,11 @@ from linkage_ros.files.parameters import choice, number
 
 @dataclass(frozen=True, slots=True)
 class JitterParameters:
-    """The sensor looks earlier than its stamp says, by a time that wanders."""
+    """The sensor measures earlier than the stamp says, by a varying time."""
 
-    seconds: float = number('earlier at most', unit='s', least=0.0, most=1.0)
+    seconds: float = number('longest time by which it is earlier', unit='s', least=0.0, most=1.0)
     distribution: str = choice(
-        'of the time, between 0 and that', ('uniform', 'half_normal'), 'uniform'
+        'of that time, between 0 and its maximum', ('uniform', 'half_normal'), 'uniform'
     )
 
 

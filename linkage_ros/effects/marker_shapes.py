@@ -33,7 +33,7 @@ from linkage_ros.drawing.figure import all_places, symbol_size, view
 from linkage_ros.drawing.painting import COLOURS, corners, FACES, INK, outline
 from linkage_ros.drawing.shapes import carried_shapes, Circle, Polygon, Segment, Shape
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Input
+from linkage_ros.kinematics.linkage import carriers, GROUND, Input
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.messages.marker_array import (
@@ -292,11 +292,8 @@ def _still(drawn: Sequence[Shape], size: float, lifetime: int) -> list[Marker]:
 
 def _traced(closure: Closure) -> dict[str, Key]:
     """Return the key of each traced point."""
-    links = closure.linkage.links
-    return {
-        point: Key(next(link for link, named in links.items() if point in named), point)
-        for point in closure.linkage.traced
-    }
+    links = carriers(closure.linkage.links)
+    return {point: Key(links[point][0], point) for point in closure.linkage.traced}
 
 
 def _triangles(corners: Sequence[Place]) -> list[Place]:
@@ -400,7 +397,7 @@ class Arrows:
         slider = self._closure.linkage.sliders[given.slider]
         block = self._closure.structure.blocks[given.slider]
         way = rect(1.0 if effort > 0.0 else -1.0, angles[slider.along])
-        way *= complex(*slider.direction) / abs(complex(*slider.direction))
+        way *= slider.unit
         start = points[block, slider.point]
         length = self._length(abs(effort))
         return self._headed([start, start + length * way], way, length)

@@ -47,7 +47,7 @@ from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.kinematics.topology import Driven, Dyad, Group
+from linkage_ros.kinematics.topology import links_of
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.messages.marker_array import DELETE, MarkerArrayWriter
 
@@ -62,15 +62,15 @@ class MarkersParameters:
     """The linkage drawn for RViz and Foxglove, on ~/markers."""
 
     rate: float = number('messages a second, at most', 30.0, unit='Hz', least=0.01, most=1000.0)
-    frame: str = text("frame of the markers, in the place of the ground's", '')
+    frame: str = text("frame of the markers, instead of the ground's", '')
     thickness: float = number(
-        'width of a bar, as a share of all that the linkage reaches; 0: what suits it',
+        'width of a bar, as a fraction of the workspace; 0: a suitable one',
         0.0,
         least=0.0,
         most=0.5,
     )
     trace: float = number(
-        'how long a traced point leaves its way behind; 0: its whole curve, with one input',
+        'duration of the trail of a traced point; 0: its whole curve, with one input',
         0.0,
         unit='s',
         least=0.0,
@@ -138,7 +138,7 @@ class Markers:
         self._full = MarkerArrayWriter(self._frame, (*shapes.moving, *shapes.still))
         self._trails: list[deque[complex]] = [deque(maxlen=trail) for _ in shapes.trails]
         self._near = sqrt(2.0) * sin(0.5 * use.near_toggle)
-        self._groups = tuple(frozenset(_links(group)) for group in closure.structure.groups)
+        self._groups = tuple(frozenset(links_of(group)) for group in closure.structure.groups)
         # Search once here, not in a tick.
         closure.singularity_margin(closure.position(*usual_inputs(closure)))
 
@@ -235,12 +235,3 @@ def _lifetimes(use: MarkersParameters, context: Context) -> tuple[int, int]:
     period = 1.0 / min(use.rate, context.rate)
     moves = max(1.0, 3.0 * period)
     return round(moves * NANOSECONDS), round(max(3.0, moves) * NANOSECONDS)
-
-
-def _links(group: Group) -> tuple[str, ...]:
-    """Return the links of a group."""
-    if isinstance(group, Driven):
-        return (group.joint.link,)
-    if isinstance(group, Dyad):
-        return tuple(link for body in group.bodies for link in body)
-    return group.links

@@ -64,7 +64,7 @@ class JointNoise:
 
 @dataclass(frozen=True, slots=True)
 class NoiseParameters:
-    """White noise and a random walk in what is read of a joint."""
+    """White noise and a random walk in the readings of joints."""
 
     joints: Mapping[str, JointNoise] = each('noise of a joint', 'joint', JointNoise, required=True)
 

@@ -60,9 +60,9 @@ def stage(_parameters: PinForcesParameters, context: Context) -> Stage:
 
 def writer(_parameters: PinForcesParameters, context: Context) -> Writer:
     """Build the writer of the message; b'' where there are no forces."""
-    from linkage_ros.messages import multi_dof_joint_state  # local import: if published
+    from linkage_ros.messages import joint_values  # local import: if published
 
-    write = multi_dof_joint_state.PlanarWrenchWriter(
+    write = joint_values.PlanarWrenchWriter(
         [context.prefix + name for name in context.reactions.names]
     ).write
 

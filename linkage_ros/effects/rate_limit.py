@@ -52,7 +52,7 @@ class RateLimitParameters:
 
     rate: float = number('samples a second', unit='Hz', least=0.001, most=20_000.0)
     hold: str = choice(
-        'between two samples: repeat the last one at every tick, or be silent',
+        'between two samples: repeat the last one at every tick, or publish nothing',
         ('repeat', 'silent'),
         'repeat',
     )

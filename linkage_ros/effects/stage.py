@@ -14,45 +14,45 @@
 
 
 """
-The effects, in the order in which physics applies them.
+The effects in the order in which physics applies them, and the interface of their modules.
 
-Each is a module, imported only where a scene names the effect, with
+Each is a module, imported only if a scene names the effect, with
 
 ``PARAMETERS``
     The type of its parameters (see `linkage_ros.files.parameters`).
 
-and with what builds its part of the tick; which, says where in the tick it stands:
+and with one function, whose name gives its place in the tick and which builds its part there:
 
 ``alter(parameters, linkage, random) -> Linkage``
-    Another linkage in the place of the one that is drawn; no part of the tick.
+    Return the linkage as it is made; this runs once, before the tick.
 ``drive_stage(parameters, context) -> Callable[[CrankState], CrankState]``
     Between the drive and the crank.
-``stage(parameters, context) -> Callable[[Motion], Motion]``
-    In the mechanism, once its loops are closed. The first is `velocity`: all others start from
+``stage(parameters, context) -> Callable[[MechanismState], MechanismState]``
+    In the mechanism, after its loops are closed. The first is `velocity`: all others start from
     rates.
-``sensor(parameters, context) -> Callable[[int, Reading], Reading | None]``
-    Between the mechanism and the message: given the time of the tick, in [ns], and what is read
-    so far, return what is read; None where nothing is. Where the linkage has no pose, or no crank,
-    it is not asked, unless it has a method ``gap(now) -> Reading | None``; such a sensor also says
-    by ``gap_begins`` whether the last gap that it was told of began there.
+``sensor(parameters, context) -> Callable[[int, SensorReading], SensorReading | None]``
+    Between the mechanism and the message: takes the time of the tick, in [ns], and the reading so
+    far; returns the reading, or None. It is not called where the linkage has no pose or no crank,
+    unless it has a method ``gap(now) -> SensorReading | None``; such a sensor also says by
+    ``gap_begins`` whether the last gap that it was told of began there.
 
-An effect that publishes a message of its own has also
+An effect that publishes its own message also has
 
 ``TOPIC``, ``MESSAGE``
     The topic, and the type of the message: package/msg/Type.
 ``OF_READING``
-    True where the message is made of the reading alone: then the motion is None, and the message
-    is also published of a reading that a delay brings where the loop has no pose.
-``writer(parameters, context) -> Callable[[int, Motion, Reading], bytes]``
-    Build what writes the message, given the time of the tick, in [ns]; b'' where there is nothing
-    to publish. It is asked only where there is a reading. Where it has a method
-    ``no_pose(now, position) -> bytes`` that is asked where the loop has no pose. Where it has a
-    method ``due(now) -> bool`` and that says no, it is not asked at all, and no motion is worked
-    out for it.
+    True if the message is made of the reading alone: then the motion is None, and the message is
+    also published for a reading that a delay brings while the loop has no pose.
+``writer(parameters, context) -> Callable[[int, MechanismState, SensorReading], bytes]``
+    Build a function that writes the message, given the time of the tick, in [ns]; b'' if there is
+    nothing to publish. It is called only if there is a reading. If it has a method
+    ``no_pose(now, position) -> bytes``, that is called where the loop has no pose. If it has a
+    method ``due(now) -> bool`` that returns False, it is not called, and no motion is computed
+    for it.
 
-A scene may also name a module of one's own, by its dotted name: see
-`linkage_ros.effects.user_effects`. What a module, a sensor or a writer may leave out is looked up
-here alone: `Effect`, `SensorStage` and `WriterStage` say what stands in its place.
+A scene may also name a user-defined effect by the dotted name of its module: see
+`linkage_ros.effects.user_effects`. The optional parts of a module, a sensor or a writer are looked
+up only here: in `Effect`, `SensorStage` and `WriterStage`.
 """
 
 from __future__ import annotations
@@ -72,16 +72,16 @@ EFFECTS = {
     'tolerance': 'linkage_ros.effects.tolerance',
     # Between motor and crank.
     'backlash': 'linkage_ros.effects.backlash',
-    # How it moves, and what that takes.
+    # Its motion, and the forces for it.
     'velocity': 'linkage_ros.effects.velocity',
     'acceleration': 'linkage_ros.effects.acceleration',
     'friction': 'linkage_ros.effects.friction',
     'effort': 'linkage_ros.effects.effort',
     'pin_forces': 'linkage_ros.effects.pin_forces',
-    # How it yields under these forces.
+    # Its displacement under these forces.
     'compliance': 'linkage_ros.effects.compliance',
     'clearance': 'linkage_ros.effects.clearance',
-    # What a sensor makes of it: when it looks, what it sees, and when that arrives.
+    # The sensor: when it measures, what it reads, and when that arrives.
     'jitter': 'linkage_ros.effects.jitter',
     'bias': 'linkage_ros.effects.bias',
     'noise': 'linkage_ros.effects.noise',
@@ -89,10 +89,10 @@ EFFECTS = {
     'rate_limit': 'linkage_ros.effects.rate_limit',
     'dropout': 'linkage_ros.effects.dropout',
     'delay': 'linkage_ros.effects.delay',
-    # What is drawn of the mechanism.
+    # The drawing of the mechanism.
     'markers': 'linkage_ros.effects.markers',
 }
-"""Name of each effect, and the module that holds it."""
+"""Module of each effect, by name."""
 
 NEEDS = {
     'acceleration': ('velocity',),
@@ -100,14 +100,14 @@ NEEDS = {
     'pin_forces': ('velocity', 'acceleration'),
     'compliance': ('velocity', 'acceleration', 'pin_forces'),
     'clearance': ('velocity', 'acceleration', 'pin_forces'),
-    # Between two readings by their rates, whether these are published or not.
+    # They interpolate by the rates, whether these are published or not.
     'jitter': ('velocity',),
     'delay': ('velocity',),
 }
-"""What an effect starts from, which is then computed; but published only where it is named."""
+"""Effects that an effect starts from: they are computed, but published only if named."""
 
 PUBLISHED_WITH = {'acceleration': ('velocity',)}
-"""What to name an effect is to name too: a trajectory without rates is of no use."""
+"""Effects that are named together with an effect: a trajectory needs rates."""
 
 FORCE_EFFECTS = ('effort', 'pin_forces', 'compliance', 'clearance')
 """
@@ -120,7 +120,7 @@ call those that know numbers alone by its `called`.
 
 class MechanismState(NamedTuple):
     """
-    What the mechanism does at a tick, handed from stage to stage.
+    The state of the mechanism at a tick, passed from stage to stage.
 
     Attributes
     ----------
@@ -129,14 +129,13 @@ class MechanismState(NamedTuple):
     position
         The closed loop.
     velocity, acceleration
-        The loop's; nothing where no stage asked, or at a toggle.
+        Those of the loop; None if no stage computes them, or at a toggle.
     efforts
-        Of the inputs, in [N·m] or [N]; empty where no stage asked, or at a toggle.
+        Of the inputs, in [N·m] or [N]; empty if no stage computes them, or at a toggle.
     reactions
         In pins and sliders; empty as the efforts are.
     shift
-        What is added to the published joints, in [rad] or [m], because the mechanism yields; empty
-        for nothing.
+        Displacement of the published joints under load, in [rad] or [m]; empty for none.
 
     """
 
@@ -151,7 +150,7 @@ class MechanismState(NamedTuple):
 
 class SensorReading(NamedTuple):
     """
-    What the sensors make of a motion, and what is published.
+    The reading of the sensors, which is published.
 
     Attributes
     ----------
@@ -160,7 +159,7 @@ class SensorReading(NamedTuple):
     joints
         Values of the published joints, in [rad] or [m].
     rates
-        In [rad/s] or [m/s]; empty where not called for, or at a toggle.
+        In [rad/s] or [m/s]; empty if not computed, or at a toggle.
     accelerations
         In [rad/s²] or [m/s²]; empty as the rates are.
     efforts
@@ -182,13 +181,13 @@ class SensorStage(NamedTuple):
     Attributes
     ----------
     read
-        Reads.
+        The sensor.
     gap
-        Is told that the linkage has no pose, and returns what is read then; None where nothing is
-        and it need not be told.
+        Called where the linkage has no pose; returns the reading. None if the sensor has no such
+        method.
     silence
-        Is told that a sensor before it reads nothing, and whether since that one looks into a gap;
-        returns what is read then. None as above.
+        Called where a sensor before it has no reading, with whether the reason is a gap; returns
+        the reading. None if the sensor has no such method.
 
     """
 

@@ -60,21 +60,23 @@ _FARTHEST = 1e9
 
 @dataclass(frozen=True, slots=True)
 class ToleranceParameters:
-    """Points of links, pivots among them, that lie beside where the linkage file has them."""
+    """Points of links, including pivots, that deviate from the linkage file."""
 
     standard_deviation: float = number(
-        'of each coordinate of each point as made, drawn from the seed; none is off by more than '
-        'three times it',
+        'of each coordinate of each point, drawn with the seed; no deviation exceeds three times '
+        'this value',
         0.0,
         unit='m',
         least=0.0,
         most=_FARTHEST,
     )
-    links: tuple[str, ...] = names('links that deviate so, the ground among them', 'body')
+    links: tuple[str, ...] = names(
+        'links with such deviations, which may include the ground', 'body'
+    )
     given: Mapping[str, tuple[float, float]] = each(
-        'deviations that are known, in the frame of the link; they take the place of those drawn',
+        'known deviations, in the frame of the link; they replace the drawn ones',
         'point',
-        Point('from where it is drawn to where it is', 'm', _FARTHEST),
+        Point('from the place in the file to the real one', 'm', _FARTHEST),
     )
 
 

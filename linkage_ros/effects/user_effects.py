@@ -14,17 +14,17 @@
 
 
 """
-Effects of one's own: modules that a scene names by their dotted names, ``my_package.my_effect``.
+User-defined effects: modules that a scene names by their dotted names, ``my_package.my_effect``.
 
-Python finds them as it finds any module, on ``PYTHONPATH`` or in a sourced workspace. They have
-what the effects of this package have (see `linkage_ros.effects.stage`), and
+Python finds them like any module, on ``PYTHONPATH`` or in a sourced workspace. They have the same
+contents as the effects of this package (see `linkage_ros.effects.stage`), and
 
 ``AFTER``
-    The effect of this package behind which it acts, whether a scene names that or not. Of several
-    behind the same one the alphabet decides.
+    The effect of this package after which it acts, whether or not the scene names that one.
+    Several after the same one act in alphabetical order.
 ``NEEDS``
-    The quantities that it starts from, of `QUANTITIES`; they are then computed. May be left out. A
-    ``stage`` starts from `velocity` in any case.
+    Optional: the quantities that it starts from, of `QUANTITIES`; they are then computed. A
+    ``stage`` always starts from `velocity`.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
 from linkage_ros.files.parameters import declared
 
 QUANTITIES = ('velocity', 'acceleration', 'effort', 'pin_forces')
-"""What an effect can ask for."""
+"""Quantities that an effect can request."""
 
 FUNCTIONS = ('alter', 'drive_stage', 'stage', 'sensor', 'writer')
-"""Of these it has one at least."""
+"""Functions of which it has at least one."""
 
 _LAST_FOR_SENSORS = 'dropout'
 _IDENTIFYING_DIGITS = 16
@@ -57,7 +57,7 @@ _ORDER = tuple(EFFECTS)
 @cache
 def user_module(name: str) -> ModuleType:
     """
-    Import an effect of one's own, and look whether it is one.
+    Import a user-defined effect, and check it.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def user_module(name: str) -> ModuleType:
     Raises
     ------
     DefinitionError
-        Where there is none, or where it is no effect; ``where`` is its name.
+        If there is no such module, or it is no effect; ``where`` is its name.
 
     """
     if not all(part.isidentifier() for part in name.split('.')):
@@ -89,10 +89,10 @@ def user_module(name: str) -> ModuleType:
 
 
 def found_in(name: str) -> str:
-    """Return where Python would look for an effect of one's own; nothing of it is run for that."""
+    """Return where Python would find a user-defined effect, without running any of it."""
     package = name.partition('.')[0]
     try:
-        # Of the package alone: to look for a module within it would run the package.
+        # The package alone: searching for a module within it would run the package.
         spec = find_spec(package)
     except (ImportError, ValueError):
         spec = None
@@ -102,7 +102,7 @@ def found_in(name: str) -> str:
 
 
 def user_needs(name: str) -> tuple[str, ...]:
-    """Return the quantities that an effect of one's own starts from, and what these start from."""
+    """Return the quantities that a user-defined effect starts from, and those they start from."""
     module = user_module(name)
     own = (*(('velocity',) if hasattr(module, 'stage') else ()), *getattr(module, 'NEEDS', ()))
     needs = {need for one in own for need in (*NEEDS.get(one, ()), one)}
@@ -116,10 +116,10 @@ def with_user_effects(named: Iterable[str]) -> tuple[str, ...]:
 
 def identity(name: str) -> str:
     """
-    Return which module an effect of one's own is, for the account of a run.
+    Return which version of a user-defined effect a run uses.
 
-    It is the version of its package, where that says one as ``__version__``, and the beginning of
-    the SHA-256 of the module's file.
+    It is the ``__version__`` of the module or its package, if any, and the first digits of the
+    SHA-256 of the module's file.
     """
     module = user_module(name)
     package = sys.modules[name.partition('.')[0]]
@@ -145,7 +145,7 @@ def _failed(name: str, error: BaseException) -> DefinitionError:
 
 
 def _check(name: str, module: ModuleType) -> None:
-    """Refuse what is no effect."""
+    """Refuse a module that is no effect."""
     parameters: Any = getattr(module, 'PARAMETERS', None)
     try:
         known = isinstance(parameters, type) and declared(parameters) is not None
@@ -175,7 +175,7 @@ def _check(name: str, module: ModuleType) -> None:
 
 
 def _check_order(name: str, module: ModuleType) -> None:
-    """Refuse what acts before what it starts from, or where nothing can."""
+    """Refuse an effect that acts before one that it starts from, or after the last sensor."""
     after = getattr(module, 'AFTER', None)
     if after not in EFFECTS:
         known = f'name one of {listed(EFFECTS)}'

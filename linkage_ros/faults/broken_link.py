@@ -34,9 +34,9 @@ from linkage_ros.kinematics.status import Status
 
 @dataclass(frozen=True, slots=True)
 class BrokenLinkParameters:
-    """A link is in two: the linkage has no pose."""
+    """A link is broken: the linkage has no pose."""
 
-    link: str = name('which', 'link')
+    link: str = name('the broken link', 'link')
 
 
 PARAMETERS = BrokenLinkParameters

@@ -58,7 +58,7 @@ class Fault:
     """
     A fault that a scene can inject.
 
-    A fault of a scene.
+    Attributes
     ----------
     kind, parameters
         Key of `FAULTS`, and the parameters.

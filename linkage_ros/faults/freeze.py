@@ -31,7 +31,7 @@ from linkage_ros.faults.fault import Switch
 
 @dataclass(frozen=True, slots=True)
 class FreezeParameters:
-    """The last reading is published again and again, newly stamped."""
+    """The last reading is published again and again, with new stamps."""
 
 
 PARAMETERS = FreezeParameters

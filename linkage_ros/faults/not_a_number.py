@@ -31,7 +31,7 @@ from linkage_ros.messages.joint_state import with_every_number
 
 @dataclass(frozen=True, slots=True)
 class NotANumberParameters:
-    """The crank's messages say NaN."""
+    """The crank's messages hold NaN."""
 
 
 PARAMETERS = NotANumberParameters

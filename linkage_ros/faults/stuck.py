@@ -34,7 +34,7 @@ from linkage_ros.files.parameters import name
 class StuckParameters:
     """The sensor of one joint stands still."""
 
-    joint: str = name('which', 'joint')
+    joint: str = name('the joint of the sensor', 'joint')
 
 
 PARAMETERS = StuckParameters

@@ -32,9 +32,9 @@ from linkage_ros.messages.single_values import TIME_END
 
 @dataclass(frozen=True, slots=True)
 class TimeJumpParameters:
-    """The clock steps, and back when the fault ends."""
+    """The clock jumps, and jumps back when the fault ends."""
 
-    by: float = number('step; negative for back', unit='s', least=-1e6, most=1e6)
+    by: float = number('jump; negative for backwards', unit='s', least=-1e6, most=1e6)
 
 
 PARAMETERS = TimeJumpParameters

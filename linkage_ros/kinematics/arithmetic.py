@@ -16,7 +16,8 @@
 The functions in which the steps of a solution are written.
 
 They take numbers, or symbols of a `Tape`, which records the operations on them: so a step that is
-written once also becomes code of a compiled linkage.
+written once also becomes code of a compiled linkage. `Root` and its functions decide by a sum that
+may be zero, given the rounding errors of lengths and reaches.
 """
 
 from __future__ import annotations
@@ -24,9 +25,11 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable, Sequence
 import math
-from math import pi
+from math import fsum, pi
 from math import remainder as math_remainder
-from typing import Any
+from typing import Any, NamedTuple
+
+from linkage_ros.kinematics.status import Status
 
 
 def sin(angle: float) -> float:
@@ -166,3 +169,78 @@ def resolved(vector: complex, unit: complex) -> tuple[float, float]:
 def folded(angle: float) -> float:
     """Return the acute angle between two lines, given any angle between them, in [rad]."""
     return abs(math_remainder(angle, pi))
+
+
+UNIT_ROUNDOFF = 2.0**-53
+
+SMALLEST = 2.0**-1020
+"""Smaller numbers count as zero: their inverse would overflow."""
+
+ROUNDING = 16.0 * UNIT_ROUNDOFF
+"""Bound of the error of a reach, relative to the size of its terms."""
+
+
+def margin(*lengths: float) -> float:
+    """
+    Return a sum of signed lengths that is a constant of a linkage, correctly rounded.
+
+    Lengths come from files, in decimals: terms that cancel up to rounding were meant to cancel,
+    and their sum is 0.
+    """
+    total = fsum(lengths)
+    return 0.0 if abs(total) <= 4.0 * UNIT_ROUNDOFF * fsum(map(abs, lengths)) else total
+
+
+class Root(NamedTuple):
+    """
+    The root of a reach: the distance of a dyad from its limit.
+
+    Attributes
+    ----------
+    root
+        0 at the limit.
+    missing
+        0 if the dyad closes, otherwise the amount that the sum is short of 0.
+    status
+        A toggle if the sum is zero within its rounding error, open if it is negative.
+
+    """
+
+    root: float
+    missing: float = 0.0
+    status: Status = Status.CLOSED
+
+
+def reach(constant: float, part: float, square: float) -> Root:
+    """
+    Return the root of ``constant + part²``, given the square.
+
+    A dyad folds or stretches where such a sum, its reach, becomes zero. The constant is a bracket
+    of the linkage; the part is signed by the half angle. If the constant is zero, the root is the
+    part and has its sign. A sum within its own rounding error of zero counts as zero: these are
+    the last few floats on either side of a toggle, where the rate has no correct digit.
+    """
+    if constant == 0.0:
+        return Root(part)
+    return root_of(constant + square, abs(constant) + square)
+
+
+def root_of(total: float, size: float) -> Root:
+    """Return the root as `reach` does, of a sum; ``size`` is the sum of its absolute terms."""
+    rounding = ROUNDING * size
+    if total > rounding:
+        return Root(sqrt(total))
+    if total >= -rounding:
+        return Root(0.0, 0.0, Status.TOGGLE)
+    return Root(0.0, -total, Status.OPEN)
+
+
+def passes_zero(part: float, half_angle: float) -> bool:
+    """
+    Return whether the sine or cosine of a half angle is zero up to the rounding of the angle.
+
+    An angle is rounded at its own size, and π is not a double: at the nearest double the cosine of
+    the half angle is 6e-17.
+    """
+    size = abs(half_angle)
+    return abs(part) <= ROUNDING * where(size > 1.0, size, 1.0)

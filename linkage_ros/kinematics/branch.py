@@ -38,11 +38,12 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from math import floor, inf, nextafter, remainder, sqrt, tau
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.equations import Array, Constraint, derivative, equations, spread
-from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.step import State
 import numpy as np
 
@@ -136,11 +137,12 @@ class Cell(NamedTuple):
         return part
 
 
+@dataclass(frozen=True, slots=True)
 class Continuation:
     """
     Follows the solutions of constraints while one input changes.
 
-    Parameters
+    Attributes
     ----------
     constraints
         As many equations as there are unknowns.
@@ -149,14 +151,9 @@ class Continuation:
 
     """
 
-    __slots__ = ('_constraints', '_known_at', '_rates_at')
-
-    def __init__(
-        self, constraints: Sequence[Constraint], known_at: KnownAt, rates_at: RatesAt
-    ) -> None:
-        self._constraints = constraints
-        self._known_at = known_at
-        self._rates_at = rates_at
+    constraints: Sequence[Constraint]
+    known_at: KnownAt
+    rates_at: RatesAt
 
     def first(self, unknowns: Array, x: float) -> Node | None:
         """Return the node at a solution, with its tangent towards larger inputs."""
@@ -169,16 +166,16 @@ class Continuation:
 
     def alone(self, node: Node, away: Array) -> bool:
         """Return whether a node's solution is the only one at its input within a distance."""
-        known = self._known_at(float(node.place[-1]))
+        known = self.known_at(float(node.place[-1]))
         if known is None:
             return False
         unknowns = node.place[:-1]
         still = State([0.0] * len(known[0]), [0j] * len(known[1]))
         try:
-            inverse = np.linalg.inv(self._jacobian(unknowns, known))
+            inverse = np.linalg.inv(equations(self.constraints, unknowns.tolist(), known)[1])
         except np.linalg.LinAlgError:
             return False
-        change = spread(self._constraints, unknowns, known, away, still)
+        change = spread(self.constraints, unknowns, known, away, still)
         return _radius(np.abs(inverse) @ change) < 1.0
 
     def cells(self, node: Node, sign: float, last: float) -> Iterator[Cell]:
@@ -209,8 +206,7 @@ class Continuation:
             left = sign * (last - node.place[-1])
             slope = sign * float(node.tangent[-1])
             whole = slope > 0.0 and step * slope >= 0.9 * left
-            tried = self._cell(node, step, last if whole else None)
-            cell, growth = tried
+            cell, growth = self._cell(node, step, last if whole else None)
             if cell is not None and sign * (cell.end.place[-1] - last) > 0.0:
                 cell, growth = None, 0.5
             if cell is None:
@@ -269,7 +265,7 @@ class Continuation:
         middle = 0.125 * (control[0] + control[3]) + 0.375 * (control[1] + control[2])
         moved = np.abs(control - middle).max(axis=0)
         at = float(middle[-1])
-        known_rates = self._rates_at(at)
+        known_rates = self.rates_at(at)
         if known_rates is None:
             return inf
         known, speeds = known_rates
@@ -283,31 +279,24 @@ class Continuation:
         off = np.abs(inverse[:, :n] @ errors)
         moved += 5.0 * off.max()
         change = np.zeros((n + 1, n + 1))
-        ways = [_apart(known, end) for end in self._known_at_ends(cell) if end is not None]
+        ends = [self.known_at(float(node.place[-1])) for node in cell[:2]]
+        ways = [_apart(known, end) for end in ends if end is not None]
         if len(ways) < 2:
             return inf
         way = State(
             np.max([w[0] for w in ways], axis=0).tolist(),
             np.max([w[1] for w in ways], axis=0).tolist() if ways[0][1] else [],
         )
-        change[:n, :n] = spread(self._constraints, middle[:n], known, moved[:n], way)
+        change[:n, :n] = spread(self.constraints, middle[:n], known, moved[:n], way)
         for node in cell[:2]:
-            ends = self._rates_at(float(node.place[-1]))
-            if ends is None:
+            system = self._system(node.place)
+            if system is None:
                 return inf
-            slope = self._slopes(node.place, *ends)[1][:, -1]
+            slope = system[1][:, -1]
             change[:n, -1] = np.maximum(change[:n, -1], np.abs(slope - slopes[:, -1]))
-        grown = np.abs(inverse) @ change
-        q = _radius(grown)
         if off.max() > 0.1 * float(np.abs(control[3] - control[0]).max()):
             return inf
-        return q
-
-    def _known_at_ends(self, cell: Cell) -> tuple[State | None, State | None]:
-        return (
-            self._known_at(float(cell.begin.place[-1])),
-            self._known_at(float(cell.end.place[-1])),
-        )
+        return _radius(np.abs(inverse) @ change)
 
     def _folded(self, cell: Cell) -> Cell:
         """Return the part of a cell before the point where x turns back."""
@@ -371,18 +360,14 @@ class Continuation:
 
     def _system(self, place: Array) -> tuple[Array, Array] | None:
         """Return the residuals, and their derivatives by the unknowns and the input."""
-        known_rates = self._rates_at(float(place[-1]))
+        known_rates = self.rates_at(float(place[-1]))
         return None if known_rates is None else self._slopes(place, *known_rates)
-
-    def _jacobian(self, unknowns: Array, known: State) -> Array:
-        _, jacobian = equations(self._constraints, unknowns.tolist(), known)
-        return np.array(jacobian)
 
     def _slopes(self, place: Array, known: State, speeds: State) -> tuple[Array, Array]:
         unknowns = place[:-1].tolist()
-        errors, jacobian = equations(self._constraints, unknowns, known)
+        errors, jacobian = equations(self.constraints, unknowns, known)
         still = [0.0] * len(unknowns)
-        drift = derivative(self._constraints, unknowns, known, speeds, still, None, still)
+        drift = derivative(self.constraints, unknowns, known, speeds, still, None, still)
         return np.array(errors), np.column_stack([jacobian, drift])
 
 
@@ -505,8 +490,6 @@ class Branch:
         Follows the branch.
     unknowns, x
         The solution at the pose, and the input there.
-    known_at
-        Returns the state of the links solved before at an input, None where they do not close.
     turning
         Whether the input is an angle.
     far
@@ -522,13 +505,12 @@ class Branch:
         continuation: Continuation,
         unknowns: Array,
         x: float,
-        known_at: Callable[[float], State | None],
         *,
         turning: bool,
         far: float,
     ) -> None:
         self._continuation = continuation
-        self._known_at = known_at
+        self._known_at = continuation.known_at
         self._turning = turning
         self._far = far
         self._x = x

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from itertools import combinations
 from math import inf, isfinite, isnan
 
@@ -48,7 +49,7 @@ def check(linkage: Linkage) -> None:
         _check_slider(linkage, name, slider)
     _check_points(linkage)
     if not linkage.inputs:
-        raise DefinitionError('input', 'nothing is driven', 'name a joint that is')
+        raise DefinitionError('input', 'no joint is driven', 'name the driven joint')
     for given in linkage.inputs:
         _check_input(linkage, given)
     names = [given.joint for given in linkage.inputs]
@@ -68,7 +69,9 @@ def check(linkage: Linkage) -> None:
     for point in (*linkage.traced, *(linkage.pose.points if linkage.pose else ())):
         if point not in points:
             key = 'traced' if point in linkage.traced else 'pose.points'
-            raise DefinitionError(key, f'{quoted(point)} is no point of a link', _one_of(points))
+            raise DefinitionError(
+                key, f'{quoted(point)} is not a point of a link', _one_of(points)
+            )
     if linkage.pose and len(linkage.pose.inputs) != len(linkage.inputs):
         raise DefinitionError(
             'pose.inputs',
@@ -88,7 +91,7 @@ def _check_points(linkage: Linkage) -> None:
         for point, place in points.items():
             if not all(map(isfinite, place)):
                 raise DefinitionError(
-                    f'links.{name}.{point}', f'{place} is no place', 'write two finite numbers'
+                    f'links.{name}.{point}', f'{place} is not a point', 'write two finite numbers'
                 )
     for (one, one_points), (other, other_points) in combinations(linkage.links.items(), 2):
         shared = sorted(set(one_points) & set(other_points))
@@ -98,14 +101,11 @@ def _check_points(linkage: Linkage) -> None:
                 f'shares the points {listed(shared)} with {one!r}',
                 'two links have one pin between them; rename the points that are not pins',
             )
-    carriers: dict[str, int] = {}
-    for points in linkage.links.values():
-        for point in points:
-            carriers[point] = carriers.get(point, 0) + 1
-    for slider in linkage.sliders.values():
-        carriers[slider.point] += 1
+    ends = [point for points in linkage.links.values() for point in points]
+    ends += [slider.point for slider in linkage.sliders.values()]
+    joined = {point for point, count in Counter(ends).items() if count > 1}
     for name, points in linkage.links.items():
-        pins = [point for point in points if carriers[point] > 1]
+        pins = [point for point in points if point in joined]
         for one, other in combinations(pins, 2):
             if points[one] == points[other]:
                 raise DefinitionError(
@@ -141,7 +141,7 @@ def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
     if slider.direction == (0.0, 0.0) or not all(map(isfinite, slider.direction)):
         raise DefinitionError(
             f'{key}.direction',
-            f'[{slider.direction[0]:g}, {slider.direction[1]:g}] points nowhere',
+            f'[{slider.direction[0]:g}, {slider.direction[1]:g}] has no direction',
             'write for example [1, 0]',
         )
 
@@ -166,14 +166,14 @@ def _check_input(linkage: Linkage, given: Input) -> None:
 
 def _check_all_limits(linkage: Linkage) -> None:
     for given in linkage.inputs:
-        _check_limits('input', given.limits, given.joint)
+        _check_limits('input', given.limits, given.joint, given.unit)
     for name, joint in linkage.joints.items():
-        _check_limits(f'joints.{name}', joint.limits, name)
+        _check_limits(f'joints.{name}', joint.limits, name, joint.unit)
         ends = (joint.limits.low, joint.limits.high)
         if isinstance(joint, RevoluteJoint) and ends != (-inf, inf) and inf in map(abs, ends):
             raise DefinitionError(
                 f'joints.{name}.limits',
-                f'{joint.limits} limits the angle on one side, and angles come round to it',
+                f'{joint.limits} rad limits the angle on one side, and angles come round to it',
                 'write two finite numbers',
             )
     if linkage.pose:
@@ -181,32 +181,33 @@ def _check_all_limits(linkage: Linkage) -> None:
             if not given.limits.low <= value <= given.limits.high:
                 raise DefinitionError(
                     'pose.inputs',
-                    f'{value:g} is beyond the limits {given.limits} of {quoted(given.joint)}',
+                    f'{value:g} {given.unit} is beyond the limits {given.limits} {given.unit} of '
+                    f'{quoted(given.joint)}',
                     'start within the limits, or widen them',
                 )
 
 
-def _check_limits(key: str, limits: Limits, name: str) -> None:
+def _check_limits(key: str, limits: Limits, name: str, unit: str) -> None:
     """Refuse limits that allow no motion."""
     low, high = limits.low, limits.high
     if isnan(low) or isnan(high) or low == inf or high == -inf:
         raise DefinitionError(
             f'{key}.limits',
-            f'{limits} of {quoted(name)} are no limits',
+            f'{limits} of {quoted(name)} are not valid limits',
             'write [low, high]; -.inf or .inf for none on a side',
         )
     if low >= high:
         fault = 'are the same number' if low == high else 'cross'
         raise DefinitionError(
             f'{key}.limits',
-            f'{limits} of {quoted(name)} {fault}',
+            f'{limits} {unit} of {quoted(name)} {fault}',
             'write [low, high], the lower one first',
         )
     for what in ('velocity', 'effort'):
         if not (value := getattr(limits, what)) > 0.0:
             raise DefinitionError(
                 f'{key}.{what}',
-                f'{value:g} of {quoted(name)} lets nothing move',
+                f'{value:g} of {quoted(name)} allows no motion',
                 'write a number of more than 0, or leave it out',
             )
 

@@ -145,7 +145,7 @@ class Closure:
         return svg(self)
 
     def _keep_limits(self) -> None:
-        """Let positions tell of limits; where there are none, nothing is asked at any."""
+        """Let `position` check the limits; without limits it checks nothing."""
         vars(self).pop('position', None)
         if self.bounds:
             self.position = limited(self.position, self.bounds)  # type: ignore[method-assign]
@@ -195,11 +195,11 @@ class Closure:
         return Position(status, 0.0, joints, state, poses, self)
 
     def known(self, *inputs: float) -> State:
-        """Return what is known before the first step: the ground's coordinate and the inputs'."""
+        """Return the state before the first step: the coordinates of the ground and the inputs."""
         return State(self._coordinates('inputs', inputs) or [], [])
 
     def posed(self, *inputs: float) -> Position:
-        """Close the loops as `position` does, whatever the limits."""
+        """Close the loops as `position` does, without limits."""
         return type(self).position(self, *inputs)
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
@@ -370,7 +370,7 @@ class Closure:
 
     def point_tracker(self, points: Sequence[tuple[str, complex]]) -> PointTracker:
         """
-        Return what follows certain points of links and computes no others.
+        Return a tracker of certain points of links, which computes no others.
 
         Parameters
         ----------
@@ -398,15 +398,19 @@ class Closure:
         }
 
     def beyond(self, position: Position) -> str:
-        """Return of a pose which joint is beyond its limits, in words; '' where none is."""
+        """Return which joint of a pose is beyond its limits, as text; '' if none is."""
         inputs = position.inputs
         joints = position.joints or self.position(*inputs).joints
         bound = self.bounds.exceeded(inputs, joints) if joints else None
         if bound is None:
             return ''
         driven_one = bound in self.bounds.inputs
-        value = bound.turned((inputs if driven_one else joints)[bound.number])
-        return f'{bound.name} at {value:.6g}, limits {self.linkage.limits[bound.name]}'
+        number = bound.number
+        value = bound.turned((inputs if driven_one else joints)[number])
+        turns = not self.linkage.inputs[number].slider if driven_one else self.turning[number]
+        unit = 'rad' if turns else 'm'
+        limits = self.linkage.limits[bound.name]
+        return f'{bound.name} at {value:.6g} {unit}, limits {limits} {unit}'
 
     def inputs_of(self, state: State) -> tuple[float, ...]:
         """Return the driven joints in a state, or their rates, in [rad] or [m]."""
@@ -416,10 +420,10 @@ class Closure:
 
     def residual(self, position: Position) -> float:
         """
-        Return what is left open by a closed position, in [m].
+        Return the closure error of a closed position, in [m].
 
-        Every link is walked from where it is held, with its angle alone: the farthest that two of
-        them miss a pin of theirs by, or a slider its place.
+        Each link is placed by its own pin or slider and its angle. The result is the largest
+        distance between the two places of a pin, or of a slider's point.
         """
         points, angles = self.points(position), self.link_angles(position)
         worst = 0.0
@@ -438,7 +442,7 @@ class Closure:
     @cached_property
     def input_ranges(self) -> tuple[InputRange, ...]:
         """
-        Where the single input can go, in [rad] or [m]; of several inputs, none.
+        Ranges of a single input, in [rad] or [m]; empty for several inputs.
 
         Every loop closes there, and no joint is beyond its limits.
         """
@@ -446,26 +450,27 @@ class Closure:
 
     @cached_property
     def singular_inputs(self) -> tuple[SingularInput, ...]:
-        """Where a single input meets toggles and change points; of several inputs, none."""
+        """Toggles and change points of a single input; empty for several inputs."""
         return singular_inputs(self)
 
     @cached_property
     def closing_ranges(self) -> tuple[InputRange, ...]:
         """
-        Where the single input closes every loop, whatever the limits; of several inputs, none.
+        Ranges in which a single input closes every loop, without limits; empty for several.
 
-        Of a cylinder those of positive length, unless it starts, or is limited to, the others.
+        A cylinder has those of positive length, unless it starts in the others or is limited to
+        them.
         """
         found = closing_ranges(self)
         return without_mirrored(self.linkage, self.structure, 0, found) if found else ()
 
     @cached_property
     def zero_length(self) -> float | None:
-        """Slide at which the two pins of a cylinder meet, in [m]; None without one."""
+        """Slide at which the two pins of a cylinder meet, in [m]; None if there is none."""
         return zero_length(self.linkage, self.structure, 0)
 
     def singularity_margin(self, position: Position) -> SingularityMargin:
-        """Return how near trouble a closed position is."""
+        """Return how near a closed position is to a singularity."""
         return singularity_margin(self, position)
 
     def _all(self, position: Position) -> State:
@@ -476,7 +481,7 @@ class Closure:
         return state
 
     def _coordinates(self, what: str, values: tuple[float, ...]) -> list[float] | None:
-        """Return the ground's coordinate and the inputs'; nothing where one is not finite."""
+        """Return the coordinates of the ground and the inputs; None if one is not finite."""
         if len(values) != len(self.input_names):
             names = listed(self.input_names)
             raise ValueError(f'{what}: {len(values)} given; give {len(self.input_names)}: {names}')
@@ -496,7 +501,7 @@ class Closure:
         return values if factors is None else map(mul, values, factors)
 
     def _check_own(self, what: str, found: Position | Velocity) -> None:
-        """Refuse what was found for another linkage: the steps would read its numbers."""
+        """Refuse a result of another linkage: the steps would read its numbers."""
         closure = getattr(found, 'closure', None)
         if getattr(closure, 'linkage', None) is not self.linkage:
             message = f'{what}: {quoted(found)} is not of {self!r}; give what that returned'

@@ -28,8 +28,19 @@ import math
 from math import fsum, inf, pi
 from typing import NamedTuple, Protocol
 
-from linkage_ros.kinematics.arithmetic import atan2, cos, phase, sin, sqrt, where
-from linkage_ros.kinematics.rounding import passes_zero, reach, Root, root_of, SMALLEST
+from linkage_ros.kinematics.arithmetic import (
+    atan2,
+    cos,
+    passes_zero,
+    phase,
+    reach,
+    Root,
+    root_of,
+    sin,
+    SMALLEST,
+    sqrt,
+    where,
+)
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
@@ -211,7 +222,6 @@ class CrankDiagonal:
         self._half_turn = (math.sin(0.5 * offset), math.cos(0.5 * offset))
 
     def at(self, known: State) -> Diagonal:
-        """Return the diagonal."""
         first, second = self.arms
         base = known.coordinates[second]
         half = 0.5 * (known.coordinates[first] - base)
@@ -370,12 +380,10 @@ class UnsignedDiagonal(CrankDiagonal):
     _at_change_point = Status.TOGGLE
 
     def at(self, known: State) -> Diagonal:
-        """Return the diagonal."""
         signed = super().at(known)
         return signed._replace(fold=abs(signed.fold), stretch=abs(signed.stretch))
 
     def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
-        """Return near/fold and far/stretch."""
         return diagonal.near / diagonal.fold, diagonal.far / diagonal.stretch
 
 
@@ -401,7 +409,6 @@ class FreeDiagonal:
         self._limits = (*limits, limits[1] != inf)
 
     def at(self, known: State) -> Diagonal:
-        """Return the diagonal."""
         start, end = (known.pins[i] for i in self._ends)
         return free_diagonal(end - start, abs(start) + abs(end), *self._limits)
 
@@ -419,7 +426,6 @@ class FreeDiagonal:
         _speeds: State,
         changes: State,
     ) -> DiagonalAcceleration:
-        """Return the derivative of `rates`."""
         first, second = self._ends
         vector = known.pins[second] - known.pins[first]
         return free_diagonal_acceleration(

@@ -22,14 +22,20 @@ derivative by time for given rates and accelerations.
 
 from __future__ import annotations
 
+from cmath import phase
 from collections.abc import Sequence
 from math import hypot, tau
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import facing, remainder, vector
+from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.topology import Joint
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.known_links import KnownLinks
 
 Array = NDArray[np.floating[Any]]
 
@@ -308,3 +314,85 @@ def line_motion(
     pull = (point[2] - through[2]) * back
     pull -= vector(0.0, 2.0 * turn) * velocity + vector(-turn * turn, change) * place
     return place, velocity, pull
+
+
+class Constraints:
+    """
+    The joints of a group of links, as constraints.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    joints
+        The joints of the group.
+    links
+        The links of the group.
+    planner
+        Gives and places the links solved before the group.
+
+    Attributes
+    ----------
+    all
+        The constraints: as many equations as there are unknowns.
+    slides
+        The sliders of the group, by name.
+    known_pins
+        Indices of the pins that links solved before the group have in it, by name.
+
+    """
+
+    def __init__(
+        self,
+        linkage: Linkage,
+        joints: Sequence[Joint],
+        links: Sequence[str],
+        planner: KnownLinks,
+    ) -> None:
+        self._linkage = linkage
+        self._planner = planner
+        self._links = links
+        self._bodies = {link: i for i, link in enumerate(links)}
+        self.all: list[Constraint] = []
+        self.known_pins: dict[str, int] = {}
+        self.slides: dict[str, OnLine] = {}
+        for joint in joints:
+            self._add_joint(joint)
+        self._add_drives()
+
+    def _add_joint(self, joint: Joint) -> None:
+        if joint.kind == 'R':
+            self.all.append(
+                Meeting(self._end(joint.link, joint.name), self._end(joint.to, joint.name))
+            )
+            return
+        slider = self._linkage.sliders[joint.name]
+        block, rail = self._facing(joint.link, 0.0), self._facing(joint.to, 0.0)
+        self.all.append(Parallel(block, rail, slider.angle))
+        self.slides[joint.name] = OnLine(
+            self._end(joint.link, slider.point),
+            self._end(joint.to, slider.through),
+            self._facing(joint.to, phase(complex(*slider.direction))),
+        )
+        self.all.append(self.slides[joint.name])
+
+    def _add_drives(self) -> None:
+        for i, given in enumerate(self._linkage.inputs, 1):
+            if given.slider in self.slides:
+                self.all.append(self.slides[given.slider]._replace(slide=i))
+            elif given.child in self._bodies or given.parent in self._bodies:
+                child, parent = (self._facing(end, 0.0) for end in (given.child, given.parent))
+                self.all.append(Parallel(child, parent, 0.0, i))
+
+    def _end(self, link: str, name: str) -> End:
+        points = self._planner.points[link]
+        if link in self._bodies:
+            return End(self._bodies[link], points[name] - next(iter(points.values())))
+        self.known_pins[name] = self._planner.place(link, points[name])
+        return End(-1, 0j, self.known_pins[name])
+
+    def _facing(self, link: str, direction: float) -> Facing:
+        if link in self._bodies:
+            return Facing(self._bodies[link], 0, direction)
+        angle = self._planner.angles[link].plus(direction)
+        return Facing(-1, angle.coordinate, angle.constant)

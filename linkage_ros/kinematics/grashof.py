@@ -21,9 +21,9 @@ from itertools import product
 from math import fsum
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import margin
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.rounding import margin
-from linkage_ros.kinematics.topology import Driven, Dyad, Structure
+from linkage_ros.kinematics.topology import Dyad, links_of, Structure
 
 
 class FourBarType(NamedTuple):
@@ -49,19 +49,19 @@ class FourBarType(NamedTuple):
 
 
 # In the order of the shortest link, or of the longest: input, coupler, output, frame.
-_GRASHOF = (
+GRASHOF = (
     ('GCRR', 'crank-rocker'),
     ('GRCR', 'double rocker (the coupler turns fully)'),
     ('GRRC', 'rocker-crank'),
     ('GCCC', 'double crank (drag link)'),
 )
-_TRIPLE_ROCKERS = (
+TRIPLE_ROCKERS = (
     ('RRR2', 'triple rocker, the input is longest'),
     ('RRR3', 'triple rocker, the coupler is longest'),
     ('RRR4', 'triple rocker, the output is longest'),
     ('RRR1', 'triple rocker, the frame is longest'),
 )
-_CHANGE_POINTS = (
+CHANGE_POINTS = (
     ('SCRR', 'change-point crank-rocker'),
     ('SRCR', 'change-point double rocker'),
     ('SRRC', 'change-point rocker-crank'),
@@ -99,9 +99,9 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     if fsum((shortest, p, q, -longest)) < 0.0 and margin(shortest, p, q, -longest):
         return FourBarType('', 'no loop (one link is longer than the others together)', excess)
     if excess > 0.0:
-        return FourBarType(*_GRASHOF[sides.index(shortest)], excess)
+        return FourBarType(*GRASHOF[sides.index(shortest)], excess)
     if excess < 0.0:
-        return FourBarType(*_TRIPLE_ROCKERS[sides.index(longest)], excess)
+        return FourBarType(*TRIPLE_ROCKERS[sides.index(longest)], excess)
     opposite = margin(a, -c) == margin(b, -d) == 0.0
     beside = margin(a, -b) == margin(c, -d) == 0.0 or margin(a, -d) == margin(b, -c) == 0.0
     if opposite and beside:
@@ -110,7 +110,7 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
         return FourBarType('S2X', 'parallelogram (change point)', 0.0)
     if beside:
         return FourBarType('S2X', 'kite (change point)', 0.0)
-    return FourBarType(*_CHANGE_POINTS[sides.index(shortest)], 0.0)
+    return FourBarType(*CHANGE_POINTS[sides.index(shortest)], 0.0)
 
 
 class FourBar(NamedTuple):
@@ -144,11 +144,7 @@ def four_bars(structure: Structure) -> Iterator[FourBar]:
             four_bar = _four_bar(structure, known, number, group)
             if four_bar is not None:
                 yield four_bar
-            known += [link for body in group.bodies for link in body]
-        elif isinstance(group, Driven):
-            known.append(group.joint.link)
-        else:
-            known += group.links
+        known += links_of(group)
 
 
 def _four_bar(structure: Structure, known: list[str], number: int, dyad: Dyad) -> FourBar | None:
@@ -165,17 +161,15 @@ def _four_bar(structure: Structure, known: list[str], number: int, dyad: Dyad) -
         pivot = min(pivots)
         closing = dyad.inner.name
         ((coupler,), (output,)) = dyad.bodies
-        lengths = (
-            _length(structure, arm, pivot, start),
-            _length(structure, coupler, start, closing),
-            _length(structure, output, closing, end),
-            _length(structure, frame, pivot, end),
+        a, b, c, d = (
+            abs(complex(*links[link][one]) - complex(*links[link][other]))
+            for link, one, other in (
+                (arm, pivot, start),
+                (coupler, start, closing),
+                (output, closing, end),
+                (frame, pivot, end),
+            )
         )
-        kind = four_bar_type(*lengths)
-        return FourBar(number, (arm, coupler, output, frame), lengths, kind)
+        kind = four_bar_type(a, b, c, d)
+        return FourBar(number, (arm, coupler, output, frame), (a, b, c, d), kind)
     return None
-
-
-def _length(structure: Structure, link: str, one: str, other: str) -> float:
-    points = structure.links[link]
-    return abs(complex(*points[one]) - complex(*points[other]))

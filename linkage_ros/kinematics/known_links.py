@@ -28,8 +28,7 @@ from math import frexp, hypot, ldexp
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
-from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail
-from linkage_ros.kinematics.step import Step
+from linkage_ros.kinematics.step import FixedPoint, PointOnLink, PointOnRail, Step
 from linkage_ros.kinematics.topology import Joint, Structure
 
 
@@ -216,8 +215,7 @@ class KnownLinks:
         slider = self._linkage.sliders[name]
         through = self.points[slider.along][slider.through]
         sliding = self.points[self.blocks[name]][slider.point]
-        direction = complex(*slider.direction)
-        direction /= abs(direction)
+        direction = slider.unit
         if on == slider.along:
             start = through + rect(1.0, slider.angle) * (point - sliding)
             return Line(start, direction, slider.angle, 1.0)

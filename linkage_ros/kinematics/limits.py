@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The limits of a linkage's joints: which states are beyond them.
+The limits of a linkage's joints, and the states beyond them.
 
-An input is compared as it is sent, an angle with all its turns. A published angle is compared in
-that of its turns which lies nearest to the middle of its limits, since it is the same pose.
+An input is compared as it is given, an angle with all its turns. A published angle is compared
+after whole turns that bring it nearest to the middle of its limits, since the pose is the same.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from functools import wraps
 from math import inf, pi, remainder, tau
 from typing import NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.arithmetic import ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.linkage import GROUND, Limits, Linkage, RevoluteJoint
-from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
@@ -39,15 +39,15 @@ if TYPE_CHECKING:
 
 
 _UNDISTURBED = (Status.CLOSED, Status.CHANGE_POINT)
-"""What a state beyond the limits would be without them; a toggle stays one, without rates."""
+"""A state of these becomes limited beyond the limits; a toggle stays one, without rates."""
 
 _ROUNDINGS = 4.0
-"""A value may be beyond by as many roundings: the sum of two typed numbers is within."""
+"""Roundings by which a value may be beyond: the sum of two decimal numbers is still within."""
 
 
 class Bound(NamedTuple):
     """
-    The limits of one joint, ready to be compared with.
+    The limits of one joint, ready for comparisons.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Bound(NamedTuple):
     low, high
         In [rad] or [m], widened by rounding.
     middle
-        About which a published angle is taken, in [rad]; None where turns count.
+        Middle of the limits of a published angle, in [rad]; None if whole turns count.
 
     """
 
@@ -77,13 +77,13 @@ class Bound(NamedTuple):
         return not self.low <= self.turned(value) <= self.high
 
     def turned(self, value: float) -> float:
-        """Return a value in that of its turns in which it is compared."""
+        """Return a value plus the whole turns with which it is compared."""
         if self.middle is None:
             return value
         return value - tau * round((value - self.middle) / tau)
 
     def margin(self, value: float) -> float:
-        """Return how far within the limits a value is, negative beyond them; continuous."""
+        """Return the distance of a value from the limits, negative beyond them; continuous."""
         if self.middle is None:
             return min(value - self.low, self.high - value)
         return self.high - self.middle - abs(remainder(value - self.middle, tau))
@@ -91,7 +91,7 @@ class Bound(NamedTuple):
 
 class Bounds:
     """
-    All limits of a linkage between which its joints stay.
+    All limits of a linkage's joints.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class Bounds:
         return bool(self.inputs or self.joints)
 
     def exceeded(self, inputs: Sequence[float], joints: Sequence[float]) -> Bound | None:
-        """Return the first limits that a state is beyond, none where it is within all."""
+        """Return the first limits that a state is beyond, or None."""
         for bound in self.inputs:
             if bound.beyond(inputs[bound.number]):
                 return bound
@@ -134,7 +134,7 @@ class Bounds:
         return None
 
     def beyond(self, inputs: Sequence[Array], joints: Array) -> Mask:
-        """Return of many states which are beyond; arrays (N,) of inputs and (joints, N)."""
+        """Return which of many states are beyond; inputs (N,) each, and joints (joints, N)."""
         import numpy as np  # local import: the batch alone needs it
 
         found = np.zeros(joints.shape[1], bool)
@@ -152,7 +152,7 @@ class Bounds:
 
 
 def limited(position: Callable[..., Position], bounds: Bounds) -> Callable[..., Position]:
-    """Return what closes the loops, and says of a pose that it is beyond the limits."""
+    """Return a function that closes the loops, with the status limited beyond the limits."""
     exceeded = bounds.exceeded
 
     @wraps(position)
@@ -176,14 +176,14 @@ def _bound(name: str, number: int, limits: Limits, *, turning: bool = False) -> 
 
 # Cylinders: driven slides whose length has a mirror image below zero.
 #
-# A rod that slides in a tube, each pinned to the rest by one pin that lies on the line, holds the
-# two pins apart by a length. With the tube turned about, minus that length holds them just so, and
-# nothing else of the linkage moves: every pose has a second one that no machine has.
+# A rod slides in a tube, and each has one pin, on the line. The slide is the distance of the pins.
+# With the tube turned by π, the negative distance holds the same pins, and nothing else moves. So
+# every pose has a second one that no machine has.
 
 
 def zero_length(linkage: Linkage, structure: Structure, index: int) -> float | None:
     """
-    Return at which slide the two pins of a cylinder meet.
+    Return the slide at which the two pins of a cylinder meet.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def zero_length(linkage: Linkage, structure: Structure, index: int) -> float | N
     Returns
     -------
     zero : float or None
-        In [m]; None where the input is not a cylinder.
+        In [m]; None if the input is not a cylinder.
 
     """
     name = linkage.inputs[index].slider
@@ -215,7 +215,7 @@ def zero_length(linkage: Linkage, structure: Structure, index: int) -> float | N
         places.append(complex(*structure.links[link][pins.pop()]))
     at_tube, at_rod = places
     through = complex(*structure.links[tube][slider.through])
-    along = complex(*slider.direction) / abs(complex(*slider.direction))
+    along = slider.unit
     arm = at_rod - complex(*structure.links[rod][slider.point])
     angle = slider.angle if slider.block else 0.0
     # From pin to pin where the slide is 0, along the line and across it.
@@ -228,9 +228,10 @@ def without_mirrored(
     linkage: Linkage, structure: Structure, index: int, ranges: tuple[InputRange, ...]
 ) -> tuple[InputRange, ...]:
     """
-    Return the ranges of an input, of a cylinder those in which its length is positive.
+    Return the ranges of an input; for a cylinder only those of positive length.
 
-    They are the others where its pose or its limits say so, and where there are no such ones.
+    Those of negative length are returned if its pose or its limits lie there, or if there are no
+    others.
 
     Parameters
     ----------

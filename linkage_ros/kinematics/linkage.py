@@ -21,10 +21,10 @@ is a pin of these links.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import Literal
+from typing import ClassVar, Literal
 
 Point = tuple[float, float]
 
@@ -63,6 +63,12 @@ class Slider:
     direction: Point
     block: str = ''
     angle: float = 0.0
+
+    @property
+    def unit(self) -> complex:
+        """Return the direction as a unit vector."""
+        direction = complex(*self.direction)
+        return direction / abs(direction)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,10 +120,17 @@ class Input:
     slider: str = ''
     limits: Limits = NO_LIMITS
 
+    @property
+    def unit(self) -> str:
+        """Return the unit of its value."""
+        return 'm' if self.slider else 'rad'
+
 
 @dataclass(frozen=True, slots=True)
 class RevoluteJoint:
     """A published angle, of ``child`` minus that of ``parent``, in [rad], as in a URDF."""
+
+    unit: ClassVar = 'rad'
 
     parent: str
     child: str
@@ -127,6 +140,8 @@ class RevoluteJoint:
 @dataclass(frozen=True, slots=True)
 class SlideJoint:
     """A published slide: the position of a slider's point along its line, in [m]."""
+
+    unit: ClassVar = 'm'
 
     slider: str
     limits: Limits = NO_LIMITS
@@ -215,3 +230,12 @@ class Linkage:
         named = {given.joint: given.limits for given in self.inputs}
         named |= {name: limits for name, limits in published.items() if name not in named}
         return {name: limits for name, limits in named.items() if limits != NO_LIMITS}
+
+
+def carriers(links: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:
+    """Return the links that carry each point, in the order of the file."""
+    found: dict[str, list[str]] = {}
+    for link, points in links.items():
+        for point in points:
+            found.setdefault(point, []).append(link)
+    return found

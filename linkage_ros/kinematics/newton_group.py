@@ -29,35 +29,30 @@ the pose is followed again for each state, with the same proof that no other ass
 
 from __future__ import annotations
 
-from cmath import phase
-from collections.abc import Sequence
+from cmath import phase, rect
+from collections.abc import Mapping, Sequence
+from copy import copy
 from math import hypot, inf, isnan, nan
 from operator import add, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.arithmetic import called, is_found
+from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.kinematics.arithmetic import called, is_found, UNIT_ROUNDOFF
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
 from linkage_ros.kinematics.compiling.python import straight
 from linkage_ros.kinematics.equations import (
     along,
     Array,
     Constraint,
+    Constraints,
     derivative,
-    End,
     equations,
-    Facing,
     line_motion,
-    Meeting,
     OnLine,
-    Parallel,
 )
-from linkage_ros.kinematics.initial_guess import initial_guess, InitialGuess
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step
-from linkage_ros.kinematics.topology import Joint
 import numpy as np
 
 if TYPE_CHECKING:
@@ -75,6 +70,10 @@ _AROUND = 64.0
 
 _MOVED = 1e-6
 """In lengths: a smaller closure error is not reported."""
+
+_EARLY_STEPS = 8
+_EARLY_SINGULAR = 1e-6
+"""Steps that end at a tolerance, and the conditioning below which full accuracy is needed."""
 
 
 class IteratedPose(NamedTuple):
@@ -108,8 +107,10 @@ class Iteration:
         As many equations as there are unknowns.
     slides
         The sliders whose slides are appended to the coordinates.
+    inputs
+        The inputs of the pose, as coordinates.
     start
-        The pose to continue from.
+        Approximate angle and place of each body at the pose, one after the other.
     before
         The steps before this one.
     sliding
@@ -117,16 +118,24 @@ class Iteration:
     far
         No slide needs to be longer than this to stretch a link.
 
+    Attributes
+    ----------
+    inputs
+        As given.
+    tolerance
+        Bound of the last correction, in [rad] and in the unit of the lengths; 0 for full accuracy.
+
     """
 
-    __slots__ = ('_before', '_branch', '_constraints', '_far', '_inputs', '_slides', '_sliding',
-                 '_solution', '_start', '_straight')  # fmt: skip
+    __slots__ = ('_before', '_branch', '_constraints', '_far', '_slides', '_sliding', '_solution',
+                 '_start', '_straight', 'inputs', 'tolerance')  # fmt: skip
 
     def __init__(
         self,
         constraints: tuple[Constraint, ...],
         slides: tuple[OnLine, ...],
-        start: InitialGuess,
+        inputs: tuple[float, ...],
+        start: Sequence[float],
         before: tuple[Step, ...],
         sliding: tuple[bool, ...],
         far: float,
@@ -134,32 +143,31 @@ class Iteration:
         self._constraints = constraints
         self._slides = slides
         self._before = before
-        self._inputs = start.inputs
+        self.inputs = inputs
         self._sliding = sliding
         self._far = far
-        self._start = np.array(
-            [
-                value
-                for angle, place in zip(start.angles, start.places, strict=True)
-                for value in (angle, place.real, place.imag)
-            ]
-        )
+        self._start = np.array(start)
         self._branch: Branch | None = None
         self._solution: Array | None = None
         self._straight: _StraightSystem | None = None
+        self.tolerance = 0.0
 
     @property
     def equation_count(self) -> int:
         """Return the number of equations solved at once."""
         return len(self._start)
 
-    @property
-    def inputs(self) -> tuple[float, ...]:
-        """Return the inputs of the pose, as coordinates."""
-        return self._inputs
+    def stopped_at(self, tolerance: float) -> Iteration:
+        """Return the same iteration with a tolerance; with several inputs it changes nothing."""
+        stopped = copy(self)
+        stopped.tolerance = tolerance
+        return stopped
 
     def close(self, known: State) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
+        early = self._closed_early(known) if self.tolerance else None
+        if early is not None:
+            return early
         solved = called(self._closed_at, len(known.coordinates), *known.coordinates, *known.pins)
         if not is_found(solved):
             return self._not_closed(known)
@@ -193,6 +201,31 @@ class Iteration:
             return None
         return (*unknowns.tolist(), *(unknowns + start.turned)[0::3].tolist(), jacobian)
 
+    def _closed_early(self, known: State) -> IteratedPose | None:
+        """Append a solution within the tolerance; None if the first steps do not contract."""
+        inputs = self._inputs_of(known)
+        start = self._start_at(inputs) if len(inputs) == 1 else None
+        if start is None or start.ends:
+            return None
+        unknowns, last = start.unknowns, start.farthest
+        for _ in range(_EARLY_STEPS):
+            errors, jacobian = self._system(known, unknowns)
+            try:
+                step = np.linalg.solve(jacobian, -errors)
+            except np.linalg.LinAlgError:
+                return None
+            length = float(np.abs(step).max())
+            if not length < 0.7 * last:
+                return None
+            unknowns, last = unknowns + step, length
+            if length <= self.tolerance:
+                if _conditioning(jacobian) <= _EARLY_SINGULAR:
+                    return None
+                values = unknowns.tolist()
+                self._place(known, values, (unknowns + start.turned)[0::3].tolist())
+                return IteratedPose(Status.CLOSED, 0.0, values, jacobian)
+        return None
+
     def _not_closed(self, known: State) -> IteratedPose:
         """Return the pose at a toggle, or the nearest one where the links are open."""
         inputs = self._inputs_of(known)
@@ -212,7 +245,7 @@ class Iteration:
         return IteratedPose(Status.TOGGLE, 0.0, values, jacobian)
 
     def _inputs_of(self, known: State) -> list[float]:
-        end = 1 + len(self._inputs)
+        end = 1 + len(self.inputs)
         return known.coordinates[1:end]
 
     def branch(self) -> Branch | None:
@@ -226,10 +259,13 @@ class Iteration:
             if solution is None:
                 return None
             self._branch = Branch(
-                Continuation(self._constraints, self._known, self._moving),
+                Continuation(
+                    self._constraints,
+                    lambda x: self._known_at((x,)),
+                    lambda x: self._moving_at((x,)),
+                ),
                 solution,
-                self._inputs[0],
-                self._known,
+                self.inputs[0],
                 turning=not self._sliding[0],
                 far=self._far,
             )
@@ -238,7 +274,7 @@ class Iteration:
     def solution(self) -> Array | None:
         """Return the unknowns at the pose's inputs; None if the pose leads to no solution."""
         if self._solution is None:
-            known = self._known_at(self._inputs)
+            known = self._known_at(self.inputs)
             corrected = self._correct(known, self._start, inf) if known is not None else None
             self._solution = corrected[0] if corrected is not None else None
         return self._solution
@@ -276,7 +312,7 @@ class Iteration:
 
         The constraints are linear in the places, which start at the least-squares solution.
         """
-        known = self._known_at(self._inputs)
+        known = self._known_at(self.inputs)
         if known is None:
             return None
         start = np.zeros_like(self._start)
@@ -289,7 +325,7 @@ class Iteration:
 
     def solution_at(self, x: float) -> Array | None:
         """Return the unknowns at a value of the single input; None outside the branch."""
-        start, known = self._start_at((x,)), self._known(x)
+        start, known = self._start_at((x,)), self._known_at((x,))
         if start is None or known is None:
             return None
         corrected = self._correct(known, start.unknowns, start.farthest)
@@ -330,7 +366,7 @@ class Iteration:
         return known
 
     def _moving_at(
-        self, inputs: Sequence[float], rates: Sequence[float]
+        self, inputs: Sequence[float], rates: Sequence[float] = (1.0,)
     ) -> tuple[State, State] | None:
         """Return the state of the links solved before and its rates, or None."""
         known, speeds = State([0.0, *inputs], []), State([0.0, *rates], [])
@@ -340,12 +376,6 @@ class Iteration:
                 return None
             step.rates(pose, known, speeds)
         return known, speeds
-
-    def _known(self, x: float) -> State | None:
-        return self._known_at((x,))
-
-    def _moving(self, x: float) -> tuple[State, State] | None:
-        return self._moving_at((x,), (1.0,))
 
     def _start_at(self, inputs: Sequence[float]) -> Start | None:
         """Return where Newton's method starts; None if the assembly does not lead there."""
@@ -359,7 +389,7 @@ class Iteration:
         solution = self.solution()
         if solution is None:
             return None
-        ways = [value - begin for value, begin in zip(inputs, self._inputs, strict=True)]
+        ways = [value - begin for value, begin in zip(inputs, self.inputs, strict=True)]
         length = hypot(*ways)
         still = np.zeros_like(solution)
         if not length:
@@ -367,7 +397,7 @@ class Iteration:
         rates = [way / length for way in ways]
 
         def place(x: float) -> list[float]:
-            return [begin + x * rate for begin, rate in zip(self._inputs, rates, strict=True)]
+            return [begin + x * rate for begin, rate in zip(self.inputs, rates, strict=True)]
 
         continuation = Continuation(
             self._constraints,
@@ -499,112 +529,123 @@ def _solve(jacobian: Array, *drift: float) -> list[float]:
     return rates
 
 
-class Constraints:
+def iteration(
+    linkage: Linkage,
+    links: Sequence[str],
+    constraints: Constraints,
+    planner: KnownLinks,
+    before: tuple[Step, ...],
+) -> Iteration:
     """
-    The joints of a group of links, as constraints of an `Iteration`.
+    Return the step that solves a group of links.
 
     Parameters
     ----------
     linkage
         The linkage.
-    joints
-        The joints of the group.
     links
         The links of the group.
+    constraints
+        Their joints.
     planner
-        Gives and places the links solved before the group.
+        The links solved before the group.
+    before
+        The steps before it.
 
-    Attributes
-    ----------
-    slides
-        The sliders of the group, by name.
+    Raises
+    ------
+    DefinitionError
+        If there is no pose, or if it has too few points of a link.
 
     """
+    pose, scale = linkage.pose, planner.scale
+    if pose is None:
+        raise DefinitionError(
+            'pose',
+            f'is missing: no dyad covers {listed(links)}, they are solved by iteration',
+            'give inputs, and where points of these links lie then: '
+            'pose: {inputs: [...], points: {...}}',
+        )
+    sliding = tuple(bool(given.slider) for given in linkage.inputs)
+    inputs = tuple(
+        value / scale if slides else value
+        for value, slides in zip(pose.inputs, sliding, strict=True)
+    )
+    known = State([0.0, *inputs], [])
+    for step in before:
+        if not step.close(known).status.has_pose:
+            raise DefinitionError(
+                'pose.inputs',
+                'what comes before the iterated links does not close there',
+                'give inputs that the linkage can have',
+            )
+    x, pins = known
+    places = {name: complex(*place) / scale for name, place in pose.points.items()}
+    places |= {name: pins[i] for name, i in constraints.known_pins.items()}
+    angles = {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()}
+    start = _initial_guess(linkage, links, planner, places, angles)
+    far = sum(
+        max(abs(one - other) for one in points.values() for other in points.values())
+        for points in planner.points.values()
+    )
+    slides = tuple(constraints.slides.values())
+    return Iteration(tuple(constraints.all), slides, inputs, start, before, sliding, far)
 
-    def __init__(
-        self,
-        linkage: Linkage,
-        joints: Sequence[Joint],
-        links: Sequence[str],
-        planner: KnownLinks,
-    ) -> None:
-        self._linkage = linkage
-        self._planner = planner
-        self._links = links
-        self._bodies = {link: i for i, link in enumerate(links)}
-        self._constraints: list[Constraint] = []
-        self._known_pins: dict[str, int] = {}
-        self.slides: dict[str, OnLine] = {}
-        for joint in joints:
-            self._add_joint(joint)
-        self._add_drives()
 
-    def iteration(self, before: tuple[Step, ...]) -> Iteration:
-        """Return the step that solves the group, given the steps before it."""
-        planner = self._planner
+def _initial_guess(
+    linkage: Linkage,
+    links: Sequence[str],
+    planner: KnownLinks,
+    given: Mapping[str, complex],
+    angles: dict[str, float],
+) -> list[float]:
+    """Return angle and place of each link, fitted to the given places of points."""
+    points = planner.points
 
-        def place_known(
-            inputs: Sequence[float],
-        ) -> tuple[dict[str, complex], dict[str, float]]:
-            known = State([0.0, *inputs], [])
-            for step in before:
-                if not step.close(known).status.has_pose:
+    def by_slider(link: str) -> float | None:
+        """Return the angle of a link from its slider: by the other link or by the direction."""
+        for name, slider in linkage.sliders.items():
+            block, rail = planner.blocks[name], slider.along
+            ends = slider.through, slider.point
+            if link not in (block, rail):
+                continue
+            turn = slider.angle if link == block else 0.0
+            if all(end in given for end in ends) and given[ends[0]] != given[ends[1]]:
+                along = given[ends[1]] - given[ends[0]]
+                return phase(along / complex(*slider.direction)) + turn
+            if link == block:
+                return angle_of(rail) + turn
+            if block in angles:
+                return angles[block] - slider.angle
+        return None
+
+    def angle_of(link: str) -> float:
+        if link not in angles:
+            known = [name for name in points[link] if name in given]
+            apart = [n for n in known[1:] if points[link][n] != points[link][known[0]]]
+            if apart:
+                there = given[apart[0]] - given[known[0]]
+                angles[link] = phase(there / (points[link][apart[0]] - points[link][known[0]]))
+            else:
+                angle = by_slider(link)
+                if angle is None:
                     raise DefinitionError(
-                        'pose.inputs',
-                        'what comes before the iterated links does not close there',
-                        'give inputs that the linkage can have',
+                        'pose.points',
+                        f'does not say where {link!r} lies',
+                        f'give two of its points: {listed(points[link])}',
                     )
-            x, pins = known
-            return (
-                {name: pins[i] for name, i in self._known_pins.items()},
-                {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()},
+                angles[link] = angle
+        return angles[link]
+
+    start: list[float] = []
+    for link in links:
+        angle = angle_of(link)
+        known = next((name for name in points[link] if name in given), None)
+        if known is None:
+            raise DefinitionError(
+                'pose.points', f'does not say where {link!r} lies', 'give one of its points'
             )
-
-        start = initial_guess(
-            self._linkage, self._links, planner.blocks, planner.points, planner.scale, place_known
-        )
-        sliding = tuple(bool(given.slider) for given in self._linkage.inputs)
-        far = sum(
-            max(abs(one - other) for one in points.values() for other in points.values())
-            for points in planner.points.values()
-        )
-        return Iteration(
-            tuple(self._constraints), tuple(self.slides.values()), start, before, sliding, far
-        )
-
-    def _add_joint(self, joint: Joint) -> None:
-        if joint.kind == 'R':
-            self._constraints.append(
-                Meeting(self._end(joint.link, joint.name), self._end(joint.to, joint.name))
-            )
-            return
-        slider = self._linkage.sliders[joint.name]
-        block, rail = self._facing(joint.link, 0.0), self._facing(joint.to, 0.0)
-        self._constraints.append(Parallel(block, rail, slider.angle))
-        self.slides[joint.name] = OnLine(
-            self._end(joint.link, slider.point),
-            self._end(joint.to, slider.through),
-            self._facing(joint.to, phase(complex(*slider.direction))),
-        )
-        self._constraints.append(self.slides[joint.name])
-
-    def _add_drives(self) -> None:
-        for i, given in enumerate(self._linkage.inputs, 1):
-            if given.slider in self.slides:
-                self._constraints.append(self.slides[given.slider]._replace(slide=i))
-            elif given.child in self._bodies or given.parent in self._bodies:
-                child, parent = (self._facing(end, 0.0) for end in (given.child, given.parent))
-                self._constraints.append(Parallel(child, parent, 0.0, i))
-
-    def _end(self, link: str, name: str) -> End:
-        points = self._planner.points[link]
-        if link in self._bodies:
-            return End(self._bodies[link], points[name] - next(iter(points.values())))
-        self._known_pins[name] = self._planner.place(link, points[name])
-        return End(-1, 0j, self._known_pins[name])
-
-    def _facing(self, link: str, direction: float) -> Facing:
-        if link in self._bodies:
-            return Facing(self._bodies[link], 0, direction)
-        angle = self._planner.angles[link].plus(direction)
-        return Facing(-1, angle.coordinate, angle.constant)
+        first = next(iter(points[link].values()))
+        place = given[known] + rect(1.0, angle) * (first - points[link][known])
+        start += (angle, place.real, place.imag)
+    return start

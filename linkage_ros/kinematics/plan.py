@@ -17,12 +17,13 @@
 from __future__ import annotations
 
 from cmath import phase, rect
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, listed, quoted
-from linkage_ros.kinematics.arithmetic import cross, resolved
+from linkage_ros.kinematics.arithmetic import cross, resolved, ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.diagonals import (
     AnyDiagonal,
     CrankDiagonal,
@@ -43,9 +44,8 @@ from linkage_ros.kinematics.dyads.rrr import (
 )
 from linkage_ros.kinematics.known_links import Angle, Held, KnownLinks, Line, Slide
 from linkage_ros.kinematics.linkage import Input, Linkage
-from linkage_ros.kinematics.point_steps import RelativeAngle
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
-from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
+from linkage_ros.kinematics.step import RelativeAngle
 from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Structure
 
 _SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
@@ -109,18 +109,31 @@ class SolutionPlan(KnownLinks):
         self._structure = structure
         self._assembly = dict(linkage.assembly)
         self._keys: list[str] = []
+        self._missing: dict[str, str] = {}
         for self.group, group in enumerate(structure.groups):
             if isinstance(group, Driven):
                 self._drive(group)
             elif isinstance(group, Dyad):
                 self._close(group)
             else:
+                self._check_sides()  # the iteration starts from the links before it
                 self._iterate(group)
+        self._check_sides()
         for name in self._assembly:
             raise DefinitionError(
                 f'assembly.{name}',
                 f'{quoted(name)} does not close a dyad that has two assemblies',
                 f'name {listed(map(repr, self._keys))}' if self._keys else 'leave it out',
+            )
+
+    def _check_sides(self) -> None:
+        """Refuse a linkage without the sides of all dyads so far."""
+        if self._missing:
+            verb = 'is' if len(self._missing) == 1 else 'are'
+            raise DefinitionError(
+                'assembly',
+                f'{listed(map(repr, self._missing))} {verb} missing',
+                f'write {listed(self._missing.values())}',
             )
 
     def _drive(self, driven: Driven) -> None:
@@ -139,11 +152,7 @@ class SolutionPlan(KnownLinks):
                         one + sign * other for one, other in zip(before, with_input, strict=True)
                     )
             self.angles[joint.link] = Angle(coordinate, angle.constant, angle.unit)
-            self.held[joint.link] = Held(
-                self.points[joint.link][joint.name],
-                joint.to,
-                self.points[joint.to][joint.name],
-            )
+            self.pin_to(joint.link, joint)
             return
         point = self.point_of(joint.name, joint.link)
         line = self.line(joint.name, joint.to, point)
@@ -170,22 +179,13 @@ class SolutionPlan(KnownLinks):
         one_arm = self.arm(one, first.name, closing)
         other_arm = self.arm(other, second.name, closing)
         b, c = abs(one_arm), abs(other_arm)
-        diagonal: AnyDiagonal
-        hinge = self._hinge(first.name, second.name)
-        if hinge is None:
-            ends = self.place_pin(first.name), self.place_pin(second.name)
-            diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c, 4.0 * b * c)), _LEVEL
-        else:
-            diagonal, base = (
-                crank_diagonal(
-                    hinge.a, b, c, hinge.d, hinge.arms, hinge.offset, self._driven_only(hinge.arms)
-                ),
-                hinge.base,
-            )
-            sign = hinge.side_at_change_point(diagonal, sign)
-        kind: type[RRRDyad] = RRRDyad
-        if FoldingRRRDyad.fits(diagonal):
-            kind = FoldingRRRDyad
+        diagonal, base, sign = self._diagonal(
+            dyad,
+            (abs(b - c), b + c, 4.0 * b * c),
+            lambda a, d, *hinge: crank_diagonal(a, b, c, d, *hinge),
+            sign,
+        )
+        kind: type[RRRDyad] = FoldingRRRDyad if FoldingRRRDyad.fits(diagonal) else RRRDyad
         self.add(kind(diagonal, b, c, sign))
         k = self.new_coordinates(2)
         self.angles[one] = _facing(k, base, one_arm)
@@ -204,24 +204,12 @@ class SolutionPlan(KnownLinks):
         offset = foot.imag
         if abs(offset) <= 4.0 * UNIT_ROUNDOFF * (abs(line.start) + abs(start)):
             offset = 0.0
-        diagonal: AnyDiagonal
-        hinge = self._hinge(first.name, second.name)
-        if hinge is None:
-            ends = self.place_pin(first.name), self.place_pin(second.name)
-            diagonal, base = FreeDiagonal(ends, (abs(offset), inf, inf)), _LEVEL
-        else:
-            diagonal, base = (
-                swivel_diagonal(
-                    hinge.a,
-                    hinge.d,
-                    offset,
-                    hinge.arms,
-                    hinge.offset,
-                    self._driven_only(hinge.arms),
-                ),
-                hinge.base,
-            )
-            sign = hinge.side_at_change_point(diagonal, sign)
+        diagonal, base, sign = self._diagonal(
+            dyad,
+            (abs(offset), inf, inf),
+            lambda a, d, *hinge: swivel_diagonal(a, d, offset, *hinge),
+            sign,
+        )
         self.add(RPRDyad(diagonal, offset, sign))
         k = self.new_coordinates(2)
         self.angles[rail] = _facing(k, base, line.direction)
@@ -330,12 +318,14 @@ class SolutionPlan(KnownLinks):
             self.pin_to(outer.link, outer)
 
     def _iterate(self, group: Iterated) -> None:
-        from linkage_ros.kinematics.newton_group import Constraints  # local import: it loads numpy
+        from linkage_ros.kinematics.equations import Constraints  # local import: it loads numpy
+        from linkage_ros.kinematics.newton_group import iteration  # local import: likewise
 
         joints = self._structure.joints_of(group)
         constraints = Constraints(self._linkage, joints, group.links, self)
         slides = constraints.slides
-        self.add(constraints.iteration(tuple(self.steps)))
+        step = iteration(self._linkage, group.links, constraints, self, tuple(self.steps))
+        self.add(step)
         k = self.new_coordinates(len(group.links) + len(slides))
         for i, link in enumerate(group.links):
             self.angles[link] = Angle(k + i, 0.0, 1 + 0j)
@@ -375,6 +365,23 @@ class SolutionPlan(KnownLinks):
         return DrivenOffset(
             self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j
         )
+
+    def _diagonal(
+        self,
+        dyad: Dyad,
+        limits: tuple[float, float, float],
+        crank: Callable[..., CrankDiagonal],
+        sign: int,
+    ) -> tuple[AnyDiagonal, Angle, int]:
+        """Return the diagonal of a dyad, the zero of its directions, and the dyad's sign."""
+        first, second = (outer.name for outer in dyad.outer)
+        hinge = self._hinge(first, second)
+        if hinge is None:
+            ends = self.place_pin(first), self.place_pin(second)
+            return FreeDiagonal(ends, limits), _LEVEL, sign
+        turns_known = self._driven_only(hinge.arms)
+        diagonal = crank(hinge.a, hinge.d, hinge.arms, hinge.offset, turns_known)
+        return diagonal, hinge.base, hinge.side_at_change_point(diagonal, sign)
 
     def _hinge(self, first: str, second: str) -> _Hinge | None:
         """Return the links with a common pin O that carry two pins, or None."""
@@ -421,9 +428,8 @@ class SolutionPlan(KnownLinks):
         choices = ' or '.join(sides)
         side = self._assembly.pop(closing, None)
         if side is None:
-            raise DefinitionError(
-                'assembly', f'{closing!r} is missing', f'write {closing}: {choices} ({meaning})'
-            )
+            self._missing[closing] = f'{closing}: {choices} ({meaning})'
+            return 1
         if side not in sides:
             raise DefinitionError(
                 f'assembly.{closing}',
@@ -431,6 +437,16 @@ class SolutionPlan(KnownLinks):
                 f'write {choices} ({meaning})',
             )
         return sides[side]
+
+
+def assembly_sides(structure: Structure) -> dict[str, tuple[str, ...]]:
+    """Return the pins and sliders whose side is to be written, with the sides they may have."""
+    sides = {}
+    for group in structure.groups:
+        if isinstance(group, Dyad) and group.kind in _SIDES:
+            closing = group.outer[1] if group.kind == 'RRP' else group.inner
+            sides[closing.name] = tuple(_SIDES[group.kind])
+    return sides
 
 
 def _facing(coordinate: int, base: Angle, vector: complex) -> Angle:

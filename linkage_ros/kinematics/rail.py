@@ -29,8 +29,17 @@ import math
 from math import fsum, inf, pi
 from typing import NamedTuple, Protocol
 
-from linkage_ros.kinematics.arithmetic import facing, phase, vector, where
-from linkage_ros.kinematics.rounding import margin, passes_zero, reach, Root, root_of
+from linkage_ros.kinematics.arithmetic import (
+    facing,
+    margin,
+    passes_zero,
+    phase,
+    reach,
+    Root,
+    root_of,
+    vector,
+    where,
+)
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
@@ -161,7 +170,6 @@ class CrankRail:
         return tuple(psi - phase(self._arm) for bracket, psi in across if bracket == 0.0)
 
     def at(self, known: State) -> PinOnRail:
-        """Return the pin in the frame of the rail."""
         first, second = self.arms
         base = known.coordinates[second]
         swing = known.coordinates[first] - base
@@ -207,7 +215,6 @@ class CrankRail:
         )
 
     def rates(self, sight: PinOnRail, _known: State, speeds: State) -> tuple[complex, float]:
-        """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
         first, second = self.arms
         turn, arm = speeds.coordinates[second], sight.arm
         swing = speeds.coordinates[first] - turn
@@ -221,7 +228,6 @@ class CrankRail:
         speeds: State,
         changes: State,
     ) -> tuple[complex, float]:
-        """Return the pin's acceleration in the frame of the rail, and that of the frame."""
         first, second = self.arms
         swing = speeds.coordinates[first] - speeds.coordinates[second]
         change = changes.coordinates[second]
@@ -229,7 +235,6 @@ class CrankRail:
         return (1j * swing_change - swing * swing) * sight.arm, change
 
     def climb(self, sight: PinOnRail, rise: float, speeds: State) -> float:
-        """Return ẏ/(below·above); ``rise`` is ẏ."""
         if not self._changes_over:
             return rise / (sight.below * sight.above)
         first, second = self.arms
@@ -283,7 +288,6 @@ class UnsignedRail(CrankRail):
     _at_change_point = Status.TOGGLE
 
     def at(self, known: State) -> PinOnRail:
-        """Return the pin in the frame of the rail."""
         signed = super().at(known)
         lean = where((signed.below < 0.0) != (signed.above < 0.0), -signed.lean, signed.lean)
         return signed._replace(below=abs(signed.below), above=abs(signed.above), lean=lean)
@@ -315,7 +319,6 @@ class FreeRail:
         self._back = unit.conjugate()
 
     def at(self, known: State) -> PinOnRail:
-        """Return the pin in the frame of the rail."""
         base = known.coordinates[self._arm]
         start, end = (known.pins[i] for i in self._ends)
         place = (end - start) * (facing(-base) * self._back)
@@ -332,7 +335,6 @@ class FreeRail:
         return PinOnRail(place, below.root, above.root, gap, base, 0j, 0.0, status)
 
     def rates(self, sight: PinOnRail, _known: State, speeds: State) -> tuple[complex, float]:
-        """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
         start, end = (speeds.pins[i] for i in self._ends)
         turn = speeds.coordinates[self._arm]
         back = facing(-sight.base) * self._back
@@ -346,7 +348,6 @@ class FreeRail:
         _speeds: State,
         changes: State,
     ) -> tuple[complex, float]:
-        """Return the pin's acceleration in the frame of the rail, and that of the frame."""
         start, end = (changes.pins[i] for i in self._ends)
         velocity, turn = rates
         change = changes.coordinates[self._arm]
@@ -356,12 +357,10 @@ class FreeRail:
         return (end - start) * back - apparent, change
 
     def climb(self, sight: PinOnRail, rise: float, _speeds: State) -> float:
-        """Return ẏ/(below·above); ``rise`` is ẏ."""
         return rise / (sight.below * sight.above)
 
     def across(
         self, sight: PinOnRail, pull: complex, link_rate: float, _speeds: State, _changes: State
     ) -> float:
-        """Return (ÿ + y·λ̇²)/(below·above)."""
         across = pull.imag + sight.place.imag * link_rate * link_rate
         return across / (sight.below * sight.above)

@@ -13,24 +13,25 @@
 # limitations under the License.
 
 """
-Where an input can go: the intervals in which every loop closes.
+The ranges of an input: the intervals in which every loop closes.
 
 The limits of a dyad on a crank and the ground follow from its lengths, those of an iterated group
-from its branch. What else there is, chains, is searched within these: sampled, and each limit
-narrowed down to neighbouring floats.
+from its branch. The limits of all other dyads are searched within these ranges: the input is
+sampled, and each limit is narrowed down to neighbouring floats.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from math import acos, asin, ceil, floor, inf, lcm, pi, remainder, sqrt, tau
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from linkage_ros.kinematics.diagonals import CrankDiagonal
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
-from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, RelativeAngle
+from linkage_ros.kinematics.linkage import Point
 from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
+from linkage_ros.kinematics.step import FixedPoint, PointOnLink, PointOnRail, RelativeAngle
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.branch import Branch
@@ -62,25 +63,25 @@ def golden(function: Callable[[float], float], low: float, high: float) -> tuple
 _SAMPLES = 720
 
 _POINT = 1e-9
-"""Of an interval: what is open over no more than this is a place without a pose, and no gap."""
+"""Fraction of an interval: a narrower open part is a single place without a pose, and no gap."""
 
 _ROUNDED = 1e-9
-"""Of a margin: what is farther from zero has its sign."""
+"""A margin farther from zero than this has a certain sign."""
 
 _CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle)
 
 
 def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     """
-    Return where the lengths let a single input go, whatever limits its joints have.
+    Return the ranges of a single input in which every loop closes, without limits of joints.
 
-    None where it closes nowhere, and of several inputs.
+    Empty if it closes nowhere, or if there are several inputs.
     """
     if len(closure.linkage.inputs) > 1:
         return ()
     branches = _branches(closure)
     if branches:
-        # Each is followed only where those before it close: the last one lies within all.
+        # Each branch is followed only where those before it close: the last one lies within all.
         return tuple(_on_a_branch(closure, branches[-1]))
     if closure.linkage.inputs[0].slider:
         far = reach(closure)
@@ -103,21 +104,33 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     if intervals and not exact:
         start, end = intervals[0][0], intervals[-1][1]
         intervals = [part for ends in intervals for part in _searched(closure, *ends, _SAMPLES)]
-        ends_meet = end - start >= tau and len(intervals) > 1
-        if ends_meet and intervals[0][0] == start and intervals[-1][1] == end:
-            # One interval that runs through the end of the turn.
-            (_, high), *others, (low, _) = intervals
-            intervals = [*others, (low, high + tau)]
+        if end - start >= tau:
+            intervals = through_the_end(intervals, start, end)
     return tuple(InputRange(low, high) for low, high in intervals)
+
+
+def through_the_end(
+    parts: list[tuple[float, float]], low: float, high: float, turn: float = tau
+) -> list[tuple[float, float]]:
+    """Return the parts of whole turns, those at both ends as one that runs through the end."""
+    if len(parts) < 2 or parts[0][0] != low or parts[-1][1] != high:
+        return parts
+    (_, end), *others, (begin, _) = parts
+    return [*others, (begin, end + turn)]
+
+
+def _iterations(closure: LoopClosure) -> dict[int, Any]:
+    """Return the steps that iterate, by their numbers."""
+    return {number: step for number, step in enumerate(closure.steps) if hasattr(step, 'branch')}
 
 
 def iterated(closure: LoopClosure) -> bool:
     """Return whether a linkage has links that only iteration solves."""
-    return any(hasattr(step, 'branch') for step in closure.steps)
+    return bool(_iterations(closure))
 
 
 def whole_turns(closure: LoopClosure) -> int:
-    """Return how many whole turns of the inputs change nothing, 0 where each turn is another."""
+    """Return the number of whole turns after which poses repeat; 0 if each turn differs."""
     if len(closure.linkage.inputs) > 1:
         return 0 if iterated(closure) else 1
     return lcm(*(branch.interval.period if branch else 1 for branch in _branches(closure)))
@@ -125,14 +138,14 @@ def whole_turns(closure: LoopClosure) -> int:
 
 def _branches(closure: LoopClosure) -> list[Branch | None]:
     """Return the branch of each iterated group."""
-    return [step.branch() for step in closure.steps if hasattr(step, 'branch')]
+    return [step.branch() for step in _iterations(closure).values()]
 
 
 def _on_a_branch(closure: LoopClosure, branch: Branch | None) -> Iterator[InputRange]:
-    """Yield the intervals of a branch in which what comes behind it closes, too."""
+    """Yield the intervals of a branch in which the steps after it close too."""
     if branch is None:
         return
-    after = 1 + max(i for i, step in enumerate(closure.steps) if hasattr(step, 'branch'))
+    after = 1 + max(_iterations(closure))
     behind = [s for s in closure.steps[after:] if not isinstance(s, _CLOSE_EVERYWHERE)]
     turning = not closure.linkage.inputs[0].slider
     unit = 1.0 if turning else closure.scale
@@ -142,19 +155,17 @@ def _on_a_branch(closure: LoopClosure, branch: Branch | None) -> Iterator[InputR
     if behind:
         count = _SAMPLES * max(1, ceil((high - low) / tau)) if turning else 4 * _SAMPLES
         parts = _searched(closure, low, high, count)
-        if turns and len(parts) > 1 and parts[0][0] == low and parts[-1][1] == high:
-            # One interval that runs through the end of the turns.
-            (_, end), *others, (begin, _) = parts
-            parts = [*others, (begin, end + turns * tau)]
+        if turns:
+            parts = through_the_end(parts, low, high, turns * tau)
     for begin, end in parts:
         ends = limited[0] or begin > low, limited[1] or end < high
-        # What turns fully has no ends, and is said as it is of dyads.
+        # A full turn has no ends; it is reported as for dyads.
         ends = ends if any(ends) else (True, True) if turns else ends
         yield InputRange(begin, end, turning, ends, whole_turns(closure))
 
 
 def describe(ranges: tuple[InputRange, ...]) -> str:
-    """Return ranges as a user reads them."""
+    """Return ranges as text for a user."""
     return ' or '.join(map(str, ranges)) or 'no single range: it depends on every input'
 
 
@@ -186,12 +197,17 @@ def _crank_intervals(diagonal: CrankDiagonal) -> list[tuple[float, float]]:
     return [(-highest, -lowest), (lowest, highest)]
 
 
+def link_lengths(links: Mapping[str, Mapping[str, Point]]) -> list[float]:
+    """Return the longest distance between two points of each link, in [m]."""
+    return [
+        max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
+        for points in links.values()
+    ]
+
+
 def reach(closure: LoopClosure) -> float:
     """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
-    return sum(
-        max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
-        for points in closure.structure.links.values()
-    )
+    return sum(link_lengths(closure.structure.links))
 
 
 def search(
@@ -202,7 +218,7 @@ def search(
     margin: Callable[[float], float] | None = None,
 ) -> Iterator[tuple[float, float]]:
     """
-    Yield the parts of an interval in which something holds, as that loops close.
+    Yield the parts of an interval in which a condition holds, such as that loops close.
 
     Parameters
     ----------
@@ -211,11 +227,10 @@ def search(
     low, high
         The interval.
     samples
-        Where it is looked at.
+        Number of samples.
     margin
-        By how much it holds at a value, negative where it does not. Where that has a valley or a
-        summit between samples, it is looked at there, too; without it what is narrower than from
-        sample to sample is missed.
+        Margin by which it holds at a value, negative if it does not. Its valleys and summits
+        between samples are tested too; without it, parts narrower than a sample are missed.
 
     """
     values = [low + (high - low) * i / samples for i in range(samples)] + [high]
@@ -242,7 +257,7 @@ def search(
 def _turning_points(
     margin: Callable[[float], float], values: Sequence[float], margins: Sequence[float]
 ) -> Iterator[float]:
-    """Yield where a margin may reach to the other side of zero between samples."""
+    """Yield the values between samples at which a margin may cross zero and return."""
     for i in range(1, len(values) - 1):
         before, here, after = margins[i - 1], margins[i], margins[i + 1]
         if 0.0 < here <= min(before, after):
@@ -252,10 +267,10 @@ def _turning_points(
 
 
 def _margin(closure: LoopClosure, value: float) -> float:
-    """Return how far a state is from the limits of its dyads, negative where it does not close."""
+    """Return the distance of a state from the limits of its dyads; negative if it is open."""
     position = closure.posed(value)
     if not position.status.has_pose:
-        # Where two pins meet, or two lines are parallel, it does not end.
+        # Where two pins meet, or two lines are parallel, the range does not end.
         return 0.0 if not position.gap else -position.gap
     angles = [
         step.transmission_angle(pose)
@@ -268,7 +283,7 @@ def _margin(closure: LoopClosure, value: float) -> float:
 def _searched(
     closure: LoopClosure, low: float, high: float, samples: int
 ) -> list[tuple[float, float]]:
-    """Return the parts of an interval in which loops close, the narrow ones, too."""
+    """Return the parts of an interval in which loops close, including narrow ones."""
 
     def closes(value: float) -> bool:
         return closure.posed(value).status.has_pose
@@ -276,7 +291,7 @@ def _searched(
     parts: list[tuple[float, float]] = []
     for begin, end in search(closes, low, high, samples, partial(_margin, closure)):
         if parts and begin - parts[-1][1] < _POINT * (high - low):
-            # Between them two pins meet, or two lines are parallel, and nothing ends.
+            # Between them two pins meet, or two lines are parallel: the range does not end.
             parts[-1] = (parts[-1][0], end)
         else:
             parts.append((begin, end))
@@ -284,7 +299,7 @@ def _searched(
 
 
 def last_inside(closes: Callable[[float], bool], inside: float, outside: float) -> float:
-    """Return the last value at which the loops close, on the way to one at which they do not."""
+    """Return the last value at which loops close, between one at which they do and one not."""
     for _ in range(60):
         middle = 0.5 * (inside + outside)
         if middle in (inside, outside):
@@ -296,24 +311,24 @@ def last_inside(closes: Callable[[float], bool], inside: float, outside: float) 
     return inside
 
 
-# Where the machine lets an input go: what its lengths allow, cut by the limits of its joints.
+# The ranges of an input in the machine: the closing ranges, cut by the limits of joints.
 #
-# The limits of the input itself cut exactly. Those of published joints are searched: the margin
-# that is left to them is sampled over each range, its valleys and summits between samples are
-# narrowed down, and each change of its sign to neighbouring floats.
+# The limits of the input itself cut exactly. Those of published joints are searched: their margin
+# is sampled over each range, its valleys and summits between samples are narrowed down, and each
+# change of its sign is narrowed down to neighbouring floats.
 
 _SAME = 1e-9
-"""What joints may differ by and be the same, in [rad] or of a length."""
+"""Largest difference of joints that count as equal, in [rad] or relative to the scale."""
 
 _COPIES = 8
-"""How many turns of a range are told of an input whose limits are turns apart."""
+"""Largest number of turns of a range that are listed for an input with wide limits."""
 
 
 def input_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     """
-    Return where a single input can go: every loop closes, every joint is within its limits.
+    Return the ranges of a single input: every loop closes, every joint is within its limits.
 
-    None where that is nowhere, and of several inputs.
+    Empty if there is none, or if there are several inputs.
     """
     ranges, bounds = closure.closing_ranges, closure.bounds
     if bounds.inputs:
@@ -324,7 +339,7 @@ def input_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
 
 
 def within_own(closure: LoopClosure, ranges: Sequence[InputRange]) -> tuple[InputRange, ...]:
-    """Return what the limits of the single input itself leave of ranges."""
+    """Return the parts of ranges within the limits of the single input itself."""
     (bound,) = closure.bounds.inputs
     return tuple(part for one in ranges for part in _cut(closure, one, bound))
 
@@ -332,14 +347,14 @@ def within_own(closure: LoopClosure, ranges: Sequence[InputRange]) -> tuple[Inpu
 def within_published(
     closure: LoopClosure, ranges: Sequence[InputRange], bounds: Sequence[Bound]
 ) -> tuple[InputRange, ...]:
-    """Return what limits of published joints leave of ranges of the single input."""
+    """Return the parts of ranges of the single input within limits of published joints."""
     if not closure.bounds.inputs:
         ranges = [copy for one in ranges for copy in _assemblies(closure, one)]
     return tuple(part for one in ranges for part in _within_limits(closure, one, bounds))
 
 
 def _assemblies(closure: LoopClosure, interval: InputRange) -> Iterator[InputRange]:
-    """Yield a range, and the same a turn on where the poses there are others."""
+    """Yield a range, and the same one turn later if the poses there differ."""
     yield interval
     if not interval.turning or interval.whole or interval.turns != 1:
         return
@@ -351,7 +366,7 @@ def _assemblies(closure: LoopClosure, interval: InputRange) -> Iterator[InputRan
 
 
 def turns(closure: LoopClosure, position: Callable[[float], Position]) -> int:
-    """Return after how many turns of an input that turns fully all joints are the same."""
+    """Return the number of turns after which all joints repeat, for an input that turns fully."""
     count = max(1, whole_turns(closure))
     once = all(repeats(closure, position, 0.1 + i, count * tau) for i in range(6 * count))
     return count if once else 2 * count
@@ -360,7 +375,7 @@ def turns(closure: LoopClosure, position: Callable[[float], Position]) -> int:
 def repeats(
     closure: LoopClosure, position: Callable[[float], Position], value: float, shift: float
 ) -> bool:
-    """Return whether all joints are the same again after a shift, but for whole turns."""
+    """Return whether all joints are the same after a shift, apart from whole turns."""
     here, there = position(value).joints, position(value + shift).joints
     return len(here) == len(there) and all(
         abs(remainder(p - q, tau) if turning else p - q)
@@ -370,7 +385,7 @@ def repeats(
 
 
 def _cut(closure: LoopClosure, interval: InputRange, bound: Bound) -> Iterator[InputRange]:
-    """Yield what the limits of the input itself leave of a range; angles count with turns."""
+    """Yield the parts of a range within the limits of the input; angles count with turns."""
     limits = closure.linkage.inputs[0].limits
     if not (interval.turning and interval.turns):
         yield from _between(interval, limits.low, limits.high, bound.name)
@@ -398,7 +413,7 @@ def _cut(closure: LoopClosure, interval: InputRange, bound: Bound) -> Iterator[I
 
 
 def _copied(closure: LoopClosure, interval: InputRange, shift: float) -> InputRange | None:
-    """Return a range some turns on, none where the linkage does not close there."""
+    """Return a range some turns later, or None if the linkage does not close there."""
     inside = 0.6 * interval.lowest + 0.4 * interval.highest
 
     def closes(value: float) -> bool:
@@ -414,7 +429,7 @@ def _copied(closure: LoopClosure, interval: InputRange, shift: float) -> InputRa
 
 
 def _between(interval: InputRange, low: float, high: float, name: str) -> Iterator[InputRange]:
-    """Yield what two limits leave of a range."""
+    """Yield the part of a range between two limits, if any."""
     lowest, highest = interval.lowest, interval.highest
     limited, by = list(interval.limited), list(interval.by)
     if low > lowest:

@@ -16,7 +16,7 @@
 """
 Results of a closure: position, velocity, acceleration; ranges, singular inputs, margins.
 
-They stand below the modules that work them out, and below `Closure`.
+The modules that compute them, and `Closure`, import this one.
 """
 
 from __future__ import annotations
@@ -44,14 +44,13 @@ class InputRange(NamedTuple):
     turning
         Whether the input is an angle.
     limited
-        Of each end whether the linkage ends there; a slide may go on, beyond what was searched,
-        and so may an angle that is limited on one side.
+        For each end whether the input cannot go beyond it. A slide may go beyond the end of the
+        search, and so may an angle that is limited on one side.
     turns
-        How many whole turns of the input change nothing: one where dyads alone are solved, several
-        where links that are iterated come back after so many, and 0 where they never do, so that
-        each turn has poses of its own.
+        Number of whole turns of the input after which the poses repeat: 1 if all links are solved
+        by dyads, several if iterated links come back after so many, 0 if they never do.
     by
-        Of each end the joint whose limits it is at; '' where there is another reason: a toggle.
+        For each end the joint that is at its limit there; '' at a toggle.
 
     """
 
@@ -64,14 +63,14 @@ class InputRange(NamedTuple):
 
     @property
     def whole(self) -> bool:
-        """Whether the input turns fully, on and on."""
+        """Whether the input turns fully, without end."""
         width = self.highest - self.lowest
         comes_round = self.turning and self.turns > 0 and self.by == ('', '')
         return comes_round and width >= self.turns * tau
 
     @property
     def toggles(self) -> tuple[float, ...]:
-        """Return the ends at which a toggle lies: those that the linkage's lengths set."""
+        """Return the ends at which a toggle lies: those that follow from the links' lengths."""
         if self.whole:
             return ()
         ends = zip((self.lowest, self.highest), self.limited, self.by, strict=True)
@@ -95,7 +94,7 @@ class InputRange(NamedTuple):
         return f'{low} to {high} {unit}'
 
     def shifted(self, shift: float) -> InputRange:
-        """Return the range as far away as this."""
+        """Return the range moved by a distance, in [rad] or [m]."""
         return self._replace(lowest=self.lowest + shift, highest=self.highest + shift)
 
     @property
@@ -113,8 +112,8 @@ class SingularInput(NamedTuple):
     value
         In [rad] or [m].
     status
-        ``TOGGLE`` where the linkage ends or turns back, ``CHANGE_POINT`` where it goes on, and
-        ``INDETERMINATE`` where it has no pose that could be told: two pins meet, or two lines are
+        ``TOGGLE`` where the linkage ends or turns back, ``CHANGE_POINT`` where it passes, and
+        ``INDETERMINATE`` where its pose is not determined: two pins coincide, or two lines are
         parallel.
 
     """
@@ -125,22 +124,21 @@ class SingularInput(NamedTuple):
 
 class SingularityMargin(NamedTuple):
     """
-    How near trouble a position is; the smaller, the nearer.
+    How near a position is to a singularity: the smaller, the nearer.
 
     Attributes
     ----------
     transmission_angle
-        The smallest of all dyads, folded into [0, π/2], in [rad]; π/2 where there is none.
+        The smallest of all dyads, folded into [0, π/2], in [rad]; π/2 if there is none.
     conditioning
         The smallest singular value of a loop's Jacobian, of rows of length 1: for a dyad of
         transmission angle μ it is √2·sin(μ/2), from 0 at a toggle to 1. For an iterated group it
         is the smallest singular value divided by the largest.
     toggle_distance
-        How far the input is from the next singular one, in [rad] or [m]; infinite where there is
-        none, and where there are several inputs.
+        Distance of the input from the nearest singular one, in [rad] or [m]; infinite if there is
+        none, or if there are several inputs.
     group
-        Number of the group whose conditioning that is; −1 where there is no dyad and none that is
-        iterated.
+        Number of the group with this conditioning; −1 if there is no dyad and no iterated group.
 
     """
 
@@ -154,7 +152,7 @@ class LoopClosure(Protocol):
     """
     The part of a `Closure` that ranges, margins, limits and the compiler use.
 
-    They stand below `Closure`, which calls them. Its docstrings say what each member is.
+    `Closure` imports them. Its docstrings describe the members.
     """
 
     linkage: Linkage

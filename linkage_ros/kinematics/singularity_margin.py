@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""How near trouble a linkage is: transmission angle, conditioning, distance to a toggle."""
+"""The margin to a singularity: transmission angle, conditioning, distance to a toggle."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ if TYPE_CHECKING:
 
 
 _SAME = 1e-9
-"""Singular inputs that are nearer to each other are one, in [rad] or [m]."""
+"""Singular inputs nearer to each other than this count as one, in [rad] or [m]."""
 
 _BESIDE = 1e-6
-"""How far beside a singular input a dyad's side is looked at, in [rad] or [m]."""
+"""Distance from a singular input at which the side of a dyad is compared, in [rad] or [m]."""
 
 
 _STATES = 4096
-"""How many states are kept while a linkage is searched for singular inputs."""
+"""Number of states that are kept during the search for singular inputs."""
 
 
 def singularity_margin(closure: LoopClosure, position: Position) -> SingularityMargin:
-    """Return how near trouble a closed position is."""
+    """Return the margin of a closed position to a singularity."""
     angle, conditioning, weakest = 0.5 * pi, 1.0, -1
     groups = closure.step_groups
     for step, pose, group in zip(closure.steps, position.poses, groups, strict=True):
@@ -70,9 +70,9 @@ def singularity_margin(closure: LoopClosure, position: Position) -> SingularityM
 
 def away(closure: LoopClosure, value: float, place: float) -> float:
     """
-    Return how far a value of the single input is from a place, in [rad] or [m].
+    Return the distance of a value of the single input from a place, in [rad] or [m].
 
-    Whole turns do not count, but from an end of a range where each turn has poses of its own.
+    Whole turns do not count, except from the end of a range whose turns have different poses.
     """
     if closure.linkage.inputs[0].slider:
         return value - place
@@ -85,12 +85,12 @@ def away(closure: LoopClosure, value: float, place: float) -> float:
 
 def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
     """
-    Return where a single input meets toggles and change points, in ascending order.
+    Return the toggles and change points of a single input, in ascending order.
 
-    Toggles end the ranges of the input. Where the links of a dyad's two outer pins turn with the
-    input, its constants tell at which angles its links lie in one line, or its lines are parallel.
-    Of all other dyads the transmission angle is searched over the ranges for where it is 0, and of
-    a straight rod in a swivel, whose angle never is, the distance of the two pins.
+    Toggles end the ranges of the input. If the links of a dyad's two outer pins turn with the
+    input, its constants give the angles at which its links are collinear, or its lines parallel.
+    For all other dyads the zeros of the transmission angle are searched over the ranges; for a
+    straight rod in a swivel, whose angle is never 0, those of the distance of its two pins.
     """
     from linkage_ros.kinematics.sweep_analysis import zeros  # local import: it needs the closure
 
@@ -99,14 +99,14 @@ def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
         return ()
     ends = [end for interval in closure.closing_ranges for end in interval.toggles]
     found = [SingularInput(end, Status.TOGGLE) for end in ends]
-    # All dyads are looked at in the same states.
+    # All dyads are evaluated at the same states.
     posed = lru_cache(_STATES)(closure.posed)
     for number, step in enumerate(closure.steps):
         if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
             continue
         places = _turned_by_input(closure, step)
         if places is None:
-            places = zeros(partial(_room, step, number, posed), closure.closing_ranges)
+            places = zeros(partial(_distance, step, number, posed), closure.closing_ranges)
         for place in places:
             status = _met(closure, number, place)
             distances = (abs(away(closure, place, one.value)) for one in found)
@@ -116,7 +116,7 @@ def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
 
 
 def _within(closure: LoopClosure, value: float) -> float:
-    """Return the input of the same pose within the ranges: of a cylinder its other length."""
+    """Return the input of the same pose within the ranges: for a cylinder its other length."""
     zero = closure.zero_length
     ranges = closure.closing_ranges
     if zero is None or any(one.lowest <= value <= one.highest for one in ranges):
@@ -138,16 +138,16 @@ def _turned_by_input(closure: LoopClosure, step: Any) -> list[float] | None:
 
 
 def _met(closure: LoopClosure, number: int, place: float) -> Status | None:
-    """Return what a dyad meets where it is singular; nothing where no loops close next to it."""
+    """Return the kind of a dyad's singular input; None if no loop closes next to it."""
     status = closure.posed(place).status
     beside = [closure.posed(place + step) for step in (-_BESIDE, _BESIDE)]
     if not any(position.status.has_pose for position in beside):
         return None
     if not status.has_pose or _never_toggles(closure.steps[number]):
-        # The float next to where lines are parallel, or pins meet, may have a pose.
+        # The nearest float to parallel lines, or to coincident pins, may have a pose.
         return Status.INDETERMINATE
     if status is Status.CLOSED and all(position.status.has_pose for position in beside):
-        # The floats next to it, of a dyad that follows others: does it come out on its other side?
+        # A dyad after others, next to the singular float: is it on its other side afterwards?
         step: Any = closure.steps[number]
         before, after = (step.side_of(position.poses[number]) for position in beside)
         return Status.CHANGE_POINT if before * after < 0.0 else Status.TOGGLE
@@ -161,8 +161,8 @@ def _never_toggles(step: Any) -> bool:
     )
 
 
-def _room(step: Any, number: int, posed: Callable[[float], Position], value: float) -> float:
-    """Return how far a dyad is from being singular at an input, in [rad]; 0 without a pose."""
+def _distance(step: Any, number: int, posed: Callable[[float], Position], value: float) -> float:
+    """Return the angle of a dyad to its singularity at an input, in [rad]; 0 without a pose."""
     position = posed(value)
     if len(position.poses) <= number or not position.status.has_pose:
         return 0.0

@@ -14,7 +14,7 @@
 
 
 """
-The steps of a solution, and the state that they pass on.
+The steps of a solution, the state that they pass on, and the steps that place points.
 
 A linkage is solved by a sequence of steps. Each step starts from the known coordinates and pins
 and appends its own; velocities and accelerations are computed by the same sequence again, in lists
@@ -24,8 +24,10 @@ coordinates that the steps append. Lengths are in the unit of the closure's scal
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
+from linkage_ros.kinematics.arithmetic import facing
 from linkage_ros.kinematics.status import Status
 
 
@@ -81,3 +83,154 @@ class Step(Protocol):
         self, pose: Any, rates: Any, known: State, speeds: State, changes: State, /
     ) -> None:
         """Append to the accelerations."""
+
+
+@dataclass(frozen=True, slots=True)
+class FixedPoint:
+    """A point of the ground, at ``place`` in the frame of the ground."""
+
+    place: complex
+
+    def close(self, known: State) -> Pose:
+        """Append the point."""
+        known.pins.append(self.place)
+        return PLACED
+
+    def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
+        """Append a velocity of zero."""
+        speeds.pins.append(0j)
+
+    def accelerations(
+        self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
+    ) -> None:
+        """Append an acceleration of zero."""
+        changes.pins.append(0j)
+
+
+@dataclass(frozen=True, slots=True)
+class PointOnLink:
+    """
+    A point at a constant distance from a pin of the same link.
+
+    Attributes
+    ----------
+    pin
+        Index of that pin.
+    arm
+        Index, among the coordinates, of the angle of the link.
+    vector
+        Vector from the pin to the point at a coordinate of 0.
+
+    """
+
+    pin: int
+    arm: int
+    vector: complex
+
+    def close(self, known: State) -> Pose:
+        """Append the point."""
+        arm = facing(known.coordinates[self.arm]) * self.vector
+        known.pins.append(known.pins[self.pin] + arm)
+        return PLACED
+
+    def rates(self, _pose: Pose, known: State, speeds: State) -> complex:
+        """Append its velocity; return the vector from the pin."""
+        # Not the difference of the two places, which has few digits far from the origin.
+        arm = facing(known.coordinates[self.arm]) * self.vector
+        turn = speeds.coordinates[self.arm]
+        speeds.pins.append(speeds.pins[self.pin] + 1j * turn * arm)
+        return arm
+
+    def accelerations(
+        self, _pose: Pose, arm: complex, _known: State, speeds: State, changes: State
+    ) -> None:
+        """Append its acceleration."""
+        turn, change = speeds.coordinates[self.arm], changes.coordinates[self.arm]
+        changes.pins.append(changes.pins[self.pin] + (1j * change - turn * turn) * arm)
+
+
+@dataclass(frozen=True, slots=True)
+class PointOnRail:
+    """
+    A point that travels along a line of a link.
+
+    Attributes
+    ----------
+    pin
+        Index of the pin that the line starts from.
+    arm
+        Index, among the coordinates, of the angle of the link that carries the line.
+    slide
+        Index, among the coordinates, of the slide along the line.
+    unit
+        Direction in which the point travels with the slide, at a link coordinate of 0.
+
+    """
+
+    pin: int
+    arm: int
+    slide: int
+    unit: complex
+
+    def close(self, known: State) -> Pose:
+        """Append the point."""
+        unit = facing(known.coordinates[self.arm]) * self.unit
+        slide = known.coordinates[self.slide]
+        known.pins.append(known.pins[self.pin] + slide * unit)
+        return PLACED
+
+    def rates(self, _pose: Pose, known: State, speeds: State) -> None:
+        """Append its velocity."""
+        x, v = known.coordinates, speeds.coordinates
+        unit = facing(x[self.arm]) * self.unit
+        moved = v[self.slide] + 1j * (v[self.arm] * x[self.slide])
+        speeds.pins.append(speeds.pins[self.pin] + moved * unit)
+
+    def accelerations(
+        self, _pose: Pose, _rates: None, known: State, speeds: State, changes: State
+    ) -> None:
+        """Append its acceleration."""
+        x, v, a = known.coordinates, speeds.coordinates, changes.coordinates
+        unit = facing(x[self.arm]) * self.unit
+        slide, turn = x[self.slide], v[self.arm]
+        across = a[self.arm] * slide + 2.0 * turn * v[self.slide]
+        moved = a[self.slide] - turn * turn * slide + 1j * across
+        changes.pins.append(changes.pins[self.pin] + moved * unit)
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeAngle:
+    """
+    The angle of a link that a driven joint turns against another.
+
+    Attributes
+    ----------
+    arm, turn
+        Indices, among the coordinates, of the other link's angle and of the joint.
+    sign
+        +1 if the joint adds to that angle, −1 if it is subtracted.
+
+    """
+
+    arm: int
+    turn: int
+    sign: float
+
+    def close(self, known: State) -> Pose:
+        """Append the angle."""
+        self._append(known)
+        return PLACED
+
+    def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
+        """Append its rate."""
+        self._append(speeds)
+
+    def accelerations(
+        self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
+    ) -> None:
+        """Append its acceleration."""
+        self._append(changes)
+
+    def _append(self, state: State) -> None:
+        values = state.coordinates
+        values.append(values[self.arm] + self.sign * values[self.turn])

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What an input does to a linkage as it goes through its range: ways, samples, extremes."""
+"""A linkage while one input goes through its range: samples, extremes, checks of limits."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.limits import Bound, without_mirrored
-from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.kinematics.ranges import (
     describe,
     golden,
     reach,
     repeats,
     search,
+    through_the_end,
     turns,
     within_own,
     within_published,
@@ -45,18 +46,18 @@ from linkage_ros.kinematics.topology import Driven, Dyad, links_of
 
 def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..., Pose]:
     """
-    Return what gives the pose of a step, by the inputs, in [rad] and [m].
+    Return a function that gives the pose of a step at inputs, in [rad] and [m].
 
-    Of a hundred loops that hang side by side on a crank it closes one.
+    Of a hundred independent loops on a crank it closes one.
 
     Parameters
     ----------
     closure
         The linkage.
     number
-        Of the step.
+        Number of the step.
     *inputs
-        Where the linkage closes: where each step appends what it finds is looked up there.
+        Inputs at which the linkage closes: they show where each step appends its results.
 
     """
     needed = _needed(closure, closure.step_groups[number])
@@ -64,7 +65,7 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
     plan: list[tuple[Callable[[State], Pose], int, int]] = []
     for step, group in zip(closure.steps[: number + 1], closure.step_groups, strict=False):
         start = len(walked.coordinates), len(walked.pins)
-        # A pin is placed for the first group that asks for it, and serves others.
+        # A pin is placed for the first group that needs it, and used by others.
         if step.close(walked) is PLACED or group in needed:
             plan.append((step.close, *start))
 
@@ -72,7 +73,7 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
         state = closure.known(*values)
         found: Pose = PLACED
         for close, coordinates, pins in plan:
-            # What is left out has its places all the same, which nobody asks for.
+            # Steps that are left out keep their places in the lists, which nothing reads.
             state.coordinates.extend([0.0] * (coordinates - len(state.coordinates)))
             state.pins.extend([0j] * (pins - len(state.pins)))
             found = close(state)
@@ -84,7 +85,7 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
 
 
 def _needed(closure: LoopClosure, number: int) -> set[int]:
-    """Return the groups that one starts from, and it."""
+    """Return a group and those that it starts from, by number."""
     groups = closure.structure.groups
     owner = {link: i for i, group in enumerate(groups) for link in links_of(group)}
     needed: set[int] = set()
@@ -107,37 +108,37 @@ def _needed(closure: LoopClosure, number: int) -> set[int]:
 _SAMPLES = 720
 _GRID = 24
 _SAME = 1e-9
-"""What two values may differ by and be the same for a user, in [rad] or of a length."""
+"""Largest difference of values that count as equal, in [rad] or relative to a length."""
 
 _NOISE = 1e-13
-"""What two values may differ by and be the same but for their rounding, in [rad]."""
+"""Largest difference of values that is rounding, in [rad]."""
 
 _DEEPER = 10.0
-"""How far below its sample a valley may go, of what the samples beside it lie above."""
+"""Depth that a valley may have below its sample, relative to the height of those beside it."""
 
 _APART = 1e-4
-"""Places that are nearer to each other are one, in [rad] or [m]."""
+"""Places nearer to each other than this count as one, in [rad] or [m]."""
 
 _MANY = 12
-"""At more places than these a value is the rule and no extreme; also the lines of a grid."""
+"""An extreme met at more places than this lists none of them; also the lines of a grid."""
 
 
 _NEAR_ZERO, _ZERO = 0.25, 1e-7
-"""What a sample next to a zero is below, and what a zero is below, in [rad]."""
+"""Upper bounds of a sample next to a zero, and of a zero, in [rad]."""
 
 _EASY = 0.25
-"""Conditioning of a pose that shows a linkage well: its transmission angle is above 20 degrees."""
+"""Conditioning of a good pose to show: its transmission angle is above 20 degrees."""
 
 
 class Extreme(NamedTuple):
-    """A lowest or highest value, and where it is met; nowhere named where it is met all along."""
+    """A lowest or highest value, and the inputs where it occurs; none if it is constant."""
 
     value: float
     at: tuple[float, ...]
 
 
 class Sampled(NamedTuple):
-    """What a function comes to at values of the input, from one end of a range to the other."""
+    """The values of a function at samples of an input, from one end of a range to the other."""
 
     interval: InputRange
     values: list[float]
@@ -145,7 +146,7 @@ class Sampled(NamedTuple):
 
 
 class MinMaxCurve(NamedTuple):
-    """The lowest and the highest value of something over the range of an input."""
+    """The lowest and the highest value of a function over the ranges of an input."""
 
     lowest: Extreme
     highest: Extreme
@@ -165,7 +166,7 @@ class InputSweep:
     closure
         The linkage.
     held
-        Values of all inputs, in [rad] or [m]; not needed where there is one.
+        Values of all inputs, in [rad] or [m]; not needed for a single input.
     index
         Number of the input that moves.
 
@@ -200,10 +201,10 @@ class InputSweep:
     @cached_property
     def ranges(self) -> tuple[InputRange, ...]:
         """
-        Where every loop closes, as a user expects the angles.
+        Ranges in which every loop closes, with angles as a user expects them.
 
-        A full turn begins at 0, and is two where the linkage needs two to come back to where it
-        was; a limited range lies about a place in (−π, π].
+        A full turn begins at 0, and is two turns if the linkage repeats only after two; the
+        middle of a limited range lies in (−π, π].
         """
         if len(self.closure.linkage.inputs) == 1:
             found = self.closure.input_ranges
@@ -217,7 +218,7 @@ class InputSweep:
         return tuple(map(self._usual, found))
 
     def range_about(self, value: float) -> InputRange | None:
-        """Return the range in which a value lies, none where it lies in none."""
+        """Return the range in which a value lies, or None."""
         for interval in self.ranges:
             if interval.whole or interval.lowest <= value <= interval.highest:
                 return interval
@@ -228,9 +229,9 @@ class InputSweep:
         return None
 
     def _shift(self, interval: InputRange, value: float) -> float:
-        """Return the turns by which a value lies beyond a range and in it all the same, or 0."""
+        """Return the turns, in [rad], that bring a range to a value in the same poses, or 0."""
         period, turns = tau * interval.turns, -interval.shift(value)
-        # Where only two turns lead back to where it was, one leads to another pose.
+        # If the linkage repeats only after two turns, one turn leads to another pose.
         for shift in (turns, turns - period, turns + period):
             within = interval.lowest <= value - shift <= interval.highest
             if not (shift and within):
@@ -242,7 +243,7 @@ class InputSweep:
 
     @property
     def widest_range(self) -> InputRange | None:
-        """Return the widest range; of equal ones the last, since slides are meant positive."""
+        """Return the widest range; of equal ones the last, in which slides are positive."""
         return max(
             reversed(self.ranges),
             key=lambda interval: round(interval.highest - interval.lowest, 6),
@@ -263,7 +264,7 @@ class InputSweep:
         return interval
 
     def _searched(self) -> list[tuple[float, float]]:
-        """Return the intervals in which every loop closes, of several inputs."""
+        """Return the intervals in which every loop closes, for several inputs."""
         far = pi if self.turning else reach(self.closure)
         limits = self.input.limits
         if limits.bounded:
@@ -274,14 +275,10 @@ class InputSweep:
                 high = limits.high if limits.high < inf else limits.low + tau
             return list(search(self.closes, low, high)) if low < high else []
         found = list(search(self.closes, -far, far))
-        if self.turning and len(found) > 1 and found[0][0] == -far and found[-1][1] == far:
-            # One interval that runs through the end of the turn.
-            (_, high), *others, (low, _) = found
-            found = [*others, (low, high + tau)]
-        return found
+        return through_the_end(found, -far, far) if self.turning else found
 
     def _named(self, low: float, high: float) -> InputRange:
-        """Return a range with the joints whose limits it ends at; the others are held."""
+        """Return a range with the joints whose limits end it; the other inputs are held."""
         by = []
         whole = self.turning and high - low >= tau and not self.closure.bounds
         for end, outwards in ((low, low - high), (high, high - low)):
@@ -294,18 +291,18 @@ class InputSweep:
 
 def usual_inputs(closure: LoopClosure) -> tuple[float, ...]:
     """
-    Return inputs at which a linkage shows what it is, or from which it starts.
+    Return inputs at which a linkage is shown, or from which it starts.
 
-    What the file's pose says, if it closes there: of several inputs any pose, of one a pose
-    without points, since one with points is where an iteration starts best. Else of a single
-    input 60 degrees where it turns fully, or two thirds of the way through its widest range, since
-    in the middle the links of a symmetric linkage often lie on each other; and of several inputs
-    60 degrees each, where that is far from a toggle, or what is farthest from one on a coarse
-    grid.
+    These are the inputs of the file's pose, if the linkage closes there; with a single input only
+    if the pose has no points, since one with points is the start of an iteration. Otherwise a
+    single input is at 60 degrees if it turns fully, or at two thirds of its widest range: in the
+    middle the links of a symmetric linkage often lie on each other. Several inputs are at 60
+    degrees each if that is far from a toggle, or else at the point of a coarse grid that is
+    farthest from one.
     """
     linkage, pose = closure.linkage, closure.linkage.pose
     several = len(linkage.inputs) > 1
-    # No joints: no loop that closes.
+    # Without joints a loop is open.
     if pose and (several or not pose.points) and closure.position(*pose.inputs).joints:
         return pose.inputs
     if several:
@@ -328,7 +325,7 @@ def _ease(closure: LoopClosure, position: Position) -> float:
 
 
 def grid(closure: LoopClosure, count: int = _GRID) -> Iterator[tuple[tuple[float, ...], Position]]:
-    """Yield positions on a grid over all inputs: a turn each, or as far as a slide may reach."""
+    """Yield positions on a grid over all inputs: one turn each, or the reach of a slide."""
     ways = []
     for given in closure.linkage.inputs:
         low, high = given.limits.low, given.limits.high
@@ -351,7 +348,8 @@ def samples(interval: InputRange, count: int = _SAMPLES) -> list[float]:
     """
     Return values from one end of a range to the other.
 
-    At the limits of a range, joints move as the root of the input does; there they lie closer.
+    Near the limits of a range joints move as the square root of the input: there samples are
+    denser.
     """
     low, high = interval.lowest, interval.highest
     if interval.whole:
@@ -367,7 +365,7 @@ def extremes(
     """
     Find the lowest and the highest value of a function of the input.
 
-    It is sampled, and each valley and each summit narrowed down by golden sections.
+    The function is sampled, and each valley and summit is narrowed down by golden sections.
     """
     sampled = []
     for interval in ranges:
@@ -389,7 +387,7 @@ def _lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> E
     for interval, values, results in sampled:
         last = len(values) - 1
         for i, result in enumerate(results):
-            # The ends of a full turn are one place, and what lies beyond each is at the other.
+            # The ends of a full turn are one place: each continues at the other.
             turn = values[last] - values[0] if interval.whole else 0.0
             before = values[i - 1] if i else values[last - 1] - turn if turn else values[0]
             after = values[i + 1] if i < last else values[1] + turn if turn else values[last]
@@ -398,11 +396,11 @@ def _lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> E
                 results[(i + 1) % last if turn else min(i + 1, last)],
             )
             found.append((result, values[i]))
-            # A valley that is not nearly as deep as the deepest stays above it, kink or no kink.
+            # A valley much higher than the deepest cannot reach it, even with a kink.
             deep = result - best <= _DEEPER * (max(beside) - result) + _SAME
             if deep and result <= min(beside) and result < max(beside):
                 lowest = golden(function, before, after)
-                # At a smooth valley the place has half the digits; the sample's may be better.
+                # The place of a smooth valley has half the digits; the sample may be better.
                 if result - lowest[0] > _NOISE:
                     found[-1] = lowest
     found = [(result, value) for result, value in found if isfinite(result)]
@@ -422,9 +420,9 @@ def _lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> E
 
 def zeros(function: Callable[[float], float], ranges: Sequence[InputRange]) -> list[float]:
     """
-    Return where a function that is never negative is 0, within its ranges and not at their ends.
+    Return the zeros of a function that is never negative, inside its ranges, not at their ends.
 
-    What is next to 0 by the roundings of a chain counts as 0.
+    Values within the rounding errors of a chain of dyads count as 0.
     """
     found = []
     for interval in ranges:
@@ -459,7 +457,7 @@ def conditionings(way: InputSweep) -> dict[int, MinMaxCurve]:
 
 
 def _of_each_step(way: InputSweep, name: str, count: int) -> dict[int, MinMaxCurve]:
-    """Return the extremes of what a method of the steps tells of their poses, by group."""
+    """Return the extremes of a method of the steps, applied to their poses, by group."""
     closure = way.closure
     told = {
         number: getattr(step, name)
@@ -468,7 +466,7 @@ def _of_each_step(way: InputSweep, name: str, count: int) -> dict[int, MinMaxCur
     }
     if not told:
         return {}
-    # One walk serves all steps: of n loops each would else be closed n times.
+    # One sweep for all steps: otherwise each of n loops would be closed n times.
     sampled: dict[int, list[Sampled]] = {number: [] for number in told}
     closed = nan
     for interval in way.ranges:
@@ -493,7 +491,7 @@ def _of_each_step(way: InputSweep, name: str, count: int) -> dict[int, MinMaxCur
 def _of_pose(
     way: InputSweep, number: int, method: Callable[..., float], closed: float
 ) -> Callable[[float], float]:
-    """Return what a method tells of a step's pose; no number where its loops do not close."""
+    """Return a method of a step as a function of the input; NaN where its loops do not close."""
     pose_at = pose_alone(way.closure, number, *way.inputs(closed))
 
     def told(value: float) -> float:
@@ -512,9 +510,9 @@ def worst_residual(closure: LoopClosure) -> tuple[float, tuple[float, ...], int]
     residual : float
         In [m].
     inputs : tuple[float, ...]
-        Where, in [rad] or [m].
+        The inputs at which it occurs, in [rad] or [m].
     count : int
-        How many poses were tried. None in place of all three where no loop closed.
+        Number of poses that were tried. None in place of all three if no loop closed.
 
     """
     if len(closure.linkage.inputs) > 1:
@@ -531,7 +529,7 @@ def worst_residual(closure: LoopClosure) -> tuple[float, tuple[float, ...], int]
     return (*max(found), len(found)) if found else None
 
 
-# Limits that no state of a linkage meets, refused.
+# Checks that a linkage can be within its limits.
 
 
 def check_limits(closure: LoopClosure) -> None:
@@ -541,8 +539,8 @@ def check_limits(closure: LoopClosure) -> None:
     Raises
     ------
     DefinitionError
-        Where the pose is beyond limits, the range of an input never meets its limits, or none of
-        the states in it brings a published joint within its own.
+        If the pose is beyond limits, or no state of the input's range is within the limits of the
+        input, of a published joint, or of all joints together.
 
     """
     bounds, linkage = closure.bounds, closure.linkage
@@ -554,7 +552,8 @@ def check_limits(closure: LoopClosure) -> None:
         if bound is not None:
             raise DefinitionError(
                 'pose.inputs',
-                f'bring {quoted(bound.name)} to {bound.turned(joints[bound.number]):.6g}, '
+                f'bring {quoted(bound.name)} to {bound.turned(joints[bound.number]):.6g} '
+                f'{_unit(linkage, bound)}, '
                 f'beyond its limits {_limits(closure, bound)}',
                 'start within the limits, or widen them',
             )
@@ -587,7 +586,7 @@ def _check_single(closure: LoopClosure) -> None:
             raise DefinitionError(
                 f'joints.{bound.name}.limits',
                 f'{_limits(closure, bound)} of {quoted(bound.name)} are never met: it goes from '
-                f'{low:.6g} to {high:.6g}',
+                f'{low:.6g} to {high:.6g} {_unit(closure.linkage, bound)}',
                 'widen them',
             )
     if bounds.joints and not within_published(closure, ranges, bounds.joints):
@@ -602,7 +601,7 @@ def _check_single(closure: LoopClosure) -> None:
 def _extent(
     closure: LoopClosure, ranges: Iterable[InputRange], bound: Bound
 ) -> tuple[float, float]:
-    """Return between which values a published joint goes, as near to its limits as turns let."""
+    """Return the range of a published joint, with the turns that bring it nearest its limits."""
     values = [value for one in ranges for value in samples(one)]
     found = [closure.position(value).joints for value in values]
     turned = [bound.turned(joints[bound.number]) for joints in found if joints]
@@ -618,4 +617,9 @@ def _met_on_grid(closure: LoopClosure) -> bool:
 
 def _limits(closure: LoopClosure, bound: Bound) -> str:
     limits = closure.linkage.limits[bound.name]
-    return str(limits)
+    return f'{limits} {_unit(closure.linkage, bound)}'
+
+
+def _unit(linkage: Linkage, bound: Bound) -> str:
+    driven = {given.joint: given.unit for given in linkage.inputs}
+    return driven.get(bound.name) or linkage.joints[bound.name].unit

@@ -27,8 +27,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
-from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
+from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage, Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class Structure:
         """
         known = {GROUND}
         for before in self.groups[: self.groups.index(group)]:
-            known |= links_of(before)
+            known.update(links_of(before))
         joints: list[Joint] = []
         pins: set[str] = set()
         for joint in self.joints:
@@ -144,13 +144,13 @@ class Structure:
         return tuple(joints)
 
 
-def links_of(group: Group) -> set[str]:
+def links_of(group: Group) -> tuple[str, ...]:
     """Return the links that a group places."""
     if isinstance(group, Driven):
-        return {group.joint.link}
+        return (group.joint.link,)
     if isinstance(group, Dyad):
-        return {link for body in group.bodies for link in body}
-    return set(group.links)
+        return tuple(link for body in group.bodies for link in body)
+    return group.links
 
 
 _BLOCK = 'block of '
@@ -180,29 +180,24 @@ def assur_groups(linkage: Linkage) -> Structure:
     _check_connected(linkage, links, joints)
     search = _Search(linkage, links, blocks, joints)
     structure = Structure(links, blocks, tuple(search.groups()), joints)
-    freedom = structure.freedom
-    if freedom != len(linkage.inputs):
-        raise DefinitionError('links', *_freedom(freedom, len(linkage.inputs)))
+    freedom, inputs = structure.freedom, len(linkage.inputs)
+    if freedom != inputs:
+        raise DefinitionError(
+            'links',
+            f'{freedom} degree(s) of freedom and {inputs} input(s)',
+            (_same_pin(linkage) or 'add an input, a link or a pin')
+            if freedom > inputs
+            else 'take away a link or a pin',
+        )
     return structure
-
-
-def _freedom(freedom: int, inputs: int) -> tuple[str, str]:
-    return (
-        f'{freedom} degree(s) of freedom and {inputs} input(s)',
-        'add an input, a link or a pin' if freedom > inputs else 'take away a link or a pin',
-    )
 
 
 def _joints(
     linkage: Linkage, links: Mapping[str, Mapping[str, Point]], blocks: Mapping[str, str]
 ) -> Iterator[Joint]:
-    carriers: dict[str, list[str]] = {}
-    for link, points in links.items():
-        for point in points:
-            carriers.setdefault(point, []).append(link)
-    for point, carried in carriers.items():
-        for link in carried[1:]:
-            yield Joint('R', point, link, carried[0])
+    for point, (first, *others) in carriers(links).items():
+        for link in others:
+            yield Joint('R', point, link, first)
     for name, slider in linkage.sliders.items():
         yield Joint('P', name, blocks[name], slider.along)
 
@@ -221,7 +216,8 @@ def _check_connected(
             raise DefinitionError(
                 f'links.{link}',
                 'no chain of pins and sliders joins it to the ground',
-                'name one of its points on another link too, or leave it out',
+                _same_pin(linkage)
+                or 'name one of its points on another link too, or leave it out',
             )
 
 
@@ -246,13 +242,13 @@ class _Search:
 
     def groups(self) -> Iterator[Group]:
         """Yield group after group until all links are known."""
-        yield from self._learn((GROUND,))
+        yield from self._learn(GROUND)
         while unknown := [body for body in self._bodies if body[0] not in self._rank]:
             dyad = self._next_dyad(unknown)
             if dyad is not None:
                 yield dyad
-                for body, first in zip(dyad.bodies, _firsts(dyad), strict=True):
-                    yield from self._learn(body, first)
+                for outer in dyad.outer:
+                    yield from self._learn(outer.link)
                 continue
             chosen = self._smallest_group(unknown)
             yield Iterated(tuple(link for body in chosen for link in body))
@@ -264,8 +260,7 @@ class _Search:
         given = self._linkage.inputs[index]
         if given.slider:
             return self._sliders[given.slider]
-        shared = set(self._links[given.parent]) & set(self._links[given.child])
-        (pin,) = shared
+        (pin,) = set(self._links[given.parent]) & set(self._links[given.child])
         return Joint('R', pin, given.child, given.parent)
 
     def _merged(self) -> list[tuple[str, ...]]:
@@ -284,7 +279,7 @@ class _Search:
                 body_of[link] = both
         return sorted(set(body_of.values()), key=lambda body: self._order[body[0]])
 
-    def _learn(self, body: tuple[str, ...], first: str = GROUND) -> Iterator[Driven]:
+    def _learn(self, first: str) -> Iterator[Driven]:
         """Mark the links of a body as known, by its driven joints from the first known one."""
         self._rank.setdefault(first, len(self._rank))
         body = next(known for known in self._bodies if first in known)
@@ -338,8 +333,8 @@ class _Search:
             if len(joints) > 1:
                 raise DefinitionError(
                     _key(body, self._linkage),
-                    f'is held twice: by {" and ".join(_spoken(j) for j in joints)}',
-                    'with both it cannot move as the rest does; take one of them away',
+                    f'is over-constrained by {" and ".join(_spoken(j) for j in joints)}',
+                    'take one of them away: with both it cannot move',
                 )
         for one, other in combinations(unknown, 2):
             if not (outer[one] and outer[other]):
@@ -369,8 +364,8 @@ class _Search:
         if kind == 'PPP':
             raise DefinitionError(
                 f'sliders.{inner.name}',
-                f'with {outer[0].name!r} and {outer[1].name!r} three sliders follow each other',
-                'they leave a link free and an angle held twice; make one of them a pin',
+                f'with {outer[0].name!r} and {outer[1].name!r} it forms a dyad of three sliders',
+                'they leave a link free and over-constrain an angle; make one of them a pin',
             )
         if composite and kind != 'RRR':
             return None
@@ -398,36 +393,33 @@ class _Search:
             frozenset((one, other)): self._inner(one, other)
             for one, other in combinations(unknown, 2)
         }
-        everything = self._freedom_of(unknown, constrained, between)
         largest = len(unknown) if len(unknown) <= 14 else 0
         for size in range(1, min(largest, _LARGEST_GROUP) + 1):
             for chosen in combinations(unknown, size):
                 if self._freedom_of(list(chosen), constrained, between) == 0:
                     return list(chosen)
+        everything = self._freedom_of(unknown, constrained, between)
         if everything == 0:
             return unknown
-        loose = min(unknown, key=lambda b: constrained[b] + self._hold(b, unknown, between))
         if everything > 0:
+            loose = min(
+                unknown,
+                key=lambda body: (
+                    constrained[body]
+                    + sum(len(joints) for ends, joints in between.items() if body in ends)
+                ),
+            )
             raise DefinitionError(
                 _key(loose, self._linkage),
                 'is free: its pins and sliders do not hold it, '
                 f'{everything} degree(s) of freedom too many',
-                'join it to one more link, or name one more input',
+                _same_pin(self._linkage) or 'join it to one more link, or name one more input',
             )
         raise DefinitionError(
             _key(unknown[-1], self._linkage),
-            f'belongs to links that hold each other too well, {-everything} degree(s) of freedom '
-            'too few',
+            f'belongs to over-constrained links, {-everything} degree(s) of freedom too few',
             'take away a link or a pin',
         )
-
-    def _hold(
-        self,
-        body: tuple[str, ...],
-        unknown: list[tuple[str, ...]],
-        between: Mapping[frozenset[tuple[str, ...]], list[Joint]],
-    ) -> int:
-        return sum(len(between[frozenset((body, other))]) for other in unknown if other != body)
 
     def _freedom_of(
         self,
@@ -448,9 +440,20 @@ class _Search:
         return 3 * len(bodies) - 2 * joints
 
 
-def _firsts(dyad: Dyad) -> tuple[str, str]:
-    """Return the link of each body that has the dyad's outer joint."""
-    return dyad.outer[0].link, dyad.outer[1].link
+def _same_pin(linkage: Linkage) -> str:
+    """Return the remedy for a pin that has another name on each of its links; '' if none has."""
+    used = {*linkage.traced}
+    for slider in linkage.sliders.values():
+        used |= {slider.point, slider.through}
+    single = {
+        point: links[0]
+        for point, links in carriers(linkage.links).items()
+        if len(links) == 1 and point not in used
+    }
+    if len({*single.values()}) < 2:
+        return ''
+    points = listed((f'{point} ({link})' for point, link in single.items()), ' and ')
+    return f'{points} each stand on one link only; the same pin? then give it one name'
 
 
 def _key(body: tuple[str, ...], linkage: Linkage) -> str:

@@ -153,18 +153,9 @@ class AuxiliaryOutput(NamedTuple):
 
 @dataclass(frozen=True)
 class _Wanted:
-    """
-    Picks the values that the scene publishes from the motion of a compiled linkage.
+    """Picks the values that the scene publishes from the motion of a compiled linkage."""
 
-    Attributes
-    ----------
-    of
-        Key of equality: two objects with equal keys pick the same values.
-    pick
-        Picks the values.
-
-    """
-
+    # Two objects with equal keys pick the same values.
     of: list[Any]
     pick: Callable[[CompiledMotion], Sequence[Sequence[float]]] = field(compare=False)
 
@@ -208,7 +199,7 @@ class LinkagePipeline:
         except DefinitionError as error:
             of_linkage = error.where.startswith('masses')
             content = member.linkage_content if of_linkage else member.content
-            raise content.error(error.where, error.reason, error.remedy) from None
+            raise content.located(error) from None
 
     def _build(self, scene: Scene, closure: Closure | None, injection: Injection | None) -> None:
         member = self.member

@@ -188,8 +188,7 @@ class LoopFinder:
             other = self._walk(joint.to, points[joint.to][joint.name])
             return _merged([*one, *_negative(other)])
         slider, slide = self._sliders[joint.name], self._known.slides[joint.name]
-        direction = complex(*slider.direction)
-        direction /= abs(direction)
+        direction = slider.unit
         # The joint of a dyad may be given from either end.
         block, rail = self._known.blocks[joint.name], slider.along
         line = self._known.angles[rail]

@@ -44,14 +44,20 @@ from math import copysign, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.files.parameters import number
-from linkage_ros.kinematics.arithmetic import cross
+from linkage_ros.kinematics.arithmetic import cross, UNIT_ROUNDOFF
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, RelativeAngle
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
-from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import PLACED, State, Step
+from linkage_ros.kinematics.step import (
+    FixedPoint,
+    PLACED,
+    PointOnLink,
+    PointOnRail,
+    RelativeAngle,
+    State,
+    Step,
+)
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import Dyad, Iterated
 from linkage_ros.solvers.loops import LoopFinder, Loops, Vector
@@ -384,7 +390,7 @@ class NewtonParameters:
     """Newton's method on the loops of each dyad."""
 
     tolerance: float = number(
-        'what the last correction is below', unit='rad or m', least=1e-15, most=1e-2
+        'bound of the last correction', unit='rad and m', least=1e-15, most=1e-2
     )
 
 
@@ -444,15 +450,6 @@ class NewtonClosure(Solver):
             self._pose = pose.state.coordinates
 
     def position(self, *inputs: float) -> Position:
-        """
-        Close the loops.
-
-        Parameters
-        ----------
-        *inputs
-            Values of the driven joints, in [rad] or [m], finite.
-
-        """
         x = self._coordinates('inputs', inputs)
         if x is None:
             return self._exact(inputs)
@@ -489,17 +486,6 @@ class NewtonClosure(Solver):
         return Position(_CLOSED, 0.0, joints, state, poses, self)
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
-        """
-        Return the rates at a closed position; at a toggle there are none.
-
-        Parameters
-        ----------
-        position
-            A closed position.
-        *rates
-            Rates of the driven joints, in [rad/s] or [m/s].
-
-        """
         state, poses = position.state, position.poses
         if not isinstance(poses, _Found):
             return self.closed.velocity(position, *rates)
@@ -520,17 +506,6 @@ class NewtonClosure(Solver):
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
     ) -> Acceleration:
-        """
-        Return the accelerations at a closed position.
-
-        Parameters
-        ----------
-        position, velocity
-            Results of this closure.
-        *accelerations
-            Accelerations of the driven joints, in [rad/s²] or [m/s²].
-
-        """
         state, poses = position.state, position.poses
         if not isinstance(poses, _Found):
             return self.closed.acceleration(position, velocity, *accelerations)
@@ -549,7 +524,6 @@ class NewtonClosure(Solver):
         return Acceleration(self._joints(a), changes, self)
 
     def placed(self, position: Position) -> Position:
-        """Return a position with the angles, slides and pins of all links."""
         if not isinstance(position.poses, _Found):
             return position
         if self._iterates:
@@ -585,10 +559,9 @@ class NewtonClosure(Solver):
             elif isinstance(groups[group], Dyad):
                 plan.append(NewtonDyad(next(loops), tolerance, tolerance / self.scale))
             else:
-                from linkage_ros.solvers import early_stopping  # local import: it loads numpy
-
                 next(loops)
-                plan.append(early_stopping.early_stopping(step, tolerance))
+                iteration: Any = step
+                plan.append(iteration.stopped_at(tolerance))
         return tuple(plan), iterates
 
     def _orientations(self, x: list[float]) -> tuple[float, ...]:

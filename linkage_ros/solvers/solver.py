@@ -64,6 +64,8 @@ class Solver(Closure):
     """
     A closure that subclasses solve differently; itself, it uses the closed form.
 
+    Its methods are those of `Closure`.
+
     Parameters
     ----------
     closed
@@ -133,21 +135,17 @@ class Solver(Closure):
         return self.exact(position)
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:
-        """Return every point of every link, by link and name, in the ground's frame, in [m]."""
         return super().points(self.placed(position))
 
     def link_angles(self, position: Position) -> dict[str, float]:
-        """Return the angle of every link to the ground, in [rad], not wrapped."""
         return super().link_angles(self.placed(position))
 
     def slide_values(self, position: Position) -> dict[str, float]:
-        """Return the slide of every slider, in [m]."""
         return super().slide_values(self.placed(position))
 
     def point_motion(
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> dict[tuple[str, str], PointMotion]:
-        """Return place, velocity and acceleration of every point of every link."""
         exact = self.exact(position)
         rates = self.closed.velocity(exact, *self.inputs_of(velocity.state))
         changes = self.inputs_of(acceleration.state)
@@ -156,21 +154,17 @@ class Solver(Closure):
 
     @cached_property
     def input_ranges(self) -> tuple[InputRange, ...]:
-        """Return the ranges of a single input, in [rad] or [m]; none for several inputs."""
         return self.closed.input_ranges
 
     @cached_property
     def singular_inputs(self) -> tuple[SingularInput, ...]:
-        """Return the toggles and change points of a single input; none for several inputs."""
         return self.closed.singular_inputs
 
     @cached_property
     def closing_ranges(self) -> tuple[InputRange, ...]:
-        """Return where a single input closes every loop, ignoring limits; none for several."""
         return self.closed.closing_ranges
 
     def singularity_margin(self, position: Position) -> SingularityMargin:
-        """Return the singularity margin of a closed position."""
         return self.closed.singularity_margin(self.exact(position))
 
 

@@ -33,7 +33,6 @@ ends, the states are those of the closed form.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from math import fmod, inf, tau
 from struct import Struct
 from time import perf_counter
@@ -43,6 +42,7 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import number, point
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.ranges import link_lengths
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
@@ -70,11 +70,10 @@ class TableParameters:
     """A table of one input's range, interpolated by cubics."""
 
     tolerance: float = number(
-        'proven bound of the error of positions', unit='rad or m', least=1e-12, most=1e-2
+        'proven bound of the error of positions', unit='rad and m', least=1e-12, most=1e-2
     )
     span: tuple[float, float] | tuple[()] = point(
-        'from where to where of the input; [] for all that it can reach. Beyond it the closed '
-        'form goes on',
+        'range of the input; [] for its whole range. Beyond it the closed form is used',
         (),
         unit='rad or m',
         most=1e6,
@@ -158,7 +157,7 @@ class TableClosure(Solver):
         if len(linkage.inputs) > 1:
             raise DefinitionError(
                 'solver.table',
-                f'is of one input, and there are {len(linkage.inputs)}',
+                f'needs a linkage with one input, and this one has {len(linkage.inputs)}',
                 'write solver: closed_form',
             )
         self._period, intervals = self._intervals(span)
@@ -198,15 +197,6 @@ class TableClosure(Solver):
         self.build_time = perf_counter() - begun
 
     def position(self, *inputs: float) -> Position:
-        """
-        Close the loops.
-
-        Parameters
-        ----------
-        *inputs
-            Value of the driven joint, in [rad] or [m], finite.
-
-        """
         (x,) = inputs
         low, high, first, density = self._first
         if not low <= x < high:
@@ -241,31 +231,11 @@ class TableClosure(Solver):
         """
         exact = self.exact(position)
         joints = zip(position.joints, exact.joints, self.turning, strict=True)
-        off = max(abs(ours - true) * (self._arm if turns else 1.0) for ours, true, turns in joints)
+        arm = max(link_lengths(self.linkage.links))
+        off = max(abs(ours - true) * (arm if turns else 1.0) for ours, true, turns in joints)
         return off + self.closed.residual(exact)
 
-    @cached_property
-    def _arm(self) -> float:
-        """Length of the longest link, in [m]."""
-        return max(
-            abs(complex(*one) - complex(*other))
-            for points in self.linkage.links.values()
-            for one in points.values()
-            for other in points.values()
-        )
-
     def velocity(self, position: Position, *rates: float) -> Velocity:
-        """
-        Return the rates at a closed position; at a toggle there are none.
-
-        Parameters
-        ----------
-        position
-            A closed position.
-        *rates
-            Rate of the driven joint, in [rad/s] or [m/s].
-
-        """
         if position.state.pins is not self._no_pins:
             return self.closed.velocity(position, *rates)
         c, t, density = cast('_Place', position.poses)
@@ -284,17 +254,6 @@ class TableClosure(Solver):
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
     ) -> Acceleration:
-        """
-        Return the accelerations at a closed position.
-
-        Parameters
-        ----------
-        position, velocity
-            Results of this closure.
-        *accelerations
-            Acceleration of the driven joint, in [rad/s²] or [m/s²].
-
-        """
         if position.state.pins is not self._no_pins:
             return self.closed.acceleration(position, velocity, *accelerations)
         c, t, density = cast('_Place', position.poses)

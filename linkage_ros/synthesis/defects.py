@@ -28,7 +28,13 @@ from math import degrees, inf, log, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import did_you_mean, listed, SynthesisError
-from linkage_ros.kinematics.grashof import four_bar_type, FourBarType
+from linkage_ros.kinematics.grashof import (
+    CHANGE_POINTS,
+    four_bar_type,
+    FourBarType,
+    GRASHOF,
+    TRIPLE_ROCKERS,
+)
 from linkage_ros.synthesis.design import Design
 from linkage_ros.synthesis.proof import (
     Array,
@@ -232,10 +238,8 @@ _WORDS = (*_KINDS, 'grashof', 'non-grashof', 'turning')
 
 # Barker's codes by the shortest link if some link turns fully, by the longest if none does, by the
 # shortest at a change point. No word selects equal links, as in a parallelogram.
-_CODES = (
-    ('GCRR', 'GRCR', 'GRRC', 'GCCC'),
-    ('RRR2', 'RRR3', 'RRR4', 'RRR1'),
-    ('SCRR', 'SRCR', 'SRRC', 'SCCC'),
+_CODES = tuple(
+    tuple(code for code, _ in names) for names in (GRASHOF, TRIPLE_ROCKERS, CHANGE_POINTS)
 )
 
 _FAR = 10.0
@@ -284,12 +288,12 @@ class Needs(NamedTuple):
         if not 0.0 <= self.transmission <= 0.5 * pi:
             raise SynthesisError(
                 'transmission angle',
-                f'{degrees(self.transmission):g}° is none',
-                'need one from 0 to 90 degrees',
+                f'{degrees(self.transmission):g}° is not in its range',
+                'write 0 to 90 degrees',
             )
         if not self.link_ratio >= 1.0:
             raise SynthesisError(
-                'link ratio', f'{self.link_ratio:g} is none', 'need one of 1 or more'
+                'link ratio', f'{self.link_ratio:g} is not a ratio', 'write 1 or more'
             )
         if self.kind and self.kind not in _WORDS:
             raise SynthesisError(

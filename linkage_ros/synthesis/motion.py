@@ -43,8 +43,8 @@ from math import degrees, isfinite, remainder, tau
 from typing import Any, NamedTuple, TypeAlias
 
 from linkage_ros.errors import SynthesisError
+from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.batch import Array, Complex
-from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
 from linkage_ros.synthesis.double_double import minus, over, plus, sine_cosine, times, Twofold
 from linkage_ros.synthesis.proof import assembled
@@ -77,7 +77,9 @@ def check_task(poses: Sequence[Pose], pivots: Mapping[str, complex]) -> None:
     for number, (place, angle) in enumerate(poses, 1):
         if not (finite(place) and isfinite(angle)):
             raise SynthesisError(
-                f'pose {number}', f'({place.real}, {place.imag}), {angle} is none', 'give numbers'
+                f'pose {number}',
+                f'({place.real}, {place.imag}), {angle} is not a pose',
+                'write numbers',
             )
     for name, place in pivots.items():
         if not finite(place):

@@ -36,9 +36,9 @@ from dataclasses import replace
 from math import inf, remainder, tau
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 from linkage_ros.synthesis.design import Assembly, COUPLER, Design, Wanted
 import numpy as np
@@ -47,10 +47,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_TURN = 2.0 * np.pi
-
-_SAME = 1e-9
-"""Crank angles nearer than this count as equal, in [rad]."""
+SAME = 1e-9
+"""Angles nearer than this count as equal, in [rad]; the lengths' error is far below."""
 
 
 class Mobility(NamedTuple):
@@ -152,16 +150,16 @@ def _lifted(lengths: Array, directions: Array, turns: Flags) -> tuple[Array, Fla
     ahead, back = _ahead(by), _ahead(-by)
     length_ahead, length_back = ahead.sum(-1), back.sum(-1)
     round_steps = np.where((length_ahead <= length_back)[..., None], ahead, -back)
-    in_turn = np.minimum(length_ahead, length_back) <= _TURN + _SAME
+    in_turn = np.minimum(length_ahead, length_back) <= tau + SAME
 
     # One range around the direction in which the linkage closes, 0 or π; or two, one on each side
     # of the ground line.
     a, b, c, d = (lengths[..., i] for i in range(4))
     about_pi = np.abs(b - c) - np.abs(d - a) > _rounding(lengths)
-    wrapped = directions - _TURN * np.round(directions / _TURN)
-    within = np.where(about_pi[..., None], np.mod(directions, _TURN), wrapped)
+    wrapped = directions - tau * np.round(directions / tau)
+    within = np.where(about_pi[..., None], np.mod(directions, tau), wrapped)
     steps = np.diff(within, axis=-1)
-    one_way = (steps > -_SAME).all(-1) | (steps < _SAME).all(-1)
+    one_way = (steps > -SAME).all(-1) | (steps < SAME).all(-1)
 
     steps = np.where(turns[..., None], round_steps, steps)
     first = directions[..., :1]
@@ -170,15 +168,15 @@ def _lifted(lengths: Array, directions: Array, turns: Flags) -> tuple[Array, Fla
 
 
 def _rounding(lengths: Array) -> Array:
-    """Return the rounding error of a sum of four lengths, as in `rounding.margin`."""
+    """Return the rounding error of a sum of four lengths, as in `arithmetic.margin`."""
     total: Array = 4.0 * UNIT_ROUNDOFF * lengths.sum(-1)
     return total
 
 
 def _ahead(by: Array) -> Array:
     """Return the forward rotation of a crank for differences of directions."""
-    ahead = np.mod(by, _TURN)
-    return np.where(ahead > _TURN - _SAME, ahead - _TURN, ahead)
+    ahead = np.mod(by, tau)
+    return np.where(ahead > tau - SAME, ahead - tau, ahead)
 
 
 def transmission(lengths: Array, direction: Array) -> Array:
@@ -238,9 +236,6 @@ def least_transmission(lengths: Array, start: Array, end: Array) -> tuple[Array,
 
 
 SIDES: tuple[Assembly, Assembly] = ('left', 'right')
-
-SAME = 1e-9
-"""Angles nearer than this count as equal, in [rad]; the lengths' error is far below."""
 
 _MARKEDLY = 2.0
 """An assembly is better if the error of the other is this many times larger. At a toggle, where

@@ -62,47 +62,30 @@ class C(Language):
 
     functions: ClassVar[dict[str, str]] = {'abs': 'fabs', '**': 'pow'}
     infinity = 'INFINITY'
+    finite = 'isfinite'
+    nearest = 'rint'
+    comment = '/* {} */'
 
     def __init__(self, name: str, *, header: bool) -> None:
         self._name = name
         self._header = header
+        self.status = f'{name.upper()}_{{}}'
 
     def function(self, derivatives: int) -> str:
-        """Return the name of the function with so many derivatives."""
         return f'{self._name}_{super().function(derivatives)}'
 
     def call(self, operation: Operation, parts: list[str]) -> str:
-        """Write the call of a function."""
         if operation.name == '**' and parts[1] == '2.0':
             return f'pow({parts[0]}, {_TWO})'
         return super().call(operation, parts)
 
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
-        """Write a line that assigns a number, or a truth value, to a name."""
         return f'const {"int" if truth else "double"} {name} = {text};'
 
-    def commented(self, line: str, text: str) -> str:
-        """Write a comment behind a line."""
-        return f'{line}  /* {text} */'
-
-    def finite(self, name: str) -> str:
-        """Write that a number is finite."""
-        return f'isfinite({name})'
-
-    def rounded(self, text: str) -> str:
-        """Write the nearest integer."""
-        return f'rint({text})'
-
-    def status(self, name: str) -> str:
-        """Write a status."""
-        return f'{self._name.upper()}_{name}'
-
     def left(self, status: str) -> str:
-        """Write a line that returns a status without values."""
         return f'return {status};'
 
     def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
-        """Write lines that return a status and values."""
         lines = [
             f'{array}[{number}] = {text};'
             for array, group in zip(RETURNED, groups, strict=False)
@@ -111,7 +94,6 @@ class C(Language):
         return [*lines, f'return {status};']
 
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
-        """Write the source."""
         name, function = self._name, self.function(subject.derivatives)
         driven, joints = len(subject.closure.linkage.inputs), len(subject.joints)
         kind = f'enum {name}_status'
@@ -124,7 +106,9 @@ class C(Language):
             f'{kind} {function}(',
             *(f'    {each}{")" if i == last else ","}' for i, each in enumerate(parameters)),
         ]
-        statuses = [f'    {self.status(status)} = {i},' for i, status in enumerate(STATUSES)]
+        statuses = [
+            f'    {self.status.format(status)} = {i},' for i, status in enumerate(STATUSES)
+        ]
         statuses[-1] = statuses[-1].removesuffix(',')
         listed = [f'{kind} {{', *statuses, '};']
         two = [_DECLARED_TWO] if any(f'{_TWO})' in line for line in body) else []

@@ -48,33 +48,17 @@ class JavaScript(Language):
         **{name: f'Math.{name}' for name in ('abs', 'sin', 'cos', 'sqrt', 'atan2', 'hypot')},
     }
     infinity = 'Infinity'
+    finite = 'Number.isFinite'
+    nearest = 'Math.round'
+    status = 'Status.{}'
 
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
-        """Write a line that assigns a number, or a truth value, to a name."""
         return f'const {name} = {text};'
 
-    def commented(self, line: str, text: str) -> str:
-        """Write a comment behind a line."""
-        return f'{line}  // {text}'
-
-    def finite(self, name: str) -> str:
-        """Write that a number is finite."""
-        return f'Number.isFinite({name})'
-
-    def rounded(self, text: str) -> str:
-        """Write the nearest integer."""
-        return f'Math.round({text})'
-
-    def status(self, name: str) -> str:
-        """Write a status."""
-        return f'Status.{name}'
-
     def left(self, status: str) -> str:
-        """Write a line that returns a status without values."""
         return f'return nothing({status});'
 
     def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
-        """Write lines that return a status and values."""
         arrays = (
             f', {name}: [{", ".join(group)}]'
             for name, group in zip(RETURNED, groups, strict=False)
@@ -82,7 +66,6 @@ class JavaScript(Language):
         return [f'return {{status: {status}{"".join(arrays)}}};']
 
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
-        """Write the source."""
         given, returned = (names[: 1 + subject.derivatives] for names in (GIVEN, RETURNED))
         empty = ', '.join(f'{name}: []' for name in returned)
         comment = (f' * {line.replace("*/", "* /")}'.rstrip() for line in (*head, *_NOTES))

@@ -28,10 +28,10 @@ import operator
 from typing import Any, Final, NamedTuple
 
 from linkage_ros.generated_code import written
+from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.batch import Array, Mask
-from linkage_ros.kinematics.compiling.tape import Kind, Operation
-from linkage_ros.kinematics.compiling.writer import uses
-from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
+from linkage_ros.kinematics.compiling.tape import Kind, Operation, rewritten
+from linkage_ros.kinematics.compiling.writer import needed, uses
 import numpy as np
 
 Number = Any
@@ -97,19 +97,7 @@ class ArrayForm:
 
     def number(self, root: Number) -> Number:
         """Return an operation of a path in its new form, or the constant that it reduces to."""
-        if not isinstance(root, Operation):
-            return root
-        waiting = [root]
-        while waiting:
-            operation = waiting[-1]
-            needed = [one for one in operation.operands() if one not in self._written]
-            if needed:
-                waiting += needed
-                continue
-            waiting.pop()
-            if operation not in self._written:
-                self._written[operation] = self._write(operation)
-        return self._written[root]
+        return root if _constant(root) else rewritten(root, self._written, self._write)
 
     def opposite(self, condition: Number) -> Number:
         """Return the negation of a condition."""
@@ -337,7 +325,8 @@ def _split(number: Number) -> tuple[float, Number]:
     """Return the constant factor of a number, and the rest, or None if there is none."""
     if _constant(number):
         return number, None
-    if number.name == '*' and _constant(number.arguments[0]):
+    # A 0 stays where it is: a product of the other factors alone may overflow.
+    if number.name == '*' and _constant(number.arguments[0]) and number.arguments[0] != 0.0:
         factor, rest = number.arguments
         return factor, rest
     return 1.0, number
@@ -516,16 +505,8 @@ class _Writer:
 
     def _write(self, root: Number) -> None:
         """Write a number, after the operations that it needs."""
-        waiting = [(root, False)] if isinstance(root, Operation) else []
-        while waiting:
-            operation, ready = waiting.pop()
-            if operation in self._names:
-                continue
-            if ready or operation.is_input:
-                self._place(operation)
-            else:
-                waiting.append((operation, True))
-                waiting += [(operand, False) for operand in reversed(operation.operands())]
+        for operation in needed(root, self._names) if isinstance(root, Operation) else ():
+            self._place(operation)
 
     def _place(self, operation: Operation) -> None:
         operands = operation.operands()

@@ -47,6 +47,9 @@ class PythonModule(Language):
     """
 
     infinity = 'inf'
+    finite = 'isfinite'
+    nearest = 'round'
+    comment = '# {}'
     conjunction = 'and'
     disjunction = 'or'
 
@@ -54,7 +57,6 @@ class PythonModule(Language):
         self._groups = 1 + derivatives
 
     def call(self, operation: Operation, parts: list[str]) -> str:
-        """Write the call of a function."""
         if operation.name == '**':
             return f'(({parts[0]}) ** {parts[1]})'
         if operation.name == 'hypot':
@@ -63,19 +65,15 @@ class PythonModule(Language):
         return super().call(operation, parts)
 
     def choice(self, condition: str, one: str, other: str) -> str:
-        """Write a choice between two expressions."""
         return f'{one} if {condition} else {other}'
 
     def negated(self, condition: str) -> str:
-        """Write that a condition does not hold; this is true for NaN too."""
         return f'not {condition}' if condition.isidentifier() else f'not ({condition})'
 
     def block(self, condition: str, lines: Sequence[str]) -> list[str]:
-        """Write lines that run if a condition holds."""
         return [f'if {condition}:', *(f'    {line}' for line in lines)]
 
     def wrapped(self, line: str) -> list[str]:
-        """Break a line of code that is too long."""
         if len(line) > WIDTH:
             name, equals, text = line.partition(' = ')
             if equals:
@@ -86,36 +84,16 @@ class PythonModule(Language):
         return super().wrapped(line)
 
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
-        """Write a line that assigns a number, or a truth value, to a name."""
         return f'{name} = {text}'
 
-    def commented(self, line: str, text: str) -> str:
-        """Write a comment behind a line."""
-        return f'{line}  # {text}'
-
-    def finite(self, name: str) -> str:
-        """Write that a number is finite."""
-        return f'isfinite({name})'
-
-    def rounded(self, text: str) -> str:
-        """Write the nearest integer."""
-        return f'round({text})'
-
-    def status(self, name: str) -> str:
-        """Write a status."""
-        return name
-
     def left(self, status: str) -> str:
-        """Write a line that returns a status without values."""
         return f'return ({", ".join([status, *["()"] * self._groups])})'
 
     def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
-        """Write lines that return a status and values."""
         tuples = (f'({", ".join(group)},)' for group in groups)
         return [f'return ({", ".join([status, *tuples])})']
 
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
-        """Write the source."""
         name = self.function(subject.derivatives)
         lines = [
             *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', _IMPORTS, '',

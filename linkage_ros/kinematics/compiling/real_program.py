@@ -21,20 +21,22 @@ are the same, except for the sign of a zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
+from collections.abc import Callable
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.arithmetic import atan2, cos, sin, sqrt, where
 from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.tape import Decision, Operation, Symbol, Tape
+from linkage_ros.kinematics.compiling.tape import Decision, Operation, rewritten, Symbol, Tape
 from linkage_ros.kinematics.compiling.trace import (
-    Fate,
-    Fork,
+    Branch,
     moved,
     Number,
     number_of,
     Path,
+    Solved,
+    Tree,
+    tree_below,
     Wanted,
 )
 from linkage_ros.kinematics.ranges import iterated
@@ -55,10 +57,10 @@ class Lowered(NamedTuple):
     """A path in real numbers, and its fates."""
 
     path: Path
-    fates: tuple[Fate, ...]
+    fates: tuple[Tree, ...]
 
 
-def lowered(path: Path, fates: tuple[Fate, ...] = (), by_squares: bool = False) -> Lowered:
+def lowered(path: Path, fates: tuple[Tree, ...] = (), by_squares: bool = False) -> Lowered:
     """
     Return a path in real numbers only; paths with iterated links have no such form.
 
@@ -79,9 +81,7 @@ def lowered(path: Path, fates: tuple[Fate, ...] = (), by_squares: bool = False) 
         Decision(lower.operation(condition), held) for condition, held in path.decisions
     )
     outputs = tuple(tuple(map(lower.operation, group)) for group in path.outputs)
-    return Lowered(
-        Path(inputs, decisions, outputs, lower.tape), tuple(lower.fate(fate) for fate in fates)
-    )
+    return Lowered(Path(inputs, decisions, outputs, lower.tape), tuple(map(lower.tree, fates)))
 
 
 class Lowering:
@@ -97,12 +97,18 @@ class Lowering:
         number = self._number(root)
         return number.operation if isinstance(number, Symbol) else number
 
-    def fate(self, fate: Fate) -> Fate:
-        """Return a fate with conditions on the new tape."""
-        if isinstance(fate, Fork):
-            held, failed = self.fate(fate.held), self.fate(fate.failed)
-            return Fork(self.operation(fate.condition), held, failed)
-        return fate
+    def tree(self, tree: Tree) -> Tree:
+        """Return a tree with conditions and numbers on the new tape."""
+        if isinstance(tree, Branch):
+            condition = self.operation(tree.condition)
+            if isinstance(condition, bool):
+                return self.tree(tree.held if condition else tree.failed)
+            return Branch(condition, self.tree(tree.held), self.tree(tree.failed), tree.usual)
+        if isinstance(tree, Solved):
+            return Solved(
+                tree.status, tuple(tuple(map(self.operation, group)) for group in tree.outputs)
+            )
+        return tree
 
     def _number(self, root: Any) -> Any:
         """Return a symbol, its components, or a constant."""
@@ -110,17 +116,7 @@ class Lowering:
             return _Parts(root.real, root.imag)
         if not isinstance(root, Operation):
             return root
-        waiting = [root]
-        while waiting:
-            operation = waiting[-1]
-            needed = [one for one in operation.operands() if one not in self._known]
-            if needed:
-                waiting += needed
-                continue
-            waiting.pop()
-            if operation not in self._known:
-                self._known[operation] = self._written(operation)
-        return self._known[root]
+        return rewritten(root, self._known, self._written)
 
     def _written(self, operation: Operation) -> Any:
         name = operation.name
@@ -251,25 +247,6 @@ _MOST_SOLVED = 32
 """Largest number of leaves with numbers: change points of several dyads multiply."""
 
 
-class Solved(NamedTuple):
-    """A leaf with numbers, in the requested groups."""
-
-    status: Status
-    outputs: tuple[tuple[Number, ...], ...]
-
-
-class Branch(NamedTuple):
-    """A condition, the trees where it holds and where it fails, and the usual outcome."""
-
-    condition: Operation
-    held: Tree
-    failed: Tree
-    usual: bool
-
-
-Tree: TypeAlias = Branch | Solved | Status | None
-
-
 class Program(NamedTuple):
     """
     A linkage as a tree in real numbers.
@@ -321,94 +298,36 @@ def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
         )
     tape = Tape()
     count = len(closure.linkage.inputs)
-    given = [tape.given(one.name, one.value) for one in paths[0].inputs]
+    given: list[Any] = [tape.given(one.name, one.value) for one in paths[0].inputs]
     groups = [given[start:][:count] for start in range(0, len(given), count)]
     taken = [tuple(decision.held for decision in path.decisions) for path in paths]
-    tree = _Growth(closure, tape, groups, wanted, taken).below(())
-    lowering = Lowering()
-    inputs = tuple(lowering.operation(one.operation) for one in given)
-    return Program(inputs, _lowered(tree, lowering))
+    solved = 0
 
-
-class _Growth:
-    """
-    Runs the steps on symbols, once for each path.
-
-    Parameters
-    ----------
-    closure, wanted
-        As in `program`.
-    tape, given
-        The tape, and the inputs, rates and accelerations on it.
-    taken
-        The decisions taken at closed states.
-
-    """
-
-    def __init__(
-        self,
-        closure: LoopClosure,
-        tape: Tape,
-        given: Sequence[Sequence[Any]],
-        wanted: Wanted,
-        taken: Sequence[tuple[bool, ...]],
-    ) -> None:
-        self._closure = closure
-        self._tape = tape
-        self._given = given
-        self._wanted = wanted
-        self._taken = taken
-        self._solved = 0
-
-    def below(self, decided: tuple[bool, ...]) -> Tree:
-        """Return the tree below the given first decisions."""
-        tape, count = self._tape, len(decided)
-        ahead = next((way for way in self._taken if way[:count] == decided), None)
-        leaf = self._leaf(decided if ahead is None else ahead, count, ahead is not None)
-        made = tape.decisions[:]
-        tree: Tree = leaf
-        for number in reversed(range(count, len(made))):
-            condition, held = made[number]
-            if condition.name == 'finite':
-                continue
-            other = self.below((*(each.held for each in made[:number]), not held))
-            if tree != other:
-                tree = Branch(condition, *((tree, other) if held else (other, tree)), held)
-        return tree
-
-    def _leaf(self, ahead: Sequence[bool], count: int, known: bool) -> Tree:
-        """Run the steps; the last of ``count`` decisions is the one that differs."""
-        tape, closure = self._tape, self._closure
+    def leaf(decided: tuple[bool, ...]) -> Tree:
+        """Run the steps; the last of the first decisions is the one that differs."""
+        nonlocal solved
+        first = len(decided)
+        known = next((way for way in taken if way[:first] == decided), None)
+        ahead = decided if known is None else known
         tape.begin(ahead)
-        known_state = closure.known(*self._given[0])
+        state = closure.known(*groups[0])
         for step in closure.steps:
             before = len(tape.decisions)
-            status = step.close(known_state).status
+            status = step.close(state).status
             if not status.has_rates:
                 return status
-            turned = before < count <= len(tape.decisions)
-            if turned and status is Status.CLOSED and not known:
+            turned = before < first <= len(tape.decisions)
+            if turned and status is Status.CLOSED and known is None:
                 return None
-        if self._solved == _MOST_SOLVED:
+        if solved == _MOST_SOLVED:
             return None
-        self._solved += 1
+        solved += 1
         tape.begin(ahead)
-        motion = moved(closure, self._given, within_limits=False)
-        numbers = tuple(tuple(map(number_of, group)) for group in self._wanted(motion))
+        motion = moved(closure, groups, within_limits=False)
+        numbers = tuple(tuple(map(number_of, group)) for group in wanted(motion))
         return Solved(motion.position.status, numbers)
 
-
-def _lowered(tree: Tree, lowering: Lowering) -> Tree:
-    """Return a tree in real numbers."""
-    if isinstance(tree, Branch):
-        condition = lowering.operation(tree.condition)
-        if isinstance(condition, bool):
-            return _lowered(tree.held if condition else tree.failed, lowering)
-        held, failed = _lowered(tree.held, lowering), _lowered(tree.failed, lowering)
-        return Branch(condition, held, failed, tree.usual)
-    if isinstance(tree, Solved):
-        return Solved(
-            tree.status,
-            tuple(tuple(map(lowering.operation, group)) for group in tree.outputs),
-        )
-    return tree
+    tree = tree_below(tape, (), leaf)
+    lowering = Lowering()
+    inputs = tuple(lowering.operation(one.operation) for one in given)
+    return Program(inputs, lowering.tree(tree))

@@ -33,7 +33,7 @@ from linkage_ros.kinematics.batch import Array, Batch, CODES, Codes, Mask
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction, Number
 from linkage_ros.kinematics.compiling.real_program import Lowered, lowered
-from linkage_ros.kinematics.compiling.trace import Fate, fates, Fork, joints, Wanted
+from linkage_ros.kinematics.compiling.trace import Branch, fates, joints, Tree, Wanted
 from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -287,9 +287,9 @@ def _program(path: Lowered, kinds: Sequence[Any]) -> _Program:
     return _Program(BlockFunction(names, arrays, roots, holds), BlockFunction(names, arrays, lost))
 
 
-def _comes_to(form: ArrayForm, fate: Fate, status: Status) -> Number:
+def _comes_to(form: ArrayForm, fate: Tree, status: Status) -> Number:
     """Return the condition that a fate leads to a status."""
-    if not isinstance(fate, Fork):
+    if not isinstance(fate, Branch):
         return fate is status
     condition = form.number(fate.condition)
     return form.either(

@@ -31,14 +31,14 @@ from typing import Any, ClassVar, NamedTuple
 
 from linkage_ros import __version__
 from linkage_ros.errors import clean
+from linkage_ros.kinematics.arithmetic import ROUNDING, SMALLEST
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.real_program import Branch, Program, program, Solved, Tree
+from linkage_ros.kinematics.compiling.real_program import Program, program
 from linkage_ros.kinematics.compiling.tape import Operation
-from linkage_ros.kinematics.compiling.trace import Motion
+from linkage_ros.kinematics.compiling.trace import Branch, Motion, Solved, Tree
 from linkage_ros.kinematics.compiling.writer import uses, Writer
 from linkage_ros.kinematics.limits import Bound
 from linkage_ros.kinematics.linkage import RevoluteJoint
-from linkage_ros.kinematics.rounding import ROUNDING, SMALLEST
 from linkage_ros.kinematics.status import Status
 
 WIDTH = 99
@@ -105,8 +105,15 @@ class Language(ABC):
     functions: ClassVar[dict[str, str]] = {}
     """Functions that have a different name on the tape."""
     infinity: ClassVar[str]
+    finite: ClassVar[str]
+    """Function that tells whether a number is finite."""
+    nearest: ClassVar[str]
+    """Function that rounds to the nearest integer."""
     conjunction: ClassVar[str] = '&&'
     disjunction: ClassVar[str] = '||'
+    comment: ClassVar[str] = '// {}'
+    status: str = '{}'
+    """Forms of a comment and of the name of a status."""
 
     def constant(self, value: Any) -> str:
         """Write a number."""
@@ -146,22 +153,6 @@ class Language(ABC):
     @abstractmethod
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
         """Write a line that assigns a number, or a truth value, to a name."""
-
-    @abstractmethod
-    def commented(self, line: str, text: str) -> str:
-        """Write a comment behind a line."""
-
-    @abstractmethod
-    def finite(self, name: str) -> str:
-        """Write that a number is finite."""
-
-    @abstractmethod
-    def rounded(self, text: str) -> str:
-        """Write the nearest integer."""
-
-    @abstractmethod
-    def status(self, name: str) -> str:
-        """Write a status."""
 
     @abstractmethod
     def left(self, status: str) -> str:
@@ -237,8 +228,8 @@ class _Body:
             array, index = divmod(number, count)
             given.append(language.assigned(operation.name, f'{GIVEN[array]}[{index}]'))
             self._writer.name(operation, operation.name)
-        finite = f' {language.conjunction} '.join(language.finite(o.name) for o in inputs)
-        leave = language.left(language.status(Status.INDETERMINATE.name))
+        finite = f' {language.conjunction} '.join(f'{language.finite}({o.name})' for o in inputs)
+        leave = language.left(language.status.format(Status.INDETERMINATE.name))
         given += language.block(language.negated(finite), [leave])
         self._follow(self._program.tree)
         constants = []
@@ -246,7 +237,8 @@ class _Body:
             line = language.assigned(name, language.constant(value))
             if value in self._lengths:
                 length = value * self._subject.closure.scale
-                line = language.commented(line, f'{length:.9g} m')
+                note = language.comment.format(f'{length:.9g} m')
+                line = f'{line}  {note}'
             constants.append(line)
         code = (f'    {line}' for line in (*given, *self._writer.lines))
         wrapped = (part for line in code for part in language.wrapped(line))
@@ -270,7 +262,7 @@ class _Body:
             self._solved(tree)
         else:
             status = UNDECIDED if tree is None else tree.name
-            writer.lines.append(language.left(language.status(status)))
+            writer.lines.append(language.left(language.status.format(status)))
 
     def _solved(self, leaf: Solved) -> None:
         language, writer = self._language, self._writer
@@ -284,10 +276,12 @@ class _Body:
                 writer.name(value, name)
             beyond.append(self._beyond(bound, name))
         texts = [[writer.write(number) for number in group] for group in groups]
-        status = language.status(leaf.status.name)
+        status = language.status.format(leaf.status.name)
         if beyond:
             condition = f' {language.disjunction} '.join(beyond)
-            status = language.choice(condition, language.status(Status.LIMITED.name), status)
+            status = language.choice(
+                condition, language.status.format(Status.LIMITED.name), status
+            )
         writer.lines += language.solved(status, texts)
 
     def _beyond(self, bound: Bound, name: str) -> str:
@@ -301,7 +295,7 @@ class _Body:
         if bound.middle is None:
             return compared(name)
         middle, turn = language.constant(bound.middle), language.constant(tau)
-        turns = language.rounded(f'({name} - {middle}) / {turn}')
+        turns = f'{language.nearest}(({name} - {middle}) / {turn})'
         turned = f'{name}_turned'
         self._writer.lines.append(language.assigned(turned, f'{name} - {turn} * {turns}'))
         return f'({compared(name)} {language.conjunction} {compared(turned)})'
@@ -363,7 +357,7 @@ def _head(subject: Subject, function: str) -> Iterator[str]:
     yield ''
     yield f'The function {function} takes:'
     for number, given in enumerate(linkage.inputs):
-        unit = 'm' if given.slider else 'rad'
+        unit = given.unit
         yield f'  {GIVEN[0]}[{number}]  {clean(given.joint)} [{unit}]'
     yield from _derived(subject, GIVEN)
     yield 'and gives:'

@@ -68,6 +68,21 @@ class Operation:
         return [argument for argument in self.arguments if isinstance(argument, Operation)]
 
 
+def rewritten(root: Any, known: dict[Operation, Any], write: Callable[[Operation], Any]) -> Any:
+    """Return what an operation is rewritten as, after its operands; others are kept as known."""
+    waiting = [root]
+    while waiting:
+        operation = waiting[-1]
+        needed = [one for one in operation.operands() if one not in known]
+        if needed:
+            waiting += needed
+            continue
+        waiting.pop()
+        if operation not in known:
+            known[operation] = write(operation)
+    return known[root]
+
+
 class Decision(NamedTuple):
     """A decision of the steps: a condition, and whether it held."""
 

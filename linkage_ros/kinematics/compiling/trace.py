@@ -133,27 +133,61 @@ def number_of(number: Any) -> Number:
     return number.operation if isinstance(number, Symbol) else number
 
 
-# The fates of a path: the status of the linkage where it leaves the path.
+class Solved(NamedTuple):
+    """A leaf with numbers, in the requested groups."""
+
+    status: Status
+    outputs: tuple[tuple[Number, ...], ...]
 
 
-class Fork(NamedTuple):
-    """A condition, and the fates where it holds and where it fails."""
+class Branch(NamedTuple):
+    """A condition, the trees where it holds and where it fails, and the usual outcome."""
 
     condition: Operation
-    held: Fate
-    failed: Fate
+    held: Tree
+    failed: Tree
+    usual: bool
 
 
-Fate: TypeAlias = Status | Fork | None
-"""A status; or None if the steps continue on another path, and only they give the status."""
+Tree: TypeAlias = Branch | Solved | Status | None
+"""What the steps come to, by their decisions; None where that is not followed."""
 
 
-def fates(closure: LoopClosure, path: Path) -> tuple[Fate, ...]:
+def tree_below(
+    tape: Tape, decided: tuple[bool, ...], leaf: Callable[[tuple[bool, ...]], Tree]
+) -> Tree:
     """
-    Return, for each decision of a path, the fate of the linkage if the decision differs.
+    Return the tree below some first decisions.
+
+    Parameters
+    ----------
+    tape
+        The tape on which the steps run.
+    decided
+        The first decisions.
+    leaf
+        Runs the steps with given first decisions, and returns what they come to.
+
+    """
+    tree = leaf(decided)
+    made = tape.decisions[:]
+    for number in reversed(range(len(decided), len(made))):
+        condition, held = made[number]
+        if condition.name == 'finite':
+            continue
+        other = tree_below(tape, (*(each.held for each in made[:number]), not held), leaf)
+        if tree != other:
+            tree = Branch(condition, *((tree, other) if held else (other, tree)), held)
+    return tree
+
+
+def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
+    """
+    Return, for each decision of a path, the status of the linkage if the decision differs.
 
     The status is that of the first step that is not closed. If that step has a pose, as at a
-    toggle, a later step may have a worse status.
+    toggle, a later step may have a worse status. None if the steps continue on another path, and
+    only they give the status.
 
     Parameters
     ----------
@@ -163,39 +197,30 @@ def fates(closure: LoopClosure, path: Path) -> tuple[Fate, ...]:
         The path, traced without limits.
 
     """
-    result: list[Fate] = []
-    held: list[bool] = []
+    tape = path.tape
+    inputs: list[Any] = [
+        Symbol(tape, given) for given in path.inputs[: len(closure.linkage.inputs)]
+    ]
+
+    def leaf(decided: tuple[bool, ...]) -> Tree:
+        tape.begin()
+        known = closure.known(*inputs)
+        # The inputs are finite: the first decision is that of the first step.
+        tape.begin(decided)
+        for step in closure.steps:
+            status = step.close(known).status
+            if status is not Status.CLOSED:
+                return status
+            if len(tape.decisions) >= len(decided):
+                break
+        return None
+
+    result: list[Tree] = []
+    held: tuple[bool, ...] = ()
     for decision in path.decisions:
         if decision.condition.name == 'finite':
             result.append(Status.INDETERMINATE)
         else:
-            result.append(_fate(closure, path, [*held, not decision.held]))
-            held.append(decision.held)
+            result.append(tree_below(tape, (*held, not decision.held), leaf))
+            held = (*held, decision.held)
     return tuple(result)
-
-
-def _fate(closure: LoopClosure, path: Path, decided: Sequence[bool]) -> Fate:
-    """Return the fate of a linkage for its first decisions."""
-    tape = path.tape
-    tape.begin()
-    inputs = path.inputs[: len(closure.linkage.inputs)]
-    symbols: list[Any] = [Symbol(tape, given) for given in inputs]
-    known = closure.known(*symbols)
-    # The inputs are finite: the first decision is that of the first step.
-    tape.begin(decided)
-    fate: Fate = None
-    for step in closure.steps:
-        status = step.close(known).status
-        if status is not Status.CLOSED:
-            fate = status
-            break
-        if len(tape.decisions) >= len(decided):
-            break
-    count = len(decided)
-    made = tape.decisions[count:]
-    for number in reversed(range(len(made))):
-        before = [*decided, *(decision.held for decision in made[:number])]
-        other = _fate(closure, path, [*before, not made[number].held])
-        condition, held = made[number]
-        fate = Fork(condition, fate, other) if held else Fork(condition, other, fate)
-    return fate

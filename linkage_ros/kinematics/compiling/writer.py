@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -44,6 +44,20 @@ def uses(roots: Iterable[Any]) -> dict[Operation, int]:
                 counts[operand] = counts.get(operand, 0) + 1
                 waiting.append(operand)
     return counts
+
+
+def needed(root: Operation, known: Container[Operation]) -> Iterator[Operation]:
+    """Yield an operation and those that it needs, unless known, each after its operands."""
+    waiting: list[tuple[Operation, bool]] = [(root, False)]
+    while waiting:
+        operation, ready = waiting.pop()
+        if operation in known:
+            continue
+        if ready:
+            yield operation
+            continue
+        waiting.append((operation, True))
+        waiting += [(operand, False) for operand in reversed(operation.operands())]
 
 
 class Text(NamedTuple):
@@ -118,22 +132,9 @@ class Writer:
         """Return a number as an expression, after the lines that it needs."""
         if not isinstance(root, Operation):
             return Text(self._constant(root), _ATOM if not str(root).startswith('-') else 6, 0)
-        for operation in self._needed(root):
+        for operation in needed(root, self._texts):
             self._texts[operation] = self._placed(operation)
         return self._texts[root]
-
-    def _needed(self, root: Operation) -> Iterator[Operation]:
-        """Yield the operations without a text, each after its operands."""
-        waiting: list[tuple[Operation, bool]] = [(root, False)]
-        while waiting:
-            operation, ready = waiting.pop()
-            if operation in self._texts:
-                continue
-            if ready:
-                yield operation
-                continue
-            waiting.append((operation, True))
-            waiting += [(operand, False) for operand in reversed(operation.operands())]
 
     def _placed(self, operation: Operation) -> Text:
         text = self._expression(operation)

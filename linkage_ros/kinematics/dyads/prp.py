@@ -31,8 +31,7 @@ from __future__ import annotations
 from math import pi
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import atan2, cross, facing, phase
-from linkage_ros.kinematics.rounding import ROUNDING
+from linkage_ros.kinematics.arithmetic import atan2, cross, facing, phase, ROUNDING
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
@@ -48,11 +47,11 @@ class PRPPose(NamedTuple):
     gap
         Distance of parallel lines, otherwise 0, in the unit of the lengths.
     first, second
-        s1 and s2, in the unit of the lengths.
+        s1 and s2, or r1 and r2, in the unit of the lengths.
     across
         e^{iδ}.
     units
-        û1 and û2.
+        û1 and û2 of a `PRPDyad`.
 
     """
 
@@ -61,10 +60,34 @@ class PRPPose(NamedTuple):
     first: float
     second: float
     across: complex
-    units: tuple[complex, complex]
+    units: tuple[complex, complex] = (0j, 0j)
 
 
-class PRPDyad:
+class _CrossingLines:
+    """Two lines on links of the coordinates ``arms``; at equal ones ``across`` is e^{iδ}."""
+
+    __slots__ = ('_across', 'arms')
+
+    def __init__(self, arms: tuple[int, int], across: complex) -> None:
+        self.arms = arms
+        self._across = across
+
+    @property
+    def singular_angles(self) -> tuple[float, ...]:
+        """Differences of the two coordinates at which the lines are parallel, in [rad]."""
+        angle = phase(self._across)
+        return angle, angle + pi
+
+    def side_of(self, pose: PRPPose) -> float:
+        """Return a number with the sign of the assembly; 0 where it is singular."""
+        return pose.across.imag
+
+    def transmission_angle(self, pose: PRPPose) -> float:
+        """Return the angle between the two lines, in [0, π/2], in [rad]."""
+        return atan2(abs(pose.across.imag), abs(pose.across.real))
+
+
+class PRPDyad(_CrossingLines):
     """
     A pin on two lines.
 
@@ -79,15 +102,14 @@ class PRPDyad:
 
     """
 
-    __slots__ = ('_across', '_starts', '_units', 'arms')
+    __slots__ = ('_starts', '_units')
 
     def __init__(
         self, starts: tuple[int, int], arms: tuple[int, int], units: tuple[complex, complex]
     ) -> None:
+        super().__init__(arms, units[1] * units[0].conjugate())
         self._starts = starts
-        self.arms = arms
         self._units = units
-        self._across = units[1] * units[0].conjugate()
 
     def close(self, known: State) -> PRPPose:
         """Append both slides."""
@@ -131,20 +153,6 @@ class PRPDyad:
         carried -= start + _carried(pose.first, slide_rate, v[i], a[i]) * one
         resolved(carried, pose.units, pose.across.imag, changes)
 
-    @property
-    def singular_angles(self) -> tuple[float, ...]:
-        """Differences of the two coordinates at which the lines are parallel, in [rad]."""
-        angle = phase(self._across)
-        return angle, angle + pi
-
-    def side_of(self, pose: PRPPose) -> float:
-        """Return a number with the sign of the assembly; 0 where it is singular."""
-        return pose.across.imag
-
-    def transmission_angle(self, pose: PRPPose) -> float:
-        """Return the angle between the two lines, in [0, π/2], in [rad]."""
-        return atan2(abs(pose.across.imag), abs(pose.across.real))
-
 
 def _carried(slide: float, rate: float, turn: float, change: float) -> complex:
     """Return the centrifugal, Euler and Coriolis terms of a point on a turning line."""
@@ -162,31 +170,7 @@ def resolved(
     return first, second
 
 
-class CrankPRPPose(NamedTuple):
-    """
-    The dyad at one state of the linkage.
-
-    Attributes
-    ----------
-    status
-        Whether the lines cross.
-    gap
-        Distance of parallel lines, otherwise 0, in the unit of the lengths.
-    first, second
-        r1 and r2, in the unit of the lengths.
-    across
-        e^{iδ}.
-
-    """
-
-    status: Status
-    gap: float
-    first: float
-    second: float
-    across: complex
-
-
-class CrankPRPDyad:
+class CrankPRPDyad(_CrossingLines):
     """
     A pin on two lines of links that are pinned together at O.
 
@@ -219,17 +203,16 @@ class CrankPRPDyad:
 
     """
 
-    __slots__ = ('_across', '_offsets', '_size', 'arms')
+    __slots__ = ('_offsets', '_size')
 
     def __init__(
         self, offsets: tuple[float, float], size: float, arms: tuple[int, int], across: complex
     ) -> None:
+        super().__init__(arms, across)
         self._offsets = offsets
         self._size = size
-        self.arms = arms
-        self._across = across
 
-    def close(self, known: State) -> CrankPRPPose:
+    def close(self, known: State) -> PRPPose:
         """Append r1 and r2."""
         x = known.coordinates
         (i, j), (one, other) = self.arms, self._offsets
@@ -239,13 +222,13 @@ class CrankPRPDyad:
             gap = abs(one * cosine - other)
             far = gap > ROUNDING * self._size
             status = Status.OPEN if far else Status.INDETERMINATE
-            return CrankPRPPose(status, gap if far else 0.0, 0.0, 0.0, across)
+            return PRPPose(status, gap if far else 0.0, 0.0, 0.0, across)
         first, second = (one * cosine - other) / sine, (one - other * cosine) / sine
         x.append(first)
         x.append(second)
-        return CrankPRPPose(Status.CLOSED, 0.0, first, second, across)
+        return PRPPose(Status.CLOSED, 0.0, first, second, across)
 
-    def rates(self, pose: CrankPRPPose, _known: State, speeds: State) -> float:
+    def rates(self, pose: PRPPose, _known: State, speeds: State) -> float:
         """Append their rates; return δ̇/sin δ."""
         v = speeds.coordinates
         i, j = self.arms
@@ -256,7 +239,7 @@ class CrankPRPDyad:
 
     def accelerations(
         self,
-        pose: CrankPRPPose,
+        pose: PRPPose,
         swing: float,
         _known: State,
         _speeds: State,
@@ -269,17 +252,3 @@ class CrankPRPDyad:
         pull, whirl = (a[j] - a[i]) / pose.across.imag, swing * swing
         a.append(whirl * (first + second * cosine) - pull * second)
         a.append(whirl * (second + first * cosine) - pull * first)
-
-    def transmission_angle(self, pose: CrankPRPPose) -> float:
-        """Return the angle between the two lines, in [0, π/2], in [rad]."""
-        return atan2(abs(pose.across.imag), abs(pose.across.real))
-
-    @property
-    def singular_angles(self) -> tuple[float, ...]:
-        """Differences of the two coordinates at which the lines are parallel, in [rad]."""
-        angle = phase(self._across)
-        return angle, angle + pi
-
-    def side_of(self, pose: CrankPRPPose) -> float:
-        """Return a number with the sign of the assembly; 0 where it is singular."""
-        return pose.across.imag

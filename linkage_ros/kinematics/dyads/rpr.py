@@ -40,7 +40,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import atan2
+from linkage_ros.kinematics.arithmetic import atan2, margin
 from linkage_ros.kinematics.diagonals import (
     AnyDiagonal,
     CrankDiagonal,
@@ -48,7 +48,6 @@ from linkage_ros.kinematics.diagonals import (
     DiagonalRate,
     UnsignedDiagonal,
 )
-from linkage_ros.kinematics.rounding import margin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 

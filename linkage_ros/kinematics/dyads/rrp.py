@@ -33,9 +33,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import atan2
+from linkage_ros.kinematics.arithmetic import atan2, SMALLEST
 from linkage_ros.kinematics.rail import PinOnRail, Rail
-from linkage_ros.kinematics.rounding import SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 

@@ -46,10 +46,19 @@ were measured.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import atan2, copysign, facing, folded, phase
+from linkage_ros.kinematics.arithmetic import (
+    atan2,
+    copysign,
+    facing,
+    folded,
+    margin,
+    phase,
+    SMALLEST,
+)
 from linkage_ros.kinematics.diagonals import (
     AnyDiagonal,
     CrankDiagonal,
@@ -61,7 +70,6 @@ from linkage_ros.kinematics.diagonals import (
     free_diagonal_rate,
     UnsignedDiagonal,
 )
-from linkage_ros.kinematics.rounding import margin, SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
@@ -374,11 +382,12 @@ class DrivenOffset(NamedTuple):
     unit: complex
 
 
+@dataclass(frozen=True, slots=True)
 class Side:
     """
     A vector from one point of a group of links to another, in the frame of the link of the first.
 
-    Parameters
+    Attributes
     ----------
     start, end
         The points, each in the frame of its own link.
@@ -387,29 +396,26 @@ class Side:
 
     """
 
-    __slots__ = ('_carries', '_end', '_start')
-
-    def __init__(self, start: complex, end: complex, carries: tuple[DrivenOffset, ...]) -> None:
-        self._start = start
-        self._end = end
-        self._carries = carries
+    start: complex
+    end: complex
+    carries: tuple[DrivenOffset, ...]
 
     def at(self, x: list[float]) -> complex:
         """Return the vector."""
-        z = self._end
-        for origin, inner, angle, turn, slide, sign, unit in self._carries:
+        z = self.end
+        for origin, inner, angle, turn, slide, sign, unit in self.carries:
             if turn >= 0:
                 z = origin + facing(angle + sign * x[turn]) * (z - inner)
             else:
                 z = origin + facing(angle) * (z - inner) + sign * x[slide] * unit
-        return z - self._start
+        return z - self.start
 
     def changes(
         self, x: list[float], v: list[float], a: list[float] | None = None
     ) -> tuple[complex, complex]:
         """Return the first derivative, and the second if accelerations are given."""
-        z, rate, change = self._end, 0j, 0j
-        for origin, inner, angle, turn, slide, sign, unit in self._carries:
+        z, rate, change = self.end, 0j, 0j
+        for origin, inner, angle, turn, slide, sign, unit in self.carries:
             if turn >= 0:
                 turned = facing(angle + sign * x[turn])
                 w = sign * v[turn]

@@ -33,11 +33,12 @@ from dataclasses import dataclass
 from math import degrees, floor, isfinite, log10, nan, tau
 from typing import NamedTuple
 
-from linkage_ros.errors import SynthesisError
+from linkage_ros.errors import quoted, SynthesisError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.synthesis.design import Design, ROCKER
 from linkage_ros.synthesis.function.expression import Array, Expression, named
+from linkage_ros.synthesis.pairs.freudenstein import exact
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -350,7 +351,7 @@ def _between(ends: Range, part: Array) -> Array:
 def _check_range(name: str, ends: Range) -> None:
     start, end = ends
     if not isfinite(end - start):
-        raise SynthesisError(name, f'{start} to {end} is none', 'give it two numbers')
+        raise SynthesisError(name, f'{start} to {end} is not a range', 'write two finite numbers')
     if start == end:
         raise SynthesisError(
             name, f'begins and ends at {start:.10g}', 'let it end where it does not begin'
@@ -364,6 +365,58 @@ def _check_turn(name: str, ends: Range) -> None:
         raise SynthesisError(
             name, f'{start:.10g}° to {end:.10g}° is a full turn or more', 'keep it below 360°'
         )
+
+
+def generate_function(
+    function: str,
+    x_range: Range,
+    crank_range: Range,
+    rocker_range: Range,
+    *,
+    points: int = 3,
+    ground: float = 1.0,
+) -> Design:
+    """
+    Design a four-bar that computes a function.
+
+    With three precision points it meets them exactly, by Freudenstein's equation; with more points
+    it is the nearest four-bar, which needs scipy.
+
+    Parameters
+    ----------
+    function
+        Function of x, such as ``'log10(x)'``.
+    x_range
+        First and last x.
+    crank_range, rocker_range
+        Angles of crank and rocker there, in [rad].
+    points
+        Number of precision points, spaced by `chebyshev`.
+    ground
+        Length of the ground, in [m].
+
+    Raises
+    ------
+    SynthesisError
+        If the function or a range is invalid, or no four-bar of finite links exists.
+    LinkageError
+        If scipy is needed and not installed.
+    TypeError
+        If the function is not a string.
+
+    """
+    if not isinstance(function, str):
+        raise TypeError(f"function: {quoted(function)} is not a text; write it as 'log10(x)'")
+    if points < 3:
+        raise SynthesisError('points', f'there are {points}', 'ask for 3 or more')
+    task = FunctionTask(Expression(function), x_range, crank_range, rocker_range)
+    crank, rocker = pairs(task, chebyshev(*x_range, points))
+    if points > 3:
+        from linkage_ros.synthesis.pairs.angle_fit import nearest  # local import: to fit only
+
+        return nearest(crank, rocker, ground)
+    design, _ = exact(crank, rocker, ground)
+    return design
 
 
 _ERROR_SAMPLES = 720
@@ -444,14 +497,6 @@ def structural_error(
     return StructuralError(
         crank, error, greatest, at, _rms(crank, error), _opens_at(closure, low, high)
     )
-
-
-def errors_at_positions(design: Design) -> Array:
-    """Return the error at each position of a design, on its own assembly, in [rad]; (n,)."""
-    closure = Closure(design.four_bar.linkage())
-    crank = np.array([one.crank for one in design.wanted])
-    wanted = [nan if one.rocker is None else one.rocker for one in design.wanted]
-    return _wrapped(_rocker_of(closure, crank) - np.array(wanted))
 
 
 def _rocker_of(closure: Closure, crank: Array) -> Array:

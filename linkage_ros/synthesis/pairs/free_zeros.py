@@ -54,7 +54,7 @@ from math import cos, hypot, log10, pi, sin
 from typing import Literal, NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.rounding import SMALLEST, UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import SMALLEST, UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.double_double import (
     minus,

@@ -50,7 +50,7 @@ from math import degrees, inf, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
 from linkage_ros.synthesis.double_double import (
     Array,

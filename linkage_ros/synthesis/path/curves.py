@@ -361,8 +361,7 @@ def closes(rows: Array, low: Array, high: Array) -> Mask:
 
 def _holds(low: Array, high: Array, angle: float) -> Mask:
     """Return whether an angle lies between two others, modulo a turn."""
-    turn = 2.0 * np.pi
-    held: Mask = np.ceil((low - angle) / turn) * turn + angle <= high
+    held: Mask = np.ceil((low - angle) / tau) * tau + angle <= high
     return held
 
 

@@ -226,8 +226,6 @@ def _box(aim: Aim) -> tuple[Array, Array]:
     return low, high
 
 
-_TURN = 2.0 * np.pi
-
 _DAMPING = 1e-2
 _LEAST_DAMPED, _MOST_DAMPED = 1e-12, 1e10
 _HELPED, _FAILED = 0.2, 5.0
@@ -291,9 +289,9 @@ def allowed(fitted: Fitted, aim: Aim) -> Mask:
     good: Mask = np.ones(len(low), dtype=bool)
     if aim.timing is None:
         along = np.diff(angles, axis=1) * np.sign(angles[:, -1:] - angles[:, :1])
-        good = (along > 0.0).all(1) & (high - low < _TURN)
+        good = (along > 0.0).all(1) & (high - low < tau)
     if aim.full_turn:
-        low, high = np.zeros_like(low), np.full_like(high, _TURN)
+        low, high = np.zeros_like(low), np.full_like(high, tau)
     good &= closes(fitted.rows, low, high)
     return good
 

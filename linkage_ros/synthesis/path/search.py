@@ -34,6 +34,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from math import tau
 
 from linkage_ros.kinematics.batch import Array, Complex
 from linkage_ros.synthesis.path.curves import (
@@ -47,8 +48,6 @@ from linkage_ros.synthesis.path.curves import (
     theta_at,
 )
 import numpy as np
-
-_TURN = 2.0 * np.pi
 
 _GROUND = (-2.3, 2.3)
 """Bounds of ln(d/a): grounds from a tenth of the crank to ten cranks."""
@@ -95,7 +94,7 @@ class Timed(Starts):
     """Candidates b/a, c/a, d/a, side and the crank angle at the zero of the timing."""
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
-        zero = generator.uniform(0.0, _TURN, count)
+        zero = generator.uniform(0.0, tau, count)
         timing = _known(self.aim.timing)
         low, high = zero + timing.min(), zero + timing.max()
         return np.column_stack((_bars(generator, low, high, self.aim.full_turn), zero))
@@ -109,7 +108,7 @@ class Open(Starts):
     """Candidates b/a, c/a, d/a, side, the traced point, the first crank angle and the travel."""
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
-        start = generator.uniform(0.0, _TURN, count)
+        start = generator.uniform(0.0, tau, count)
         travel = generator.uniform(*_ARC, count) * generator.choice((-1.0, 1.0), count)
         low, high = np.minimum(start, start + travel), np.maximum(start, start + travel)
         bars = _bars(generator, low, high, self.aim.full_turn)
@@ -127,12 +126,12 @@ class Closed(Starts):
     """Candidates b/a, c/a, d/a, side and the traced point; the start is computed."""
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
-        bars = _bars(generator, np.zeros(count), np.full(count, _TURN), True)
+        bars = _bars(generator, np.zeros(count), np.full(count, tau), True)
         return np.column_stack((bars, _arms(generator, bars)))
 
     def _angles(self, candidates: Array) -> Array:
         """Return the angles for the rotation of the whole curve that fits the points best."""
-        curve = _curve(candidates, np.linspace(0.0, _TURN, _GRID + 1)[None, :])
+        curve = _curve(candidates, np.linspace(0.0, tau, _GRID + 1)[None, :])
         way = along(curve)
         even = np.arange(_AROUND) / _AROUND
         spectrum = np.fft.fft(resampled(curve, way, even), axis=1)
@@ -154,7 +153,7 @@ class Closed(Starts):
             way_round[better] = sign
         goes = begin[:, None] + way_round[:, None] * wanted[:-1]
         whole = np.floor(goes)
-        return _TURN * (whole + theta_at(way, goes - whole))
+        return tau * (whole + theta_at(way, goes - whole))
 
 
 def problem_of(aim: Aim, closed: bool) -> Starts:
@@ -168,7 +167,7 @@ def _bars(generator: np.random.Generator, low: Array, high: Array, full_turn: bo
     """Draw b, c, d for a crank of 1, and the side, that close between these angles; (n, 4)."""
     count = len(low)
     if full_turn:
-        low, high = np.zeros(count), np.full(count, _TURN)
+        low, high = np.zeros(count), np.full(count, tau)
     d = np.exp(generator.uniform(*_GROUND, count))
     shortest, longest = diagonals(np.ones(count), d, low, high)
     both = longest * (1.0 + np.exp(generator.uniform(*_SPARE, count)))
