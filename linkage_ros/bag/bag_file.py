@@ -207,7 +207,7 @@ class BagFile:
 
         mcap before 1.6 cannot close a chunk early: with it, only full chunks are safe.
         """
-        self._file.look()
+        self._file.check()
         if hasattr(self._mcap, 'flush'):
             self._mcap.flush()  # type: ignore[no-untyped-call]
         if self._file.position == self._flushed:
@@ -243,7 +243,7 @@ class BagFile:
         self._mcap.finish()  # type: ignore[no-untyped-call]
         self._reserve.release()
         with suppress(OSError):
-            self._file.look()
+            self._file.check()
         error = self._file.error
         try:
             try:

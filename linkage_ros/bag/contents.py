@@ -30,10 +30,10 @@ from mcap.opcode import Opcode
 from mcap.records import Header, Metadata
 from mcap.writer import MCAP0_MAGIC
 
-TOLD_EVERY = 4096
+REPORT_EVERY = 4096
 """Number of messages between two progress reports and checks for a stop."""
 
-_RECORD_SIZE = 31
+RECORD_SIZE = 31
 """Size of a message record without the message itself [bytes]."""
 
 
@@ -91,20 +91,61 @@ class Contents(NamedTuple):
     stopped: bool
 
 
-class _Tally:
+class Tally:
     """Counts the messages of a topic."""
 
-    __slots__ = ('count', 'first', 'last', 'size', 'topic')
+    __slots__ = ('first', 'last', 'messages', 'size', 'topic')
 
     def __init__(self, topic: Topic) -> None:
         self.topic = topic
-        self.count = self.size = self.last = 0
+        self.messages = self.size = self.last = 0
         self.first = 2**64
+
+    def add(self, messages: int, size: int, first: int, last: int) -> None:
+        """Add messages with their size [bytes], and least and greatest log time, in [ns]."""
+        self.messages += messages
+        self.size += size
+        self.first = min(self.first, first)
+        self.last = max(self.last, last)
+
+
+class Tallies(dict[str, Tally]):
+    """
+    Counts of all topics, by name.
+
+    Parameters
+    ----------
+    bag
+        The bag; its topics come first, others in the order of their first message.
+
+    """
+
+    def __init__(self, bag: Bag) -> None:
+        super().__init__({topic.name: Tally(topic) for topic in bag.topics})
+
+    def __missing__(self, name: str) -> Tally:
+        # Its channel is missing in the index.
+        tally = self[name] = Tally(Topic(name, '', '', ''))
+        return tally
+
+    def contents(self, damage: str, stopped: bool) -> Contents:
+        """Return the counts."""
+        held = [tally for tally in self.values() if tally.messages]
+        return Contents(
+            tuple(
+                TopicContents(t.topic, t.messages, t.size, t.first if t.messages else 0, t.last)
+                for t in self.values()
+            ),
+            min((tally.first for tally in held), default=None),
+            max((tally.last for tally in held), default=None),
+            damage,
+            stopped,
+        )
 
 
 def contents_of(
     bag: Bag,
-    told: Callable[[int], None] = lambda _: None,
+    progress: Callable[[int], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Contents:
     """
@@ -114,45 +155,28 @@ def contents_of(
     ----------
     bag
         The bag. If it is damaged, the messages before the damage are counted.
-    told
-        Progress callback; receives the number of bytes read, now and then.
+    progress
+        Receives the number of bytes read, now and then.
     stopped
         Returns whether to stop.
 
     """
-    tallies = {topic.name: _Tally(topic) for topic in bag.topics}
+    tallies = Tallies(bag)
     damage, halted = '', False
-    number = read = 0
+    read = 0
     try:
         for number, (name, log_time, _, data) in enumerate(bag.messages(), 1):
-            tally = tallies.get(name)
-            if tally is None:  # its channel is missing in the index
-                tally = tallies[name] = _Tally(Topic(name, '', '', ''))
             size = len(data)
-            tally.count += 1
-            tally.size += size
-            tally.first = min(tally.first, log_time)
-            tally.last = max(tally.last, log_time)
-            read += size + _RECORD_SIZE
-            if not number % TOLD_EVERY:
-                told(read)
+            tallies[name].add(1, size, log_time, log_time)
+            read += size + RECORD_SIZE
+            if not number % REPORT_EVERY:
+                progress(read)
                 if stopped():
                     halted = True
                     break
     except BagError as error:
         damage = f'{error.where}: {error.reason}'
-    topics = tuple(
-        TopicContents(t.topic, t.count, t.size, t.first if t.count else 0, t.last)
-        for t in tallies.values()
-    )
-    held = [topic for topic in topics if topic.messages]
-    return Contents(
-        topics,
-        min((topic.first for topic in held), default=None),
-        max((topic.last for topic in held), default=None),
-        damage,
-        halted,
-    )
+    return tallies.contents(damage, halted)
 
 
 class Layout(NamedTuple):

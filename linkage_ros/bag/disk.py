@@ -101,7 +101,7 @@ class RecordFile:
     def flush(self) -> None:
         """Do nothing: there is no buffer between `write` and the system."""
 
-    def look(self) -> None:
+    def check(self) -> None:
         """
         Raise LostError if another process has truncated, moved or removed the file.
 
@@ -153,7 +153,7 @@ class RecordFile:
         if self.error and self._is_cut:
             raise self.error
         while self._waiting:
-            self.look()
+            self.check()
             self._put(self._waiting[0], self.size)
             self._unsynced.append((self.size, self._waiting.pop(0)))
             self.size += len(self._unsynced[-1][1])

@@ -14,9 +14,10 @@
 
 
 """
-Write ``metadata.yaml``, which rosbag2 reads before it opens a bag's files.
+Write what a bag says of itself: ``metadata.yaml``, and the statistics of its recording.
 
-The keys and their order are rosbag2's, metadata version 9 (Jazzy; ``rosbag2_storage/yaml.hpp``).
+rosbag2 reads ``metadata.yaml`` before it opens a bag's files. The keys and their order are its
+own, metadata version 9 (Jazzy; ``rosbag2_storage/yaml.hpp``).
 """
 
 from __future__ import annotations
@@ -25,10 +26,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import errno
 from functools import lru_cache
+import json
 import os
 from pathlib import Path
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 from linkage_ros.bag.topic import QosProfile, Topic
 import yaml
@@ -68,7 +70,7 @@ class BagSummary:
         Size of the MCAP file, or files [bytes].
     parts
         Summaries of the files, if there are several.
-    let_go
+    discarded
         Messages in files that were removed to keep newer ones, for each topic; () for none.
 
     """
@@ -82,7 +84,7 @@ class BagSummary:
     duration: int
     size: int
     parts: tuple[BagSummary, ...] = ()
-    let_go: tuple[int, ...] = ()
+    discarded: tuple[int, ...] = ()
 
 
 @lru_cache
@@ -138,7 +140,7 @@ def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool 
 
 
 def together(
-    parts: Sequence[BagSummary], refused: Sequence[int], let_go: Sequence[int]
+    parts: Sequence[BagSummary], refused: Sequence[int], discarded: Sequence[int]
 ) -> BagSummary:
     """Return the summary of a bag of these files; of a single file, its own summary."""
     last = parts[-1]
@@ -154,7 +156,7 @@ def together(
         duration=max(ends) - start if ends else 0,
         size=sum(part.size for part in parts),
         parts=tuple(parts) if len(parts) > 1 else (),
-        let_go=tuple(let_go),
+        discarded=tuple(discarded),
     )
 
 
@@ -245,3 +247,109 @@ def _indented(text: str) -> str:
 def _dump(content: Any) -> str:
     text: str = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=1000)
     return text
+
+
+_PREFIX = 'linkage_ros.'
+
+STATS_RECORD = f'{_PREFIX}account'
+"""Name of the metadata record with the `RecordingStats` at the end of a bag's last file."""
+
+DISCARDED = f'{_PREFIX}let_go'
+"""Key in the ``custom_data`` of a bag whose first files were removed: counts by topic, as JSON."""
+
+FAILURE = f'{_PREFIX}failure'
+"""Key in the ``custom_data`` of a bag whose recording ended early: the reason."""
+
+UNFINISHED = f'{_PREFIX}unfinished'
+"""Key in the ``custom_data`` of a bag in recording, or of a killed recording."""
+
+UNFINISHED_DATA: Mapping[str, str] = {
+    UNFINISHED: 'being recorded, or killed; counted is what was on the disk by the last flush'
+}
+
+
+class RecordingStats(NamedTuple):
+    """
+    Messages by topic: ``received == recorded + dropped + discarded``.
+
+    Attributes
+    ----------
+    received
+        Messages offered to the recorder.
+    recorded
+        Messages in the bag.
+    dropped
+        Messages for which the disk was too slow or too full, or whose times do not fit into a bag.
+    discarded
+        Messages in files that were removed to keep newer ones.
+
+    """
+
+    received: Sequence[int]
+    recorded: Sequence[int]
+    dropped: Sequence[int]
+    discarded: Sequence[int]
+
+
+def custom_data(
+    custom: Mapping[str, str], summary: BagSummary, account: RecordingStats | None
+) -> dict[str, str]:
+    """
+    Return the ``custom_data`` of a bag's metadata.
+
+    Parameters
+    ----------
+    custom
+        Further entries.
+    summary
+        Summary of the bag.
+    account
+        The statistics; None while they are unknown.
+
+    """
+    entries = dict(custom)
+    if any(summary.discarded):
+        entries[DISCARDED] = _by_topic(summary.discarded, summary)
+    if account:
+        entries[f'{_PREFIX}received'] = _by_topic(account.received, summary)
+        entries[f'{_PREFIX}dropped'] = _by_topic(account.dropped, summary)
+    return entries
+
+
+def last_records(
+    custom: Mapping[str, str], summary: BagSummary, account: RecordingStats | None
+) -> dict[str, dict[str, str]]:
+    """Return the metadata records at the end of a file, by name; arguments as `custom_data`."""
+    text = metadata_text(summary, custom_data(custom, summary, account), root=False)
+    records = {'rosbag2': {'serialized_metadata': text}}
+    if account:
+        words = ('received', 'recorded', 'dropped', 'let_go')
+        counts = {
+            word: _by_topic(counts, summary) for word, counts in zip(words, account, strict=True)
+        }
+        records[STATS_RECORD] = counts
+    return records
+
+
+def counts_in(custom: Mapping[str, str], word: str) -> dict[str, int]:
+    """
+    Return the counts by topic in a bag's ``custom_data``; empty if missing or damaged.
+
+    Parameters
+    ----------
+    custom
+        The ``custom_data``.
+    word
+        Kind of counts: 'received', 'dropped' or 'let_go'.
+
+    """
+    try:
+        counts = json.loads(custom[f'{_PREFIX}{word}'])
+    except (KeyError, ValueError, RecursionError):
+        return {}
+    entries = counts.items() if isinstance(counts, dict) else ()
+    return {topic: count for topic, count in entries if type(count) is int and count >= 0}
+
+
+def _by_topic(counts: Sequence[int], summary: BagSummary) -> str:
+    return json.dumps({t.name: n for t, n in zip(summary.topics, counts, strict=True)})

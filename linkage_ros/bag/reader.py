@@ -40,11 +40,10 @@ from linkage_ros.bag.mcap_records import (
     Source,
     strict,
 )
-from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
-from linkage_ros.bag.recording_stats import STATS_RECORD, UNFINISHED
+from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY, STATS_RECORD, UNFINISHED
 from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
 from linkage_ros.errors import BagError, quoted
-from linkage_ros.files.regular_file import read_regular
+from linkage_ros.files.file_access import read_regular
 from linkage_ros.files.yaml_file import bounded_yaml
 from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
@@ -90,10 +89,10 @@ def serialized_metadata(record: Metadata) -> dict[str, Any]:
     """Return the content of rosbag2's metadata record; empty if it is damaged."""
     text = record.metadata.get('serialized_metadata', '')
     try:
-        said = bounded_yaml(text if len(text) <= MOST_METADATA else '')
+        content = bounded_yaml(text if len(text) <= MOST_METADATA else '')
     except ValueError:
         return {}
-    return said if isinstance(said, dict) else {}
+    return content if isinstance(content, dict) else {}
 
 
 def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
@@ -138,6 +137,10 @@ def is_empty(file: Path) -> bool:
         return False
 
 
+_RECOGNISED = 512
+"""Length of the start by which a text file is recognised [bytes]."""
+
+
 def is_finished(file: Path) -> bool:
     """Return whether an MCAP file is complete; raise if it is not an MCAP file."""
     length = len(MCAP0_MAGIC)
@@ -146,7 +149,7 @@ def is_finished(file: Path) -> bool:
             # Opening a pipe would wait for a writer.
             raise BagError(file, 'is no file', "name a bag's folder, or its file")
         with file.open('rb') as stream:
-            start = stream.read(length)
+            start = stream.read(_RECOGNISED)
             size = stream.seek(0, SEEK_END)
             stream.seek(max(0, size - length))
             end = stream.read()
@@ -156,9 +159,11 @@ def is_finished(file: Path) -> bool:
         raise unreadable(file, error) from None
     if not start:
         raise BagError(file, 'is empty', 'its recording never began, or the power failed in it')
-    if start != MCAP0_MAGIC:
+    if not start.startswith(MCAP0_MAGIC):
+        text = start.isascii() and not any(code in start for code in b'\0\x1b')
+        found = 'is a text file' if text else f'starts with {quoted(start[:length])}'
         raise BagError(
-            file, f'starts with {quoted(start)}, as no MCAP file does', 'name an MCAP file'
+            file, f'{found}, and no MCAP file', "name a bag's folder, or its .mcap file"
         )
     return size > length and end == MCAP0_MAGIC
 
@@ -222,8 +227,8 @@ def footer_metadata(file: Path) -> FooterMetadata:
             records = index_of(source).metadata
             accounted = any(each.name == STATS_RECORD for each in records)
             # Of several records, the last one has the final outcome.
-            said = [each for each in records if each.name == 'rosbag2'][-1:]
-            for each in said:
+            latest = [each for each in records if each.name == 'rosbag2'][-1:]
+            for each in latest:
                 content = source.read(each.offset, each.length)
                 # Other records may take seconds to parse, and are not needed.
                 if b'linkage_ros.' in content:
@@ -307,7 +312,7 @@ class Bag:
         """
         for file in self.files:
             until_damage = self.truncated and file == self.files[-1]
-            for record in _contents(file, Definitions(), _untold, until_damage=until_damage):
+            for record in _contents(file, Definitions(), until_damage=until_damage):
                 if isinstance(record, Message):
                     yield BagMessage(
                         record.channel.topic, record.log_time, record.publish_time, record.data
@@ -315,7 +320,10 @@ class Bag:
 
 
 def read_bag(
-    path: str | Path, *, allow_truncated: bool = False, told: ProgressCallback = lambda read: None
+    path: str | Path,
+    *,
+    allow_truncated: bool = False,
+    progress: ProgressCallback = lambda read: None,
 ) -> Bag:
     """
     Open a bag for reading.
@@ -326,7 +334,7 @@ def read_bag(
         The bag's folder, or an MCAP file.
     allow_truncated
         Whether to accept the bag of a killed recording, as far as it goes.
-    told
+    progress
         Progress callback for files without an index, which are read to their end.
 
     Raises
@@ -353,7 +361,7 @@ def read_bag(
     attachments: dict[str, bytes] = {}
     passed_over: dict[str, None] = {}
     for file, finished in zip(files, whole, strict=True):
-        definitions, attached, beyond = _description(file, told, finished=finished)
+        definitions, attached, beyond = _description(file, progress, finished=finished)
         passed_over |= dict.fromkeys(beyond)
         for channel in definitions.channels.values():
             topic = topic_of(channel, definitions.schema_of(channel))
@@ -380,7 +388,7 @@ def read_bag(
 
 
 def _description(
-    file: Path, told: ProgressCallback, *, finished: bool
+    file: Path, progress: ProgressCallback, *, finished: bool
 ) -> tuple[Definitions, list[Attachment], list[str]]:
     """
     Return schemas and channels, attachments, and the names of attachments not kept in memory.
@@ -396,7 +404,7 @@ def _description(
                     attachment_at(source, each.offset)[0] for each in index.attachments
                 )
     definitions = Definitions()
-    contents = _contents(file, definitions, told, until_damage=not finished)
+    contents = _contents(file, definitions, progress, until_damage=not finished)
     return definitions, *_kept(record for record in contents if isinstance(record, Attachment))
 
 
@@ -413,7 +421,11 @@ def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str
 
 
 def _contents(
-    file: Path, definitions: Definitions, told: ProgressCallback, *, until_damage: bool
+    file: Path,
+    definitions: Definitions,
+    progress: ProgressCallback = lambda _: None,
+    *,
+    until_damage: bool,
 ) -> Iterator[Found]:
     """Yield messages, attachments and metadata in file order, with checksums verified."""
     finished = is_finished(file)
@@ -428,7 +440,7 @@ def _contents(
         messages, at = 0, len(MCAP0_MAGIC)
         try:
             while not data.finished:
-                told(at)
+                progress(at)
                 records, end = data.take(at)
                 for record in records:
                     messages += isinstance(record, Message)
@@ -448,10 +460,6 @@ def _contents(
             raise DamagedError(f'{messages:,} messages are there of {promised.message_count:,}')
 
 
-def _untold(_read: int) -> None:
-    pass
-
-
 @contextmanager
 def _translated(file: Path) -> Iterator[None]:
     try:
@@ -459,7 +467,9 @@ def _translated(file: Path) -> Iterator[None]:
     except OSError as error:
         raise unreadable(file, error) from None
     except DamagedError as error:
-        raise _damaged(file, str(error)) from None
+        raise BagError(
+            file, f'is damaged: {error}', 'linkage recover saves what is whole'
+        ) from None
 
 
 def topic_of(channel: Channel, schema: Schema | None) -> Topic:
@@ -485,7 +495,3 @@ def _qos(text: str) -> QosProfile:
     except Exception:  # noqa: BLE001 (yaml and its numbers raise many kinds)
         # An invalid QoS is no reason to refuse the messages.
         return QosProfile(understood=not text)
-
-
-def _damaged(file: Path, reason: str) -> BagError:
-    return BagError(file, f'is damaged: {reason}', 'linkage recover saves what is whole')

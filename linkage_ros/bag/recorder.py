@@ -32,8 +32,7 @@ from pathlib import Path
 import threading
 import time
 
-from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.recording_stats import RecordingStats
+from linkage_ros.bag.metadata import BagSummary, RecordingStats
 from linkage_ros.bag.storage import FLUSH_AFTER
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
@@ -156,8 +155,8 @@ class TopicCounts:
     """
     Counts of one topic's messages.
 
-    At every instant ``received == recorded + dropped + let_go + waiting``. Waiting messages are in
-    the queue or with the recorder's thread; let_go messages were recorded in a file that was
+    At every instant ``received == recorded + dropped + discarded + waiting``. Waiting messages are
+    in the queue or with the recorder's thread; discarded messages were recorded in a file that was
     removed for a newer one.
     """
 
@@ -166,7 +165,7 @@ class TopicCounts:
     recorded: int
     dropped: int
     waiting: int
-    let_go: int = 0
+    discarded: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +179,7 @@ class RecordingSummary:
         Folder of the bag.
     topics
         Counts for each topic, in the order of their numbers; no message waits any more, so
-        ``received == recorded + dropped + let_go``.
+        ``received == recorded + dropped + discarded``.
     size
         Size of the MCAP files [bytes].
     failure
@@ -239,11 +238,11 @@ class Recorder:
         """Return the current counts; after a failure, ``recorded`` counts the messages kept."""
         counts = []
         # Read first, so that no message is let go before it is recorded.
-        let_go = self._writer.let_go
+        discarded = self._writer.discarded
         opened = self._writer.opened
         taken, lost = self._done
         for number, topic in enumerate(self._writer.topics):
-            gone = let_go[number]
+            gone = discarded[number]
             recorded = taken[number] + opened[number] - gone
             dropped = self._queue.dropped[number].value() + lost[number]
             # Read last, so that a message in transit counts as waiting, and never twice.
@@ -284,8 +283,8 @@ class Recorder:
         for number, counts in enumerate(self.inspect()):
             recorded = counts.recorded
             if stuck:
-                recorded = max(0, self._safe[number] - counts.let_go)
-            dropped = counts.received - recorded - counts.let_go
+                recorded = max(0, self._safe[number] - counts.discarded)
+            dropped = counts.received - recorded - counts.discarded
             topics.append(replace(counts, recorded=recorded, dropped=dropped, waiting=0))
         self._summary = RecordingSummary(
             folder=self._writer.folder,
@@ -358,9 +357,9 @@ class Recorder:
         ]
         dropped = [
             came - there - gone
-            for came, there, gone in zip(received, summary.counts, summary.let_go, strict=True)
+            for came, there, gone in zip(received, summary.counts, summary.discarded, strict=True)
         ]
-        return RecordingStats(received, summary.counts, dropped, summary.let_go)
+        return RecordingStats(received, summary.counts, dropped, summary.discarded)
 
     def _write_batch(self) -> bool:
         """Write up to a batch of messages; return whether there may be more."""

@@ -34,6 +34,7 @@ from linkage_ros.bag.metadata import (
     metadata_text,
     NO_START,
     sync_folder,
+    UNFINISHED,
     write_metadata,
 )
 from linkage_ros.bag.reader import (
@@ -46,7 +47,6 @@ from linkage_ros.bag.reader import (
     topic_of,
     unreadable,
 )
-from linkage_ros.bag.recording_stats import UNFINISHED
 from linkage_ros.bag.salvage import BEGINNING, Loss, Salvage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError, quoted, RecordingError
@@ -306,7 +306,7 @@ def recovered_name(path: Path) -> Path:
 def recover(
     path: Path,
     target: Path | None = None,
-    told: ProgressCallback = lambda done, of: None,
+    progress: ProgressCallback = lambda done, of: None,
     stopped: Stopped = lambda: False,
 ) -> Recovery | None:
     """
@@ -318,7 +318,7 @@ def recover(
         The bag's folder, or an MCAP file.
     target
         The new folder; by default `recovered_name`.
-    told
+    progress
         Progress callback; receives the number of bytes examined and the total.
     stopped
         Returns whether to stop; then nothing is left behind, and the result is None.
@@ -346,7 +346,7 @@ def recover(
             for number, file in enumerate(files):
                 before, of = sum(sizes[:number]), sum(sizes)
                 for done in _save(file, bag, findings):
-                    told(before + done, of)
+                    progress(before + done, of)
                     if stopped():
                         bag.abandon()
                         shutil.rmtree(target)
@@ -454,12 +454,12 @@ def _save(file: Path, bag: NewBag, findings: _Findings) -> Iterator[int]:
     with file.open('rb') as stream:
         salvage = Salvage(Source(stream))
         definitions = salvage.data.definitions
-        told = 0
+        reported = 0
         for record in salvage.found():
             bag.add(record, definitions)
-            if salvage.seen != told:
-                told = salvage.seen
-                yield told
+            if salvage.seen != reported:
+                reported = salvage.seen
+                yield reported
         bag.describe(definitions)
     findings.losses += [(file.name, loss) for loss in salvage.losses]
     findings.repaired += [f'{file.name}: {what}' for what in salvage.repaired]
@@ -468,11 +468,11 @@ def _save(file: Path, bag: NewBag, findings: _Findings) -> Iterator[int]:
             f'{file.name}: {salvage.data.unchecked:,} messages that no checksum covers, taken as '
             'they stand'
         )
-    said = salvage.index.statistics if salvage.index else None
-    if said is None:
+    statistics = salvage.index.statistics if salvage.index else None
+    if statistics is None:
         findings.all_promised = False
         return
-    for number, count in said.channel_message_counts.items():
+    for number, count in statistics.channel_message_counts.items():
         if number in definitions.channels:
             findings.promised[definitions.channels[number].topic] += count
 

@@ -22,8 +22,8 @@ import json
 import re
 from typing import Any, NamedTuple
 
+from linkage_ros.bag.metadata import counts_in
 from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
-from linkage_ros.bag.recording_stats import counts_in
 from linkage_ros.errors import BagError
 
 BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'
@@ -32,7 +32,7 @@ BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'
 CHOSEN = 'solver'
 """Key for the chosen solvers, if the scene asks for an accuracy."""
 
-OWN_EFFECTS = 'effects'
+USER_EFFECTS = 'effects'
 """Key for the modules of user-defined effects."""
 
 SEED = 'seed'
@@ -106,7 +106,7 @@ class RunAccount(NamedTuple):
         Versions of the software of the run, by name.
     solvers
         Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
-    own_effects
+    user_effects
         Modules of the user-defined effects, by name.
     seed
         Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
@@ -124,7 +124,7 @@ class RunAccount(NamedTuple):
     begun: str = ''
     versions: Mapping[str, str] = {}
     solvers: Mapping[str, Any] = {}
-    own_effects: Mapping[str, str] = {}
+    user_effects: Mapping[str, str] = {}
     seed: int = 0
 
 
@@ -142,7 +142,7 @@ def run_account(bag: Bag) -> RunAccount:
         raise BagError(
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'
         )
-    account = run_said(bag)
+    account = raw_account(bag)
     extras = account.get('extra_topics', [])
     texts = {
         key: value
@@ -152,6 +152,9 @@ def run_account(bag: Bag) -> RunAccount:
     missing = {'scene', 'joint_states_topic'} - set(texts)
     wrong = (account.keys() & {*_TEXTS, BEGUN}) - set(texts)
     solvers = account.get(CHOSEN, {})
+    modules = account.get(USER_EFFECTS)
+    if not isinstance(modules, dict):
+        modules = {}
     topics = [value for key, value in texts.items() if key.endswith('_topic')]
     named = _are_names(topics) and _are_names(extras)
     seed = account.get(SEED, 0)
@@ -166,15 +169,8 @@ def run_account(bag: Bag) -> RunAccount:
         begun=texts.get(BEGUN, ''),
         versions={key: texts[key] for key in VERSIONS if key in texts},
         solvers=solvers,
-        own_effects=_own_effects(account),
+        user_effects={name: str(module) for name, module in modules.items()},
         seed=seed,
-    )
-
-
-def _own_effects(account: Mapping[str, Any]) -> dict[str, str]:
-    modules = account.get(OWN_EFFECTS)
-    return (
-        {name: str(which) for name, which in modules.items()} if isinstance(modules, dict) else {}
     )
 
 
@@ -197,7 +193,7 @@ def _are_names(values: Any) -> bool:
     )
 
 
-def run_said(bag: Bag) -> dict[str, Any]:
+def raw_account(bag: Bag) -> dict[str, Any]:
     """Return the run's account as stored in its bag; empty if it is damaged."""
     try:
         text = bag.attachments[RUN_FILE]
@@ -286,9 +282,9 @@ def lost_beginning(bag: Bag, run: RunAccount) -> str:
         The run's account in it.
 
     """
-    let_go = sum(counts_in(bag.custom, 'let_go').values())
-    if let_go:
-        return f'its first {let_go} messages have made way for newer ones'
+    discarded = sum(counts_in(bag.custom, 'let_go').values())
+    if discarded:
+        return f'its first {discarded} messages have made way for newer ones'
     if run.begun == MID_RUN:
         return 'begun in mid-run'
     first = bag.files[0].name

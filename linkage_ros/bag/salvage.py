@@ -347,13 +347,13 @@ def _trusted_index(source: Source) -> FileIndex | None:
 
 def _is_complete(index: FileIndex) -> bool:
     """Return whether an index covers the whole content."""
-    said = index.statistics
+    statistics = index.statistics
     return (
-        said is not None
-        and said.chunk_count == len(index.chunks)
-        and said.attachment_count == len(index.attachments)
-        and said.metadata_count == len(index.metadata)
-        and bool(index.chunks or not said.message_count)
+        statistics is not None
+        and statistics.chunk_count == len(index.chunks)
+        and statistics.attachment_count == len(index.attachments)
+        and statistics.metadata_count == len(index.metadata)
+        and bool(index.chunks or not statistics.message_count)
     )
 
 

@@ -33,9 +33,8 @@ import threading
 import time
 from typing import NamedTuple
 
-from linkage_ros.bag.metadata import BagSummary
+from linkage_ros.bag.metadata import BagSummary, RecordingStats
 from linkage_ros.bag.recorder import BATCH, MessageQueue, NAP, POLL, Recorder, RecordingSummary
-from linkage_ros.bag.recording_stats import RecordingStats
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter, TIME_END
 from linkage_ros.errors import RecordingError
@@ -128,13 +127,13 @@ class LastSeconds:
 
     Attributes
     ----------
-    let_go
+    discarded
         Number of removed messages of each topic.
 
     """
 
     def __init__(self, topics: int, span: int, most: int) -> None:
-        self.let_go = [0] * topics
+        self.discarded = [0] * topics
         self._span = span
         self._most = most
         self._counts = [0] * topics
@@ -167,7 +166,7 @@ class LastSeconds:
         self._size += size
         self._counts[topic] += 1
 
-    def let_old_go(self, limit: int) -> bool:
+    def discard_old(self, limit: int) -> bool:
         """Remove up to `limit` messages that are due; return whether there may be more."""
         # The newest block is small, and none of its messages is too old.
         for _ in range(limit):
@@ -182,7 +181,7 @@ class LastSeconds:
             if crowded:
                 self._crowded = self._now
             self._gone = log_time
-            self.let_go[topic] += 1
+            self.discarded[topic] += 1
             self._counts[topic] -= 1
             self._begin += _HEAD.size + size
             self._size -= _HEAD.size + size
@@ -195,7 +194,7 @@ class LastSeconds:
         """Return the content of the memory."""
         self._seal()
         seconds, _, _ = self.extent()
-        whole = not any(self.let_go)
+        whole = not any(self.discarded)
         return Kept(tuple(self._blocks), self._begin, tuple(self._counts), seconds, whole)
 
     def extent(self) -> Extent:
@@ -224,7 +223,7 @@ _BLOCKS = 16  # 1 MiB
 
 class KeptCounts(NamedTuple):
     """
-    Counts of one topic's messages: at every instant ``received == kept + let_go + dropped``.
+    Counts of one topic's messages: at every instant ``received == kept + discarded + dropped``.
 
     Attributes
     ----------
@@ -234,7 +233,7 @@ class KeptCounts(NamedTuple):
         Messages offered.
     kept
         Messages in memory.
-    let_go
+    discarded
         Messages that became too old, or were removed for lack of memory.
     dropped
         Messages that no bag can hold, or that came while the memory's thread was too slow.
@@ -244,7 +243,7 @@ class KeptCounts(NamedTuple):
     name: str
     received: int
     kept: int
-    let_go: int
+    discarded: int
     dropped: int
 
 
@@ -293,11 +292,11 @@ class SnapshotMemory:
         """Return the current counts; messages that wait for the thread count as kept."""
         counts = []
         for number, topic in enumerate(self.topics):
-            let_go, dropped = self._last.let_go[number], self._queue.dropped[number].value()
+            discarded, dropped = self._last.discarded[number], self._queue.dropped[number].value()
             # Read last, so that a message in transit counts as kept, and never twice.
             received = self._queue.received[number].value()
-            kept = received - let_go - dropped
-            counts.append(KeptCounts(topic.name, received, kept, let_go, dropped))
+            kept = received - discarded - dropped
+            counts.append(KeptCounts(topic.name, received, kept, discarded, dropped))
         return tuple(counts)
 
     def take(self) -> Kept:
@@ -316,7 +315,7 @@ class SnapshotMemory:
             if not self._queue.open:
                 raise RecordingError(_WHERE, 'has ended', 'ask while the node is active')
             self._put_away(len(self._queue))
-            while self._last.let_old_go(BATCH):
+            while self._last.discard_old(BATCH):
                 pass
             return self._last.kept()
 
@@ -345,7 +344,7 @@ class SnapshotMemory:
         """Add a batch of messages, and remove as many; return whether there may be more."""
         with self._lock:
             self._put_away(BATCH)
-            more = self._last.let_old_go(2 * BATCH)
+            more = self._last.discard_old(2 * BATCH)
             self.extent = self._last.extent()
         return more or bool(self._queue)
 
@@ -364,7 +363,7 @@ class SnapshotMemory:
             _WHERE, f'has ended early: {type(error).__name__}: {error}', 'please report this'
         )
         for number, counts in enumerate(self.inspect()):
-            self._last.let_go[number] += counts.kept
+            self._last.discarded[number] += counts.kept
 
 
 _AHEAD = 5000

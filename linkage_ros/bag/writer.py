@@ -18,7 +18,7 @@ Write a bag of one or more files; every flushed message survives a kill or a ful
 
 ``metadata.yaml`` exists from the start and is updated about once a second and with each new file:
 it names all files, and counts the messages on the disk. Until the bag is closed its custom data
-has `recording_stats.UNFINISHED`, so that the bag of a killed process is recognisable, with the
+has `metadata.UNFINISHED`, so that the bag of a killed process is recognisable, with the
 point where it stopped.
 """
 
@@ -33,13 +33,16 @@ from typing import NoReturn
 
 from linkage_ros.bag.bag_file import BagFile, channels_file, compression_type
 from linkage_ros.bag.disk import FIRST_RESERVE, LostError, NO_ROOM, Reserve
-from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_metadata
-from linkage_ros.bag.recording_stats import (
+from linkage_ros.bag.metadata import (
+    BagSummary,
     custom_data,
     FAILURE,
     last_records,
     RecordingStats,
+    sync_folder,
+    together,
     UNFINISHED_DATA,
+    write_metadata,
 )
 from linkage_ros.bag.storage import scarcity, Storage
 from linkage_ros.bag.topic import CHANNELS_FILE, Topic
@@ -76,7 +79,7 @@ class BagWriter:
 
     Attributes
     ----------
-    let_go
+    discarded
         Messages of each topic in files that were removed to keep newer ones.
     out_of_room
         Whether it failed for lack of space, so that `resume` may continue.
@@ -105,7 +108,7 @@ class BagWriter:
         self.topics = tuple(topics)
         self.storage = storage or Storage()
         self._compression = compression_type(self.storage.compression, self.folder)
-        self.let_go = (0,) * len(self.topics)
+        self.discarded = (0,) * len(self.topics)
         self.account: Callable[[BagSummary], RecordingStats | None] = lambda summary: None
         channels = 'application/mcap', channels_file(self.topics)
         self._attachments = {**(attachments or {}), CHANNELS_FILE: channels}
@@ -119,11 +122,11 @@ class BagWriter:
         self._ended: list[BagSummary] = []
         self._gone: list[Path] = []  # files to remove that still exist
         self._due = 0.0
-        self._looked = 0  # size of the file at the last check of free space [bytes]
+        self._checked = 0  # size of the file at the last check of free space [bytes]
         self._summary: BagSummary | None = None
         self.out_of_room = False
         self._failure: RecordingError | None = None
-        self._said: dict[str, str] = {}  # messages about failures, for the metadata
+        self._outcome: dict[str, str] = {}  # messages about failures, for the metadata
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:
@@ -176,8 +179,8 @@ class BagWriter:
             return False
         if self._splits and self._is_full(log_time):
             self._split()
-        if self.storage.min_free_bytes and self._file.size != self._looked:
-            self._look()
+        if self.storage.min_free_bytes and self._file.size != self._checked:
+            self._check_space()
         if self._opening and self._file.first is None:
             self._open_file(log_time)
         self._add(topic, log_time, publish_time, data)
@@ -229,7 +232,7 @@ class BagWriter:
             return False
         self._ended, self._file = self._parts(), file
         self._failure, self.out_of_room = None, False
-        self._renew_and_let_go()
+        self._renew_and_discard()
         return True
 
     def close(self, custom: Mapping[str, str] | None = None) -> BagSummary:
@@ -260,7 +263,7 @@ class BagWriter:
     def kept(self) -> tuple[int, ...]:
         """Return how many messages of each topic `write` has taken and not lost since."""
         summary = self._summarize()
-        there = zip(summary.counts, summary.let_go, self.opened, strict=True)
+        there = zip(summary.counts, summary.discarded, self.opened, strict=True)
         return tuple(counts + gone - opened for counts, gone, opened in there)
 
     @property
@@ -277,9 +280,9 @@ class BagWriter:
         # After a backward jump of time, new messages do not join the earlier ones.
         return 0 < self._split_time <= abs(log_time - file.first)
 
-    def _look(self) -> None:
+    def _check_space(self) -> None:
         """End the recording if there is too little free space."""
-        self._looked = self._file.size
+        self._checked = self._file.size
         try:
             self._refuse_if_scarce('the recording was interrupted')
         except (OSError, RecordingError) as error:
@@ -294,20 +297,20 @@ class BagWriter:
                 raise error
             file = self._next_file()
             self._ended, self._file = self._parts(), file
-            self._renew_and_let_go()
+            self._renew_and_discard()
         except (OSError, RecordingError) as worse:
             self._end(worse)
 
-    def _renew_and_let_go(self) -> None:
+    def _renew_and_discard(self) -> None:
         """List the kept files, then remove the others: every listed file exists."""
         parts, most = self._parts(), self.storage.keep_files
         excess = max(0, len(parts) - most) if most else 0
         gone, kept = parts[:excess], parts[excess:]
-        let_go = [self.let_go, *(part.counts for part in gone)]
-        summary = together(kept, self._refused, tuple(map(sum, zip(*let_go, strict=True))))
+        discarded = [self.discarded, *(part.counts for part in gone)]
+        summary = together(kept, self._refused, tuple(map(sum, zip(*discarded, strict=True))))
         if not self._try_to_renew(summary):
             return
-        self._ended, self.let_go = kept[:-1], summary.let_go
+        self._ended, self.discarded = kept[:-1], summary.discarded
         self._gone += [self.folder / part.file for part in gone]
         self._remove_gone()
 
@@ -325,16 +328,16 @@ class BagWriter:
         if not self._file.finished:
             summary = self._summarize()
             account = self.account(summary) if accounted else None
-            said = {**custom, **self._said}
-            error = self._file.finish(last_records(said, summary, account))
+            entries = {**custom, **self._outcome}
+            error = self._file.finish(last_records(entries, summary, account))
         gone = self._lose_what_is_gone()
         error = error or gone
         if error and not self._failure:
-            self._said = {FAILURE: str(self._ended_by(error))}
+            self._outcome = {FAILURE: str(self._ended_by(error))}
         summary = self._summarize()
         self._remove_gone()
         account = self.account(summary) if accounted else None
-        last = custom_data({**self._said, **custom}, summary, account)
+        last = custom_data({**self._outcome, **custom}, summary, account)
         try:
             try:
                 write_metadata(summary, last)
@@ -380,7 +383,7 @@ class BagWriter:
     @property
     def _unfinished(self) -> dict[str, str]:
         """Return the custom data of a recording in progress."""
-        return {**UNFINISHED_DATA, **self._said}
+        return {**UNFINISHED_DATA, **self._outcome}
 
     def _refuse_if_scarce(self, what: str, remedy: str = _GO_ON) -> None:
         """Raise RecordingError if too little is free, without the files' reserve."""
@@ -390,7 +393,7 @@ class BagWriter:
 
     def _end(self, error: OSError | RecordingError) -> NoReturn:
         self._failure = error if isinstance(error, RecordingError) else self._ended_by(error)
-        self._said = {FAILURE: str(self._failure)}
+        self._outcome = {FAILURE: str(self._failure)}
         # Only `_refuse_if_scarce` raises RecordingError.
         self.out_of_room = isinstance(error, RecordingError) or error.errno in NO_ROOM
         if self.out_of_room:
@@ -425,7 +428,7 @@ class BagWriter:
         return [*self._ended, self._file.summary(self.topics)]
 
     def _summarize(self) -> BagSummary:
-        return together(self._parts(), self._refused, self.let_go)
+        return together(self._parts(), self._refused, self.discarded)
 
 
 def _remove(folder: Path) -> None:

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from importlib import import_module
 import json
@@ -32,26 +32,9 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-_FIELD = re.compile(r'^\s*(?P<type>[A-Za-z]\w*(?:/\w+)*)(?:<=\d+)?(?:\[[^\]]*\])?\s+[a-z]\w*')
-_PRIMITIVES = frozenset(
-    [
-        'bool',
-        'byte',
-        'char',
-        'float32',
-        'float64',
-        'int8',
-        'uint8',
-        'int16',
-        'uint16',
-        'int32',
-        'uint32',
-        'int64',
-        'uint64',
-        'string',
-        'wstring',
-    ]
-)
+_NESTED = re.compile(r'([a-z]\w*)/([A-Z]\w*)')
+"""A message type within the type of a field, as in sequence<geometry_msgs/Point>."""
+
 _SEPARATOR = f'\n{"=" * 80}\n'
 
 
@@ -102,9 +85,9 @@ def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:
         The definition of the message is not installed.
 
     """
-    package, _, kind = message_type.__module__.split('.')[0], None, message_type.__name__
+    package, kind = message_type.__module__.split('.')[0], message_type.__name__
     texts: dict[str, str] = {}
-    _collect(package, kind, texts)
+    _collect(message_type, package, kind, texts)
     first, *others = texts
     definition = texts[first] + ''.join(
         f'{_SEPARATOR}MSG: {other}\n{texts[other]}' for other in others
@@ -112,22 +95,15 @@ def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:
     return Topic(name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), _qos(qos))
 
 
-def _collect(package: str, kind: str, texts: dict[str, str]) -> None:
+def _collect(message_type: Any, package: str, kind: str, texts: dict[str, str]) -> None:
     """Collect the text of a type and, after it, those of all types that it contains."""
     if f'{package}/{kind}' in texts:
         return
-    text = texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
+    texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
+    nested = _NESTED.findall(' '.join(message_type.get_fields_and_field_types().values()))
     # Sorted by full name, as rosbag2 does.
-    for needed in sorted(name if '/' in name else f'{package}/{name}' for name in _types(text)):
-        needed_package, _, needed_kind = needed.rpartition('/')
-        _collect(needed_package, needed_kind, texts)
-
-
-def _types(text: str) -> Iterator[str]:
-    for line in text.splitlines():
-        field = _FIELD.match(line.split('#')[0])
-        if field and field['type'] not in _PRIMITIVES:
-            yield field['type']
+    for other, other_kind in sorted(nested):
+        _collect(getattr(import_module(f'{other}.msg'), other_kind), other, other_kind, texts)
 
 
 def _type_hash(package: str, kind: str) -> str:
@@ -232,15 +208,7 @@ def _publisher(node: Node, topic: Topic) -> Publisher:
 
 
 def _class_of(topic: Topic) -> Any:
-    """
-    Return the class of a topic's messages.
-
-    Raises
-    ------
-    LinkageError
-        The type is not installed, or differs from the recorded one.
-
-    """
+    """Return the class of a topic's messages, if it is installed and as it was recorded."""
     matched = _TYPE.fullmatch(topic.type)
     if matched is None:
         raise LinkageError(

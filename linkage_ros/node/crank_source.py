@@ -20,15 +20,21 @@ from __future__ import annotations
 from importlib import import_module
 import sys
 
+from linkage_ros.errors import LinkageError, missing_packages_reported
 from linkage_ros.signals import stop_on_signals
 
 
 def main() -> int:
-    """Run the source and return the exit code."""
+    """Run the node and return the exit code."""
     # First of all, as in `linkage_node`.
     stop = stop_on_signals()
-    crank_node = import_module('linkage_ros.node.demo_nodes')
-    return int(crank_node.run_crank_source(stop))
+    try:
+        with missing_packages_reported():
+            nodes = import_module('linkage_ros.node.demo_nodes')
+    except LinkageError as error:
+        print(f'crank_source: {error}', file=sys.stderr)
+        return 2
+    return int(nodes.run_crank_source(stop))
 
 
 if __name__ == '__main__':

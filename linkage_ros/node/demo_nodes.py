@@ -35,14 +35,14 @@ from math import cos, inf, sin, tau
 import sys
 from threading import Event
 from time import monotonic, monotonic_ns, sleep, time_ns
-from typing import TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.simulated_time import ClockGuard
-from linkage_ros.node.transports import leave_out_shared_memory
+from linkage_ros.node.pacing import ClockGuard
+from linkage_ros.node.parameters import declare_parameters, NodeParameter, show_help
+from linkage_ros.node.real_time import leave_out_shared_memory
 from linkage_ros.signals import bounded_end
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -52,23 +52,21 @@ from sensor_msgs.msg import JointState
 
 
 class DemoNode(Node):
-    """A node whose parameters are bounded numbers and a joint name."""
+    """A node with `PARAMETERS`, which are fixed at its start."""
 
-    def joint(self) -> str:
-        """Declare and return the name of the joint."""
-        descriptor = ParameterDescriptor(description='Name of the joint', read_only=True)
-        return str(self.declare_parameter('joint', 'crank_joint', descriptor).value)
+    PARAMETERS: ClassVar[tuple[NodeParameter, ...]]
 
-    def number(
-        self, name: str, default: float, description: str, least: float, most: float
-    ) -> float:
-        """Declare a numeric parameter and return its value; rclpy refuses one out of bounds."""
-        bounds = FloatingPointRange(from_value=least, to_value=most)
-        descriptor = ParameterDescriptor(
-            description=description, read_only=True, floating_point_range=[bounds]
-        )
-        return float(self.declare_parameter(name, default, descriptor).value)
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        declare_parameters(self, self.PARAMETERS)
 
+    def value(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        return self.get_parameter(name).value
+
+
+_JOINT = NodeParameter('joint', 'crank_joint', 'Name of the joint')
+_SECONDS = NodeParameter('seconds', 0.0, 'How long [s]; 0 for ever', (0.0, 1e9))
 
 AnyNode = TypeVar('AnyNode', bound=Node)
 
@@ -96,7 +94,7 @@ def run_demo_node(
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = make()
     except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
-        print(f'{name}: {str(error).splitlines()[0]}; see the README', file=sys.stderr)
+        print(f'{name}: {str(error).splitlines()[0]}; see {name} --help', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
     run(node, stop)
@@ -114,25 +112,34 @@ _OLDEST = 0.1
 class PDController(DemoNode):
     """Commands the effort of a joint."""
 
+    PARAMETERS = (
+        _JOINT,
+        NodeParameter('rate', 500.0, 'Commands a second [Hz]', (0.1, 20_000.0)),
+        NodeParameter('target', 2.0, 'Where the joint is to be [rad]', (-1e6, 1e6)),
+        NodeParameter('swing', 0.0, 'Amplitude about the target [rad]', (0.0, 1e6)),
+        NodeParameter('period', 5.0, 'Of the swing [s]', (1e-3, 1e6)),
+        NodeParameter('kp', 1.0, 'Effort for each unit of error [N·m/rad]', (0.0, 1e9)),
+        NodeParameter(
+            'kd', 0.05, "Effort for each unit of the error's rate [N·m·s/rad]", (0.0, 1e9)
+        ),
+        _SECONDS,
+    )
+
     def __init__(self) -> None:
         super().__init__('pd_controller')
-        self._joint = self.joint()
-        rate = self.number('rate', 500.0, 'Commands a second [Hz]', 0.1, 20_000.0)
-        self._target = self.number('target', 2.0, 'Where the joint is to be [rad]', -1e6, 1e6)
-        self._swing = self.number('swing', 0.0, 'Amplitude about the target [rad]', 0.0, 1e6)
-        self._period = self.number('period', 5.0, 'Of the swing [s]', 1e-3, 1e6)
-        self._kp = self.number('kp', 1.0, 'Effort for each unit of error [N·m/rad]', 0.0, 1e9)
-        self._kd = self.number(
-            'kd', 0.05, "Effort for each unit of the error's rate [N·m·s/rad]", 0.0, 1e9
-        )
-        self._seconds = self.number('seconds', 0.0, 'How long [s]; 0 for ever', 0.0, 1e9)
+        self._joint = self.value('joint')
+        self._target = self.value('target')
+        self._swing = self.value('swing')
+        self._period = self.value('period')
+        self._kp, self._kd = self.value('kp'), self.value('kd')
+        self._seconds = self.value('seconds')
         self._state = (0.0, 0.0)
         self._heard = -inf
         self._begun = self.get_clock().now()
         # Reliable, for any subscriber; depth 1, since only the newest command matters.
         self._publisher = self.create_publisher(JointState, 'crank_commands', 1)
         self.create_subscription(JointState, 'joint_states', self._hear, 10)
-        self.create_timer(1.0 / rate, self._command)
+        self.create_timer(1.0 / self.value('rate'), self._command)
         ClockGuard(self._time_source)
 
     def _hear(self, message: JointState) -> None:
@@ -172,21 +179,32 @@ class PDController(DemoNode):
 
 def run_pd_controller(stop: Event) -> int:
     """Control until the event is set, or for the configured time, and return the exit code."""
+    purpose = 'Reads a joint from joint_states and commands its effort on crank_commands.'
+    if show_help('pd_controller', purpose, PDController.PARAMETERS, '-p target:=1.0'):
+        return 0
     return run_demo_node('pd_controller', PDController, PDController.run, stop)
 
 
 class CrankSource(DemoNode):
     """Publishes the angle of a turning crank."""
 
+    PARAMETERS = (
+        _JOINT,
+        NodeParameter('rate', 500.0, 'Messages a second [Hz]', (0.1, 20_000.0)),
+        NodeParameter('speed', tau, 'Mean speed [rad/s]', (-1e4, 1e4)),
+        NodeParameter('ripple', 0.3, 'Swing of the speed, of its mean', (0.0, 1.0)),
+        NodeParameter('start', 0.0, 'First angle [rad]', (-1e6, 1e6)),
+        _SECONDS,
+    )
+
     def __init__(self) -> None:
         super().__init__('crank_source')
-        joint = self.joint()
-        self._rate = self.number('rate', 500.0, 'Messages a second [Hz]', 0.1, 20_000.0)
-        self._speed = self.number('speed', tau, 'Mean speed [rad/s]', -1e4, 1e4)
-        self._ripple = self.number('ripple', 0.3, 'Swing of the speed, of its mean', 0.0, 1.0)
-        self._start = self.number('start', 0.0, 'First angle [rad]', -1e6, 1e6)
-        self._seconds = self.number('seconds', 0.0, 'How long [s]; 0 for ever', 0.0, 1e9)
-        self._writer = JointStateWriter([joint])
+        self._rate = self.value('rate')
+        self._speed = self.value('speed')
+        self._ripple = self.value('ripple')
+        self._start = self.value('start')
+        self._seconds = self.value('seconds')
+        self._writer = JointStateWriter([self.value('joint')])
         self._publisher = self.create_publisher(
             JointState, 'crank_states', qos_profile_sensor_data
         )
@@ -213,4 +231,7 @@ class CrankSource(DemoNode):
 
 def run_crank_source(stop: Event) -> int:
     """Publish a turning crank until the event is set, and return the exit code."""
+    purpose = 'Publishes angle and rate of a turning crank on crank_states.'
+    if show_help('crank_source', purpose, CrankSource.PARAMETERS, '-p speed:=3.0'):
+        return 0
     return run_demo_node('crank_source', CrankSource, CrankSource.run, stop)

@@ -13,25 +13,34 @@
 # limitations under the License.
 
 
-"""Diagnostics of the node: ``diagnostic_msgs/DiagnosticArray``, once a period."""
+"""
+What the node reports on itself: ``diagnostic_msgs/DiagnosticArray`` once a period, and warnings.
+
+Warnings in the log are limited in rate, each kind by itself. The limit is not rclpy's throttle:
+there a suppressed log line costs 150 µs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from operator import itemgetter
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from linkage_ros.kinematics.linkage import Input
+from linkage_ros.errors import listed
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import head_of, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.run_snapshots import RunSnapshots
+from linkage_ros.node.run_recording import RunSnapshots
 from linkage_ros.node.tick_loop import Counts, TickLoop
 from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageTick
+from rclpy.impl.rcutils_logger import RcutilsLogger
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
@@ -296,7 +305,7 @@ class DiagnosticsSummary:
         """Return the singularity measures of the worst linkage, and the warning text."""
         nearness = [(line, line.closure.singularity_margin(position)) for line, position in posed]
         inputs = [driven for line, _ in posed for driven in line.member.linkage.inputs]
-        unit = ' or '.join(sorted({_unit(driven) for driven in inputs}))
+        unit = ' or '.join(sorted({driven.unit for driven in inputs}))
         values, warnings = {}, []
         for name, text in _NEARNESS.items():
             line, value = min(
@@ -333,8 +342,8 @@ class DiagnosticsSummary:
                 values[f'Recorded: {topic.name}'] = topic.recorded
                 values[f'Dropped: {topic.name}'] = topic.dropped
                 values[f'Waiting: {topic.name}'] = topic.waiting
-                if topic.let_go:
-                    values[f'Let go: {topic.name}'] = topic.let_go
+                if topic.discarded:
+                    values[f'Let go: {topic.name}'] = topic.discarded
             if any(topic.dropped for topic in topics):
                 level, message = WARN, 'The disk does not keep up: messages dropped'
             if recorder.failure is not None:
@@ -354,7 +363,7 @@ class DiagnosticsSummary:
         for topic in topics:
             values[f'Received: {topic.name}'] = topic.received
             values[f'In memory: {topic.name}'] = topic.kept
-            values[f'Let go: {topic.name}'] = topic.let_go
+            values[f'Let go: {topic.name}'] = topic.discarded
             values[f'Dropped: {topic.name}'] = topic.dropped
         values |= {
             'In memory (s)': f'{seconds:.3f}',
@@ -415,7 +424,7 @@ def _inputs(line: LinkagePipeline, look: LinkageTick) -> dict[str, str]:
     """Return the inputs of a linkage, as diagnostic values."""
     angles = look.crank.angles if look.crank is not None else ()
     return {
-        f'Input {driven.joint} ({_unit(driven)})': f'{angle:.6f}'
+        f'Input {driven.joint} ({driven.unit})': f'{angle:.6f}'
         for driven, angle in zip(line.member.linkage.inputs, angles, strict=False)
     }
 
@@ -442,5 +451,176 @@ def _of(line: LinkagePipeline) -> str:
     return f' ({line.member.name})' if line.member.name else ''
 
 
-def _unit(driven: Input) -> str:
-    return 'm' if driven.slider else 'rad'
+_REMEDIES = {
+    Rejection.MALFORMED: 'the publisher must send sensor_msgs/JointState as plain CDR',
+    Rejection.EMPTY: 'fill name, position and velocity',
+    Rejection.UNEQUAL: 'give each joint that is named a number in every array that is filled',
+    Rejection.TWICE: 'name the joint once',
+    Rejection.NO_RATE: 'fill velocity, or set carry_forward: false and leave out velocity',
+    Rejection.NOT_FINITE: 'look at the sensor',
+    Rejection.TOO_LARGE: 'the units are rad and m',
+    Rejection.NO_EFFORT: 'fill name and effort',
+    Rejection.EFFORT_NOT_FINITE: 'look at the controller',
+    Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
+    Rejection.STAMP_ZERO: 'stamp the messages',
+    Rejection.STAMP_INVALID: 'stamp the messages with the time',
+    Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
+    Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
+}
+
+
+_PATIENCE = 2.0
+"""Time without a warning about a missing crank, in [s]."""
+
+
+class Warnings:
+    """
+    Warnings, with the time of the last one of each kind.
+
+    Parameters
+    ----------
+    logger
+        Logger of the warnings.
+
+    """
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        self._logger = logger
+        self._last: dict[str, float] = {}
+        self._rejected = dict.fromkeys(Rejection, 0)
+        self._unclosed = dict.fromkeys(Status, 0)
+        self._lost = self._stalls = self._ticks = 0
+        self._heard = (0, 0, monotonic())
+
+    def check_silence(
+        self,
+        counts: Counts,
+        crank_topic: str,
+        inputs: Sequence[str],
+        period: float,
+        max_age: int,
+        publishers: Callable[[], Sequence[str]],
+    ) -> None:
+        """
+        Warn if no message arrives, or none with the crank's joints, and nothing is published.
+
+        Parameters
+        ----------
+        counts
+            Counts of the tick.
+        crank_topic
+            Topic of the crank samples.
+        inputs
+            Names of the joints that a sample must have.
+        period
+            Least time between two warnings of this kind, in [s].
+        max_age
+            Age of the newest sample above which there is no crank, in [ns]; 0 for never.
+        publishers
+            Returns the names of the other publishers on the topic.
+
+        """
+        names = listed(inputs)
+        if counts.ignored and counts.ignored == counts.received:
+            head = head_of(counts.last_ignored)
+            held = sorted(name.decode(errors='replace') for name in head[0]) if head else ()
+            self.warn(
+                'ignored',
+                f'messages on {crank_topic} hold {listed(map(repr, held))}; the linkage needs '
+                f'{listed(map(repr, inputs))}: name the joint so there, or remap the topic',
+                period,
+            )
+        received, published, since = self._heard
+        if (counts.received, counts.published) != (received, published):
+            self._heard = (counts.received, counts.published, monotonic())
+            return
+        waited = monotonic() - since
+        if (counts.received and not max_age) or waited <= max(_PATIENCE, max_age / NANOSECONDS):
+            return
+        number = len(publishers())
+        self.warn(
+            'waiting',
+            f'no message on {crank_topic} in {waited:.0f} s ({number} '
+            f'publisher{"" if number == 1 else "s"}), so nothing is published; send '
+            f'sensor_msgs/JointState with {names} there, remap the topic, or name '
+            'another drive in a scene, as drive: {sine: …}',
+            period,
+        )
+
+    def check(
+        self, counts: Counts, closures: Sequence[Closure], crank_topic: str, period: float
+    ) -> None:
+        """
+        Warn of events since the last warning of their kind.
+
+        Parameters
+        ----------
+        counts
+            Counts of the tick.
+        closures
+            The linkages.
+        crank_topic
+            Topic of the crank samples.
+        period
+            Least time between two warnings of a kind, in [s].
+
+        """
+        new = {
+            r: n - self._rejected[r] for r, n in counts.rejected.items() if n > self._rejected[r]
+        }
+        if new:
+            why = '; '.join(f'{r.value} ({n}): {_REMEDIES[r]}' for r, n in new.items())
+            line = f'{crank_topic}: {sum(new.values())} samples rejected: {why}'
+            if self.warn('rejected', line, period):
+                self._rejected = dict(counts.rejected)
+        if counts.lost > self._lost and self.warn('lost', self._lost_ticks(counts), period):
+            self._lost, self._stalls, self._ticks = counts.lost, counts.stalls, counts.ticks
+        for status, text in _UNCLOSED.items():
+            ticks = counts.unclosed[status] - self._unclosed[status]
+            if ticks and status in counts.last_unclosed:
+                number, position = counts.last_unclosed[status]
+                closure = closures[number]
+                line = text.format(
+                    ticks=ticks,
+                    gap=position.gap,
+                    reachable=describe(closure.input_ranges),
+                    published='published all the same' if position.joints else 'nothing published',
+                    beyond=closure.beyond(position),
+                )
+                if self.warn(status.value, line, period):
+                    self._unclosed[status] = counts.unclosed[status]
+
+    def _lost_ticks(self, counts: Counts) -> str:
+        """Return the line for ticks that were lost: by what, and whether the rate is too high."""
+        lost, stalls = counts.lost - self._lost, counts.stalls - self._stalls
+        ticks = counts.ticks - self._ticks
+        often = stalls > 1 and lost > _RATE_TOLERANCE * (lost + ticks)
+        assert counts.stall is not None, 'a lost tick is counted with its stall'
+        seconds = counts.stall.duration / NANOSECONDS
+        what = (
+            f'a tick took {seconds:.3f} s'
+            if counts.stall.in_tick
+            else f'the operating system woke the node {seconds:.3f} s late'
+        )
+        where = 'at once' if stalls == 1 else f'in {stalls} stalls, the last'
+        remedy = 'lower the rate' if often else 'the rate holds otherwise'
+        return f'{lost} ticks lost {where}: {what}; {remedy}'
+
+    def warn(self, kind: str, line: str, period: float) -> bool:
+        """Warn, unless this kind was already warned of within the period, in [s]."""
+        now = monotonic()
+        if now - self._last.get(kind, -inf) < period:
+            return False
+        self._last[kind] = now
+        self._logger.warning(line)
+        return True
+
+
+_UNCLOSED = {
+    Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',
+    Status.INDETERMINATE: (
+        '{ticks} ticks without a pose (two pins in one place, or a broken link), nothing published'
+    ),
+    Status.TOGGLE: '{ticks} ticks at a toggle: positions published, velocities not',
+    Status.LIMITED: '{ticks} ticks beyond limits, {published}: {beyond}',
+}

@@ -31,6 +31,12 @@ def main() -> int:
     stop = stop_on_signals()
     try:
         with missing_packages_reported():
+            parameters = import_module('linkage_ros.node.parameters')
+            purpose = 'Solves a linkage each tick: crank in, joint states of the other joints out.'
+            if parameters.show_help(
+                'linkage_node', purpose, parameters.LINKAGE_NODE, '-p scene:=demo'
+            ):
+                return 0
             run = import_module('linkage_ros.node.run')
             return int(run.run_linkage_node(stop, sys.argv[1:]))
     except LinkageError as error:

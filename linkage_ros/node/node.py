@@ -36,18 +36,23 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node import pacing
 from linkage_ros.node.bag_topics import bag_topic
-from linkage_ros.node.diagnostics import CLOCK_PATIENCE, DiagnosticsSummary, no_clock, Snapshot
-from linkage_ros.node.parameters import declare_parameters, nearness_limits
-from linkage_ros.node.real_time import RealTime
+from linkage_ros.node.diagnostics import (
+    CLOCK_PATIENCE,
+    DiagnosticsSummary,
+    no_clock,
+    Snapshot,
+    Warnings,
+)
+from linkage_ros.node.pacing import ClockGuard
+from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE, nearness_limits
+from linkage_ros.node.real_time import RealTime, standstill
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
-from linkage_ros.node.simulated_time import ClockGuard
 from linkage_ros.node.tick_loop import Pace, TickLoop
-from linkage_ros.node.transports import standstill
-from linkage_ros.node.warnings import Warnings
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import own_joint_states
 from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.notes import scene_notes
 from linkage_ros.scene.scene import Scene
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
@@ -123,11 +128,11 @@ def _reporting(transition: Transition) -> Transition:
 
 
 class LinkageNode(LifecycleNode):
-    """Solves a linkage for a crank; the README lists topics, parameters and services."""
+    """Solves a linkage for a crank; docs/reference lists topics, parameters and services."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__('linkage_node', **options)
-        declare_parameters(self)
+        declare_parameters(self, LINKAGE_NODE)
         self.failure: LinkageError | None = None
         """Reason why the node could not be configured."""
         self.recording = RunRecording(self.get_logger())
@@ -188,7 +193,7 @@ class LinkageNode(LifecycleNode):
                 raise LinkageError(
                     'parameter scene', "'' names no file", 'start with --ros-args -p scene:=FILE'
                 )
-            scene = load_scene(file)
+            scene = load_scene(file, self.get_parameter_or('set').value or ())
             pipeline = Pipeline(scene)  # fails here if it cannot be built, not at the first tick
             self._scene_topics.connect(pipeline)
             for closure in pipeline.closures:
@@ -202,6 +207,8 @@ class LinkageNode(LifecycleNode):
             self.failure = error
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
+        for note in scene_notes(scene):
+            self.get_logger().warning(str(note))
         for line in pipeline.lines:
             if line.choice is not None:
                 name = f'{line.member.name}: ' if line.member.name else ''
@@ -395,7 +402,7 @@ class LinkageNode(LifecycleNode):
 
     def report(self, failure: str) -> None:
         """Log a warning about a call that failed, at a limited rate."""
-        self._warnings.say('failure', failure, self.get_parameter('warning_period').value)
+        self._warnings.warn('failure', failure, self.get_parameter('warning_period').value)
 
     # Monitoring.
 
@@ -405,11 +412,11 @@ class LinkageNode(LifecycleNode):
         if loop is None or not loop.running:
             return
         period = self.get_parameter('warning_period').value
-        self._warnings.look(loop.counts, loop.pipeline.closures, self.crank_topic, period)
+        self._warnings.check(loop.counts, loop.pipeline.closures, self.crank_topic, period)
         silence = self._clock_silence()
         if min(silence, (time.monotonic_ns() - self._activated) / NANOSECONDS) > CLOCK_PATIENCE:
             remedy = 'start the simulation, or set use_sim_time: false'
-            self._warnings.say('clock', f'{no_clock(silence)}: {remedy}', period)
+            self._warnings.warn('clock', f'{no_clock(silence)}: {remedy}', period)
         while self._real_time.refused:
             self.get_logger().warning(self._real_time.refused.pop(0))
         listening = [line.member for line in loop.pipeline.lines if line.topic]
@@ -417,10 +424,17 @@ class LinkageNode(LifecycleNode):
         assert self.scene is not None
         if listening and (loop.counts.ticks or not self.scene.rate):
             inputs = [name for member in listening for name in member.inputs]
-            self._warnings.wait(loop.counts, self.crank_topic, inputs, period)
+            self._warnings.check_silence(
+                loop.counts,
+                self.crank_topic,
+                inputs,
+                period,
+                loop.pipeline.max_age,
+                self._crank_publishers,
+            )
         if loop.failure:
-            self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
-        news = self.recording.look(loop)
+            self._warnings.warn('tick', f'the tick has stopped: {loop.failure}', period)
+        news = self.recording.check(loop)
         due = self._before.time + self.get_parameter('diagnostics_period').value * NANOSECONDS
         if news or time.monotonic_ns() >= due - 0.5 * _WATCH_PERIOD * NANOSECONDS:
             self._diagnose()
@@ -435,7 +449,7 @@ class LinkageNode(LifecycleNode):
         # unknown which publisher sends the crank.
         shared = self.crank_topic == self._joint_states.topic_name or self.loop.counts.ignored
         if several and not shared:
-            self._warnings.say(
+            self._warnings.warn(
                 'publishers',
                 f'{self.crank_topic}: several publishers, {" and ".join(publishers)}; '
                 'stop all but one',

@@ -13,21 +13,25 @@
 # limitations under the License.
 
 
-"""Pacing of the tick loop: by time, by crank samples, or by the simulation's clock."""
+"""Pacing of the tick loop: by time, by crank samples, or by the simulation's ``/clock``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from threading import Event
 from time import monotonic_ns, sleep, time_ns
+from typing import TYPE_CHECKING
 
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.simulated_time import nanoseconds_of
-from linkage_ros.node.tick_loop import Pace, TickLoop
+from linkage_ros.node.tick_loop import Stall, TickLoop
 from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.subscription import Subscription
+from rclpy.time_source import TimeSource
 from rosgraph_msgs.msg import Clock as ClockMessage
+
+if TYPE_CHECKING:
+    from linkage_ros.node.tick_loop import Pace
 
 CATCH_UP = 20_000_000
 """Lag up to which late ticks still run, in [ns]; beyond it they are lost."""
@@ -56,8 +60,8 @@ def steady(rate: float) -> Pace:
         while not stopping.is_set():
             number += 1
             due = begin + round(number * period)
-            wait = due - monotonic_ns()
-            if wait > _FINE and stopping.wait((wait - _FINE) * 1e-9):
+            early = due - monotonic_ns()
+            if early > _FINE and stopping.wait((early - _FINE) * 1e-9):
                 return
             wait = due - monotonic_ns()
             if wait > 0:
@@ -68,6 +72,9 @@ def steady(rate: float) -> Pace:
                 counts.late += 1
                 if lateness > CATCH_UP:
                     lost = int(lateness // period)
+                    # Another thread reads the stall where it finds ticks lost.
+                    counts.stall = Stall(lateness, in_tick=early <= 0)
+                    counts.stalls += 1
                     counts.lost += lost
                     number += lost
             tick_at(time_ns(), time_ns)
@@ -155,3 +162,41 @@ def _waiter(context: Context, subscription: Subscription) -> Callable[[], bool]:
         return bool(wait_set.get_ready_entities('subscription'))
 
     return wait
+
+
+def nanoseconds_of(message: ClockMessage) -> int | None:
+    """Return the time of a ``/clock`` message, in [ns]; None if it is invalid."""
+    time = message.clock
+    if time.sec < 0 or time.nanosec >= NANOSECONDS:
+        return None
+    return int(time.sec * NANOSECONDS + time.nanosec)
+
+
+class ClockGuard:
+    """
+    Keeps invalid times from rclpy, which raises on them and so would end the executor.
+
+    Parameters
+    ----------
+    source
+        The source that sets the node's clock.
+
+    """
+
+    def __init__(self, source: TimeSource) -> None:
+        self._pass_on: Callable[[ClockMessage], None] = source.clock_callback
+        self.refused = 0
+        """Number of messages without a valid time."""
+        self.heard = 0
+        """Arrival of the last valid message, by the steady clock, in [ns]; 0 before the first."""
+        # For a subscription made later, and for an existing one.
+        source.clock_callback = self._look  # type: ignore[method-assign, assignment]
+        if source._clock_sub is not None:  # noqa: SLF001 (rclpy offers no other way)
+            source._clock_sub.callback = self._look  # noqa: SLF001
+
+    def _look(self, message: ClockMessage) -> None:
+        if nanoseconds_of(message) is None:
+            self.refused += 1
+            return
+        self.heard = monotonic_ns()
+        self._pass_on(message)

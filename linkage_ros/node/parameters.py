@@ -12,113 +12,175 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""The node's parameters, declared with their units and bounds."""
+"""The parameters of the nodes: declarations with units and bounds, help, warnings."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from math import pi
+import sys
+from textwrap import fill
+from typing import Any, NamedTuple
 
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    ParameterType,
-)
+from linkage_ros.errors import did_you_mean, listed
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-_PERIOD = FloatingPointRange(from_value=0.1, to_value=3600.0)
-
-_LIMITS = {
-    'warn.transmission_angle': (0.0, pi / 2, 'Transmission angle [rad]'),
-    'warn.conditioning': (1e-6, 1.0, 'Smallest singular value of the scaled loop Jacobian'),
-    'warn.toggle_distance': (1e-3, 1e6, 'Input to the nearest toggle [rad or m]'),
-}
-"""Default, highest value and meaning."""
+_PERIOD = 0.1, 3600.0
+"""Bounds of a period, in [s]."""
 
 
-def declare_parameters(node: Node) -> None:
-    """Declare the parameters of the linkage node; rclpy refuses values out of bounds."""
-    for name, default, description in (
-        ('scene', '', 'Path of the scene file'),
-        ('runs_directory', '', "Folder of the bags; '' for the scene's own"),
-    ):
-        node.declare_parameter(
-            name,
-            default,
-            ParameterDescriptor(
-                type=ParameterType.PARAMETER_STRING, description=description, read_only=True
-            ),
-        )
-    node.declare_parameter(
-        'autostart',
-        True,
-        ParameterDescriptor(
-            type=ParameterType.PARAMETER_BOOL,
-            description='Whether the node configures and activates itself',
-            read_only=True,
-        ),
+class NodeParameter(NamedTuple):
+    """
+    A parameter of a node.
+
+    Attributes
+    ----------
+    name
+        Name.
+    default
+        Default; the type of the parameter if it has none.
+    meaning
+        Meaning with its unit, for the descriptor and ``--help``.
+    bounds
+        Least and greatest value; None for no bounds.
+    changeable
+        Whether it may be changed while the node runs.
+
+    """
+
+    name: str
+    default: Any
+    meaning: str
+    bounds: tuple[float, float] | None = None
+    changeable: bool = False
+
+
+_LIMITS = tuple(
+    NodeParameter(
+        f'warn.{measure}',
+        default,
+        f'{meaning}, below which the diagnostics warn; 0: never',
+        (0.0, highest),
+        changeable=True,
     )
-    _declare_real_time(node)
-    for name, default_period, description in (
-        ('diagnostics_period', 1.0, 'Time between two diagnostics [s]'),
-        ('warning_period', 5.0, 'Least time between two warnings of one kind [s]'),
-    ):
-        node.declare_parameter(
-            name,
-            default_period,
-            ParameterDescriptor(
-                type=ParameterType.PARAMETER_DOUBLE,
-                description=description,
-                floating_point_range=[_PERIOD],
-                additional_constraints='may be changed at any time',
-            ),
-        )
-    for name, (default_limit, highest, description) in _LIMITS.items():
-        node.declare_parameter(
-            name,
-            default_limit,
-            ParameterDescriptor(
-                type=ParameterType.PARAMETER_DOUBLE,
-                description=f'{description}, below which the diagnostics warn; 0: never',
-                floating_point_range=[FloatingPointRange(from_value=0.0, to_value=highest)],
-                additional_constraints='may be changed at any time',
-            ),
-        )
-
-
-def _declare_real_time(node: Node) -> None:
-    node.declare_parameter(
-        'thread_priority',
-        0,
-        ParameterDescriptor(
-            type=ParameterType.PARAMETER_INTEGER,
-            description='Priority of the tick under SCHED_FIFO; 0: none',
-            integer_range=[IntegerRange(from_value=0, to_value=99, step=1)],
-            read_only=True,
-        ),
+    for measure, default, highest, meaning in (
+        ('transmission_angle', 0.0, pi / 2, 'Transmission angle [rad]'),
+        ('conditioning', 1e-6, 1.0, 'Smallest singular value of the scaled loop Jacobian'),
+        ('toggle_distance', 1e-3, 1e6, 'Input to the nearest toggle [rad or m]'),
     )
-    node.declare_parameter(
+)
+
+LINKAGE_NODE = (
+    NodeParameter('scene', '', 'Scene file or linkage file, or the name of a shipped one'),
+    NodeParameter(
+        'set',
+        Parameter.Type.STRING_ARRAY,  # rclpy cannot infer the type of an empty list
+        'Keys of the scene to set, as rate=500',
+    ),
+    NodeParameter('runs_directory', '', "Folder of the bags; '' for the scene's own"),
+    NodeParameter('autostart', True, 'Whether the node configures and activates itself'),
+    NodeParameter('thread_priority', 0, 'Priority of the tick under SCHED_FIFO; 0: none', (0, 99)),
+    NodeParameter(
         'cpu_affinity',
-        Parameter.Type.INTEGER_ARRAY,  # rclpy cannot infer the type of an empty list
-        ParameterDescriptor(
-            type=ParameterType.PARAMETER_INTEGER_ARRAY,
-            description='Numbers of the processors that may run the tick; not set: all',
-            read_only=True,
-        ),
-    )
-    node.declare_parameter(
-        'lock_memory',
-        False,
-        ParameterDescriptor(
-            type=ParameterType.PARAMETER_BOOL,
-            description='Whether the memory of the process stays in that of the machine',
-            read_only=True,
-        ),
-    )
+        Parameter.Type.INTEGER_ARRAY,
+        'Numbers of the processors that may run the tick; not set: all',
+    ),
+    NodeParameter(
+        'lock_memory', False, 'Whether the memory of the process stays in that of the machine'
+    ),
+    NodeParameter(
+        'diagnostics_period', 1.0, 'Time between two diagnostics [s]', _PERIOD, changeable=True
+    ),
+    NodeParameter(
+        'warning_period',
+        5.0,
+        'Least time between two warnings of one kind [s]',
+        _PERIOD,
+        changeable=True,
+    ),
+    *_LIMITS,
+)
+"""The parameters of the linkage node."""
+
+
+def declare_parameters(node: Node, parameters: Sequence[NodeParameter]) -> None:
+    """Declare parameters; rclpy refuses values out of bounds. Warn of unknown ones."""
+    for name, default, meaning, bounds, changeable in parameters:
+        descriptor = ParameterDescriptor(description=meaning, read_only=not changeable)
+        if changeable:
+            descriptor.additional_constraints = 'may be changed at any time'
+        if bounds is not None:
+            low, high = bounds
+            if isinstance(default, float):
+                descriptor.floating_point_range = [
+                    FloatingPointRange(from_value=low, to_value=high)
+                ]
+            else:
+                descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
+        node.declare_parameter(name, default, descriptor)
+    names = [parameter.name for parameter in parameters]
+    for name in node._parameter_overrides:  # noqa: SLF001 (rclpy has no other way)
+        # Qualities of service are declared with their publisher.
+        if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
+            remedy = did_you_mean(name, names, f'known: {listed(names)}')
+            node.get_logger().warning(f'parameter {name}: unknown, and without effect; {remedy}')
 
 
 def nearness_limits(node: Node) -> dict[str, float]:
     """Return the warning threshold of each singularity measure."""
-    return {name.removeprefix('warn.'): float(node.get_parameter(name).value) for name in _LIMITS}
+    return {
+        limit.name.removeprefix('warn.'): float(node.get_parameter(limit.name).value)
+        for limit in _LIMITS
+    }
+
+
+def show_help(program: str, purpose: str, declared: Sequence[NodeParameter], example: str) -> bool:
+    """
+    Print the help of a node's program, if its command line asks for it.
+
+    Parameters
+    ----------
+    program
+        Name of the program.
+    purpose
+        What the node does.
+    declared
+        Its parameters.
+    example
+        Arguments for ROS, as ``-p speed:=3.0``.
+
+    Returns
+    -------
+    asked : bool
+        Whether the command line has ``--help``; arguments for ROS do not count.
+
+    """
+    typed = sys.argv[1:]
+    if '--ros-args' in typed:
+        typed = typed[: typed.index('--ros-args')]
+    if not {'--help', '-h'} & {*typed}:
+        return False
+    print('\n'.join(_help(program, purpose, declared, example)))
+    return True
+
+
+def _help(
+    program: str, purpose: str, declared: Sequence[NodeParameter], example: str
+) -> Iterator[str]:
+    command = f'ros2 run linkage_ros {program}'
+    yield f'usage: {command} [-h] [--ros-args -p NAME:=VALUE -r OLD:=NEW ...]'
+    yield f'\n{purpose}\n\nparameters:'
+    width = max(len(parameter.name) for parameter in declared) + 4
+    for name, default, meaning, bounds, changeable in declared:
+        facts = [meaning]
+        if not isinstance(default, Parameter.Type):
+            facts.append(f'default {default!r}')
+        if bounds is not None:
+            facts.append(f'{bounds[0]:g} to {bounds[1]:g}')
+        if changeable:
+            facts.append('may be changed at any time')
+        head = f'  {name}'.ljust(width)
+        yield fill('; '.join(facts), 96, initial_indent=head, subsequent_indent=' ' * width)
+    yield f'\nexample:\n  {command} --ros-args {example}'

@@ -20,15 +20,21 @@ from __future__ import annotations
 from importlib import import_module
 import sys
 
+from linkage_ros.errors import LinkageError, missing_packages_reported
 from linkage_ros.signals import stop_on_signals
 
 
 def main() -> int:
-    """Run the controller and return the exit code."""
+    """Run the node and return the exit code."""
     # First of all, as in `linkage_node`.
     stop = stop_on_signals()
-    pd_node = import_module('linkage_ros.node.demo_nodes')
-    return int(pd_node.run_pd_controller(stop))
+    try:
+        with missing_packages_reported():
+            nodes = import_module('linkage_ros.node.demo_nodes')
+    except LinkageError as error:
+        print(f'pd_controller: {error}', file=sys.stderr)
+        return 2
+    return int(nodes.run_pd_controller(stop))
 
 
 if __name__ == '__main__':

@@ -177,7 +177,7 @@ _FINE = 20_000_000
 """Last part of a wait, in [ns], that cannot be interrupted; a stop is checked before it."""
 
 _LONGEST_WAIT = 60.0  # [s]; `Event.wait` has an upper limit
-_TOLD_EVERY = 250_000_000
+_REPORT_EVERY = 250_000_000
 
 
 class Steady(Protocol):
@@ -230,7 +230,7 @@ class Playback:
         The clock for due times.
     ticks
         Publish the bag's time; None if ``/clock`` is not wanted.
-    told
+    progress
         Progress callback; receives the log time, in [ns], now and then.
 
     Attributes
@@ -255,14 +255,14 @@ class Playback:
         publish: Mapping[str, Callable[[bytes], None]],
         steady: Steady,
         ticks: Ticks | None = None,
-        told: Callable[[int], None] = lambda _: None,
+        progress: Callable[[int], None] = lambda _: None,
     ) -> None:
         self._first = first
         self._rate = rate
         self._publish = publish
         self._steady = steady
         self._ticks = ticks
-        self._told = told
+        self._progress = progress
         self.counts = dict.fromkeys(publish, 0)
         self.late = self.latest = self.played = self.took = 0
 
@@ -297,8 +297,8 @@ class Playback:
             self.played, self.took = offset, now - begun
             last_base = base
             if now >= tell:
-                self._told(log_time)
-                tell = now + _TOLD_EVERY
+                self._progress(log_time)
+                tell = now + _REPORT_EVERY
         if self._ticks and begun is not None:
             # So that nodes on simulated time also reach the end of the bag.
             self._ticks.publish(self._first + self.played - last_base)

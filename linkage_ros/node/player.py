@@ -36,7 +36,7 @@ from linkage_ros.node.playback import (
     SteadyClock,
     Ticks,
 )
-from linkage_ros.node.transports import leave_out_shared_memory
+from linkage_ros.node.real_time import leave_out_shared_memory
 from linkage_ros.signals import bounded_end
 import rclpy
 from rclpy.duration import Duration
@@ -57,7 +57,7 @@ _DELIVERY = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
+class PlaybackOptions:
     """
     Options of a playback.
 
@@ -78,14 +78,16 @@ class Wishes:
 
 
 @contextmanager
-def player_node(arguments: Sequence[str]) -> Iterator[Node]:
+def player_node(arguments: Sequence[str], name: str = 'linkage_player') -> Iterator[Node]:
     """
-    Create a node for playback, within a context.
+    Create a node for a command, within a context.
 
     Parameters
     ----------
     arguments
         Command-line arguments with ``--ros-args``, without the program's name.
+    name
+        Name of the node.
 
     Raises
     ------
@@ -97,14 +99,12 @@ def player_node(arguments: Sequence[str]) -> Iterator[Node]:
     sys.setswitchinterval(_SWITCH_INTERVAL)
     leave_out_shared_memory()
     try:
-        rclpy.init(
-            args=['linkage_player', *arguments], signal_handler_options=SignalHandlerOptions.NO
-        )
-        node = Node('linkage_player', start_parameter_services=False)
+        rclpy.init(args=[name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        node = Node(name, start_parameter_services=False)
     except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
         rclpy.try_shutdown()
         reason = ' '.join(str(error).strip().splitlines()[:1]) or type(error).__name__
-        raise LinkageError('--ros-args', reason, 'see the README') from None
+        raise LinkageError('--ros-args', reason, 'write -r OLD:=NEW') from None
     try:
         yield node
     finally:
@@ -118,9 +118,9 @@ def play(
     publishers: Mapping[str, Publisher],
     order: LogTimeOrder,
     part: Part,
-    wishes: Wishes,
+    options: PlaybackOptions,
     stop: Event,
-    told: Callable[[int], None],
+    progress: Callable[[int], None],
 ) -> tuple[Playback, LinkageError | None]:
     """
     Publish messages until there are no more or the event is set.
@@ -135,11 +135,11 @@ def play(
         Messages of the bag, in order of log time.
     part
         Part of the bag to play.
-    wishes
+    options
         Options.
     stop
         Stops the playback.
-    told
+    progress
         Progress callback; receives the log time, in [ns], now and then.
 
     Returns
@@ -156,19 +156,19 @@ def play(
 
     """
     ticks = None
-    if wishes.clock:
+    if options.clock:
         _clock_message(part.first)  # checks the time before anything is sent
         publish = node.create_publisher(Clock, CLOCK, 10).publish
-        ticks = Ticks(NANOSECONDS / wishes.clock, lambda time: publish(_clock_message(time)))
-    if wishes.wait:
-        _wait_for_listener(publishers.values(), stop, wishes.wait)
+        ticks = Ticks(NANOSECONDS / options.clock, lambda time: publish(_clock_message(time)))
+    if options.wait:
+        _wait_for_listener(publishers.values(), stop, options.wait)
     playback = Playback(
         part.first,
-        wishes.rate,
+        options.rate,
         {name: publisher.publish for name, publisher in publishers.items()},
         SteadyClock(stop),
         ticks,
-        told,
+        progress,
     )
     error = None
     try:

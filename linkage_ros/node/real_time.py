@@ -13,10 +13,16 @@
 # limitations under the License.
 
 """
-Real-time settings of the tick: priority, processors, locked memory.
+What the ticks need of operating system and middleware: priority, memory, no shared memory.
 
 The tick's own thread requests them, except locked memory, which belongs to the process. A refused
 request is reported, and the ticks go on without it.
+
+Fast DDS uses UDP only, unless the user configures its transports. For every new subscriber, a
+publisher opens and checks its shared-memory port, on the publishing thread. The check may wait a
+third of the ``healthy_check_timeout_ms`` of the port's creator, 0.33 s by default (Fast-DDS issue
+6535, `SharedMemGlobal.hpp` of 2.14.5). Ticks stand still meanwhile. UDP within a machine costs the
+same, and clients with default settings receive it.
 """
 
 from __future__ import annotations
@@ -26,10 +32,15 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
+import re
 import resource
 from threading import Event
+from typing import TYPE_CHECKING
 
-from linkage_ros.node.tick_loop import Pace, TickLoop
+from rclpy.utilities import get_rmw_implementation_identifier
+
+if TYPE_CHECKING:
+    from linkage_ros.node.tick_loop import Pace, TickLoop
 
 _CURRENT, _FUTURE = 1, 2
 """MCL_CURRENT and MCL_FUTURE of mlockall(2)."""
@@ -122,3 +133,53 @@ def _status(key: str) -> str:
     """Return a value of this process from the kernel's status file."""
     lines = Path('/proc/self/status').read_text().splitlines()
     return next(line.split(':')[1].strip() for line in lines if line.startswith(f'{key}:'))
+
+
+_TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
+_CONFIGURED = (
+    _TRANSPORTS,
+    'FASTRTPS_DEFAULT_PROFILES_FILE',
+    'FASTDDS_DEFAULT_PROFILES_FILE',
+    'RMW_FASTRTPS_PUBLICATION_MODE',
+)
+"""Environment variables with which the user configures the transports."""
+
+_PROFILES = 'DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml'
+"""Files in the working folder with the same purpose."""
+
+_SHARED = re.compile(r'/(?:fastrtps|fastdds)_port\d+$', re.MULTILINE)
+
+
+def leave_out_shared_memory() -> None:
+    """
+    Make Fast DDS use UDP only, unless the user has configured the transports.
+
+    Call it before `rclpy.init`; it holds for this process and its children.
+    """
+    if not (
+        any(map(os.environ.get, _CONFIGURED)) or any(Path(name).is_file() for name in _PROFILES)
+    ):
+        os.environ[_TRANSPORTS] = 'UDPv4'
+
+
+def standstill() -> str:
+    """
+    Return why ticks may stand still when a subscriber comes, and the remedy; '' if they do not.
+
+    The process's memory maps decide: with the discovery range LOCALHOST rmw_fastrtps uses shared
+    memory whatever the environment says, and a context made by other code has chosen its
+    transports already.
+    """
+    if not get_rmw_implementation_identifier().startswith('rmw_fastrtps'):
+        return ''
+    try:
+        shared = _SHARED.search(Path('/proc/self/maps').read_text())
+    except OSError:  # not Linux
+        return ''
+    if shared is None:
+        return ''
+    return (
+        'Fast DDS uses shared memory: ticks may stand still for 0.33 s when a subscriber comes; '
+        'start the process with FASTDDS_BUILTIN_TRANSPORTS=UDPv4, or, in the place of '
+        'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, with the profile config/fastdds/local.xml'
+    )

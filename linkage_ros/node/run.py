@@ -24,10 +24,10 @@ from math import inf
 import sys
 from threading import Event, Thread
 from time import monotonic
-from typing import Protocol
+from typing import Any, Protocol
 
 from linkage_ros.node.node import LinkageNode
-from linkage_ros.node.transports import leave_out_shared_memory
+from linkage_ros.node.real_time import leave_out_shared_memory
 from linkage_ros.signals import bounded_end, raising, StoppedError
 import rclpy
 from rclpy.executors import (
@@ -60,7 +60,7 @@ class View(Protocol):
 def run_linkage_node(
     stop: Event,
     arguments: Sequence[str],
-    overrides: Mapping[str, str] | None = None,
+    overrides: Mapping[str, Any] | None = None,
     *,
     seconds: float = inf,
     view: View | None = None,
@@ -106,7 +106,7 @@ def run_linkage_node(
         given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
         node = LinkageNode(parameter_overrides=given)
     except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
-        print(f'linkage_node: {_first_line(error)}; see the README', file=sys.stderr)
+        print(f'linkage_node: {_first_line(error)}; see linkage_node --help', file=sys.stderr)
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION
     executor = SingleThreadedExecutor()

@@ -40,10 +40,11 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.demo_nodes import DemoNode, run_demo_node
+from linkage_ros.node.demo_nodes import run_demo_node
 from linkage_ros.node.scene_topics import OUTPUT_QOS
 from linkage_ros.scene.load import load_scene
 from linkage_ros.signals import stop_on_signals
+from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
@@ -73,7 +74,7 @@ class TableRequest(NamedTuple):
     use_rate: float
 
 
-class StalenessProbe(DemoNode):
+class StalenessProbe(Node):
     """Publishes a crank and uses joint states."""
 
     def __init__(self, task: TableRequest) -> None:

@@ -137,6 +137,23 @@ _LONGEST_DRAIN = 20_000_000
 """Longest time that a tick takes messages, in [ns]; reached with huge, unparsed messages."""
 
 
+class Stall(NamedTuple):
+    """
+    A lag that lost ticks.
+
+    Attributes
+    ----------
+    duration
+        In [ns].
+    in_tick
+        Whether ticks took so long; else the operating system woke the thread so late.
+
+    """
+
+    duration: int
+    in_tick: bool
+
+
 @dataclass(slots=True)
 class Counts:
     """Counts of the tick since its start; only its thread writes them."""
@@ -146,6 +163,10 @@ class Counts:
     silent: int = 0
     withheld: int = 0
     lost: int = 0
+    stalls: int = 0
+    """Times at which ticks were lost."""
+    stall: Stall | None = None
+    """The last of them."""
     late: int = 0
     clock_jumps: int = 0
     resets: int = 0
@@ -156,6 +177,7 @@ class Counts:
     """Good messages followed by a newer one in the same tick."""
     ignored: int = 0
     """Messages without the crank's joints: other publishers may share the topic."""
+    last_ignored: bytes = b''
     missed: int = 0
     """Gaps in the sequence numbers of a single publisher."""
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
@@ -291,14 +313,7 @@ class TickLoop:
         """
         Take the waiting messages: record, count and offer each to the pipeline.
 
-        Parameters
-        ----------
-        clock
-            Returns the time when a message is taken, in [ns], and moves `_last_time` on; None to
-            use `_last_time`.
-        tick_for_each
-            Whether to tick for each good message, at its stamp.
-
+        A clock moves `_last_time` on to the time when a message is taken.
         """
         counts, pipeline = self.counts, self._pipeline
         good, end = 0, 0
@@ -317,15 +332,12 @@ class TickLoop:
             if self._own is None or not self._own(message):
                 counts.received += 1
                 if number := info.get('publication_sequence_number'):
-                    if (
-                        0 < self._sequence < number
-                    ):  # not the first message, nor a restarted publisher
+                    # Neither the first message, nor a restarted publisher.
+                    if 0 < self._sequence < number:
                         counts.missed += number - self._sequence - 1
                     self._sequence = number
-                recorder, topic = (
-                    self.recorder,
-                    self.topics.crank,
-                )  # another thread may set it to None
+                # Another thread may set it to None.
+                recorder, topic = self.recorder, self.topics.crank
                 if recorder is not None and topic is not None:
                     recorder.offer(topic, now, info['source_timestamp'], message)
                 rejection = pipeline.offer(message, now)
@@ -335,6 +347,7 @@ class TickLoop:
                         self._tick(now, pipeline.newest_stamp)
                 elif rejection is Rejection.MISSING:
                     counts.ignored += 1
+                    counts.last_ignored = message
                 else:
                     counts.rejected[rejection] += 1
             if not end:

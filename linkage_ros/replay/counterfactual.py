@@ -70,7 +70,7 @@ class Remade(NamedTuple):
     tick: Tick | None
 
 
-Done = SampleEvent | FaultEvent | Reset | Remade
+ReplayEvent = SampleEvent | FaultEvent | Reset | Remade
 
 
 def check_drives(scene: Scene, where: str) -> None:
@@ -135,7 +135,7 @@ class Counterfactual:
             }
         )
 
-    def run(self, events: Iterable[Event]) -> Iterator[Done]:
+    def run(self, events: Iterable[Event]) -> Iterator[ReplayEvent]:
         """Yield the events of the run, in order: samples, faults, resets and ticks."""
         return self._on_clock(events) if self._period else self._on_samples(events)
 
@@ -144,7 +144,7 @@ class Counterfactual:
         published = tick.message or tick.extras
         return self.withholds and not published and self._pipeline.remembers(tick)
 
-    def _on_samples(self, events: Iterable[Event]) -> Iterator[Done]:
+    def _on_samples(self, events: Iterable[Event]) -> Iterator[ReplayEvent]:
         made: Remade | None = None  # its recorded messages may follow
         for event in events:
             if isinstance(event, TickEvent):
@@ -167,7 +167,7 @@ class Counterfactual:
         if made is not None:
             yield made
 
-    def _on_clock(self, events: Iterable[Event]) -> Iterator[Done]:
+    def _on_clock(self, events: Iterable[Event]) -> Iterator[ReplayEvent]:
         taken: int | None = None  # time of a tick that took samples and perhaps published nothing
         for event in events:
             at = event.log_time

@@ -25,7 +25,7 @@ may have caused them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 import json
 import platform
 from typing import NamedTuple, TYPE_CHECKING
@@ -74,7 +74,9 @@ class ReplayedTick(NamedTuple):
     tick: Tick
 
 
-def recorded_scene(bag: Bag, *, trust_effects: bool = False) -> Scene:
+def recorded_scene(
+    bag: Bag, *, trust_effects: bool = False, settings: Sequence[str] = ()
+) -> Scene:
     """
     Return the scene stored in a bag.
 
@@ -84,6 +86,8 @@ def recorded_scene(bag: Bag, *, trust_effects: bool = False) -> Scene:
         The bag.
     trust_effects
         As for `parse_scene`: the bag may come from an untrusted source.
+    settings
+        As for `load_scene`.
 
     Raises
     ------
@@ -114,6 +118,7 @@ def recorded_scene(bag: Bag, *, trust_effects: bool = False) -> Scene:
         run.solvers,
         run.seed,
         trust_effects=trust_effects,
+        settings=settings,
     )
 
 
@@ -211,7 +216,7 @@ def versions_here() -> dict[str, str]:
     return dict(zip(VERSIONS, here, strict=True))
 
 
-def own_effects_here(scene: Scene) -> dict[str, str]:
+def user_effects_here(scene: Scene) -> dict[str, str]:
     """Return the modules of the user-defined effects of a scene."""
     names = {name for member in scene.members for name in member.effects if '.' in name}
     if not names:

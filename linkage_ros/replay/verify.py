@@ -14,7 +14,7 @@
 
 
 """
-Verify a bag: run its scene again on its samples, and compare with the recorded messages.
+Run a bag's scene again on its samples: compare with its messages, and find its worst states.
 
 A bag may lack the start of its run (recording began later, or its first files made way for newer
 ones). Then the state of the node at that time is missing: the newest sample, whole turns, delay
@@ -24,19 +24,24 @@ turns are no difference.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from math import inf
 from typing import NamedTuple
 
 from linkage_ros.bag.reader import Bag, BagMessage
 from linkage_ros.bag.run_events import lost_beginning, run_account
+from linkage_ros.errors import BagError
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.kinematics.results import Position, SingularityMargin
+from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.compare import At, Comparison, First
-from linkage_ros.replay.replay import replay_all, ReplayedTick
-from linkage_ros.scene.scene import Scene
+from linkage_ros.replay.replay import replay, replay_all, ReplayedTick
+from linkage_ros.scene.scene import Scene, SceneLinkage
 
-IDENTICAL, DIFFERENT, UNTOLD = 'identical', 'different', 'cannot be told'
+IDENTICAL, DIFFERENT, UNDECIDED = 'identical', 'different', 'cannot be told'
 
 _NEVER_FOUND_AGAIN = ('rate_limit', 'noise', 'jitter', 'dropout')
 """
@@ -53,10 +58,10 @@ class ReplayVerification(NamedTuple):
     ----------
     comparison
         Comparison of the ticks that could be compared.
-    untold
+    undecided
         Number of ticks at the start that cannot be judged, since the bag lacks the start of the
         run.
-    first_untold
+    first_undecided
         First difference of the first such tick.
     beginning
         Reason why the start of the run is missing; '' if it is there.
@@ -66,24 +71,24 @@ class ReplayVerification(NamedTuple):
     """
 
     comparison: Comparison
-    untold: int
-    first_untold: First | None
+    undecided: int
+    first_undecided: First | None
     beginning: str
     lost: tuple[str, ...]
 
     @property
     def ticks(self) -> int:
         """Return the number of ticks in the bag."""
-        return self.comparison.ticks + self.untold
+        return self.comparison.ticks + self.undecided
 
     @property
     def verdict(self) -> str:
-        """Return `IDENTICAL`, `DIFFERENT` or `UNTOLD`."""
+        """Return `IDENTICAL`, `DIFFERENT` or `UNDECIDED`."""
         comparison = self.comparison
-        if self.untold and not comparison.ticks:
-            return UNTOLD
+        if self.undecided and not comparison.ticks:
+            return UNDECIDED
         if comparison.differing:
-            return UNTOLD if self.lost else DIFFERENT
+            return UNDECIDED if self.lost else DIFFERENT
         return IDENTICAL
 
 
@@ -91,7 +96,7 @@ def verify_replay(
     bag: Bag,
     scene: Scene,
     messages: Iterable[BagMessage],
-    look: Callable[[ReplayedTick], None] = lambda _: None,
+    observe: Callable[[ReplayedTick], None] = lambda _: None,
 ) -> ReplayVerification:
     """
     Run a bag's scene once more and compare; memory does not grow with the bag.
@@ -100,7 +105,7 @@ def verify_replay(
     ----------
     bag, scene, messages
         As for `replay_all`.
-    look
+    observe
         Callback that receives every tick.
 
     Raises
@@ -117,10 +122,10 @@ def verify_replay(
     beginning = lost_beginning(bag, run)
     turning = turning_joints(scene) if beginning and not scene.wrapped else {}
     comparison, probe = Comparison(topics, turning), Comparison(topics, turning)
-    untold, in_step = 0, not beginning
+    undecided, in_step = 0, not beginning
     for number, replayed in enumerate(replay_all(bag, scene, messages), 1):
         time, joint_states, extras, tick = replayed
-        look(replayed)
+        observe(replayed)
         recorded = (joint_states, *extras)
         now = (tick.message, *tick.extras, *silent)[: len(topics)]
         at = At(number, time)
@@ -128,19 +133,21 @@ def verify_replay(
             probe.add(at, recorded, now)
             in_step = probe.last != at and any(recorded)
             if not in_step:
-                untold += 1
+                undecided += 1
                 continue
         comparison.add(at, recorded, now)
     comparison.settle()
     lost = _lost(scene) if beginning else ()
-    return ReplayVerification(comparison, untold, probe.first if untold else None, beginning, lost)
+    return ReplayVerification(
+        comparison, undecided, probe.first if undecided else None, beginning, lost
+    )
 
 
 def beginning_text(proof: ReplayVerification) -> str:
     """Return text on the ticks that cannot be judged in a bag without the start of its run."""
-    text = f'{proof.beginning}: what the node remembered then is not in it, so {proof.untold} '
+    text = f'{proof.beginning}: what the node remembered then is not in it, so {proof.undecided} '
     text += f'of {proof.ticks} ticks, at the start, could not be told'
-    if proof.verdict == UNTOLD and proof.lost:
+    if proof.verdict == UNDECIDED and proof.lost:
         text += f'; {" and ".join(proof.lost)} cannot come to the same again'
     return text
 
@@ -167,3 +174,168 @@ def _lost(scene: Scene) -> tuple[str, ...]:
         if markers and markers.trace:
             named.append('markers')
     return tuple(dict.fromkeys(named))
+
+
+_REPORT_EVERY = 1024
+
+
+class Place(NamedTuple):
+    """
+    A state of a run.
+
+    Attributes
+    ----------
+    time
+        Time that was solved for, in [ns].
+    inputs
+        Inputs of the linkage, in [rad] or [m].
+
+    """
+
+    time: int
+    inputs: tuple[float, ...]
+
+
+class WorstResiduals(NamedTuple):
+    """
+    The worst states of a linkage over a run.
+
+    Attributes
+    ----------
+    member, closure
+        The linkage in its scene, and its closure.
+    states
+        Number of states that closed, and so were examined.
+    toggles, limited
+        Number of these at a toggle, and number of these beyond joint limits.
+    residual
+        Greatest `Closure.residual`, in [m], and its place; None without states.
+    nearest
+        The singularity measures at the least conditioning, and the place.
+
+    """
+
+    member: SceneLinkage
+    closure: Closure
+    states: int
+    toggles: int
+    limited: int
+    residual: tuple[float, Place] | None
+    nearest: tuple[SingularityMargin, Place] | None
+
+
+class Examined(NamedTuple):
+    """
+    Result of running a scene again on its bag.
+
+    Attributes
+    ----------
+    linkages
+        The worst states of each linkage.
+    joint_states
+        Number of joint states in the bag.
+    same
+        Number of these that were reproduced byte for byte.
+    damage
+        Damage at which reading ended, on one line.
+    stopped
+        Whether the examination was stopped early.
+
+    """
+
+    linkages: tuple[WorstResiduals, ...]
+    joint_states: int
+    same: int
+    damage: str
+    stopped: bool
+
+
+def examine(
+    bag: Bag, scene: Scene, progress: Callable[[int], None], stopped: Callable[[], bool]
+) -> Examined:
+    """
+    Run a scene again on its bag and examine every state; memory does not grow with them.
+
+    Parameters
+    ----------
+    bag, scene
+        As for `replay`.
+    progress
+        Progress callback; receives the number of examined ticks, now and then.
+    stopped
+        Returns whether to stop.
+
+    Raises
+    ------
+    LinkageError
+        The scene cannot be run.
+
+    """
+    # The replay builds equal closures itself: they follow from the scene alone.
+    watched = [_Watch(line.member, line.closure) for line in Pipeline(scene).lines]
+    joint_states = same = number = 0
+    damage, halted = '', False
+    try:
+        for number, (time, recorded, _, tick) in enumerate(replay(bag, scene), 1):
+            if recorded:
+                joint_states += 1
+                same += recorded == tick.message
+            for watch, (crank, position, _, _) in zip(watched, tick.looks, strict=True):
+                if crank is not None and position is not None and position.joints:
+                    watch.add(time, crank.angles, position)
+            if not number % _REPORT_EVERY:
+                progress(number)
+                if stopped():
+                    halted = True
+                    break
+    except BagError as error:
+        damage = f'{error.where}: {error.reason}'
+    linkages = tuple(watch.found() for watch in watched)
+    return Examined(linkages, joint_states, same, damage, halted)
+
+
+class _Watch:
+    """Keeps the worst of the states of a linkage."""
+
+    __slots__ = (
+        '_least',
+        '_limited',
+        '_nearest',
+        '_place',
+        '_states',
+        '_toggles',
+        '_worst',
+        'closure',
+        'of',
+    )
+
+    def __init__(self, member: SceneLinkage, closure: Closure) -> None:
+        self.of, self.closure = member, closure
+        self._states = self._toggles = self._limited = 0
+        self._worst, self._least = -1.0, inf
+        self._place: Place | None = None
+        self._nearest: tuple[SingularityMargin, Place] | None = None
+
+    def add(self, time: int, inputs: Sequence[float], position: Position) -> None:
+        self._states += 1
+        self._toggles += position.status is Status.TOGGLE
+        self._limited += position.status is Status.LIMITED
+        residual = self.closure.residual(position)
+        if residual > self._worst:
+            self._worst, self._place = residual, Place(time, tuple(inputs))
+        nearness = self.closure.singularity_margin(position)
+        if nearness.conditioning < self._least:
+            self._least = nearness.conditioning
+            self._nearest = nearness, Place(time, tuple(inputs))
+
+    def found(self) -> WorstResiduals:
+        residual = (self._worst, self._place) if self._place else None
+        return WorstResiduals(
+            self.of,
+            self.closure,
+            self._states,
+            self._toggles,
+            self._limited,
+            residual,
+            self._nearest,
+        )
