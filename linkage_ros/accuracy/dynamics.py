@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from importlib import import_module
 from math import inf, log10, sqrt, tau
 from time import perf_counter
 from typing import NamedTuple
@@ -38,13 +37,13 @@ from linkage_ros.accuracy.energy_integral import (
     turned,
 )
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
-from linkage_ros.dynamics.integrators.method import METHODS
+from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.dynamics.motion import Motion, OneFreedom
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import InputRange
-from linkage_ros.measuring import alternating, Progress, Spread, spread_of
+from linkage_ros.measuring import alternating, Progress, spread_of
 from linkage_ros.scene.scene import Scene, SceneLinkage
 
 SECONDS = 10.0
@@ -121,7 +120,7 @@ def free_motion(member: SceneLinkage) -> FreeMotion:
     closure = Closure(member.linkage)
     mechanics = Mechanics(closure, loads)
     energy = ExactEnergy(member.linkage, loads)
-    unit = 'm' if member.linkage.inputs[0].slider else 'rad'
+    unit = member.linkage.inputs[0].unit
     start: float = member.drive[1].start
     interval = next((each for each in closure.input_ranges if _holds(each, start)), None)
     if interval is not None and interval.whole:
@@ -146,7 +145,7 @@ def free_motion(member: SceneLinkage) -> FreeMotion:
 def integrate(motion: FreeMotion, method: str, step: float) -> Integrated:
     """Integrate a motion once; the evaluations of its energy are not timed."""
     mechanics = motion.mechanics
-    freedom = OneFreedom(mechanics.equation, import_module(METHODS[method]).step)
+    freedom = OneFreedom(mechanics.equation, METHODS[method].step)
     at = freedom.at(*motion.start)
     assert at is not None, 'the reference has moved it'
     whole = _energy(mechanics, at)
@@ -211,6 +210,7 @@ STEPS = {
 }
 """Steps of each method, in [s]."""
 
+_TITLE = 'What the steps of the torque drive cost'
 _QUICK = 4
 """Number of steps in a quick measurement, the longest first."""
 
@@ -225,12 +225,8 @@ def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | No
 
     Parameters
     ----------
-    scene
-        The scene.
-    quick
-        Whether to measure for a few seconds only.
-    progress
-        Called now and then with the fraction that is done, 0 to 1.
+    scene, quick, progress
+        See `linkage_ros.accuracy`.
 
     """
     driven = [member for member in scene.members if member.drive[0] == 'torque']
@@ -238,11 +234,10 @@ def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | No
         return None
     progress(0.0)
     member = driven[0]
-    title = 'What the steps of the torque drive cost'
     try:
         motion = free_motion(member)
     except NoReferenceError as error:
-        return Part('dynamics', title, [f'Not measured: {error}.'])
+        return Part('dynamics', _TITLE, f'Not measured: {error}.')
     progress(0.2)
     settings = _settings(member, quick)
     found: dict[tuple[str, float], Integrated] = {}
@@ -256,10 +251,19 @@ def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | No
     results = list(found.values())
     drive = member.drive[1]
     own = found[drive.method, drive.step]
+    return part_of(motion, results, own, rounds)
+
+
+def part_of(
+    motion: FreeMotion, results: Sequence[Integrated], own: Integrated, rounds: int
+) -> Part:
+    """Return the results, with the method and step of the scene, as a part of the page."""
     return Part(
         'dynamics',
-        title,
-        _text(motion, own, rounds),
+        _TITLE,
+        _headline(motion, own),
+        list(_sentences(results, own)),
+        _method(motion, rounds),
         [
             _diagram(
                 'dynamics_error',
@@ -306,61 +310,43 @@ def _diagram(
         points = []
         for result in results:
             if result.method == method and value(result) > 0.0:
-                times = Spread(*(1e3 * time for time in spread_of(result.times)))
-                points.append(
-                    Point(
-                        times.middle,
-                        value(result),
-                        times,
-                        setting=f'step {1e3 * result.step:g} ms',
-                    )
-                )
+                times = spread_of(result.times).scaled(1e3)
+                setting = f'step {1e3 * result.step:g} ms'
+                points.append(Point(times.middle, value(result), times, setting=setting))
         curves.append(Curve(method, points))
     time = Axis('processor time for a second of motion', 'ms')
-    return Diagram(key, title, time, axis, curves)
+    return Diagram(key, title, time, axis, curves, front=True)
 
 
 def _table(results: Sequence[Integrated], unit: str) -> Table:
-    return Table(
+    return Table.of(
         'dynamics',
         f'A free motion of {SECONDS:g} s, integrated',
-        (
-            'method',
-            'step [ms]',
-            'time for a second of motion [ms]',
-            f'error of the input [{unit}]',
-            'greatest error of the energy [of its range]',
-        ),
-        [
-            (
-                result.method,
-                1e3 * result.step,
-                Spread(*(1e3 * time for time in spread_of(result.times))),
-                result.error,
-                result.drift,
-            )
-            for result in results
-        ],
+        results,
+        {
+            'method': lambda one: one.method,
+            'step [ms]': lambda one: 1e3 * one.step,
+            'time for a second of motion [ms]': lambda one: spread_of(one.times).scaled(1e3),
+            f'error of the input [{unit}]': lambda one: one.error,
+            'greatest error of the energy [of its range]': lambda one: one.drift,
+        },
     )
 
 
 def _slopes(results: Sequence[Integrated]) -> Table:
-    rows: list[tuple[str | int | float | None, ...]] = []
-    for method in STEPS:
-        own = [result for result in results if result.method == method]
-        rows.append(
-            (
-                method,
-                import_module(METHODS[method]).ORDER,
-                slope([(result.step, result.error) for result in own]),
-                slope([(result.step, result.drift) for result in own]),
-            )
-        )
-    return Table(
+    def errors(method: str, error: Callable[[Integrated], float]) -> list[tuple[float, float]]:
+        return [(one.step, error(one)) for one in results if one.method == method]
+
+    return Table.of(
         'dynamics_slopes',
         'By which power of the step errors fall',
-        ('method', 'its order', 'of the error', 'of the energy'),
-        rows,
+        STEPS,
+        {
+            'method': lambda method: method,
+            'its order': lambda method: METHODS[method].order,
+            'of the error': lambda method: slope(errors(method, lambda one: one.error)),
+            'of the energy': lambda method: slope(errors(method, lambda one: one.drift)),
+        },
     )
 
 
@@ -383,14 +369,39 @@ def slope(errors: Sequence[tuple[float, float]]) -> float | None:
     return (y2 - y1) / (x2 - x1)
 
 
-def _text(motion: FreeMotion, own: Integrated, rounds: int) -> list[str]:
-    time = 1e3 * spread_of(own.times).middle
-    said = (
-        f'As the scene has it, {own.method} with steps of {1e3 * own.step:g} ms, '
-        f'{SECONDS:g} s of free motion end {own.error:.2g} {motion.unit} off, the energy drifts '
-        f'by {own.drift:.2g} of its range, and a second of motion takes {time:.3g} ms of a '
-        'processor.'
+def _headline(motion: FreeMotion, own: Integrated) -> str:
+    return (
+        f'{own.method}, {1e3 * own.step:g} ms a step: {own.error:.1g} {motion.unit} off after '
+        f'{SECONDS:g} s, for {_milliseconds(own):.2g} ms a second.'
     )
+
+
+def _milliseconds(one: Integrated) -> float:
+    """Return the processor time for a second of motion, in [ms]."""
+    return 1e3 * spread_of(one.times).middle
+
+
+def _sentences(results: Sequence[Integrated], own: Integrated) -> Iterator[str]:
+    yield (
+        f'That is the setting of the scene; the energy drifts by {own.drift:.1g} of its range, '
+        f'and a second of motion takes {_milliseconds(own):.2g} ms of a processor.'
+    )
+    best = min((one for one in results if one.error <= own.error), key=_milliseconds)
+    if best is own:
+        yield 'Of all methods and steps measured, none is as exact in less time.'
+    else:
+        yield (
+            f'{best.method} with steps of {1e3 * best.step:g} ms is as exact for '
+            f'{_milliseconds(best):.2g} ms.'
+        )
+    most = min(results, key=lambda one: one.error)
+    yield (
+        f'The most exact is {most.method} with steps of {1e3 * most.step:g} ms: {most.error:.1g} '
+        f'off, for {_milliseconds(most):.2g} ms.'
+    )
+
+
+def _method(motion: FreeMotion, rounds: int) -> list[str]:
     how = (
         f'The linkage moved for {SECONDS:g} s under its weight and springs alone, without '
         f'friction, dampers and commands: {motion.words}. Where it then is, is known from its '
@@ -400,7 +411,7 @@ def _text(motion: FreeMotion, own: Integrated, rounds: int) -> list[str]:
     times = (
         f'All methods and steps ran in turn, {rounds} times; looks at the energy are not timed.'
     )
-    return [said, how, times]
+    return [how, times]
 
 
 def _advice(results: Sequence[Integrated], unit: str) -> Iterator[str]:
@@ -411,8 +422,8 @@ def _advice(results: Sequence[Integrated], unit: str) -> Iterator[str]:
         if not enough:
             yield f'{words}: none of these steps will do.'
             continue
-        best = min(enough, key=lambda result: spread_of(result.times).middle)
+        best = min(enough, key=_milliseconds)
         yield (
             f'{words}: {best.method} with steps of {1e3 * best.step:g} ms, '
-            f'{1e3 * spread_of(best.times).middle:.3g} ms for a second of motion.'
+            f'{_milliseconds(best):.3g} ms for a second of motion.'
         )

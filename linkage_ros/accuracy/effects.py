@@ -24,7 +24,7 @@ error that a consumer sees.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from math import remainder, sqrt, tau
 from typing import NamedTuple
@@ -129,6 +129,9 @@ def _compare(
             rates.add(found - there)
 
 
+Row = tuple[str, Times | None, Departure | None, str]
+"""An effect: its name, what it adds to a tick, what it makes of the truth, and a remark."""
+
 WHOLE = 'a tick of the scene'
 _RATES = Names({'velocity'})
 
@@ -139,12 +142,8 @@ def measure_effects(scene: Scene, quick: bool, progress: Progress) -> Part | Non
 
     Parameters
     ----------
-    scene
-        The scene.
-    quick
-        Whether to measure for a few seconds only.
-    progress
-        Called now and then with the fraction that is done, 0 to 1.
+    scene, quick, progress
+        See `linkage_ros.accuracy`.
 
     Raises
     ------
@@ -167,7 +166,7 @@ def measure_effects(scene: Scene, quick: bool, progress: Progress) -> Part | Non
         true = variants.pipeline(_RATES)
         return departure(true, variants.pipeline(names), islice(feed(scene, true), ticks))
 
-    rows: list[tuple[str, Times | None, Departure | None, str]] = []
+    rows: list[Row] = []
     for number, effect in enumerate(cost.effects, 1):
         found = None
         if effect.adds is not None and effect.name not in faults_of(scene):
@@ -176,18 +175,23 @@ def measure_effects(scene: Scene, quick: bool, progress: Progress) -> Part | Non
         progress(0.6 + 0.4 * number / (len(cost.effects) + 1))
     rows.append((WHOLE, cost.whole, departs(named - faults_of(scene)), ''))
     progress(1.0)
+    return part_of(cost, rows, ticks)
+
+
+def part_of(cost: SceneCost, rows: Sequence[Row], ticks: int) -> Part:
+    """Return the results as a part of the page."""
     return Part(
         'effects',
         'What each effect costs, and what it makes of the truth',
-        _text(cost, ticks),
+        _headline(cost),
+        list(_sentences(rows)),
+        _method(ticks),
         [diagram] if (diagram := _diagram(rows)).curves else [],
         [_table(cost, rows)],
     )
 
 
-def _table(
-    cost: SceneCost, rows: Sequence[tuple[str, Times | None, Departure | None, str]]
-) -> Table:
+def _table(cost: SceneCost, rows: Sequence[Row]) -> Table:
     whole = cost.whole.median
     lines: list[tuple[float | str | Spread | None, ...]] = [
         ('a tick without effects', _spread(cost.bare), 100.0 * cost.bare.median / whole)
@@ -227,7 +231,7 @@ def _table(
     )
 
 
-def _diagram(rows: Sequence[tuple[str, Times | None, Departure | None, str]]) -> Diagram:
+def _diagram(rows: Sequence[Row]) -> Diagram:
     """Return the error of positions against cost, without effects that change no angle."""
     curves = [
         Curve(name, [Point(times.median, found.angles[0], _spread(times))], joined=False)
@@ -243,18 +247,38 @@ def _diagram(rows: Sequence[tuple[str, Times | None, Departure | None, str]]) ->
     )
 
 
-def _text(cost: SceneCost, ticks: int) -> list[str]:
+def _headline(cost: SceneCost) -> str:
     dearest = max(
         (effect for effect in cost.effects if effect.adds),
         key=lambda effect: effect.adds.median if effect.adds else 0.0,
         default=None,
     )
-    said = (
-        f'A tick of the scene takes {cost.whole.median:.2f} µs, without its effects '
-        f'{cost.bare.median:.2f} µs.'
-    )
+    said = f'A tick takes {cost.whole.median:.3g} µs, {cost.bare.median:.3g} µs without effects'
     if dearest is not None and dearest.adds:
-        said += f' {dearest.name} adds most: {dearest.adds.median:.2f} µs.'
+        said += f'; {dearest.name} adds {dearest.adds.median:.2g} µs'
+    return f'{said}.'
+
+
+def _sentences(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield what all effects together and the largest of them make of the truth."""
+    changed = {
+        name: found.angles[0] for name, _, found, _ in rows if found and found.angles is not None
+    }
+    *others, (_, _, whole, _) = rows
+    assert whole is not None, 'the whole scene was compared'
+    if changed.get(WHOLE):
+        yield f'Together they put the published angles {changed[WHOLE]:.2g} rad (rms) off.'
+    single = {name: error for name, *_ in others if (error := changed.get(name, 0.0))}
+    if single:
+        most = max(single, key=single.__getitem__)
+        yield f'{most} alone changes the angles most: by {single[most]:.2g} rad (rms).'
+    else:
+        yield 'No effect alone changes an angle: they add to the message, or act on other values.'
+    if whole.silent:
+        yield f'At {whole.silent:.0%} of the ticks nothing is published.'
+
+
+def _method(ticks: int) -> list[str]:
     how = (
         f'Each effect was put alone, with what it starts from, on the scene without effects; all '
         f'variants ticked in turn, {ticks:,} ticks each in blocks of 100, over the same times and '
@@ -267,7 +291,7 @@ def _text(cost: SceneCost, ticks: int) -> list[str]:
         'joints that turn, that slide, and over all rates. Random effects have the '
         "scene's own seed. Faults are timed while none is injected."
     )
-    return [said, how, what]
+    return [how, what]
 
 
 def _remark(effect: EffectCost) -> str:

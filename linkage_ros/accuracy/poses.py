@@ -212,7 +212,7 @@ def near_change_point(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], 
 
 def unit_of(poses: Poses) -> str:
     """Return the unit of the first input, and so of distances from a singular pose."""
-    return 'm' if poses.linkage.inputs[0].slider else 'rad'
+    return poses.linkage.inputs[0].unit
 
 
 def five_dyads() -> Linkage:

@@ -34,6 +34,7 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cost import feed
 from linkage_ros.errors import RecordingError
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 
@@ -42,7 +43,6 @@ FASTEST = 1000.0
 
 _SWITCH_INTERVAL = 1e-4  # as in the node, in [s]
 _PATIENCE = 4.0  # a run may be longer than requested by this factor, until it has flushed
-_JOINT_STATE = 'sensor_msgs/msg/JointState'
 
 
 class Flush(NamedTuple):
@@ -204,8 +204,8 @@ def _tick(
 
 def _topics(pipeline: Pipeline) -> list[Topic]:
     """Return the topics the node would record, without diagnostics and message definitions."""
-    names = [(pipeline.topic, _JOINT_STATE)] if pipeline.topic else []
-    names.append(('/joint_states', _JOINT_STATE))
+    names = [(pipeline.topic, JOINT_STATE)] if pipeline.topic else []
+    names.append(('/joint_states', JOINT_STATE))
     names += [(extra.topic.replace('~', '/node'), extra.message) for extra in pipeline.extras]
     return [Topic(name, kind, '', '') for name, kind in names]
 

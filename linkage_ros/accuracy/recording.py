@@ -104,11 +104,21 @@ class Cost(NamedTuple):
         return text if self.compression == NONE else f'{text}, compression: {self.compression}'
 
 
-def settings(periods: Sequence[float], packed_at: float, folder: Path) -> list[Storage | None]:
-    """Return the settings to compare: no bag, the flush periods, the installed compressions."""
+def settings(
+    scene: Scene, periods: Sequence[float], packed_at: float, folder: Path
+) -> list[Storage | None]:
+    """Return no bag, the flush periods, the installed compressions, and what the scene has."""
     compared: list[Storage | None] = [None, *(Storage(flush_period=each) for each in periods)]
     here = [name for name in COMPRESSIONS if name != NONE and _is_here(name, folder)]
-    return compared + [Storage(flush_period=packed_at, compression=name) for name in here]
+    compared += [Storage(flush_period=packed_at, compression=name) for name in here]
+    own = own_setting(scene)
+    return compared if own in compared else [*compared, own]
+
+
+def own_setting(scene: Scene) -> Storage:
+    """Return the setting of a scene; the default if it records no bag."""
+    given = scene.record.storage if scene.record else Storage()
+    return Storage(flush_period=given.flush_period, compression=given.compression)
 
 
 def measure_costs(
@@ -216,6 +226,7 @@ _WANTED = (0.1, 1.0, 5.0)
 _NEAR = 0.9
 """A flush period is near the cheapest if the minimum time is at least this fraction of its own."""
 
+_SHORTEST = 'is the shortest period here'
 _NOT_PACKED = 'not packed'
 
 
@@ -225,14 +236,10 @@ def measure_recording(scene: Scene, folder: Path, quick: bool, progress: Progres
 
     Parameters
     ----------
-    scene
-        The scene.
+    scene, quick, progress
+        See `linkage_ros.accuracy`.
     folder
         Folder on the disk to be measured; the bags are created there and removed again.
-    quick
-        Whether to measure for a few seconds only.
-    progress
-        Called now and then with the fraction that is done, 0 to 1.
 
     Raises
     ------
@@ -242,8 +249,8 @@ def measure_recording(scene: Scene, folder: Path, quick: bool, progress: Progres
     """
     periods, packed_at = (QUICK_PERIODS, QUICK_PACKED_AT) if quick else (FLUSH_PERIODS, PACKED_AT)
     costs = measure_costs(
-        scene, folder, settings(periods, packed_at, folder), 0.4 if quick else 1.3,
-        1 if quick else 3, progress,
+        scene, folder, settings(scene, periods, packed_at, folder),
+        0.4 if quick else 1.3, 1 if quick else 3, progress,
     )  # fmt: skip
     return part_of(scene, costs, quick=quick)
 
@@ -251,10 +258,27 @@ def measure_recording(scene: Scene, folder: Path, quick: bool, progress: Progres
 def part_of(scene: Scene, costs: Sequence[Cost], *, quick: bool = False) -> Part:
     """Return the results as a part of the page."""
     bags = [cost for cost in costs if cost.setting]
+    own = own_setting(scene)
+    as_is = min(
+        bags,
+        key=lambda cost: (
+            cost.compression != own.compression,
+            abs(cost.flush_period - own.flush_period),
+        ),
+    )
+    found = (
+        f'recording costs {as_is.cpu.middle:.2g} µs a message and may lose '
+        f'{as_is.stake.high * 1e-3:.2g} s in a crash'
+    )
+    advice = list(_advice(bags))
+    near = next(each for each in advice if _SHORTEST in each)
+    packed = [each for each in advice if each.startswith('compression')]
     return Part(
         'recording',
         'Recording: what a crash can lose, and what it costs to lose less',
-        list(_text(scene, costs, quick=quick)),
+        f'{found[0].upper()}{found[1:]}.',
+        [near, *packed[-1:], *_lateness(costs)],
+        list(_method(scene, quick=quick)),
         [
             Diagram(
                 'recording_cpu',
@@ -262,6 +286,7 @@ def part_of(scene: Scene, costs: Sequence[Cost], *, quick: bool = False) -> Part
                 Axis('a power cut may take', 'ms'),
                 Axis('processor time for a message', 'µs', logarithmic=False),
                 _curves(bags, lambda cost: cost.cpu),
+                front=True,
             ),
             Diagram(
                 'recording_waits',
@@ -269,10 +294,12 @@ def part_of(scene: Scene, costs: Sequence[Cost], *, quick: bool = False) -> Part
                 Axis('a power cut may take', 'ms'),
                 Axis('waiting for the disk in a second', 'ms'),
                 _curves(bags, lambda cost: cost.waited),
+                front=True,
             ),
         ],
         [_table(costs)],
-        list(_advice(bags)),
+        advice,
+        found,
     )
 
 
@@ -281,7 +308,7 @@ def _curves(bags: Sequence[Cost], value: Callable[[Cost], Spread]) -> list[Curve
     for packed in COMPRESSIONS:
         points = [
             Point(cost.stake.middle, value(cost).middle, cost.stake, value(cost), cost.name)
-            for cost in bags
+            for cost in sorted(bags, key=lambda cost: cost.flush_period)
             if cost.compression == packed
         ]
         if points:
@@ -330,7 +357,7 @@ def _table(costs: Sequence[Cost]) -> Table:
     return Table('recording', 'What each way to record costs', columns, rows)
 
 
-def _text(scene: Scene, costs: Sequence[Cost], *, quick: bool) -> Iterator[str]:
+def _method(scene: Scene, *, quick: bool) -> Iterator[str]:
     rate = min(scene.rate or FASTEST, FASTEST)
     yield (
         f'The scene ticked at {rate:g} Hz in real time, in process and without a graph, and every '
@@ -349,6 +376,9 @@ def _text(scene: Scene, costs: Sequence[Cost], *, quick: bool) -> Iterator[str]:
         'and in a file system in memory nothing does.'
         + (' In so short a run metadata.yaml is not renewed.' if quick else '')
     )
+
+
+def _lateness(costs: Sequence[Cost]) -> Iterator[str]:
     without = next((cost.late_p99.middle for cost in costs if not cost.setting), None)
     with_bag = [cost.late_p99.middle for cost in costs if cost.setting]
     if without is not None and with_bag:
@@ -380,7 +410,7 @@ def _advice(bags: Sequence[Cost]) -> Iterator[str]:
         near = [cost for cost in plain if cost.cpu.middle * _NEAR <= least]
         shortest = min(near, key=lambda cost: cost.stake.middle)
         yield (
-            f'{shortest.name} is the shortest period here whose processor time is near the least, '
+            f'{shortest.name} {_SHORTEST} whose processor time is near the least, '
             f'{shortest.cpu.middle:.1f} µs a message and {least:.1f} µs.'
         )
     for loose in plain:

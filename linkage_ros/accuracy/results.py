@@ -21,10 +21,15 @@ The modules that measure and those that present share only these types.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple, TypeVar
 
 from linkage_ros.measuring import Spread
+
+Result = TypeVar('Result')
+
+Cell = float | int | str | Spread | None
+"""What a table holds; None is an empty cell."""
 
 
 class Axis(NamedTuple):
@@ -67,6 +72,8 @@ class Point(NamedTuple):
         The quartiles, if it was measured several times.
     setting
         The setting of the method: 'tolerance 1e-6', '256 knots'.
+    fails
+        Whether the method has no answer for some states; such a point is on no front.
 
     """
 
@@ -75,6 +82,7 @@ class Point(NamedTuple):
     x_spread: Spread | None = None
     y_spread: Spread | None = None
     setting: str = ''
+    fails: bool = False
 
 
 class Curve(NamedTuple):
@@ -111,6 +119,8 @@ class Diagram(NamedTuple):
         Its axes.
     curves
         The curves; the same name has the same colour and mark in all diagrams.
+    front
+        Whether less is better on both axes: the front of best points is drawn, all others pale.
 
     """
 
@@ -119,6 +129,7 @@ class Diagram(NamedTuple):
     x: Axis
     y: Axis
     curves: Sequence[Curve]
+    front: bool = False
 
 
 class Table(NamedTuple):
@@ -141,7 +152,62 @@ class Table(NamedTuple):
     key: str
     title: str
     columns: Sequence[str]
-    rows: Sequence[Sequence[float | int | str | Spread | None]]
+    rows: Sequence[Sequence[Cell]]
+
+    @classmethod
+    def of(
+        cls,
+        key: str,
+        title: str,
+        results: Iterable[Result],
+        columns: Mapping[str, Callable[[Result], Cell]],
+    ) -> Table:
+        """Return the table with a row for each result, from the value of each column."""
+        rows = [tuple(value(result) for value in columns.values()) for result in results]
+        return cls(key, title, tuple(columns), rows)
+
+
+class Choice(NamedTuple):
+    """
+    A solver that a scene can choose, and its cost.
+
+    Attributes
+    ----------
+    accuracy
+        Its greatest error at easy poses, in [rad]; slides relative to the linkage's size.
+    write
+        Text to write into the scene.
+    solving
+        Time of a position, in [µs].
+    tick
+        Time of a tick of the scene with it, in [µs].
+
+    """
+
+    accuracy: float
+    write: str
+    solving: Spread
+    tick: Spread
+
+
+class Rate(NamedTuple):
+    """
+    A tick rate, and the error of a state when a subscriber uses it.
+
+    Attributes
+    ----------
+    rate
+        Tick rate, in [Hz].
+    error
+        Root mean square, in [rad]; the greatest of all motions of the crank.
+    use
+        How the state is used: 'held', or 'carried forward' by its rates.
+
+    """
+
+    rate: float
+    error: float
+    use: str
 
 
 class Part(NamedTuple):
@@ -153,22 +219,40 @@ class Part(NamedTuple):
     key
         'solving', 'ticking', 'effects', 'dynamics' or 'recording'.
     title
-        The question that it answers.
-    text
-        The method of measurement and the conclusions, in paragraphs without markup.
-    diagrams, tables
-        The results.
+        Its subject.
+    headline
+        Its result, in a sentence of at most some 80 characters.
+    sentences
+        Up to three sentences beside its picture; no text of a part has markup.
+    method
+        The method of measurement, in paragraphs.
+    diagrams
+        The picture of the part, and more pictures.
+    tables
+        The numbers.
     advice
         The cheapest method for some accuracies, a sentence each, derived from the data.
+    clause
+        Its clause of the headline of the page; '' if it has none.
+    choices
+        Solvers to choose from, the least exact first, the default last; the part on solving has
+        them.
+    rates
+        Tick rates to choose from; the part on the rate of ticks has them.
 
     """
 
     key: str
     title: str
-    text: Sequence[str]
+    headline: str
+    sentences: Sequence[str] = ()
+    method: Sequence[str] = ()
     diagrams: Sequence[Diagram] = ()
     tables: Sequence[Table] = ()
     advice: Sequence[str] = ()
+    clause: str = ''
+    choices: Sequence[Choice] = ()
+    rates: Sequence[Rate] = ()
 
 
 class Results(NamedTuple):
@@ -180,7 +264,7 @@ class Results(NamedTuple):
     scene
         Its name.
     machine
-        Machine and versions: names and values.
+        Day, machine and versions: names and values.
     parts
         The parts in order; a scene without torque has no part on dynamics.
 
@@ -189,3 +273,9 @@ class Results(NamedTuple):
     scene: str
     machine: Sequence[tuple[str, str]]
     parts: Sequence[Part]
+
+    @property
+    def headline(self) -> str:
+        """Return the result for the scene in a sentence."""
+        clauses = '; '.join(part.clause for part in self.parts if part.clause)
+        return f'{self.scene}: {clauses or "measured"}.'

@@ -28,6 +28,7 @@ from math import inf
 from time import perf_counter
 from typing import Any
 
+from linkage_ros.accuracy.choices import scene_choices
 from linkage_ros.accuracy.methods import ACCELERATION, Method, RATE
 from linkage_ros.accuracy.methods.equations import extended, integrations
 from linkage_ros.accuracy.methods.formulas import single_precision, textbook
@@ -81,12 +82,8 @@ def measure_solving(scene: Scene, quick: bool, progress: Progress) -> Part:
 
     Parameters
     ----------
-    scene
-        The scene.
-    quick
-        Whether to measure for a few seconds only.
-    progress
-        Called now and then with the fraction that is done, 0 to 1.
+    scene, quick, progress
+        See `linkage_ros.accuracy`.
 
     """
     member = scene.members[0]
@@ -95,8 +92,10 @@ def measure_solving(scene: Scene, quick: bool, progress: Progress) -> Part:
     for number, poses in enumerate(sets):
         progress(0.3 * number / len(sets))
         results += judge(poses, quick)
-    take_times(results, 1.0 if quick else 40.0, lambda share: progress(0.3 + 0.7 * share))
-    return part_of(results, quick)
+    _take_times(results, 1.0 if quick else 40.0, lambda share: progress(0.3 + 0.65 * share))
+    choices = scene_choices(scene, results, 2_000 if quick else 10_000)
+    progress(1.0)
+    return part_of(results, quick, choices)
 
 
 def judge(poses: Poses, quick: bool) -> list[Measured]:
@@ -111,14 +110,14 @@ def judge(poses: Poses, quick: bool) -> list[Measured]:
     """
     truths = true_states(poses)
     confirmed(poses, truths)
-    methods = methods_for(poses.linkage, poses.key, quick)
+    methods = _methods_for(poses.linkage, poses.key, quick)
     results = [_judged(method, poses, truths) for method in methods]
     if poses.key == 'easy':
         results += _integrated(poses, quick)
     return results
 
 
-def take_times(
+def _take_times(
     results: Sequence[Measured], seconds: float, progress: Progress = lambda _: None
 ) -> None:
     """Time all judged methods in turn, for about a number of seconds."""
@@ -220,20 +219,8 @@ _LARGEST_ITERATED = 2**14
 """Maximum number of knots if each is iterated."""
 
 
-def methods_for(linkage: Linkage, key: str, quick: bool) -> Iterator[Method]:
-    """
-    Yield the methods that apply to a linkage.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    key
-        Key of the poses: all settings for easy ones, a few for the others.
-    quick
-        Whether to use only a few settings everywhere, and no other packages.
-
-    """
+def _methods_for(linkage: Linkage, key: str, quick: bool) -> Iterator[Method]:
+    """Yield the methods that apply to a linkage; all settings only for easy poses."""
     closed = closed_form(linkage)
     yield closed
     for made in (single_precision, textbook, *(() if quick else PEERS)):

@@ -19,13 +19,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
+from math import floor, log10
 
 from linkage_ros.accuracy.methods import ACCELERATION, RATE
 from linkage_ros.accuracy.methods.equations import EXTENDED
 from linkage_ros.accuracy.methods.formulas import TEXTBOOK
 from linkage_ros.accuracy.methods.node import FROM_KNOTS, ITERATED, NODE_DEFAULTS, TABLES
 from linkage_ros.accuracy.poses import BATCH, Errors, Measured, Poses, unit_of
-from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
+from linkage_ros.accuracy.results import Axis, Choice, Curve, Diagram, Part, Point, Table
 from linkage_ros.measuring import Spread
 
 FLOOR = 1e-18
@@ -43,15 +44,24 @@ _WITH_PATH = ('easy', 'path')
 """Integration follows a path; it is shown with the easy poses."""
 
 
-def part_of(results: Sequence[Measured], quick: bool) -> Part:
+def part_of(results: Sequence[Measured], quick: bool, choices: Sequence[Choice] = ()) -> Part:
     """Return the results as a part of the page."""
+    sets = {one.poses.key: one.poses for one in results}
+    found = _exactness(results)
     return Part(
         'solving',
         'Solving the loop',
-        text(results, quick),
+        f'{found[0].upper()}{found[1:]}.',
+        [
+            _outcome(results, sets['easy']),
+            *(_near_trouble(results, sets[key]) for key in _TROUBLE),
+        ],
+        method(results, sets, quick),
         list(_diagrams(results)),
         list(_tables(results)),
         advice(results),
+        found,
+        choices,
     )
 
 
@@ -64,6 +74,7 @@ def _diagrams(results: Sequence[Measured]) -> Iterator[Diagram]:
         _TIME,
         _ERRORS,
         _curves(easy, 'position', lambda one: one.position),
+        front=True,
     )
     yield Diagram(
         'solving_acceleration',
@@ -71,6 +82,7 @@ def _diagrams(results: Sequence[Measured]) -> Iterator[Diagram]:
         Axis('time of a state with rates and accelerations', 'µs'),
         Axis(_ERROR, 'rad/s², or of the greatest', least=_LEAST),
         _curves(easy, 'motion', lambda one: one.motion and one.motion[2]),
+        front=True,
     )
     yield Diagram(
         'solving_batch',
@@ -78,6 +90,7 @@ def _diagrams(results: Sequence[Measured]) -> Iterator[Diagram]:
         _TIME,
         _ERRORS,
         _curves(easy, 'batch', lambda one: one.batch and one.batch[0]),
+        front=True,
     )
     for key, words in (('toggle', 'next to a toggle'), ('change_point', 'at a change point')):
         some = _of(results, (key,))
@@ -87,6 +100,7 @@ def _diagrams(results: Sequence[Measured]) -> Iterator[Diagram]:
             _TIME,
             _ERRORS,
             _curves(some, 'position', lambda one: one.position),
+            front=True,
         )
 
 
@@ -103,25 +117,20 @@ def _curves(
         error = errors.worst
         if one.method.name != EXTENDED:
             error = max(error, FLOOR)
-        micros = _micros(time)
+        micros = time.scaled(1e6)
+        setting = ', '.join(filter(None, (one.method.setting, failed)))
         points.setdefault(one.method.name, []).append(
-            Point(
-                micros.middle,
-                error,
-                micros,
-                setting=', '.join(filter(None, (one.method.setting, failed))),
-            )
+            Point(micros.middle, error, micros, setting=setting, fails=bool(failed))
         )
     return [Curve(name, some, joined=len(some) > 1) for name, some in points.items()]
 
 
 def _tables(results: Sequence[Measured]) -> Iterator[Table]:
-    for poses in _sets(results):
+    for poses in {one.poses.key: one.poses for one in results}.values():
         if poses.key != 'path':
             yield _table(_of(results, _WITH_PATH if poses.key == 'easy' else (poses.key,)), poses)
-    batch = [one for one in results if one.batch is not None]
-    if batch:
-        yield _batch_table(batch)
+    if any(one.batch is not None for one in results):
+        yield _batch_table(results)
     knots = [one for one in results if one.method.memory is not None and one.poses.key == 'easy']
     if knots:
         yield _knot_table(knots)
@@ -130,85 +139,63 @@ def _tables(results: Sequence[Measured]) -> Iterator[Table]:
 
 
 def _table(results: Sequence[Measured], poses: Poses) -> Table:
-    return Table(
+    return Table.of(
         f'solving_{poses.key}',
         f'{poses.name}, {poses.title}: all methods',
-        (
-            'method',
-            'setting',
-            'position [µs]',
-            f'greatest error [{_UNIT}]',
-            'median error',
-            'failed [%]',
-            'with accelerations [µs]',
-            'rates, greatest error [rad/s, or of the greatest]',
-            'accelerations, greatest error [rad/s², or of the greatest]',
-            'accelerations, failed [%]',
-        ),
-        [
-            (
-                one.method.name,
-                one.method.setting,
-                _time(one, 'position'),
-                one.position.worst,
-                one.position.middle,
-                100.0 * one.position.failed,
-                _time(one, 'motion'),
-                one.motion[1].worst if one.motion else None,
-                one.motion[2].worst if one.motion else None,
-                100.0 * one.motion[2].failed if one.motion else None,
-            )
-            for one in results
-        ],
+        results,
+        {
+            'method': lambda one: one.method.name,
+            'setting': lambda one: one.method.setting,
+            'position [µs]': lambda one: _time(one, 'position'),
+            f'greatest error [{_UNIT}]': lambda one: one.position.worst,
+            'median error': lambda one: one.position.middle,
+            'failed [%]': lambda one: 100.0 * one.position.failed,
+            'with accelerations [µs]': lambda one: _time(one, 'motion'),
+            'rates, greatest error [rad/s, or of the greatest]': lambda one: (
+                one.motion[1].worst if one.motion else None
+            ),
+            'accelerations, greatest error [rad/s², or of the greatest]': lambda one: (
+                one.motion[2].worst if one.motion else None
+            ),
+            'accelerations, failed [%]': lambda one: (
+                100.0 * one.motion[2].failed if one.motion else None
+            ),
+        },
     )
 
 
 def _batch_table(results: Sequence[Measured]) -> Table:
-    return Table(
+    return Table.of(
         'solving_batch',
         'Arrays of states',
-        (
-            'linkage',
-            'method',
-            'setting',
-            'position [µs]',
-            f'greatest error [{_UNIT}]',
-            'failed [%]',
-            'with accelerations [µs]',
-            'accelerations, greatest error [rad/s², or of the greatest]',
-        ),
-        [
-            (
-                one.poses.name,
-                one.method.name,
-                one.method.setting,
-                _time(one, 'batch'),
-                one.batch[0].worst,
-                100.0 * one.batch[0].failed,
-                _time(one, 'batch_motion'),
-                one.batch[2].worst,
-            )
-            for one in results
-            if one.batch is not None
-        ],
+        [(one, one.batch) for one in results if one.batch is not None],
+        {
+            'linkage': lambda each: each[0].poses.name,
+            'method': lambda each: each[0].method.name,
+            'setting': lambda each: each[0].method.setting,
+            'position [µs]': lambda each: _time(each[0], 'batch'),
+            f'greatest error [{_UNIT}]': lambda each: each[1][0].worst,
+            'failed [%]': lambda each: 100.0 * each[1][0].failed,
+            'with accelerations [µs]': lambda each: _time(each[0], 'batch_motion'),
+            'accelerations, greatest error [rad/s², or of the greatest]': lambda each: (
+                each[1][2].worst
+            ),
+        },
     )
 
 
 def _knot_table(results: Sequence[Measured]) -> Table:
-    return Table(
+    return Table.of(
         'solving_knots',
         f'Tables of {results[0].poses.name}: what they hold and take to build',
-        ('table', 'setting', 'memory [kB]', 'build [ms]', f'greatest error [{_UNIT}]'),
-        [
-            (
-                one.method.name,
-                one.method.setting,
-                (one.method.memory or 0) / 1000.0,
-                1000.0 * (one.method.build or 0.0),
-                one.position.worst,
-            )
-            for one in results
-        ],
+        results,
+        {
+            'table': lambda one: one.method.name,
+            'setting': lambda one: one.method.setting,
+            'memory [kB]': lambda one: (one.method.memory or 0) / 1000.0,
+            'build [ms]': lambda one: 1000.0 * (one.method.build or 0.0),
+            f'greatest error [{_UNIT}]': lambda one: one.position.worst,
+        },
     )
 
 
@@ -253,16 +240,8 @@ def _of(results: Sequence[Measured], keys: Sequence[str]) -> list[Measured]:
     return [one for one in results if one.poses.key in keys]
 
 
-def _sets(results: Sequence[Measured]) -> list[Poses]:
-    return list({one.poses.key: one.poses for one in results}.values())
-
-
 def _time(one: Measured, what: str) -> Spread | None:
-    return _micros(one.times[what]) if what in one.times else None
-
-
-def _micros(time: Spread) -> Spread:
-    return Spread(*(1e6 * value for value in time))
+    return one.times[what].scaled(1e6) if what in one.times else None
 
 
 WANTED = (1e-3, 1e-6, 1e-9, 1e-12)
@@ -274,9 +253,8 @@ _IN_A_SCENE = (*NODE_DEFAULTS, FROM_KNOTS, TABLES['hermite'])
 """Methods that ``solver`` of a scene can choose."""
 
 
-def text(results: Sequence[Measured], quick: bool) -> list[str]:
-    """Return paragraphs on the method of measurement and on the results."""
-    sets = {one.poses.key: one.poses for one in results}
+def method(results: Sequence[Measured], sets: dict[str, Poses], quick: bool) -> list[str]:
+    """Return paragraphs on the method of measurement."""
     easy = sets['easy']
     how = (
         f'{len(easy.inputs)} easy poses of {easy.name} were solved by each method, one call a '
@@ -284,12 +262,16 @@ def text(results: Sequence[Measured], quick: bool) -> list[str]:
         'a state: the median over blocks with its quartiles, of all methods in turn, there and '
         'back, in one run. What starts from its last state has for it the neighbouring pose.'
     )
+    confirmed = ', which were confirmed at some states of each set by interval arithmetic'
+    if find_spec('flint') is None:
+        confirmed = ''
+    turn = sets['path'].title if 'path' in sets else 'a turn'
     errors = (
         'Errors were worked out apart from the times, at the same states: those of the worst '
-        f'published joint, against fifty digits{_confirmed()}. A slide counts as a part of the '
+        f'published joint, against fifty digits{confirmed}. A slide counts as a part of the '
         'greatest length of a link. Rates and accelerations are those at '
         f'{RATE:g} rad/s and {ACCELERATION:g} rad/s² of the input; their errors are relative '
-        f'where they exceed 1. Rates that are integrated have one error, that after {_way(sets)}. '
+        f'where they exceed 1. Rates that are integrated have one error, that after {turn}. '
         'An answer that is more than 0.1 rad off, or none, counts as failed and is in no error; '
         'next to a change point also one that is off by a tenth of the distance from it, since '
         'there the other assembly is as near.'
@@ -297,8 +279,6 @@ def text(results: Sequence[Measured], quick: bool) -> list[str]:
     said = [how, errors]
     if quick:
         said.append('This is the quick run: fewer settings, poses and rounds.')
-    said.append(_outcome(results, easy))
-    said += [_near_trouble(results, sets[key]) for key in _TROUBLE]
     said.append(
         "Where Newton's method does not converge, next to toggles and change points, it takes the "
         'state of the closed form.'
@@ -307,11 +287,32 @@ def text(results: Sequence[Measured], quick: bool) -> list[str]:
     return said
 
 
+def _exactness(results: Sequence[Measured]) -> str:
+    """Return how exact the node's method is, its time, and the nearest of what is cheaper."""
+    easy = [one for one in results if one.poses.key == 'easy' and one.times.get('position')]
+    node = next(one for one in easy if one.method.name in NODE_DEFAULTS)
+    worst = node.position.worst or 0.0
+    said = f'exact to {worst:.1g} rad in {_median_us(node):.2g} µs'
+    cheaper = [
+        one
+        for one in easy
+        if one.times['position'].high < node.times['position'].low
+        and not one.position.failed
+        and one.position.worst is not None
+    ]
+    if not cheaper:
+        return f'{said}; nothing measured is cheaper'
+    nearest = min(cheaper, key=lambda one: one.position.worst or 0.0)
+    digits = floor(log10(max(nearest.position.worst or 0.0, FLOOR) / max(worst, FLOOR)))
+    if digits < 1:
+        return f'{said}; {_named(nearest)} is as exact in {_median_us(nearest):.2g} µs'
+    return f'{said}; nothing cheaper is within {digits} digits of it'
+
+
 def advice(results: Sequence[Measured]) -> list[str]:
     """Return a sentence for each accuracy: the cheapest method that a scene can choose."""
-    easy = [one for one in results if one.poses.key == 'easy' and one.times.get('position')]
-    offered = [one for one in easy if one.method.name in _IN_A_SCENE]
-    winners = [_cheapest(offered, wanted) for wanted in WANTED]
+    offered = in_a_scene(results)
+    winners = [cheapest(offered, wanted) for wanted in WANTED]
     node = next(one for one in offered if one.method.name in NODE_DEFAULTS)
     if all(one is node for one in winners):
         wins = (
@@ -341,17 +342,19 @@ def advice(results: Sequence[Measured]) -> list[str]:
     return said
 
 
-def _cheapest(results: Sequence[Measured], wanted: float) -> Measured | None:
-    """
-    Return the fastest method of those that never fail and reach the accuracy.
+def in_a_scene(results: Sequence[Measured]) -> list[Measured]:
+    """Return the methods at easy poses that a scene can choose."""
+    easy = [one for one in results if one.poses.key == 'easy' and one.times.get('position')]
+    return [one for one in easy if one.method.name in _IN_A_SCENE]
 
-    If several are within each other's spread, the node's method wins, else the one with the
-    smallest memory.
-    """
+
+def cheapest(results: Sequence[Measured], wanted: float) -> Measured | None:
+    """Return the fastest method of those that never fail and reach the accuracy."""
     able = [one for one in results if _keeps(one, wanted)]
     if not able:
         return None
     best = min(able, key=lambda one: one.times['position'].middle)
+    # Within each other's spread the node's method wins, else the one with the smallest memory.
     near = [one for one in able if one.times['position'].low <= best.times['position'].high]
     return min(
         near,
@@ -408,7 +411,7 @@ def _outcome(results: Sequence[Measured], easy: Poses) -> str:
         nearest = min(exact, key=lambda one: one.times['position'].middle)
         words += (
             f' Of the others that reach 1e-12 rad {_named(nearest)} is the cheapest, '
-            f'{_times(nearest.times["position"].middle / base)}.'
+            f'{nearest.times["position"].middle / base:.2g} times the time.'
         )
     more = [one for one in some if one.method.name == EXTENDED]
     if more:
@@ -460,32 +463,20 @@ def _iterated(results: Sequence[Measured]) -> str:
     )
 
 
-def _confirmed() -> str:
-    if find_spec('flint') is None:
-        return ''
-    return ', which were confirmed at some states of each set by interval arithmetic'
-
-
-def _way(sets: dict[str, Poses]) -> str:
-    return sets['path'].title if 'path' in sets else 'a turn'
-
-
 def _guests(sets: dict[str, Poses]) -> str:
-    told = [
+    guests = [
         f'{poses.title}: {poses.name}' for key, poses in sets.items()
         if not poses.own and key != 'path'
     ]  # fmt: skip
     return (
-        f'Other linkages stand in for what it does not have ({"; ".join(told)}).' if told else ''
+        f'Other linkages stand in for what it does not have ({"; ".join(guests)}).'
+        if guests
+        else ''
     )
 
 
 def _named(one: Measured) -> str:
     return f'{one.method.name}{one.method.setting and ", "}{one.method.setting}'
-
-
-def _times(ratio: float) -> str:
-    return f'{ratio:.2g} times the time'
 
 
 def _median_us(one: Measured) -> float:

@@ -35,16 +35,16 @@ import tempfile
 from time import monotonic
 from typing import NamedTuple
 
-from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
+from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Rate, Table
 from linkage_ros.drives.chirp import Chirp, curve
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.measuring import Progress, Spread, spread_of
+from linkage_ros.measuring import Progress, spread_of
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.processes import Graph, MeasurementError
+from linkage_ros.processes import Graph, MeasurementError, private_domain
 from linkage_ros.scene.scene import Scene
 
 CHIRP, ACCELERATION = 'chirp', 'constant acceleration'
@@ -126,8 +126,6 @@ USE_RATE = 500.0
 
 _LINKAGE_FILE, _SCENE_FILE = 'linkage.yaml', 'ticking.yaml'
 _PATIENCE = 30.0  # [s]
-_DOMAINS = 101
-"""Domain ids up to this one have ports that are safe on every operating system."""
 
 
 class Used(NamedTuple):
@@ -197,7 +195,7 @@ def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> l
         'crank_rate': CRANK_RATE,
         'use_rate': USE_RATE,
     }
-    graph = Graph(1 + os.getpid() % _DOMAINS, folder)
+    graph = Graph(private_domain(), folder)
     arguments = ('--ros-args', '-p', f'scene:={scene}')
     found = []
     with (
@@ -247,6 +245,9 @@ RATES = (20, 50, 100, 200, 500, 1000, 2000)
 QUICK_RATES = (100, 1000)
 
 _WANTED = (1e-1, 1e-2, 1e-3, 1e-4)
+_SHOWN = 1e-2
+"""The accuracy beside the picture."""
+
 _UNIT = {True: 'rad', False: 'm'}
 
 
@@ -256,12 +257,8 @@ def measure_ticking(scene: Scene, quick: bool, progress: Progress) -> Part | Non
 
     Parameters
     ----------
-    scene
-        The scene.
-    quick
-        Whether to measure for a few seconds only.
-    progress
-        Called now and then with the fraction that is done, 0 to 1.
+    scene, quick, progress
+        See `linkage_ros.accuracy`.
 
     Raises
     ------
@@ -281,20 +278,34 @@ def measure_ticking(scene: Scene, quick: bool, progress: Progress) -> Part | Non
             progress(number / len(rates))
             results += use_states(Path(folder), linkage, rate, seconds)
     progress(1.0)
+    return part_of(closure, seconds, results)
+
+
+def part_of(closure: Closure, seconds: float, results: Sequence[Used]) -> Part:
+    """Return the results as a part of the page."""
     unit = _UNIT[any(closure.turning)]
+    advice = list(_advice(results, unit))
+    chosen = (HELD, CARRIED) if unit == _UNIT[True] else ()
     return Part(
         'ticking',
         'What the rate of ticks buys',
-        _text(closure, seconds, results, unit),
+        _headline(results, unit),
+        [*_gains(results, unit), advice[_WANTED.index(_SHOWN)]],
+        _method(closure, seconds),
         [
             _diagram('ticking_rate', 'The faster the ticks, the nearer the state in use', results,
                      unit, Axis('ticks a second', 'Hz'), lambda used: used.rate),
             _diagram('ticking_cpu', 'What that costs the processor', results, unit,
                      Axis('processor time of the node', '% of a core'),
-                     lambda used: 100.0 * used.cpu),
+                     lambda used: 100.0 * used.cpu, front=True),
         ],
         [_table(results, unit)],
-        list(_advice(results, unit)),
+        advice,
+        rates=[
+            Rate(rate, max(rms(used.errors[use]) for used in results if used.rate == rate), use)
+            for rate in dict.fromkeys(used.rate for used in results)
+            for use in chosen
+        ],
     )  # fmt: skip
 
 
@@ -310,6 +321,8 @@ def _diagram(
     unit: str,
     axis: Axis,
     place: Callable[[Used], float],
+    *,
+    front: bool = False,
 ) -> Diagram:
     curves = []
     for motion in dict.fromkeys(used.motion for used in results):
@@ -322,44 +335,41 @@ def _diagram(
                 for used, spread in chosen
             ]
             curves.append(Curve(f'{motion}, {way}', points))
-    return Diagram(key, title, axis, Axis('error of a joint when used', unit), curves)
+    return Diagram(key, title, axis, Axis('error of a joint when used', unit), curves, front)
 
 
 def _table(results: Sequence[Used], unit: str) -> Table:
-    return Table(
+    return Table.of(
         'ticking',
         'The state that a subscriber has, when it uses it',
-        (
-            'ticks a second [Hz]',
-            'motion of the crank',
-            'age of the state [ms]',
-            f'held, error [{unit}]',
-            f'held, rms [{unit}]',
-            f'carried forward, error [{unit}]',
-            f'carried forward, rms [{unit}]',
-            'processor [% of a core]',
-            'uses',
-            'before the first state',
-        ),
-        [
-            (
-                used.rate,
-                used.motion,
-                Spread(*(1e3 * age for age in spread_of(used.age))),
-                spread_of(used.errors[HELD]),
-                rms(used.errors[HELD]),
-                spread_of(used.errors[CARRIED]),
-                rms(used.errors[CARRIED]),
-                100.0 * used.cpu,
-                len(used.age),
-                used.unused,
-            )
-            for used in results
-        ],
+        results,
+        {
+            'ticks a second [Hz]': lambda used: used.rate,
+            'motion of the crank': lambda used: used.motion,
+            'age of the state [ms]': lambda used: spread_of(used.age).scaled(1e3),
+            f'held, error [{unit}]': lambda used: spread_of(used.errors[HELD]),
+            f'held, rms [{unit}]': lambda used: rms(used.errors[HELD]),
+            f'carried forward, error [{unit}]': lambda used: spread_of(used.errors[CARRIED]),
+            f'carried forward, rms [{unit}]': lambda used: rms(used.errors[CARRIED]),
+            'processor [% of a core]': lambda used: 100.0 * used.cpu,
+            'uses': lambda used: len(used.age),
+            'before the first state': lambda used: used.unused,
+        },
     )
 
 
-def _text(closure: Closure, seconds: float, results: Sequence[Used], unit: str) -> list[str]:
+def _headline(results: Sequence[Used], unit: str) -> str:
+    slow, fast = (
+        max(rms(used.errors[CARRIED]) for used in results if used.rate == rate)
+        for rate in (results[0].rate, results[-1].rate)
+    )
+    return (
+        f'From {results[0].rate:g} to {results[-1].rate:g} ticks a second, a state carried '
+        f'forward is {slow:.1g} to {fast:.1g} {unit} off.'
+    )
+
+
+def _method(closure: Closure, seconds: float) -> list[str]:
     greatest = motions_of(closure, seconds).greatest
     of = {True: 'rad', False: 'm'}[not closure.linkage.inputs[0].slider]
     moves = '; '.join(
@@ -374,17 +384,20 @@ def _text(closure: Closure, seconds: float, results: Sequence[Used], unit: str) 
         'the worst joint against the linkage solved at the exact crank of that instant. So it has '
         'all in it: the crank sample on its way, the wait for the tick, the tick, the way back.'
     )
+    return [how]
+
+
+def _gains(results: Sequence[Used], unit: str) -> Iterator[str]:
+    """Yield for each motion the gain of the highest tick rate over the lowest."""
     slow, fast = results[0].rate, results[-1].rate
-    said = []
-    for motion in greatest:
+    for motion in dict.fromkeys(used.motion for used in results):
         ends = {
             used.rate: used
             for used in results
             if used.motion == motion and used.rate in (slow, fast)
         }
         if len(ends) == 2:
-            said.append(_gain(motion, ends[slow], ends[fast], unit))
-    return [how, *said]
+            yield _gain(motion, ends[slow], ends[fast], unit)
 
 
 def _gain(motion: str, slow: Used, fast: Used, unit: str) -> str:

@@ -17,9 +17,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import nan, pi, remainder, tau
+from math import remainder, tau
 from typing import NamedTuple
 
+from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
 
@@ -31,7 +32,7 @@ class Curve(NamedTuple):
     """
     A joint over the input, in [rad] or [m].
 
-    Angles are in (−π, π]; at the begin of a new turn, a NaN interrupts the line.
+    Angles are continuous, and begin in (−π, π].
     """
 
     name: str
@@ -60,14 +61,19 @@ class Sweep(NamedTuple):
     travels: dict[str, tuple[float, float]]
 
 
+def traced_carriers(linkage: Linkage) -> dict[str, str]:
+    """Return for each traced point a link that carries it."""
+    return {
+        point: next(link for link, points in linkage.links.items() if point in points)
+        for point in linkage.traced
+    }
+
+
 def sweep(way: InputSweep, interval: InputRange) -> Sweep:
     """Move a linkage through a range."""
     closure = way.closure
     linkage = closure.linkage
-    carriers = {
-        point: next(link for link, points in linkage.links.items() if point in points)
-        for point in linkage.traced
-    }
+    carriers = traced_carriers(linkage)
     x: list[float] = []
     values: list[tuple[float, ...]] = []
     paths: dict[str, list[complex]] = {point: [] for point in carriers}
@@ -86,8 +92,7 @@ def sweep(way: InputSweep, interval: InputRange) -> Sweep:
     joints = []
     for i, (name, turning) in enumerate(zip(linkage.joints, closure.turning, strict=True)):
         y = [value[i] for value in values]
-        xs, ys = wrapped_curve(x, y) if turning else (x, y)
-        joints.append(Curve(name, turning, tuple(xs), tuple(ys)))
+        joints.append(Curve(name, turning, tuple(x), tuple(continuous(y) if turning else y)))
     return Sweep(
         tuple(joints),
         {point: drawn_once(path) for point, path in paths.items()},
@@ -95,26 +100,13 @@ def sweep(way: InputSweep, interval: InputRange) -> Sweep:
     )
 
 
-def wrapped_curve(x: Sequence[float], y: Sequence[float]) -> tuple[list[float], list[float]]:
-    """
-    Wrap an angle to (−π, π], and interrupt the line at the begin of a new turn.
-
-    The two ends at ±π are interpolated linearly between the samples.
-    """
-    xs: list[float] = []
-    ys: list[float] = []
-    for place, angle in zip(x, y, strict=True):
-        rest = remainder(angle, tau)
-        if ys and abs(rest - ys[-1]) > pi:
-            edge = pi if ys[-1] > 0.0 else -pi
-            way = rest + 2.0 * edge - ys[-1]
-            part = (edge - ys[-1]) / way if way else 0.0
-            middle = xs[-1] + part * (place - xs[-1])
-            xs += [middle, middle, middle]
-            ys += [edge, nan, -edge]
-        xs.append(place)
-        ys.append(rest)
-    return xs, ys
+def continuous(angles: Sequence[float]) -> list[float]:
+    """Return angles without jumps: the first in (−π, π], each next within π of the one before."""
+    values: list[float] = []
+    for angle in angles:
+        last = values[-1] if values else 0.0
+        values.append(last + remainder(angle - last, tau))
+    return values
 
 
 def drawn_once(path: Sequence[complex]) -> tuple[complex, ...]:

@@ -50,7 +50,9 @@ from linkage_ros.drawing.painting import (
     OTHER_TEXT,
     outline,
     paint,
+    plot_places,
     save,
+    set_plane,
     settings,
     TRACE,
     WANTED,
@@ -78,12 +80,12 @@ def paint_wanted(axes: Any, design: Design, shown: Sequence[Pose], picture: floa
     for one in design.wanted:
         if one.rocker is not None:
             end = pivot + _ray(four_bar, one.rocker, picture)
-            axes.plot([pivot.real, end.real], [pivot.imag, end.imag], label=rays, **pale)
+            plot_places(axes, (pivot, end), label=rays, **pale)
             rays = ''
         if one.place is not None and one.coupler is None:
-            axes.plot(
-                [one.place.real], [one.place.imag], linestyle='', marker='x', markersize=6.0,
-                markeredgewidth=1.5, color=WANTED, zorder=LAYERS['label'], label=places,
+            plot_places(
+                axes, [one.place], linestyle='', marker='x', markersize=6.0, markeredgewidth=1.5,
+                color=WANTED, zorder=LAYERS['label'], label=places,
             )  # fmt: skip
             places = ''
         if one.place is not None and one.coupler is not None:
@@ -119,9 +121,8 @@ def paint_traces(axes: Any, ways: Sequence[Branch], drawn: Sequence[Pose]) -> No
     for way in ways:
         if way.trace and (way.own or not all(pose.own for pose in drawn)):
             path = drawn_once(way.trace)
-            axes.plot(
-                [p.real for p in path], [p.imag for p in path],
-                color=TRACE if way.own else OTHER, linewidth=1.2 if way.own else 0.8,
+            plot_places(
+                axes, path, color=TRACE if way.own else OTHER, linewidth=1.2 if way.own else 0.8,
                 linestyle=(0, (5, 2)), zorder=LAYERS['path'], label=label if way.own else '',
             )  # fmt: skip
             label = '' if way.own else label
@@ -134,10 +135,9 @@ def paint_poses(axes: Any, drawn: Sequence[Pose], size: float) -> None:
     for pose in others:
         label = 'other positions' if pose.own else 'met on the other assembly'
         for line in skeleton(pose.closure, pose.position):
-            axes.plot(
-                [line.start.real, line.end.real],
-                [line.start.imag, line.end.imag],
-                color=_ink(pose), linewidth=1.0 if pose.own else 1.3, marker='o', markersize=2.4,
+            plot_places(
+                axes, (line.start, line.end), color=_ink(pose),
+                linewidth=1.0 if pose.own else 1.3, marker='o', markersize=2.4,
                 zorder=LAYERS['ghost'] + (0.0 if pose.own else 0.5),
                 label='' if label in labelled else label,
             )  # fmt: skip
@@ -145,7 +145,7 @@ def paint_poses(axes: Any, drawn: Sequence[Pose], size: float) -> None:
     paint(axes, shapes(first.closure, first.position, size, {}))
     if (COUPLER, 'P') in first.points:
         place = first.points[COUPLER, 'P']
-        axes.plot([place.real], [place.imag], 'o', color=TRACE, markersize=4.0, zorder=7)
+        plot_places(axes, [place], 'o', color=TRACE, markersize=4.0, zorder=7)
 
 
 def magnify(panel: Any, pose: Pose, link: str) -> None:
@@ -311,14 +311,7 @@ def draw_design(
             panels = [figure.add_subplot(rows[1, i]) for i in range(len(magnified))]
         else:
             axes, panels = figure.add_subplot(left), []
-        axes.set_aspect('equal')
-        axes.set_xlim(low.real, high.real)
-        axes.set_ylim(low.imag, high.imag)
-        axes.set_xlabel('x [m]')
-        axes.set_ylabel('y [m]')
-        axes.tick_params(labelsize=7, width=0.5)
-        for side in ('top', 'right'):
-            axes.spines[side].set_visible(False)
+        set_plane(axes, low, high)
         paint_wanted(axes, design, shown, abs(high - low))
         paint_traces(axes, ways, drawn)
         paint_poses(axes, drawn, size)

@@ -223,7 +223,7 @@ def paint_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -
                 zorder=5, label=once('position' if wanted is None else 'wanted'),
             )  # fmt: skip
     _degrees(axes, f'{link} angle [°]')
-    axes.yaxis.set_major_locator(MultipleLocator(degree_step(*axes.get_ylim())))
+    axes.yaxis.set_major_locator(MultipleLocator(degree_step(axes.get_ylim())))
 
 
 def number_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -> None:
@@ -330,7 +330,7 @@ def _degrees(axes: Any, label: str) -> None:
 
     axes.set_xlabel('crank angle [°]')
     axes.set_ylabel(label)
-    axes.xaxis.set_major_locator(MultipleLocator(degree_step(*axes.get_xlim())))
+    axes.xaxis.set_major_locator(MultipleLocator(degree_step(axes.get_xlim())))
     _plain(axes)
 
 

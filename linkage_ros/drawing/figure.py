@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import degrees
+from collections.abc import Mapping, Sequence
+from math import ceil, degrees, remainder, sqrt, tau
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing.curves import Sweep, sweep
+from linkage_ros.drawing.curves import Curve, Sweep, sweep
 from linkage_ros.drawing.painting import (
     bar_size,
     COLOURS,
@@ -29,13 +30,17 @@ from linkage_ros.drawing.painting import (
     degree_step,
     GHOST,
     INK,
+    label_ends,
     LAYERS,
     NAME_INK,
     Names,
     outline,
     paint,
+    plot_places,
     save,
+    set_plane,
     settings,
+    show_lengths,
 )
 from linkage_ros.drawing.shapes import Circle, Polygon, Shape, shapes, skeleton
 from linkage_ros.errors import LinkageError
@@ -45,6 +50,8 @@ from linkage_ros.kinematics.results import InputRange, Position
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _GHOSTS = 5
+_SAME = 1e-9
+"""Largest difference of angles that counts as rounding, in [rad]."""
 
 
 class View(NamedTuple):
@@ -61,6 +68,8 @@ class View(NamedTuple):
         Poses in the background.
     interval
         Range of the first input around the pose, with the others held.
+    mark
+        The first input, less the whole turns by which it lies outside of that range.
     sweep
         The motion through that range.
 
@@ -71,6 +80,7 @@ class View(NamedTuple):
     position: Position
     ghosts: tuple[Position, ...]
     interval: InputRange
+    mark: float
     sweep: Sweep
 
 
@@ -99,8 +109,10 @@ def view(
     way = InputSweep(closure, inputs)
     value = inputs[0]
     # A pose beyond the limits lies in no range; show the widest one.
-    interval = way.range_about(value) or way.widest_range
-    interval = interval or InputRange(value, value, way.turning)
+    about = way.range_about(value) or way.widest_range
+    about = about or InputRange(value, value, way.turning)
+    interval = _listed(way, about)
+    shift = about.shift(value) if about.whole else interval.lowest - about.lowest
     if ghosts:
         behind = [_closed(closure, given) for given in ghosts]
     elif interval.whole:
@@ -115,8 +127,20 @@ def view(
         position,
         tuple(ghost for ghost in behind if ghost.joints),
         interval,
+        value + shift,
         sweep(way, interval),
     )
+
+
+def _listed(way: InputSweep, about: InputRange) -> InputRange:
+    """Return a range with the turns with which it is among the ranges."""
+    if about in way.ranges:
+        return about
+    for interval in way.ranges:
+        period = tau * interval.turns
+        if period and abs(remainder(about.lowest - interval.lowest, period)) < _SAME:
+            return interval
+    return about
 
 
 def _closed(closure: Closure, inputs: tuple[float, ...]) -> Position:
@@ -173,6 +197,13 @@ def symbol_size(shown: View) -> float:
     return bar_size(picture, shortest)
 
 
+def _turns_text(shown: View) -> str:
+    """Return where the mark is, if that is not the angle that was named."""
+    if abs(shown.mark - shown.inputs[0]) < _SAME:
+        return ''
+    return f' ({degrees(shown.mark):.4g}° on the axis)'
+
+
 def _beyond_text(shown: View) -> str:
     beyond = shown.closure.beyond(shown.position)
     return f' (limited: {beyond})' if beyond else ''
@@ -199,38 +230,82 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
     wide = min(max(4.9 * width / height, 3.0), 6.4)
     tall = min(max(wide * height / width, 3.2), 4.9)
     with context:
-        figure = Figure(figsize=(wide + 4.9, tall + 0.5), dpi=110, layout='constrained')
-        left, right = figure.subplots(1, 2, width_ratios=(wide, 4.2))
+        figure = Figure(figsize=(wide + 5.4, tall + 0.5), dpi=110, layout='constrained')
+        grid = figure.add_gridspec(1, 2, width_ratios=(wide, 4.7))
+        left, joints = figure.add_subplot(grid[0]), shown.sweep.joints
+        panels = joint_axes(grid[1], joints)
         left.set_title(
-            f'{title}, {_pose_text(shown.closure, shown.inputs)}{_beyond_text(shown)}',
+            f'{title}, {_pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}'
+            f'{_beyond_text(shown)}',
             loc='left',
             fontsize=9,
         )
-        left.set_aspect('equal')
-        left.set_xlim((low - margin).real, (high + margin).real)
-        left.set_ylim((low - margin).imag, (high + margin).imag)
-        left.set_xlabel('x [m]')
-        left.set_ylabel('y [m]')
-        left.tick_params(labelsize=7, width=0.5)
-        for side in ('top', 'right'):
-            left.spines[side].set_visible(False)
+        set_plane(left, low - margin, high + margin)
         paint_background(left, shown)
         paint(left, drawn)
-        _joints(right, shown)
+        turning_input = not shown.closure.linkage.inputs[0].slider
+        lines = plot_joints(panels, joints, degrees_x=turning_input)
+        # A pose beyond the limits has no place on the axis.
+        if shown.interval.lowest <= shown.mark <= shown.interval.highest:
+            now = degrees(shown.mark) if turning_input else shown.mark
+            for axes in panels.values():
+                axes.axvline(now, color='0.55', linewidth=0.8, linestyle=':')
+        label_across(list(panels.values())[-1], *moved_input(shown))
+        figure.draw_without_rendering()  # only now axes and texts have a size
+        label_joints(panels, joints, lines)
         if names:
-            figure.draw_without_rendering()  # only now a text has a size
+            figure.draw_without_rendering()
             _names(left, shown, drawn, size)
+        save(figure, file)
+
+
+def assemblies_picture(views: Mapping[str, View], file: Path) -> None:
+    """
+    Paint the same linkage in several assemblies, each under the text that a file needs for it.
+
+    Raises
+    ------
+    LinkageError
+        If matplotlib is not installed, or the file cannot be written.
+
+    """
+    context = settings()
+    from matplotlib.figure import Figure  # local import: an extra, and slow to load
+
+    size = min(map(symbol_size, views.values()))
+    low, high = corners(place for shown in views.values() for place in all_places(shown))
+    margin = complex(4.0, 4.0) * size
+    ratio = (high - low + 2.0 * margin).imag / (high - low + 2.0 * margin).real
+    rows = ceil(len(views) / ceil(sqrt(len(views) * ratio)))
+    columns = ceil(len(views) / rows)
+    wide = min(max(9.0 / columns, 2.6), 4.6)
+    with context:
+        figure = Figure(
+            figsize=(columns * wide, rows * (wide * ratio + 0.45)), dpi=110, layout='constrained'
+        )
+        first = next(iter(views.values()))
+        for number, (text, shown) in enumerate(views.items(), 1):
+            axes = figure.add_subplot(rows, columns, number)
+            title = fill(text, round(15.0 * wide), subsequent_indent='  ')
+            if shown.inputs != first.inputs:
+                title += f'\nat {_pose_text(shown.closure, shown.inputs)}'
+            axes.set_title(title, loc='left', fontsize=7.5, family='monospace')
+            set_plane(axes, low - margin, high + margin)
+            axes.set_axis_off()
+            paint_background(axes, shown)
+            paint(axes, shapes(shown.closure, shown.position, size, shown.sweep.travels))
         save(figure, file)
 
 
 def paint_background(axes: Any, shown: View) -> None:
     """Paint poses in light grey, and the paths of the traced points dashed."""
-    for position in shown.ghosts:
+    for number, position in enumerate(shown.ghosts):
         for line in skeleton(shown.closure, position):
-            axes.plot(
-                [line.start.real, line.end.real],
-                [line.start.imag, line.end.imag],
+            plot_places(
+                axes,
+                (line.start, line.end),
                 color=GHOST,
+                alpha=1.0 - 0.75 * number / len(shown.ghosts),  # the later, the paler
                 linewidth=1.0,
                 marker='o',
                 markersize=2.0,
@@ -239,73 +314,78 @@ def paint_background(axes: Any, shown: View) -> None:
     points = shown.closure.points(shown.position)
     for number, (name, path) in enumerate(shown.sweep.paths.items()):
         colour = COLOURS[number % len(COLOURS)]
-        axes.plot(
-            [p.real for p in path],
-            [p.imag for p in path],
+        plot_places(
+            axes,
+            path,
             color=colour,
             linewidth=1.1,
             linestyle=(0, (5, 2)),
             zorder=LAYERS['path'],
         )
         place = next(place for (_, point), place in points.items() if point == name)
-        axes.plot(
-            [place.real], [place.imag], 'o', color=colour, markersize=3.5, zorder=LAYERS['label']
-        )
+        plot_places(axes, [place], 'o', color=colour, markersize=3.5, zorder=LAYERS['label'])
 
 
-def _joints(axes: Any, shown: View) -> None:
-    """Plot the joints over the input: angles on the left axis, slides on the right."""
+def joint_axes(place: Any, joints: Sequence[Curve]) -> dict[bool, Any]:
+    """Return the axes for angles (key True) and for slides (False), above each other."""
+    kinds = sorted({joint.turning for joint in joints}, reverse=True)
+    panels = place.subgridspec(len(kinds), 1).subplots(sharex=True, squeeze=False)[:, 0]
+    return dict(zip(kinds, panels, strict=True))
+
+
+def plot_joints(
+    panels: Mapping[bool, Any], joints: Sequence[Curve], *, degrees_x: bool, steps: int = 8
+) -> dict[str, Any]:
+    """Plot joints; return their lines by name. `label_joints` labels their ends."""
     from matplotlib.ticker import MultipleLocator  # local import: an extra, and slow to load
 
-    given = shown.closure.linkage.inputs[0]
-    joints = shown.sweep.joints
-    kinds = sorted({joint.turning for joint in joints}, reverse=True)
-    sides = {turning: axes if i == 0 else axes.twinx() for i, turning in enumerate(kinds)}
-    turning_input = not given.slider
-    now = degrees(shown.inputs[0]) if turning_input else shown.inputs[0]
-    handles = []
+    lines = {}
     for number, joint in enumerate(joints):
-        side = sides[joint.turning]
-        xs = [degrees(x) for x in joint.x] if turning_input else joint.x
-        ys = [degrees(y) for y in joint.y] if joint.turning else joint.y
-        both = len(kinds) > 1
-        colour = COLOURS[number % len(COLOURS)]
-        (line,) = side.plot(
-            xs,
-            ys,
-            color=colour,
+        (lines[joint.name],) = panels[joint.turning].plot(
+            [degrees(x) for x in joint.x] if degrees_x else joint.x,
+            [degrees(y) for y in joint.y] if joint.turning else joint.y,
+            color=COLOURS[number % len(COLOURS)],
             linewidth=1.3,
-            linestyle='-' if joint.turning or not both else (0, (6, 2)),
-            label=f'{joint.name}{" (right)" if both and not joint.turning else ""}',
+            label=joint.name,
         )
-        handles.append(line)
-    for turning, side in sides.items():
-        side.set_ylabel('joint angle [°]' if turning else 'slide [m]')
+    for turning, axes in panels.items():
         if turning:
-            side.yaxis.set_major_locator(MultipleLocator(degree_step(*side.get_ylim())))
-        side.tick_params(labelsize=7, width=0.5)
-        side.spines['top'].set_visible(False)
-        side.margins(x=0.0)
-    if len(kinds) < 2:
-        axes.spines['right'].set_visible(False)
-    if turning_input:
-        axes.xaxis.set_major_locator(MultipleLocator(degree_step(*axes.get_xlim())))
-    axes.axvline(now, color='0.55', linewidth=0.8, linestyle=':')
-    held = len(shown.inputs) > 1
-    axes.set_xlabel(
-        f'{given.joint} [{"°" if turning_input else "m"}]{", the others held" if held else ""}'
-    )
-    axes.grid(alpha=0.25, linewidth=0.5)
-    axes.legend(
-        handles=handles,
-        loc='lower left',
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=2 if len(joints) > 1 else 1,
-        frameon=False,
-        fontsize=7,
-        borderaxespad=0.2,
-        columnspacing=1.2,
-    )
+            axes.set_ylabel('joint angle [°]')
+            axes.yaxis.set_major_locator(
+                MultipleLocator(degree_step(axes.get_ylim(), steps // len(panels)))
+            )
+        else:
+            show_lengths(axes.yaxis, 'slide', max(map(abs, axes.get_ylim())))
+        axes.tick_params(labelsize=7, width=0.5)
+        axes.margins(x=0.0)
+        axes.grid(alpha=0.25, linewidth=0.5)
+        for side in ('top', 'right'):
+            axes.spines[side].set_visible(False)
+    if degrees_x:
+        axes = next(iter(panels.values()))
+        axes.xaxis.set_major_locator(MultipleLocator(degree_step(axes.get_xlim(), steps)))
+    return lines
+
+
+def label_joints(panels: Mapping[bool, Any], joints: Sequence[Curve], lines: Any) -> None:
+    """Write the names of joints at the ends of their lines; the figure has been drawn once."""
+    for turning, axes in panels.items():
+        label_ends(axes, [lines[joint.name] for joint in joints if joint.turning == turning])
+
+
+def moved_input(shown: View) -> tuple[str, str]:
+    """Return the name and the unit of the input that moves."""
+    given = shown.closure.linkage.inputs[0]
+    held = ', the others held' if len(shown.inputs) > 1 else ''
+    return f'{given.joint}{held}', 'm' if given.slider else '°'
+
+
+def label_across(axes: Any, name: str, unit: str) -> None:
+    """Label the axis of the abscissa; of a length, in the unit for its size."""
+    if unit == 'm':
+        show_lengths(axes.xaxis, name, max(map(abs, axes.get_xlim())))
+    else:
+        axes.set_xlabel(f'{name} [{unit}]')
 
 
 def _names(axes: Any, shown: View, drawn: Sequence[Shape], size: float) -> None:

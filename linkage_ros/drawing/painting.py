@@ -18,19 +18,22 @@ from __future__ import annotations
 
 from cmath import rect
 from collections.abc import Iterable, Sequence
-from importlib.util import find_spec
 from io import BytesIO
 from itertools import pairwise
-from math import ceil, pi
+from math import ceil, isnan, pi
 from pathlib import Path
+from statistics import fmean
 from typing import Any, NamedTuple
 
 from linkage_ros.drawing.shapes import Circle, Polygon, Segment, Shape
-from linkage_ros.errors import LinkageError
-from linkage_ros.files.atomic_write import atomic_write
+from linkage_ros.errors import check_installed, LinkageError
+from linkage_ros.files.file_access import atomic_write
 
 _DIRECTIONS = 16
-_DISTANCES = 7
+_DISTANCES = 9
+_ROUNDS = 3
+_GAP = 4.0
+"""Smallest distance between two names, in pixels."""
 
 
 class Label(NamedTuple):
@@ -79,32 +82,51 @@ def place_labels(
         The lower left and the upper right corner of the drawing.
 
     """
-    boxes: list[tuple[complex, float, float]] = []
-    placed = []
+    placed: list[Placed] = []
     for label in labels:
-        best: tuple[float, Placed] | None = None
-        half_width, half_height = 0.5 * label.width, 0.5 * label.height
-        for rank, anchor in enumerate(label.anchors):
-            for ring in range(_DISTANCES):
-                for i in range(_DIRECTIONS):
-                    way = rect(1.0, pi / 4.0 + i * 2.0 * pi / _DIRECTIONS)
-                    # The box touches a circle around the anchor.
-                    away = label.clear + 0.45 * ring * label.height
-                    centre = anchor + complex(
-                        way.real * (away + half_width), way.imag * (away + half_height)
+        placed.append(_best(label, obstacles, frame, list(zip(labels, placed, strict=False))))
+    # The first ones did not know the others.
+    for _ in range(_ROUNDS):
+        for number, label in enumerate(labels):
+            pairs = enumerate(zip(labels, placed, strict=True))
+            others = [pair for other, pair in pairs if other != number]
+            placed[number] = _best(label, obstacles, frame, others)
+    return placed
+
+
+def _best(
+    label: Label,
+    obstacles: Sequence[complex],
+    frame: tuple[complex, complex],
+    others: Sequence[tuple[Label, Placed]],
+) -> Placed:
+    """Return the place at which a label hides least."""
+    half_width, half_height = 0.5 * label.width, 0.5 * label.height
+    best: tuple[float, Placed] | None = None
+    for rank, anchor in enumerate(label.anchors):
+        for ring in range(_DISTANCES):
+            for i in range(_DIRECTIONS):
+                way = rect(1.0, pi / 4.0 + i * 2.0 * pi / _DIRECTIONS)
+                # The box touches a circle around the anchor.
+                away = label.clear + 0.45 * ring * label.height
+                centre = anchor + complex(
+                    way.real * (away + half_width), way.imag * (away + half_height)
+                )
+                cost = 0.6 * ring + 0.3 * rank + 0.01 * i
+                cost += 400.0 * sum(
+                    _overlap(
+                        centre, half_width, half_height, other.centre, 0.5 * box.width,
+                        0.5 * box.height,
                     )
-                    cost = 0.6 * ring + 0.3 * rank + 0.01 * i
+                    for box, other in others
+                )  # fmt: skip
+                cost += 20.0 * _outside(centre, half_width, half_height, frame)
+                if best is None or cost < best[0]:
                     cost += 2.5 * _inside(centre, half_width, half_height, obstacles)
-                    cost += 12.0 * sum(
-                        _overlap(centre, half_width, half_height, *box) for box in boxes
-                    )
-                    cost += 20.0 * _outside(centre, half_width, half_height, frame)
                     if best is None or cost < best[0]:
                         best = cost, Placed(centre, anchor)
-        assert best is not None, 'a label has an anchor'
-        placed.append(best[1])
-        boxes.append((best[1].centre, half_width, half_height))
-    return placed
+    assert best is not None, 'a label has an anchor'
+    return best[1]
 
 
 def _inside(centre: complex, width: float, height: float, points: Sequence[complex]) -> int:
@@ -172,10 +194,7 @@ def settings() -> Any:
         If matplotlib is not installed.
 
     """
-    if find_spec('matplotlib') is None:
-        raise LinkageError(
-            'matplotlib', 'is not installed', 'pip install linkage_ros[report], or apt its package'
-        )
+    check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
     import matplotlib as mpl  # local import: an extra, and slow to load
 
     return mpl.rc_context(_SETTINGS)
@@ -223,15 +242,83 @@ def bar_size(picture: float, shortest: float) -> float:
     return min(0.013 * picture, max(0.26 * shortest, 0.006 * picture))
 
 
-def degree_step(low: float, high: float) -> float:
-    """Return the step of an axis in degrees."""
-    return next((step for step in _STEPS if (high - low) / step <= 8.0), _STEPS[-1])
+def spread(places: Sequence[float], gap: float) -> list[float]:
+    """Return places moved as little as possible until neighbours are a gap apart; same order."""
+    order = sorted(range(len(places)), key=places.__getitem__)
+    # Without the gaps the places may be equal but not fall: the mean of each run that falls.
+    runs: list[list[float]] = []
+    for rank, index in enumerate(order):
+        runs.append([places[index] - rank * gap])
+        while len(runs) > 1 and fmean(runs[-2]) > fmean(runs[-1]):
+            last = runs.pop()
+            runs[-1] += last
+    moved = [fmean(run) for run in runs for _ in run]
+    found = [0.0] * len(places)
+    for rank, index in enumerate(order):
+        found[index] = moved[rank] + rank * gap
+    return found
 
 
-def paint(axes: Any, drawn: Sequence[Shape]) -> None:
-    """Paint shapes, the last on top."""
+def label_ends(axes: Any, lines: Sequence[Any], *, fontsize: float = 7.0) -> None:
+    """
+    Write the names of lines at their right ends, beside the axes.
+
+    The axes' limits are final. The heights of the axes are those of the last drawing.
+    """
+    low, high = axes.get_ylim()
+    height = axes.get_window_extent().height / axes.figure.dpi * 72.0  # in points, as the font
+    gap = 1.25 * fontsize / height
+    lasts = [next((y for y in reversed(line.get_ydata()) if not isnan(y)), low) for line in lines]
+    ends = [(last - low) / (high - low) for last in lasts]
+    for line, place in zip(lines, spread(ends, gap), strict=True):
+        axes.text(
+            1.01, place, line.get_label(), transform=axes.transAxes, va='center', ha='left',
+            fontsize=fontsize, color=line.get_color(),
+        )  # fmt: skip
+
+
+def unit_of_length(size: float) -> tuple[str, float]:
+    """Return the unit in which people read lengths of a size, in [m], and how many make one m."""
+    return ('m', 1.0) if size >= 1.0 else ('mm', 1e3)
+
+
+def show_lengths(axis: Any, name: str, size: float) -> None:
+    """Let an axis in [m] show a length in the unit for its size; name it."""
+    unit, factor = unit_of_length(size)
+    axis.set_major_formatter(lambda value, _: f'{value * factor:.6g}'.replace('-', '−'))
+    axis.axes.set(**{f'{axis.axis_name}label': f'{name} [{unit}]'})
+
+
+def degree_step(ends: tuple[float, float], most: int = 8) -> float:
+    """Return the step of an axis between two angles, in [°], for so many steps at most."""
+    low, high = ends
+    turns = 360.0 * ceil((high - low) / (360.0 * most))
+    return next((step for step in _STEPS if (high - low) / step <= most), turns)
+
+
+def set_plane(axes: Any, low: complex, high: complex) -> None:
+    """Let axes show a part of the plane between two corners, in [m], true to scale."""
+    axes.set_aspect('equal')
+    axes.set_xlim(low.real, high.real)
+    axes.set_ylim(low.imag, high.imag)
+    size = max((high - low).real, (high - low).imag)
+    show_lengths(axes.xaxis, 'x', size)
+    show_lengths(axes.yaxis, 'y', size)
+    axes.tick_params(labelsize=7, width=0.5)
+    for side in ('top', 'right'):
+        axes.spines[side].set_visible(False)
+
+
+def plot_places(axes: Any, places: Sequence[complex], *mark: str, **style: Any) -> Any:
+    """Plot places of the plane, as ``axes.plot`` plots points; return the artists."""
+    return axes.plot([p.real for p in places], [p.imag for p in places], *mark, **style)
+
+
+def paint(axes: Any, drawn: Sequence[Shape]) -> list[Any]:
+    """Paint shapes, the last on top; return their artists, in the same order."""
     from matplotlib import patches  # local import: an extra, and slow to load
 
+    painted: list[Any] = []
     for shape in drawn:
         if isinstance(shape, Polygon):
             corners = [(p.real, p.imag) for p in shape.corners]
@@ -244,29 +331,29 @@ def paint(axes: Any, drawn: Sequence[Shape]) -> None:
                 joinstyle='round',
                 zorder=LAYERS['shape'],
             )
-            axes.add_patch(patch)
+            painted.append(axes.add_patch(patch))
         elif isinstance(shape, Circle):
             centre = (shape.centre.real, shape.centre.imag)
-            axes.add_patch(
-                patches.Circle(
-                    centre,
-                    shape.radius,
-                    facecolor='white',
-                    edgecolor=INK,
-                    linewidth=0.9,
-                    zorder=LAYERS['shape'],
-                )
+            circle = patches.Circle(
+                centre,
+                shape.radius,
+                facecolor='white',
+                edgecolor=INK,
+                linewidth=0.9,
+                zorder=LAYERS['shape'],
             )
+            painted.append(axes.add_patch(circle))
         else:
             colour, width = STROKES[shape.role]
-            axes.plot(
-                [shape.start.real, shape.end.real],
-                [shape.start.imag, shape.end.imag],
+            painted += plot_places(
+                axes,
+                (shape.start, shape.end),
                 color=colour,
                 linewidth=width,
                 solid_capstyle='round',
                 zorder=LAYERS['shape'],
             )
+    return painted
 
 
 class Names:
@@ -301,7 +388,7 @@ class Names:
         box = written.get_window_extent()
         self._texts.append(written)
         pixels = tuple(map(self.pixel, anchors))
-        self._labels.append(Label(pixels, box.width + 2.0, box.height, clear))
+        self._labels.append(Label(pixels, box.width + _GAP, box.height + _GAP, clear))
 
     def place(self, lines: Iterable[Sequence[complex]]) -> None:
         """Place the texts where they hide little of some lines, in [m]."""

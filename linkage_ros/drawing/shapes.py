@@ -161,6 +161,40 @@ def skeleton(closure: Closure, position: Position) -> list[Segment]:
     return drawn
 
 
+class LinkFrame(NamedTuple):
+    """Origin of a link's frame in that of the ground, in [m], and its angle, in [rad]."""
+
+    place: complex
+    angle: float
+
+
+def link_frames(closure: Closure, position: Position) -> dict[str, LinkFrame]:
+    """
+    Return the frames of the links, and of the blocks of sliders that are not links.
+
+    Such a block has its frame at the slider's point, with the angle of the link it slides along.
+    """
+    points, angles = closure.points(position), closure.link_angles(position)
+    frames = {}
+    for link, named in closure.linkage.links.items():
+        point, (x, y) = next(iter(named.items()))
+        angle = angles[link]
+        frames[link] = LinkFrame(points[link, point] - complex(x, y) * rect(1.0, angle), angle)
+    for block, along, point in blocks(closure):
+        frames[block] = LinkFrame(points[block, point], angles[along])
+    return frames
+
+
+def blocks(closure: Closure) -> list[tuple[str, str, str]]:
+    """Return the blocks that are not links: name, link they slide along, the slider's point."""
+    links = closure.linkage.links
+    return [
+        (block, slider.along, slider.point)
+        for name, slider in closure.linkage.sliders.items()
+        if (block := closure.structure.blocks[name]) not in links
+    ]
+
+
 def driven_links(closure: Closure) -> set[str]:
     """Return the links that an input moves relative to their parent."""
     driven = set()

@@ -25,11 +25,10 @@ from base64 import b64encode
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from importlib.resources import files
-from importlib.util import find_spec
 import json
 from typing import Any
 
-from linkage_ros.errors import clean, LinkageError
+from linkage_ros.errors import check_installed, clean
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
@@ -78,6 +77,7 @@ def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts:
             f'<style>\n{_joined("page.css", styles)}</style>',
             '</head>',
             '<body>',
+            '<button type="button" id="scheme" class="no-print" hidden></button>',
             _clean_lines('\n'.join(body)),
             f'<script type="application/json" id="data">{_json(data)}</script>',
             f'<script>{_within_script(plotting_library())}</script>',
@@ -104,8 +104,7 @@ def plotting_library() -> str:
         If it is not installed.
 
     """
-    if find_spec('plotly') is None:
-        raise LinkageError('plotly', 'is not installed', 'pip install linkage_ros[report]')
+    check_installed('plotly')
     from plotly.offline import get_plotlyjs  # local import: an optional dependency, slow to load
 
     return str(get_plotlyjs())

@@ -4,7 +4,15 @@
 
 const Page = (() => {
   const NARROW = 640;
+  // Where a letter is typed, it is no command.
+  const TYPED = 'select, textarea, input:not([type=checkbox], [type=range])';
   const dark = matchMedia('(prefers-color-scheme: dark)');
+  const paper = matchMedia('print');
+  // The rules for dark colours; the switch changes the condition under which they hold.
+  const darkRules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules])
+    .filter((rule) => rule.conditionText === dark.media);
+  const redraws = [];
+  let chosen = ''; // light or dark; empty: as the system is set
   const touch = matchMedia('(pointer: coarse)');
   const config = {
     displaylogo: false,
@@ -14,6 +22,27 @@ const Page = (() => {
     plotlyServerURL: '',
     responsive: false,
   };
+
+  const prefersDark = () => (chosen ? chosen === 'dark' : dark.matches);
+  const isDark = () => prefersDark() && !paper.matches;
+
+  /** Show the page in the colours 'light' or 'dark', whatever the system is set to. */
+  function setScheme(scheme) {
+    chosen = scheme;
+    document.documentElement.style.colorScheme = scheme;
+    for (const rule of darkRules) rule.media.mediaText = scheme === 'dark' ? 'screen' : 'not all';
+    redraw();
+  }
+
+  function redraw() {
+    const other = prefersDark() ? 'Light' : 'Dark';
+    switched.textContent = prefersDark() ? '☀' : '☾';
+    switched.title = `${other} colours (L)`;
+    switched.setAttribute('aria-label', `${other} colours`);
+    redraws.forEach((draw) => draw());
+  }
+
+  const switchScheme = () => setScheme(prefersDark() ? 'light' : 'dark');
 
   function colours(...more) {
     const style = getComputedStyle(document.documentElement);
@@ -81,9 +110,20 @@ const Page = (() => {
         requestAnimationFrame(() => draw(element));
       }).observe(element);
     }
-    dark.addEventListener('change', () => elements.forEach(draw));
+    redraws.push(() => elements.forEach(draw));
   }
 
   const data = JSON.parse(document.getElementById('data').textContent);
-  return { NARROW, touch, config, data, colours, axis, layout, escaped, keepDrawn };
+  const switched = document.getElementById('scheme');
+  switched.hidden = false;
+  switched.addEventListener('click', switchScheme);
+  document.addEventListener('keydown', ({ key, target, altKey, ctrlKey, metaKey }) => {
+    if (altKey || ctrlKey || metaKey || target.closest(TYPED)) return;
+    if (key.toLowerCase() === 'l') switchScheme();
+  });
+  dark.addEventListener('change', redraw);
+  redraw();
+  return {
+    NARROW, touch, paper, config, data, isDark, colours, axis, layout, escaped, keepDrawn,
+  };
 })();

@@ -26,9 +26,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from linkage_ros.bag.contents import Contents, TopicContents
+from linkage_ros.bag.contents import Contents, RECORD_SIZE, Tallies
 from linkage_ros.bag.reader import Bag, BagMessage
-from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError
 from linkage_ros.report.decimation import Times
 import numpy as np
@@ -122,9 +121,6 @@ _MOST_BYTES = 32 * 2**20
 _FARTHEST = 4
 """Factor by which a block may grow to keep messages of one log time together."""
 
-_RECORD_BYTES = 31
-"""Bytes of a message record in an MCAP file without the message itself."""
-
 Entry = tuple[int, int, int, bytes]
 """Number of the message, log time, publish time, bytes; none for a topic that is only counted."""
 
@@ -132,7 +128,7 @@ Entry = tuple[int, int, int, bytes]
 class Progress(NamedTuple):
     """Called now and then with the number of bytes read; returns whether to stop."""
 
-    told: Callable[[int], None] = lambda _read: None
+    report: Callable[[int], None] = lambda _read: None
     stopped: Callable[[], bool] = lambda: False
 
 
@@ -156,7 +152,7 @@ class Blocks:
 
     def __init__(self, bag: Bag, wanted: Collection[str], progress: Progress) -> None:
         self._bag, self._wanted, self._progress = bag, set(wanted), progress
-        self._counts: dict[str, list[int]] = {topic.name: [0, 0, 2**64, 0] for topic in bag.topics}
+        self._tallies = Tallies(bag)
         self._damage, self._stopped = '', False
         self._read = 0
 
@@ -189,21 +185,7 @@ class Blocks:
 
     def contents(self) -> Contents:
         """Return the counts of what has been read."""
-        topics = {topic.name: topic for topic in self._bag.topics}
-        rows = tuple(
-            TopicContents(
-                topics.get(name) or Topic(name, '', '', ''),
-                count,
-                size,
-                first if count else 0,
-                last,
-            )
-            for name, (count, size, first, last) in self._counts.items()
-        )
-        held = [row for row in rows if row.messages]
-        begin = min((row.first for row in held), default=None)
-        end = max((row.last for row in held), default=None)
-        return Contents(rows, begin, end, self._damage, self._stopped)
+        return self._tallies.contents(self._damage, self._stopped)
 
     def _whole(self, messages: Iterable[BagMessage]) -> Iterator[BagMessage]:
         try:
@@ -221,20 +203,16 @@ class Blocks:
             self._count(name, [(logged, len(data)) for _, logged, _, data in entries])
         for name, sizes in others.items():
             self._count(name, sizes)
-        self._progress.told(self._read)
+        self._progress.report(self._read)
         return found
 
     def _count(self, name: str, entries: list[tuple[int, int]]) -> None:
         logs, sizes = zip(*entries, strict=True)
-        tally = self._counts.setdefault(name, [0, 0, 2**64, 0])
-        tally[0] += len(entries)
-        tally[1] += sum(sizes)
-        tally[2] = min(tally[2], *logs)
-        tally[3] = max(tally[3], *logs)
-        self._read += sum(sizes) + _RECORD_BYTES * len(entries)
+        self._tallies[name].add(len(entries), sum(sizes), min(logs), max(logs))
+        self._read += sum(sizes) + RECORD_SIZE * len(entries)
 
 
-KINDS = ('samples', 'faults', 'withheld', 'resets', 'states', 'health')
+KINDS = ('samples', 'faults', 'withheld', 'resets', 'states', 'forces', 'health')
 _OTHER_RECORDER = 'health'
 """Topics recorded by another thread; run time does not follow them."""
 
@@ -289,7 +267,7 @@ def rows_of(
             for entry in entries:
                 kinds['states' if own(entry[3]) else 'samples'].append(entry)
         elif kind is not None:
-            kinds[kind] = entries
+            kinds[kind] += entries
     numbers = np.array([entry[0] for found in kinds.values() for entry in found], np.int64)
     logged = times_of([entry[1] for found in kinds.values() for entry in found])
     if len(numbers):

@@ -32,9 +32,9 @@ maximum filters*, 1992).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.replay.verify import turning_joints
 from linkage_ros.report.decimation import (
     capacity,
     Decimation,
@@ -159,7 +159,7 @@ NO_ROOM = 'curves for which there is no room'
 LATENESS, AGE = Column('tick', 'lateness', 'ms'), Column('input', 'age', 'ms')
 
 
-class Kept:
+class BoundedCurves:
     """
     Curves with common times, within a window.
 
@@ -199,20 +199,20 @@ class Kept:
     def curves(self) -> Curves | None:
         """Return the curves; None without rows."""
         found = self._kept.intervals()
-        told = [not np.isnan(column).all() for column in found.first.T]
-        if not any(told):
+        filled = [not np.isnan(column).all() for column in found.first.T]
+        if not any(filled):
             return None
-        columns = [column for column, there in zip(self._columns, told, strict=True) if there]
-        found = found._replace(first=found.first[:, told], second=found.second[:, told])
+        columns = [column for column, there in zip(self._columns, filled, strict=True) if there]
+        found = found._replace(first=found.first[:, filled], second=found.second[:, filled])
         return Curves(self._title, columns, self._rows, found)
 
 
-def joint_columns(names: Sequence[str], turning: Sequence[bool]) -> list[Column]:
+def joint_columns(names: Sequence[str], turning: Mapping[str, bool]) -> list[Column]:
     """Return the columns of joints: positions, rates and efforts, in the order of a message."""
     return [
-        Column(name, quantity, units[not turns])
+        Column(name, quantity, units[not turning[name]])
         for quantity, units in UNITS.items()
-        for name, turns in zip(names, turning, strict=True)
+        for name in names
     ]
 
 
@@ -234,25 +234,16 @@ class SceneCurves:
     """
 
     def __init__(self, scene: Scene, topics: tuple[str, str], bodies: int, window: Window) -> None:
-        turning = {
-            member.prefix + name: isinstance(joint, RevoluteJoint)
-            for member in scene.members
-            for name, joint in member.linkage.joints.items()
-        }
-        inputs = {
-            name: not given.slider
-            for member in scene.members
-            for name, given in zip(member.inputs, member.linkage.inputs, strict=True)
-        }
+        turning = turning_joints(scene)
+        inputs = [name for member in scene.members for name in member.inputs]
         states, crank = topics
-        columns = joint_columns(scene.joints, [turning[name] for name in scene.joints])
         self._window = window
-        self._states = Kept(states, columns, STATE_BYTES, window)
-        self._samples = Kept(
-            crank, joint_columns([*inputs], [*inputs.values()]), SAMPLE_BYTES, window
+        self._states = BoundedCurves(
+            states, joint_columns(scene.joints, turning), STATE_BYTES, window
         )
-        self._lates = Kept('ticks', [LATENESS], DURATION_BYTES, window)
-        self._ages = Kept('ticks', [AGE], DURATION_BYTES, window)
+        self._samples = BoundedCurves(crank, joint_columns(inputs, turning), SAMPLE_BYTES, window)
+        self._lates = BoundedCurves('ticks', [LATENESS], DURATION_BYTES, window)
+        self._ages = BoundedCurves('ticks', [AGE], DURATION_BYTES, window)
         self._lateness = Lateness(scene.rate) if scene.rate else None
         self.late, self.age = Histogram(), Histogram()
         moving = scene.members[:MOST_LINKAGES]

@@ -18,6 +18,9 @@ The data of a report page; arrays are base64 of their bytes, least significant b
 
 The size is bounded, whatever the length of the run (see `linkage_ros.report.decimation`).
 
+The shapes of a linkage are made once for a pose, in the frames of the links that carry them, and
+then move with the links. So a rod in a tube keeps the length that it has in that pose.
+
 Links are positioned by the recorded joints, for many instants at once. They form a tree of the
 published joints, as in a robot model (`linkage_ros.robot_models.tree`), and each link is turned by
 its own recorded value. The loops are not solved: where a sensor is wrong or late relative to
@@ -29,12 +32,22 @@ instead.
 from __future__ import annotations
 
 from base64 import b64encode
+from cmath import rect
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing.figure import view
-from linkage_ros.drawing.link_frames import blocks, drawn_in_frames, link_frames
-from linkage_ros.drawing.painting import COLOURS, FACES, INK
+from linkage_ros.drawing.curves import traced_carriers
+from linkage_ros.drawing.figure import all_places, symbol_size, View, view
+from linkage_ros.drawing.painting import COLOURS, corners, FACES, INK, outline
+from linkage_ros.drawing.shapes import (
+    blocks,
+    carried_shapes,
+    Circle,
+    link_frames,
+    LinkFrame,
+    Segment,
+    Shape,
+)
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
@@ -67,7 +80,7 @@ class Poses(NamedTuple):
         (instants, links, 3); NaN where it is unknown.
     apart
         Largest distance between links at a pin, or of a point from its line, in [m]; or NaN.
-    untold
+    reason
         Why the loops were closed instead; '' if recorded joints determine every link.
 
     """
@@ -75,7 +88,7 @@ class Poses(NamedTuple):
     links: tuple[str, ...]
     frames: Numbers
     apart: Numbers
-    untold: str
+    reason: str
 
 
 _Found = dict[str, tuple[Places, Places]]
@@ -101,15 +114,15 @@ def poses(
         Names of the driven joints in messages.
 
     """
-    told = {
+    known = {
         name: np.where(np.abs(given) < _FARTHEST, given, np.nan) for name, given in values.items()
     }
     linkage = closure.linkage
     _, (names,) = prefixed([(prefix, linkage)])
     try:
-        found, untold = _by_joints(grow(linkage, names), prefix, told), ''
+        found, reason = _by_joints(grow(linkage, names), prefix, known), ''
     except DefinitionError as error:
-        found, untold = _by_closing(closure, [told[name] for name in inputs]), error.reason
+        found, reason = _by_closing(closure, [known[name] for name in inputs]), error.reason
     for block, along, point in blocks(closure):
         link = next(link for link, named in linkage.links.items() if point in named)
         found.setdefault(block, (_at(found, link, linkage.links[link][point]), found[along][1]))
@@ -125,7 +138,7 @@ def poses(
     frames[np.isnan(frames).any(axis=(1, 2))] = np.nan
     apart = _apart(closure, found, count)
     apart[np.isnan(frames).any(axis=(1, 2))] = np.nan
-    return Poses(links, frames, apart, untold)
+    return Poses(links, frames, apart, reason)
 
 
 def _by_joints(tree: Tree, prefix: str, values: Mapping[str, Numbers]) -> _Found:
@@ -253,8 +266,20 @@ def lanes(run: Run) -> dict[str, Lane]:
     return {key: shown[key] for key in LANES if key in shown and shown[key].count}
 
 
+_NOT_PLOTTED_IF_ZERO = ('rate', 'effort', 'force')
+
+
 def plots(run: Run) -> list[Plot]:
     """Return the plots over time: for each its curves, by number and column, and its unit."""
+    return [plot for plot in _all_plots(run) if not _is_zero(plot, run)]
+
+
+def zero_plots(run: Run) -> list[str]:
+    """Return the titles of the plots that are left out because all their values are zero."""
+    return [plot['title'] for plot in _all_plots(run) if _is_zero(plot, run)]
+
+
+def _all_plots(run: Run) -> list[Plot]:
     found: dict[str, Plot] = {}
     # The crank comes first: everything else depends on it.
     driven = {name for linkage in run.linkages for name in linkage.inputs}
@@ -280,6 +305,19 @@ def plots(run: Run) -> list[Plot]:
         topic = f' on {run.curves[number].title}' if twice or foreign else ''
         plot['curves'].append({'of': number, 'column': place, 'name': column.name + topic})
     return [found[key] for key, _ in QUANTITIES.values() if key in found]
+
+
+def _is_zero(plot: Plot, run: Run) -> bool:
+    """Return whether a plot has only zeros; angles and times are plotted even so."""
+    for curve in plot['curves']:
+        curves = run.curves[curve['of']]
+        place = curve['column']
+        if curves.columns[place].quantity not in _NOT_PLOTTED_IF_ZERO:
+            return False
+        for values in (curves.intervals.first[:, place], curves.intervals.second[:, place]):
+            if not (np.isnan(values) | (values == 0.0)).all():
+                return False
+    return True
 
 
 def _curves(curves: Curves) -> dict[str, Any]:
@@ -336,7 +374,7 @@ def _linkage(linkage: LinkageRun, frames: Frames) -> dict[str, Any]:
         'links': found.links,
         'poses': _packed(found.frames, '<f4'),
         'apart': _packed(found.apart, '<f4'),
-        'untold': short(found.untold, 200),
+        'untold': short(found.reason, 200),
         'silent': [[span.begin / 1e9, span.end / 1e9] for span in linkage.silent.in_order],
     }
 
@@ -386,3 +424,61 @@ def facts_of_thinning(run: Run) -> Iterator[str]:
         yield f'every one of {", ".join(titles)}'
     if run.frames is not None and run.frames.step > 1:
         yield f'of the moving picture one joint state of every {run.frames.step:,}'
+
+
+_DIGITS = 6
+"""Significant digits of places: a thousandth of a pixel."""
+
+
+def drawn_in_frames(shown: View) -> dict[str, Any]:
+    """
+    Return the drawing of a linkage as JSON data; lengths are in [m].
+
+    ``shapes`` come in the order in which they are painted. Each has the ``link`` of its frame, its
+    ``role`` (see `linkage_ros.drawing.shapes`), and ``points``, x and y in turn: of a circle its
+    centre, with a ``radius``; of a segment its ends; of an area its corners, with ``closed``.
+    ``frame`` is the lower left and upper right corner of the drawing, ``size`` half the width of a
+    bar, ``paths`` the curves of the traced points over the range of the input.
+    """
+    size = symbol_size(shown)
+    frames = link_frames(shown.closure, shown.position)
+    drawn = carried_shapes(shown.closure, shown.position, size, shown.sweep.travels)
+    reached = [*all_places(shown), *(p for _, shape in drawn for p in outline(shape))]
+    low, high = corners(reached)
+    margin = 2.0 * size * (1 + 1j)
+    return {
+        'size': _short(size),
+        'frame': _flat([low - margin, high + margin]),
+        'shapes': [_shape(link, shape, frames) for link, shape in drawn],
+        'paths': {name: _flat(path) for name, path in shown.sweep.paths.items()}
+        if len(shown.closure.linkage.inputs) == 1
+        else {},
+        'traced': [
+            {'point': name, 'link': link, 'at': list(shown.closure.linkage.links[link][name])}
+            for name, link in traced_carriers(shown.closure.linkage).items()
+        ],
+    }
+
+
+def _shape(link: str, shape: Shape, frames: Mapping[str, LinkFrame]) -> dict[str, Any]:
+    # The frame of the ground is that of the drawing.
+    frame = LinkFrame(0j, 0.0) if link == GROUND else frames[link]
+    back = rect(1.0, -frame.angle)
+
+    def within(places: Sequence[complex]) -> list[float]:
+        return _flat([(place - frame.place) * back for place in places])
+
+    data: dict[str, Any] = {'link': link, 'role': shape.role, 'name': shape.name}
+    if isinstance(shape, Circle):
+        return {**data, 'points': within([shape.centre]), 'radius': _short(shape.radius)}
+    if isinstance(shape, Segment):
+        return {**data, 'points': within([shape.start, shape.end])}
+    return {**data, 'points': within(shape.corners), 'closed': True}
+
+
+def _flat(places: Sequence[complex]) -> list[float]:
+    return [_short(value) for place in places for value in (place.real, place.imag)]
+
+
+def _short(value: float) -> float:
+    return float(f'{value:.{_DIGITS}g}')

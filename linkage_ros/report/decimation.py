@@ -42,12 +42,13 @@ Flags = NDArray[np.bool_]
 PAGE_BYTES = 20_000_000
 """Size limit of a page, in [bytes]; a quarter of it is the plotting library."""
 
-STATE_BYTES, SAMPLE_BYTES, DURATION_BYTES, FRAME_BYTES = 3_600_000, 1_500_000, 500_000, 2_500_000
+STATE_BYTES, SAMPLE_BYTES, FORCE_BYTES = 3_000_000, 1_400_000, 600_000
+DURATION_BYTES, FRAME_BYTES = 500_000, 2_500_000
 """
 Size limits of the numbers, in [bytes], before encoding.
 
-One each for the curves of joints and of the crank, of lateness and of age, and for the instants of
-the animation with the poses of the links.
+One each for the curves of joints, of the crank and of pin forces, of lateness and of age, and for
+the instants of the animation with the poses of the links.
 """
 
 MOST_FRAMES = 20_000
@@ -210,15 +211,7 @@ class MinMaxCurve:
 
 
 def _least_and_greatest(values: Numbers) -> tuple[Numbers, Numbers]:
-    """
-    Return minimum and maximum of groups of rows, in the order in which they came.
-
-    Parameters
-    ----------
-    values
-        Of shape (groups, rows, columns).
-
-    """
+    """Return minimum and maximum of the rows of (groups, rows, columns), as they came."""
     none = np.isnan(values)
     low = np.where(none, np.inf, values).argmin(axis=1)[:, None]
     high = np.where(none, -np.inf, values).argmax(axis=1)[:, None]

@@ -117,13 +117,13 @@ class DiagnosticsSummary:
 
     Attributes
     ----------
-    said
+    last_values
         The last values, by task and key; at most `MOST_VALUES`.
 
     """
 
     def __init__(self, lanes: Mapping[str, Lane], from_beginning: bool = True) -> None:
-        self.said: dict[tuple[str, str], str] = {}
+        self.last_values: dict[tuple[str, str], str] = {}
         self._lanes, self._from_beginning = lanes, from_beginning
         self._before = 0
         self._counts: dict[tuple[str, str], int] = {}
@@ -147,9 +147,9 @@ class DiagnosticsSummary:
             self._lanes['health'].add(self._before, time, text)
         for key, value in status.values.items():
             named = task, short(key)
-            if named not in self.said and len(self.said) >= MOST_VALUES:
+            if named not in self.last_values and len(self.last_values) >= MOST_VALUES:
                 continue
-            self.said[named] = short(value)
+            self.last_values[named] = short(value)
             if key in _COUNTED:
                 lane, what = _COUNTED[key]
                 self._count(lane, what, named, value, time)

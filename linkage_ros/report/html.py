@@ -27,12 +27,13 @@ from typing import NamedTuple
 
 from linkage_ros.errors import LinkageError
 from linkage_ros.pages.document import document, facts_html, table_html
-from linkage_ros.report.data import facts_of_thinning, lanes, page_data, plots
+from linkage_ros.report.data import facts_of_thinning, lanes, page_data, plots, zero_plots
 from linkage_ros.report.decimation import Histogram, PAGE_BYTES, TABLE_BYTES
 from linkage_ros.report.labels import (
     AGE_NOTE,
     CLOSED_NOTE,
     duration_text,
+    FORCE_NOTE,
     LANES,
     LATENESS_NOTE,
     POSE_NOTE,
@@ -144,7 +145,7 @@ def run_tables(run: Run) -> Iterator[TableOf]:
     yield TableOf(
         'What the diagnostics said last',
         ('of', 'key', 'value'),
-        [(task, key, value) for (task, key), value in run.said.items()],
+        [(task, key, value) for (task, key), value in run.last_values.items()],
         folded=True,
     )
 
@@ -160,8 +161,8 @@ def _ranges(curves: Curves) -> Iterator[tuple[str, ...]]:
 _HERE = 'linkage_ros.report'
 _STYLES = [(_HERE, 'report.css')]
 _SCRIPTS = [
-    (_HERE, f'{name}.js')
-    for name in ('curves', 'looks', 'picture', 'over_time', 'over_others', 'plots', 'report')
+    *(('linkage_ros.pages', f'{name}.js') for name in ('angles', 'curves', 'looks', 'picture')),
+    *((_HERE, f'{name}.js') for name in ('over_time', 'over_others', 'plots', 'report')),
 ]
 
 _LONGEST_FACT = 400
@@ -288,9 +289,17 @@ def _events(run: Run) -> Iterator[str]:
     yield '</section>'
 
 
+_ANGLE_CONTROLS = (
+    '<div class="controls"><label>angles in <select id="unit"><option value="rad">radians</option>'
+    '<option value="degrees">degrees</option></select></label> <label>that are <select id="range">'
+    '<option value="continuous">continuous</option>'
+    '<option value="wrapped">within ± half a turn</option></select></label></div>'
+)
+
+
 def _plots(run: Run) -> Iterator[str]:
     found = plots(run)
-    if not found:
+    if not run.curves:
         yield '<section><h2>Over time</h2><p>No joint states are in this bag.</p></section>'
         return
     yield '<section><h2>Over time</h2>'
@@ -303,7 +312,18 @@ def _plots(run: Run) -> Iterator[str]:
         'full. '
         f'The page is no larger than {PAGE_BYTES // 1_000_000} MB, however long the run.</p>'
     )
-    notes = {'lateness': LATENESS_NOTE, 'age': AGE_NOTE}
+    keys = '<kbd>+</kbd> <kbd>-</kbd> <kbd>0</kbd> zoom, <kbd>L</kbd> light or dark'
+    if any(plot['unit'] == 'rad' for plot in found):
+        keys = f'<kbd>D</kbd> degrees, <kbd>W</kbd> within a turn, {keys}'
+        yield _ANGLE_CONTROLS
+    if moving:
+        steps = '<kbd>←</kbd> <kbd>→</kbd> one picture, <kbd>Home</kbd> <kbd>End</kbd>'
+        keys = f'<kbd>Space</kbd> plays, {steps}, {keys}'
+    yield f'<p class="note no-print">Keys: {keys}.</p>'
+    zero = zero_plots(run)
+    if zero:
+        yield f'<p class="note">Zero throughout, so not plotted: {escape("; ".join(zero))}.</p>'
+    notes = {'lateness': LATENESS_NOTE, 'age': AGE_NOTE, 'pin_forces': FORCE_NOTE}
     for plot in found:
         yield _plot(plot['key'], f'{plot["title"]} [{plot["unit"]}]', notes.get(plot['key'], ''))
     yield '</section>'
@@ -337,8 +357,8 @@ def _spread(found: Histogram) -> str:
 
 
 def _plot(key: str, title: str, note: str = '') -> str:
-    told = f'<p class="note">{escape(note)}</p>' if note else ''
+    below = f'<p class="note">{escape(note)}</p>' if note else ''
     return (
         f'<figure data-plot="{escape(key)}"><figcaption>{escape(title)}</figcaption>'
-        f'<div class="plot" role="img" aria-label="{escape(title)}"></div>{told}</figure>'
+        f'<div class="plot" role="img" aria-label="{escape(title)}"></div>{below}</figure>'
     )

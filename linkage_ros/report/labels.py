@@ -30,7 +30,7 @@ LANES = {
     'toggle': ('at a toggle', 'joint states without rates'),
     'told_toggle': ('at a toggle, by diagnostics', 'as the diagnostics count, once a period'),
     'told_limited': ('beyond limits, by diagnostics', 'as the diagnostics count, once a period'),
-    'silent': ('no joint states', 'for longer than these are otherwise apart'),
+    'silent': ('gap in joint states', 'more than five periods, and 2 ms, without one'),
     'withheld': ('withheld', 'ticks without a joint state after which something is remembered'),
     'rejected': ('samples rejected', 'as the scene refuses them, once more'),
     'stale': ('no samples', 'no good one for longer than max_age'),
@@ -52,6 +52,8 @@ QUANTITIES = {
     ('effort', 'N·m'): ('efforts_rad', 'Torques'),
     ('effort', 'N'): ('efforts_m', 'Forces'),
     ('effort', 'N·m or N'): ('efforts', 'Efforts'),
+    ('force', 'N'): ('pin_forces', 'Forces in pins and sliders'),
+    ('moment', 'N·m'): ('pin_moments', 'Moments in pins and sliders'),
     ('lateness', 'ms'): ('lateness', 'How late ticks were'),
     ('age', 'ms'): ('age', 'How old the input was at a tick'),
 }
@@ -62,6 +64,7 @@ LATENESS_NOTE = (
     'most punctual ones within 0.25 s. What all ticks nearby have in common is not in it; the '
     'node’s own measure, on its steady clock, is among what the diagnostics said last.'
 )
+FORCE_NOTE = 'The magnitude of each force; the bag holds its x and y.'
 AGE_NOTE = 'The time of the tick less the stamp of the newest good sample.'
 POSE_NOTE = (
     'The links stand where the recorded joints put them, as they do in RViz; nothing is solved '

@@ -1,9 +1,9 @@
 /* Copyright 2026 The linkage_ros authors. Licensed under the Apache License, Version 2.0. */
-/* What is not plotted over time: joints over the crank, and how durations are spread. */
+/* Plots over other things than time: joints over the crank, and histograms of durations. */
 
 const OverOthers = (() => {
   const MOST = 3000; // places of a curve over the crank
-  const TURN = 2 * Math.PI;
+  const { TURN } = Angles;
   const ALL_BUT_A_TURN = 0.95 * TURN;
 
   function reach(values, first, last) {
@@ -28,24 +28,27 @@ const OverOthers = (() => {
     const turns = unit === 'rad' && reach(crank, first, last) > ALL_BUT_A_TURN;
     const joints = linkage.joints.map((name, i) => [name, linkage.units[i]])
       .filter(([name]) => name !== input);
+    const crankUnit = Angles.shown(unit);
     const both = new Set(joints.map(([, each]) => each)).size > 1;
     const name = Looks.label(input);
     const traces = joints.map(([joint, own]) => {
       const runs = own === 'rad' && reach(values[joint], first, last) > TURN;
+      const ownUnit = Angles.shown(own);
       const [x, y, text] = [[], [], []];
       for (let i = first; i < last; i += step) {
         const value = values[joint][i];
         if (!Number.isFinite(crank[i]) || !Number.isFinite(value)) continue;
-        x.push(turns ? crank[i] - TURN * Math.floor(crank[i] / TURN) : crank[i]);
-        y.push(runs ? value - TURN * Math.round(value / TURN) : value);
-        text.push(`${when(times[i])}<br>${name} ${shown(crank[i])} ${unit}`
-          + `<br>${shown(value)} ${own}`);
+        const at = turns ? crank[i] - TURN * Math.floor(crank[i] / TURN) : crank[i];
+        x.push(at * crankUnit.factor);
+        y.push((runs ? Angles.wrap(value) : value) * ownUnit.factor);
+        text.push(`${when(times[i])}<br>${name} ${shown(crank[i] * crankUnit.factor)} `
+          + `${crankUnit.unit}<br>${shown(value * ownUnit.factor)} ${ownUnit.unit}`);
       }
       const label = Looks.label(joint);
       return {
         type: 'scatter',
         mode: 'markers',
-        name: both ? `${label} [${own}]` : label,
+        name: both ? `${label} [${ownUnit.unit}]` : label,
         x, y, text,
         yaxis: both && own === 'm' ? 'y2' : 'y',
         hovertemplate: `<b>${label}</b><br>%{text}<extra></extra>`,
@@ -55,12 +58,14 @@ const OverOthers = (() => {
     const names = joints.map(([joint]) => (both ? `${joint} [rad]` : joint));
     const [room, legend] = Looks.legend(names, width);
     const edges = Looks.margin(width);
-    const whole = turns ? { range: [0, TURN], tickmode: 'array',
-      tickvals: [0, 0.5, 1, 1.5, 2].map((k) => k * Math.PI),
-      ticktext: ['0', 'π/2', 'π', '3π/2', '2π'] } : {};
-    const side = (own, more) => Page.axis(`[${own}]`, ink, { automargin: false, ...more });
+    const turn = TURN * crankUnit.factor;
+    const whole = turns ? { range: [0, turn], tickmode: 'array',
+      tickvals: [0, 0.25, 0.5, 0.75, 1].map((k) => k * turn),
+      ticktext: Angles.chosen.degrees ? ['0', '90', '180', '270', '360']
+        : ['0', 'π/2', 'π', '3π/2', '2π'] } : {};
+    const side = (own, more) => Page.axis(`[${Angles.shown(own).unit}]`, ink, { automargin: false, ...more });
     const other = { overlaying: 'y', side: 'right', showgrid: false, tickmode: 'auto' };
-    const title = `${name} [${unit}]${turns ? ', within a turn' : ''}`;
+    const title = `${name} [${crankUnit.unit}]${turns ? ', within a turn' : ''}`;
     return [traces, {
       height: 260 + edges.t + edges.b + room,
       margin: { ...edges, t: edges.t + room, r: both ? edges.l : edges.r + 8 },

@@ -1,5 +1,5 @@
 /* Copyright 2026 The linkage_ros authors. Licensed under the Apache License, Version 2.0. */
-/* The plots of a run: those over time share it, and the line where the picture stands. */
+/* The plots of a run; those over time share their range, and a line at the time of the picture. */
 
 const Plots = (() => {
   const STILL = 4; // pixels: a pointer that moves farther has dragged
@@ -22,6 +22,10 @@ const Plots = (() => {
       if (!width) return;
       const ink = Page.colours();
       const [traces, own] = this.maker(this.plot, width, ink, view);
+      if (this.plot.unit) {
+        const { unit } = Angles.shown(this.plot.unit);
+        this.figure.querySelector('figcaption').textContent = `${this.plot.title} [${unit}]`;
+      }
       const layout = Page.layout(width, ink, { uirevision: 'kept', ...own });
       this.view = view;
       // What Plotly does to the axis comes back as an event, and is none of the reader's.

@@ -16,30 +16,35 @@
 """
 Read a bag once, from beginning to end, for its page; memory does not grow with the bag.
 
-A bag without a scene of this package is shown by all its joint state topics, as they are.
+Of a bag with a scene the ticks, samples, events and open loops are shown; of a bag without one all
+topics of joint states, as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from linkage_ros.bag.contents import Contents
 from linkage_ros.bag.reader import Bag
-from linkage_ros.bag.run_events import run_account
+from linkage_ros.bag.run_events import lost_beginning, raw_account, run_account, RunAccount
 from linkage_ros.errors import LinkageError
-from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.report.blocks import Blocks, Entry, Progress, RunClock, times_of
-from linkage_ros.report.curves import Kept, NO_ROOM, UNITS
-from linkage_ros.report.decimation import STATE_BYTES
-from linkage_ros.report.joint_states import JointStates
-from linkage_ros.report.labels import short
-from linkage_ros.report.run import APART, Column, Lane, Run, Silences, Window
-from linkage_ros.report.scene_run import SceneRun
+from linkage_ros.kinematics.batch import CODES
+from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_values import JOINT_STATE, WRENCHES
+from linkage_ros.replay.replay import own_joint_states, recorded_scene
+from linkage_ros.report.blocks import Blocks, Entry, Progress, Rows, rows_of, RunClock, times_of
+from linkage_ros.report.curves import BoundedCurves, MOST_LINKAGES, NO_ROOM, SceneCurves, UNITS
+from linkage_ros.report.decimation import Flags, Numbers, STATE_BYTES, Times
+from linkage_ros.report.diagnostics_summary import DiagnosticsSummary
+from linkage_ros.report.joint_states import JointBlock, JointStates
+from linkage_ros.report.labels import LANES, short
+from linkage_ros.report.pin_forces import PinForces
+from linkage_ros.report.run import APART, Column, Lane, LinkageRun, Run, Silences, Window
+from linkage_ros.report.samples import Crank, SampleJudge
 from linkage_ros.scene.scene import Scene
 import numpy as np
 
-_TYPE = 'sensor_msgs/msg/JointState'
 _MOST_TOPICS = 6
 _DISORDER = 1_000_000_000
 """By how much a message may come late in a bag of another program, in [ns]."""
@@ -62,12 +67,12 @@ class ForeignRun:
     """
 
     def __init__(self, bag: Bag, window: Window) -> None:
-        found = [topic.name for topic in bag.topics if topic.type == _TYPE]
+        found = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
         self._window, self._clock = window, RunClock(_DISORDER)
         self.topics = set(found[:_MOST_TOPICS])
         self._more = found[_MOST_TOPICS:]
         self._readers = {topic: JointStates() for topic in found[:_MOST_TOPICS]}
-        self._kept: dict[str, Kept] = {}
+        self._kept: dict[str, BoundedCurves] = {}
         self._widths: dict[str, int] = {}
         self._lanes = {'jump': Lane(window=window)}
         # Among several topics, none is known to publish all the time.
@@ -100,7 +105,7 @@ class ForeignRun:
                     for name in reader.joints
                 ]
                 space = STATE_BYTES // len(self._readers)
-                self._kept[topic] = Kept(topic, columns, space, self._window)
+                self._kept[topic] = BoundedCurves(topic, columns, space, self._window)
                 self._widths[topic] = len(reader.joints)
             width = self._widths[topic]
             if numbers.shape[2] > width:
@@ -183,3 +188,226 @@ def read_run(
     for block in blocks:
         reader.take(block)
     return reader.end(blocks.contents()), scene, missing
+
+
+def _find_open_loop_spans(linkage: LinkageRun, times: Times, angles: Numbers, lane: Lane) -> None:
+    """Add the samples at which a linkage does not close to a lane; times in [ns]."""
+    if not len(times):
+        return
+    status = linkage.closure.solve(*angles.T, derivatives=0).status
+    is_open = status >= CODES[Status.OPEN]
+    for time, given in zip(times[is_open].tolist(), angles[is_open].tolist(), strict=True):
+        text = ''
+        # The first of the joined events gives the text.
+        if not lane.spans or time - lane.spans[-1].end > lane.near:
+            position = linkage.closure.position(*given)
+            text = f'{position.status.value}, the links miss by {position.gap:.3g} m'
+        lane.add(time, time, f'{linkage.name} {text}'.strip())
+
+
+_TOGETHER = 20_000_000
+"""Events of a kind that are closer than this form one span, in [ns]."""
+
+_ALIKE = ('open', 'toggle')
+_MOST_SILENCES = 400
+_NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving picture'
+
+
+class SceneRun:
+    """
+    Reads a run of a scene, block by block.
+
+    Parameters
+    ----------
+    bag, run, scene
+        The bag, its run account and its scene.
+    window
+        The part of the run to show.
+
+    Raises
+    ------
+    LinkageError
+        If the scene cannot be built here.
+
+    """
+
+    def __init__(self, bag: Bag, run: RunAccount, scene: Scene, window: Window) -> None:
+        from_beginning = not lost_beginning(bag, run)
+        self._judge = SampleJudge(bag, scene, from_beginning)
+        pipeline = self._judge.pipeline
+        self._rate, self._window, self._clock = scene.rate, window, RunClock()
+        self._lanes = {
+            name: Lane(_TOGETHER, alike=name in _ALIKE, window=window) for name in LANES
+        }
+        topic = raw_account(bag).get('diagnostics_topic')
+        self._topics = {
+            topic if isinstance(topic, str) else '/diagnostics': 'health',
+            run.crank_topic: 'samples',
+            run.faults_topic: 'faults',
+            run.withheld_topic: 'withheld',
+            run.resets_topic: 'resets',
+            run.joint_states_topic: 'states',
+        }
+        wrenches = [each.name for each in bag.topics if each.type == WRENCHES]
+        forces = [name for name in wrenches if name in run.extras]
+        self._forces = PinForces(', '.join(forces), window)
+        for name in forces:
+            self._topics.setdefault(name, 'forces')
+        self._topics.pop('', None)
+        shared = run.crank_topic == run.joint_states_topic
+        self._own = own_joint_states(scene) if shared else None
+        self._linkages = [
+            LinkageRun(
+                member.name,
+                member.prefix,
+                line.closure,
+                member.inputs,
+                member.joints,
+                tuple(given.unit for given in member.linkage.inputs),
+                Lane(APART, longest=True, most=_MOST_SILENCES, window=window),
+            )
+            for member, line in zip(scene.members, pipeline.lines, strict=True)
+        ]
+        inputs = [name for linkage in self._linkages for name in linkage.inputs]
+        self._states = JointStates(scene.joints, others=False)
+        self._samples = JointStates(inputs, others=False)
+        self._cranks = {
+            number: Crank(member, [inputs.index(name) for name in member.inputs])
+            for number, member in enumerate(scene.members)
+            if member.drive[0] == 'topic'
+        }
+        self._first_joints = [scene.joints.index(linkage.joints[0]) for linkage in self._linkages]
+        self._has_limits = any(member.linkage.limits for member in scene.members)
+        self._tells_toggles = len(scene.members) == 1 and 'velocity' in scene.members[0].effects
+        self._health = DiagnosticsSummary(self._lanes, from_beginning)
+        bodies = sum(len(each.closure.structure.links) for each in self._linkages[:MOST_LINKAGES])
+        topics = run.joint_states_topic, run.crank_topic
+        self._curves = SceneCurves(scene, topics, bodies, window)
+        period = round(1e9 / scene.rate) if scene.rate else 0
+        self._silences = [Silences(each.silent, period) for each in self._linkages]
+        self._stale = Silences(self._lanes['stale'], 0, pipeline.max_age)
+
+    @property
+    def topics(self) -> set[str]:
+        """Return the topics whose messages are needed."""
+        return {*self._topics}
+
+    def take(self, block: Mapping[str, list[Entry]]) -> None:
+        """Add the messages of a block."""
+        rows = rows_of(block, self._topics, self._own, self._clock)
+        for time, by in self._clock.jumps():
+            self._lanes['jump'].add(time, time, f'by {by / 1e9:.6g} s')
+        states, withheld, health = rows['states'], rows['withheld'], rows['health']
+        read = self._states.read(states.data)
+        good = self._judge.take(rows, self._lanes)
+        if self._judge.listens:
+            self._look_at_samples(rows['samples'], good, states, read)
+        for time in withheld.passed.tolist():
+            self._lanes['withheld'].add(time, time)
+        self._look_at_states(states, read)
+        self._forces.add(rows['forces'].passed, rows['forces'].data)
+        self._curves.add_ticks(np.union1d(states.passed[read.good], withheld.passed))
+        for time, message in zip(health.passed.tolist(), health.data, strict=True):
+            self._health.take(message, time)
+            self._judge.learn(self._health.last_values)
+
+    def end(self, contents: Contents) -> Run:
+        """Return the run, with the counts of all messages."""
+        end = self._clock.end
+        self._judge.end(end, self._lanes['fault'])
+        for silences in self._silences:
+            silences.end(end)
+        if self._judge.listens and self._stale.limit:
+            self._stale.end(end)
+        curves, frames = self._curves.end()
+        forces = self._forces.curves()
+        if forces is not None:
+            curves.append(forces)
+        left_out = self._curves.left_out
+        left_out |= {('pin forces', reason): n for reason, n in self._forces.left_out.items()}
+        for what, reader in (('joint states', self._states), ('samples', self._samples)):
+            left_out |= {(what, reason): n for reason, n in reader.left_out.items() if n}
+        if len(self._linkages) > MOST_LINKAGES:
+            left_out['the scene', _NOT_MOVING] = len(self._linkages) - MOST_LINKAGES
+        kinds = {*self._known_kinds()}
+        return Run(
+            begin=self._clock.begin,
+            end=end,
+            window=self._window,
+            contents=contents,
+            curves=curves,
+            frames=frames,
+            linkages=self._linkages[:MOST_LINKAGES],
+            lanes={key: lane for key, lane in self._lanes.items() if key in kinds or lane.count},
+            lateness=self._curves.late if self._curves.late.count else None,
+            age=self._curves.age if self._curves.age.count else None,
+            rejected=self._judge.rejected,
+            left_out=left_out,
+            last_values=self._health.last_values,
+        )
+
+    def _known_kinds(self) -> Iterator[str]:
+        """Yield the kinds of events that the bag would show."""
+        yield from ('silent', 'jump')
+        kinds = self._topics.values()
+        for kind, lane in (('faults', 'fault'), ('withheld', 'withheld'), ('resets', 'reset')):
+            if kind in kinds:
+                yield lane
+        if self._judge.listens:
+            yield 'rejected'
+            if self._cranks:
+                yield 'open'
+            if self._stale.limit:
+                yield 'stale'
+        if self._tells_toggles:
+            yield 'toggle'
+        if self._health.last_values:
+            yield from ('lost', 'dropped', 'health', 'told_open', 'told_toggle')
+            if self._has_limits:
+                yield 'told_limited'
+
+    def _look_at_samples(self, samples: Rows, good: Flags, states: Rows, read: JointBlock) -> None:
+        """Add the crank's curve, and find samples at which a loop does not close."""
+        decoded = self._samples.read(samples.data)
+        self._curves.add_samples(samples.passed[decoded.good], decoded.numbers[decoded.good])
+        if self._stale.limit:
+            self._stale.add(samples.passed[good])
+        for number, crank in self._cranks.items():
+            own = crank.take(samples.numbers, decoded.stamps, good, decoded.numbers)
+            there = read.good & self._is_there(read.numbers, number)
+            alone = own & ~np.isin(samples.logged, states.logged[there])
+            at = samples.logged if self._rate else decoded.stamps
+            angles, _ = crank.at(samples.numbers[alone] + 1, at[alone])
+            _find_open_loop_spans(
+                self._linkages[number], samples.passed[alone], angles, self._lanes['open']
+            )
+
+    def _look_at_states(self, states: Rows, read: JointBlock) -> None:
+        good = read.good
+        numbers, passed = read.numbers[good], states.passed[good]
+        if self._tells_toggles:
+            for time in passed[np.isnan(numbers[:, 1]).all(axis=1)].tolist():
+                self._lanes['toggle'].add(time, time)
+        places = states.numbers[good]
+        inputs, stamps = [], []
+        for number, crank in self._cranks.items():
+            angles, newest = crank.at(places, states.published[good])
+            inputs.append((self._linkages[number].inputs, angles))
+            stamps.append(newest)
+        self._curves.add_states(passed, numbers, inputs)
+        if stamps:
+            # The oldest input of several linkages counts; 0 stands for none.
+            found = np.array(stamps)
+            oldest = np.where(found > 0, found, _NEVER).min(axis=0)
+            known = oldest < _NEVER
+            self._curves.add_ages(passed[known], states.logged[good][known] - oldest[known])
+        for number, silences in enumerate(self._silences):
+            silences.add(passed[self._is_there(numbers, number)])
+
+    def _is_there(self, numbers: Numbers, linkage: int) -> Flags:
+        """Return which joint states contain a linkage."""
+        present: Flags = ~np.isnan(numbers[:, 0, self._first_joints[linkage]])
+        return present
+
+
+_NEVER = 2**62

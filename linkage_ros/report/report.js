@@ -1,11 +1,12 @@
 /* Copyright 2026 The linkage_ros authors. Licensed under the Apache License, Version 2.0. */
-/* The page of a run: one time, in the picture as in the plots. */
+/* The page of a run: one time, shown in the picture and in the plots, and the keys that move it. */
 
 const Report = (() => {
   const { data } = Page;
   const LEAST = 1e-6; // s: the closest zoom
   const KEYS_OF_ITS_OWN = 'select, .scroll';
   const SPACE_OF_ITS_OWN = 'button, summary, [type=checkbox]';
+  const CLOSER = 1.5; // times a key zooms in
   const named = (id) => document.getElementById(id);
   const frames = data.frames && {
     step: data.frames.step,
@@ -137,10 +138,7 @@ const Report = (() => {
       const names = [...new Set([...linkage.inputs, ...linkage.joints])];
       for (const name of names) {
         const value = frames.values[name][number];
-        const unit = units.get(name);
-        if (!Number.isFinite(value)) continue;
-        const degrees = unit === 'rad' ? ` (${((value * 180) / Math.PI).toFixed(2)}°)` : '';
-        facts.push([name, `${value.toPrecision(6)} ${unit}${degrees}`]);
+        if (Number.isFinite(value)) facts.push([name, Angles.readout(value, units.get(name))]);
       }
       const apart = linkage.apart[number] * 1e3;
       const unlike = apart < 1e-6 ? '< 1 nm' : `${apart.toPrecision(3)} mm`;
@@ -153,7 +151,7 @@ const Report = (() => {
       const term = document.createElement('dt');
       const told = document.createElement('dd');
       [term.textContent, told.textContent] = [name, text];
-      row.className = text.length > 30 ? 'wide' : '';
+      row.className = text.length > 34 ? 'wide' : '';
       row.append(term, told);
       return row;
     }));
@@ -163,12 +161,13 @@ const Report = (() => {
     const roles = [...Object.keys(data.faces), 'slot', 'pin'];
     const own = Page.colours(...roles.map((role) => `dark-${role}`));
     const found = { slot: '#ffffff', pin: '#ffffff', ...data.faces, faint: own.faint };
-    if (!Looks.isDark()) return found;
+    if (!Page.isDark()) return found;
     for (const role of roles) found[role] = own[`dark-${role}`] || found[role];
     return found;
   }
 
   function begin() {
+    Angles.chosen.wrapped = data.wrapped;
     canvases = [...document.querySelectorAll('figure[data-linkage]')].flatMap((figure) => {
       const linkage = linkages[Number(figure.dataset.linkage)];
       const canvas = figure.querySelector('canvas');
@@ -186,12 +185,14 @@ const Report = (() => {
       plots.find((plot) => plot.figure === figure).draw(state.view);
     });
     // Paper has a width and colours of its own.
-    Looks.paper.addEventListener('change', () => {
+    Page.paper.addEventListener('change', () => {
       canvases.forEach((canvas) => canvas.fit(ink()));
       plots.forEach((plot) => plot.draw(state.view));
       show();
     });
     if (named('play')) controls();
+    if (named('unit')) angleControls();
+    document.addEventListener('keydown', press);
     show();
   }
 
@@ -214,16 +215,67 @@ const Report = (() => {
       canvases.forEach((canvas) => { canvas.traces = event.target.checked; });
       show();
     });
-    document.addEventListener('keydown', (event) => {
-      const { key, target } = event;
-      if (event.altKey || event.ctrlKey || event.metaKey || target.closest(KEYS_OF_ITS_OWN)) return;
-      if (key === ' ' && target.closest(SPACE_OF_ITS_OWN)) return;
-      if (key === ' ') state.playing ? pause() : play();
-      else if (key === 'ArrowLeft') step(-1);
-      else if (key === 'ArrowRight') step(1);
-      else return;
-      event.preventDefault();
+  }
+
+  function angleControls() {
+    named('unit').addEventListener('change', (event) => {
+      Angles.chosen.degrees = event.target.value === 'degrees';
+      drawAngles();
     });
+    named('range').addEventListener('change', (event) => {
+      Angles.chosen.wrapped = event.target.value === 'wrapped';
+      drawAngles();
+    });
+    named('range').value = data.wrapped ? 'wrapped' : 'continuous';
+  }
+
+  function drawAngles() {
+    plots.forEach((plot) => plot.draw(state.view));
+    show();
+  }
+
+  /** Choose the other of the two options of a list. */
+  function switchTo(list) {
+    list.selectedIndex = 1 - list.selectedIndex;
+    list.dispatchEvent(new Event('change'));
+  }
+
+  /** Zoom by a factor about the time, or about the middle if the time is not in view. */
+  function scale(factor) {
+    const [from, to] = state.view;
+    const about = from <= state.time && state.time <= to ? state.time : (from + to) / 2;
+    zoom([about - (about - from) * factor, about + (to - about) * factor]);
+  }
+
+  const keys = {
+    '+': () => scale(1 / CLOSER),
+    '-': () => scale(CLOSER),
+    0: () => zoom(null),
+  };
+
+  const angleKeys = {
+    d: () => switchTo(named('unit')),
+    w: () => switchTo(named('range')),
+  };
+
+  const playerKeys = {
+    ' ': () => (state.playing ? pause() : play()),
+    ArrowLeft: () => step(-1),
+    ArrowRight: () => step(1),
+    Home: () => seek(whole[0]),
+    End: () => seek(whole[1]),
+  };
+
+  function press(event) {
+    const { key, target } = event;
+    if (event.altKey || event.ctrlKey || event.metaKey || target.closest(KEYS_OF_ITS_OWN)) return;
+    if (key === ' ' && target.closest(SPACE_OF_ITS_OWN)) return;
+    const name = key.length === 1 ? key.toLowerCase() : key;
+    const act = keys[name] ?? (named('unit') && angleKeys[name])
+      ?? (named('play') && playerKeys[name]);
+    if (!act) return;
+    act();
+    event.preventDefault();
   }
 
   // The others look for it while they draw.

@@ -349,7 +349,7 @@ class Run:
         Number of rejected samples, by reason.
     left_out
         Number of messages, or joints of messages, that were not decoded, by topic and reason.
-    said
+    last_values
         The values of the last diagnostics, by task and key.
 
     """
@@ -366,4 +366,4 @@ class Run:
     age: Histogram | None = None
     rejected: Mapping[str, int] = field(default_factory=dict)
     left_out: Mapping[tuple[str, str], int] = field(default_factory=dict)
-    said: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    last_values: Mapping[tuple[str, str], str] = field(default_factory=dict)

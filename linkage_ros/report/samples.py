@@ -175,10 +175,10 @@ class SampleJudge:
                     lanes['rejected'].add(time, time, rejection.value)
         return good
 
-    def hear(self, said: Mapping[tuple[str, str], str]) -> None:
+    def learn(self, last_values: Mapping[tuple[str, str], str]) -> None:
         """Learn from the diagnostics, by task and key, which faults were on before."""
         for name in [name for name in self._scene.faults if name not in self._known]:
-            state = said.get(('faults', short(self._fault(name))))
+            state = last_values.get(('faults', short(self._fault(name))))
             if state:
                 self._known.add(name)
             if state == 'injected':

@@ -14,9 +14,9 @@
 
 
 """
-A method of closing the loops of a linkage, as it is measured.
+A method of closing the loops of a linkage, in the form in which it is measured.
 
-All methods have the same calls, so that a loop over states costs the same for each.
+All methods have the same signatures, so a loop over states costs the same for each.
 """
 
 from __future__ import annotations
@@ -25,40 +25,40 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 Joints = Sequence[Any]
-"""Of the published joints; empty where the method has no answer."""
+"""Values of the published joints; empty if the method has no answer."""
 
 Motion = tuple[Joints, Joints, Joints]
 """Joints, rates and accelerations."""
 
 RATE, ACCELERATION = 1.0, 0.5
-"""Of every driven joint, in [rad/s] or [m/s], and by the second, wherever motions are compared."""
+"""Rate of each driven joint where motions are compared, [rad/s] or [m/s], and acceleration."""
 
 NOTHING: Motion = ((), (), ())
 
 
 class Method(NamedTuple):
     """
-    A method with a setting, made for a linkage.
+    A method with a setting, for one linkage.
 
     Attributes
     ----------
     name
-        Of the method.
+        Name of the method.
     setting
-        In words; '' where it has none.
+        The setting, as text; '' for none.
     position
         Takes the inputs of one state; None if single states are never solved.
     motion
-        Likewise, with rates and accelerations at those of above.
+        The same with rates and accelerations, at `RATE` and `ACCELERATION` of the inputs.
     batch
-        Takes an array for each input, and how many derivatives are asked for; returns arrays of
-        joints, rates and accelerations, as many of them, of shape (joints, states).
+        Takes an array for each input and the number of derivatives; returns arrays of joints and
+        their derivatives, each of shape (joints, states).
     memory
-        Memory that it needs, in [bytes]; None where it is negligible.
+        Memory that it needs, in [bytes]; None if negligible.
     build
-        Time to build it, in [s]; None where it is negligible.
+        Time to build it, in [s]; None if negligible.
     remembers
-        Whether an answer depends on the states before.
+        Whether an answer depends on the previous states.
     together
         Whether a position comes with its rates and accelerations, in one call.
 

@@ -35,7 +35,7 @@ from linkage_ros.solvers.table import Order, TableClosure
 
 CLOSED_FORM, ITERATED = 'closed form', 'iteration from knots'
 NODE_DEFAULTS = (CLOSED_FORM, ITERATED)
-"""What the node does: the one where dyads cover a linkage, else the other."""
+"""Methods of the node: the first if dyads cover the linkage, else the second."""
 
 _CLOSED = Status.CLOSED
 
@@ -115,7 +115,7 @@ def closure_method(
 FROM_KNOTS, WARM, COLD = 'Newton, from knots', 'Newton, warm', 'Newton, cold'
 
 STARTS = {FROM_KNOTS: None, WARM: True, COLD: False}
-"""Where it starts: at the nearest of 256 knots a turn, at its last state, at one pose always."""
+"""Start of the iteration: the nearest of 256 knots a turn, the last state, or always one pose."""
 
 
 def newton(linkage: Linkage, tolerance: float, name: str) -> Method:
@@ -129,12 +129,12 @@ def newton(linkage: Linkage, tolerance: float, name: str) -> Method:
     tolerance
         Upper bound of the last correction, in [rad] or [m].
     name
-        Where it starts, of `STARTS`.
+        Start of the iteration, of `STARTS`.
 
     """
     closure = NewtonClosure(linkage, tolerance, warm=STARTS[name])
     method = closure_method(closure, name, f'tolerance {tolerance:.0e}')
-    # Arrays of states it solves one after the other.
+    # It solves the states of an array one after the other.
     return method._replace(batch=None, remembers=name == WARM)
 
 

@@ -41,7 +41,7 @@ Slopes = Callable[[], NDArray[np.float64]]
 """Returns the gap's derivatives by the latter two there, (2, 2) [m]."""
 
 _ENOUGH = 1e-14
-"""Of the linkage's size: a gap at which the iteration ends."""
+"""Gap at which the iteration ends, relative to the linkage's size."""
 
 _STEPS = 20
 
@@ -76,11 +76,11 @@ def newton_on_the_cut(shape: PlainFourBar, name: str, gap: Gap, slopes: Slopes) 
 CASADI = 'CasADi'
 
 _OPTIONS = {'abstol': 1e-14, 'max_iter': 20}
-"""It ends where the loop is open by less than this part of the linkage's size."""
+"""The tolerance is relative to the linkage's size."""
 
 
 def casadi(linkage: Linkage) -> Method | None:
-    """Return it, of a four-bar, where it is installed; it starts where it was last."""
+    """Return CasADi for a four-bar if it is installed; it starts from its last state."""
     shape = plain_four_bar(linkage)
     if shape is None or find_spec('casadi') is None:
         return None
@@ -96,7 +96,7 @@ def casadi(linkage: Linkage) -> Method | None:
     )
     problem = {'x': unknown, 'p': angle, 'g': open_by}
     solver = made_with.rootfinder('loop', 'fast_newton', problem, _OPTIONS)
-    # As its manual has it for calls from Python: memory that both look at, no copies.
+    # As its manual advises for calls from Python: shared memory, no copies.
     buffer, solve = solver.buffer()
     start, given, found = np.zeros(2), np.zeros(1), np.zeros(2)
     buffer.set_arg(0, start.data)
@@ -115,7 +115,7 @@ def casadi(linkage: Linkage) -> Method | None:
             solve()
         except RuntimeError:  # It did not converge.
             return ()
-        if buffer.ret():  # Whoever solves also keeps the buffer: without it the call crashes.
+        if buffer.ret():  # This function must hold the buffer: without it the call crashes.
             return ()
         start[:] = found
         coupler, rocker = found.tolist()
@@ -146,7 +146,7 @@ _MODEL = """
 
 
 def mujoco(linkage: Linkage) -> Method | None:
-    """Return it, of a four-bar, where it is installed; it starts where it was last."""
+    """Return MuJoCo for a four-bar if it is installed; it starts from its last state."""
     shape = plain_four_bar(linkage)
     if shape is None or find_spec('mujoco') is None:
         return None
@@ -176,7 +176,7 @@ PINOCCHIO = 'Pinocchio'
 
 
 def pinocchio(linkage: Linkage) -> Method | None:
-    """Return it, of a four-bar, where it is installed; it starts where it was last."""
+    """Return Pinocchio for a four-bar if it is installed; it starts from its last state."""
     shape = plain_four_bar(linkage)
     if shape is None or find_spec('pinocchio') is None:
         return None

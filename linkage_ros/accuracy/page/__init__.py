@@ -14,7 +14,7 @@
 
 
 """
-What was measured, shown: a page with its pictures and tables, and the same as Markdown.
+The results of measurements as a page with pictures and tables, and as Markdown.
 
-From `Results` and nothing else; the same results are the same bytes.
+A page is made from `Results` alone; equal results give equal bytes.
 """

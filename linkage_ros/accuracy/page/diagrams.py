@@ -14,11 +14,11 @@
 
 
 """
-How a diagram is laid out: its ranges, its points, and the look of each method.
+Layout of a diagram: the ranges of its axes, its points, and the style of each method.
 
-A logarithmic axis has no position for 0, nor for values below its least, and no axis has one for
-∞. Such a point is a result all the same: it is drawn hollow, on the edge. NaN is not drawn. A
-method looks the same in all diagrams of a page.
+A logarithmic axis has no position for 0 and for values below its lower bound, and no axis has one
+for ∞. Such a point is a result too: it is drawn hollow, on the edge. NaN is not drawn. A method
+has the same style in all diagrams of a page.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from linkage_ros.measuring import Spread
 
 _MARGIN = 0.05
 _LEAST_MARGIN = 0.05
-"""Of a logarithmic axis, in decades."""
+"""Smallest margin of a logarithmic axis, in decades."""
 
 _LEAST, _GREATEST = 1e-300, 1e300
-"""Plotting libraries fail beyond these values: they count as 0 and ∞."""
+"""Plotting libraries fail beyond these values, so they count as 0 and ∞."""
 
 _EMPTY = (0.1, 10.0)
 """Range of an axis without a point."""
@@ -67,7 +67,7 @@ class Range(NamedTuple):
         return abs(value) <= _GREATEST and (value >= least or not self.axis.logarithmic)
 
     def place(self, value: float) -> float:
-        """Return where a value is drawn: one that the axis cannot show lies on the nearer edge."""
+        """Return the position of a value; a value that the axis cannot show is on an edge."""
         if self.has(value):
             return value
         return self.high if value > _GREATEST else self.low
@@ -75,16 +75,18 @@ class Range(NamedTuple):
 
 class Placed(NamedTuple):
     """
-    A point where it is drawn.
+    A point with its position in the diagram.
 
     Attributes
     ----------
     x, y
-        Where.
+        Its position.
     x_arms, y_arms
-        How far the quartiles are from it, below and above, both positive; 0 without quartiles.
+        Distances to the lower and the upper quartile, both positive; 0 without quartiles.
     on_edge
         Whether it stands for a value that the axis cannot show.
+    pale
+        Whether it is drawn pale: another point is better on both axes.
     text
         Its description, in lines.
 
@@ -95,12 +97,13 @@ class Placed(NamedTuple):
     x_arms: tuple[float, float]
     y_arms: tuple[float, float]
     on_edge: bool
+    pale: bool
     text: tuple[str, ...]
 
 
 class PlacedCurve(NamedTuple):
     """
-    A curve where it is drawn.
+    A curve with the positions of its points.
 
     Attributes
     ----------
@@ -108,11 +111,14 @@ class PlacedCurve(NamedTuple):
         The curve.
     points
         Its points; None where the line is broken.
+    named
+        The point beside which its name stands; None if no point is drawn.
 
     """
 
     curve: Curve
     points: tuple[Placed | None, ...]
+    named: Placed | None
 
     @property
     def within(self) -> list[Placed | None]:
@@ -127,22 +133,25 @@ class PlacedCurve(NamedTuple):
 
 class Places(NamedTuple):
     """
-    A diagram where it is drawn.
+    A diagram with the positions of its curves.
 
     Attributes
     ----------
     x, y
-        What its axes show.
+        Ranges of its axes.
     curves
         Its curves.
+    front
+        Its best points, in the order of x; empty if more is not worse.
     on_edge
-        What the marks on its edges stand for: '0', '∞', '0 or ∞'; '' where there are none.
+        Meaning of the marks on its edges: '0', '∞', '0 or ∞'; '' if there are none.
 
     """
 
     x: Range
     y: Range
     curves: tuple[PlacedCurve, ...]
+    front: tuple[Placed, ...]
     on_edge: str
 
     @property
@@ -152,7 +161,7 @@ class Places(NamedTuple):
 
 
 def places(diagram: Diagram) -> Places:
-    """Return where the points of a diagram are drawn."""
+    """Return the positions of the points of a diagram."""
     drawn = [
         [point for point in curve.points if not (isnan(point.x) or isnan(point.y))]
         for curve in diagram.curves
@@ -160,14 +169,37 @@ def places(diagram: Diagram) -> Places:
     points = [point for curve in drawn for point in curve]
     x = _range(diagram.x, [(point.x, point.x_spread) for point in points])
     y = _range(diagram.y, [(point.y, point.y_spread) for point in points])
-    curves = [
-        PlacedCurve(curve, tuple(_placed(diagram, curve, point, x, y) for point in curve.points))
-        for curve in diagram.curves
-    ]
-    return Places(x, y, tuple(curves), _without_place(points, x, y))
+    best = _front(points) if diagram.front else points
+    curves = []
+    for curve in diagram.curves:
+        placed = tuple(_placed(diagram, curve, point, x, y, best) for point in curve.points)
+        curves.append(PlacedCurve(curve, placed, _named(diagram, placed)))
+    shown = [point for curve in curves for point in curve.points if point and not point.pale]
+    front = sorted(shown, key=lambda point: point.x) if diagram.front else []
+    return Places(x, y, tuple(curves), tuple(front), _without_place(points, x, y))
 
 
-def _placed(diagram: Diagram, curve: Curve, point: Point, x: Range, y: Range) -> Placed | None:
+def _front(points: Sequence[Point]) -> list[Point]:
+    """Return the points for which no other is as good on both axes."""
+    best: list[Point] = []
+    for point in sorted(points, key=lambda point: (point.x, point.y)):
+        if not point.fails and point.y <= _GREATEST and (not best or point.y < best[-1].y):
+            best.append(point)
+    return best
+
+
+def _named(diagram: Diagram, placed: Sequence[Placed | None]) -> Placed | None:
+    """Return the point beside which a curve has its name: its first best one, or its last."""
+    shown = [point for point in placed if point is not None]
+    best = [point for point in shown if not point.pale]
+    if diagram.front and best:
+        return best[0]
+    return shown[-1] if shown else None
+
+
+def _placed(
+    diagram: Diagram, curve: Curve, point: Point, x: Range, y: Range, best: Sequence[Point]
+) -> Placed | None:
     if isnan(point.x) or isnan(point.y):
         return None
     on_edge = not (x.has(point.x) and y.has(point.y))
@@ -177,11 +209,12 @@ def _placed(diagram: Diagram, curve: Curve, point: Point, x: Range, y: Range) ->
         _arms(x, point.x, point.x_spread, on_edge),
         _arms(y, point.y, point.y_spread, on_edge),
         on_edge,
+        point not in best,
         (
             curve.name,
             *([point.setting] if point.setting else []),
-            _said(diagram.x, point.x, point.x_spread),
-            _said(diagram.y, point.y, point.y_spread),
+            _described(diagram.x, point.x, point.x_spread),
+            _described(diagram.y, point.y, point.y_spread),
         ),
     )
 
@@ -204,7 +237,7 @@ def _without_place(points: Iterable[Point], x: Range, y: Range) -> str:
     return ' or '.join(kind for kind, found in kinds.items() if found)
 
 
-def _said(axis: Axis, value: float, spread: Spread | None) -> str:
+def _described(axis: Axis, value: float, spread: Spread | None) -> str:
     text = number_text(value) if spread is None else spread_text(spread)
     return f'{axis.name}: {text} {axis.unit}'.rstrip()
 
@@ -224,7 +257,7 @@ def _range(axis: Axis, values: Sequence[tuple[float, Spread | None]]) -> Range:
     if not shown:
         return Range(axis, *_EMPTY)
     low, high = min(shown), max(shown)
-    # An edge on which something stands keeps away from what has a place.
+    # An edge with hollow marks keeps a distance from the other points.
     above = any(value > _GREATEST for value, _ in values)
     below = any(not unbounded.has(value) and value <= _GREATEST for value, _ in values)
     if not axis.logarithmic:
@@ -234,7 +267,7 @@ def _range(axis: Axis, values: Sequence[tuple[float, Spread | None]]) -> Range:
             low - _MARGIN * span * (1 + 2 * below),
             high + _MARGIN * span * (1 + 2 * above),
         )
-    # Not of their ratio: it may be beyond a double.
+    # The logarithm of their ratio could overflow.
     margin = max(_MARGIN * (log10(high) - log10(low)), _LEAST_MARGIN)
     return Range(
         axis,
@@ -253,7 +286,7 @@ def _all(values: Sequence[tuple[float, Spread | None]]) -> Iterable[float]:
 
 class Mark(NamedTuple):
     """
-    A mark, as both libraries name it.
+    A marker, by its names in both libraries.
 
     Attributes
     ----------
@@ -278,21 +311,21 @@ MARKS = (
 )
 
 DASHES = ('solid', 'dash', 'dot', 'dashdot')
-"""As plotly names them; matplotlib's names are another's."""
+"""Names of line styles in plotly."""
 
 
 class Style(NamedTuple):
     """
-    What a curve looks like. Seven colours and eight marks make 56 pairs that differ.
+    Style of a curve. Seven colours and eight markers make 56 different pairs.
 
     Attributes
     ----------
     colour
         As #rrggbb; black stands for the colour of the text.
     mark
-        What marks a point.
+        Marker of a point.
     dash
-        What its line is like; one of `DASHES`.
+        Line style; one of `DASHES`.
 
     """
 
@@ -307,10 +340,10 @@ Styles = dict[str, Style]
 
 def styles_of(results: Iterable[Results]) -> Styles:
     """
-    Return what each method looks like.
+    Return the style of each method.
 
-    In the order in which the pages tell of them, each takes the first look that no method has
-    with which it shares a diagram: so few looks serve many methods, and those are told apart best.
+    In the order of the pages, each method takes the first style that no other method of its
+    diagrams has. So a few styles, those that differ most, serve many methods.
     """
     diagrams = [
         [curve.name for curve in diagram.curves]

@@ -19,29 +19,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from importlib.util import find_spec
 import os
 from pathlib import Path
 import re
 import shutil
 
+from linkage_ros.accuracy import PARTS
+from linkage_ros.accuracy.answer import replies, reply
 from linkage_ros.accuracy.page.diagrams import Styles, styles_of
-from linkage_ros.accuracy.page.html import results_html
-from linkage_ros.accuracy.page.numbers import (
-    cell_text,
-    diagram_csv,
-    numeric_columns,
-    table_csv,
-)
+from linkage_ros.accuracy.page.html import field_html, results_html
+from linkage_ros.accuracy.page.numbers import diagram_csv, number_text, table_csv
 from linkage_ros.accuracy.page.svg import diagram_svg
-from linkage_ros.accuracy.results import Part, Results, Table
-from linkage_ros.errors import LinkageError
+from linkage_ros.accuracy.results import Diagram, Results
+from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.pages.markdown import filled, marks, table_lines
 
 PAGE = 'index.html'
-"""What a browser opens."""
+"""File that a browser opens."""
 
-_NEEDED = ('matplotlib', 'plotly')
 _KEY = re.compile(r'[a-z0-9_]+')
 
 
@@ -52,31 +47,30 @@ def check_folder(folder: Path) -> None:
     Raises
     ------
     LinkageError
-        Where the folder exists, or what draws is not installed.
+        If the folder exists, or a plotting library is not installed.
 
     """
-    for name in _NEEDED:
-        if find_spec(name) is None:
-            raise LinkageError(name, 'is not installed', 'pip install linkage_ros[report]')
+    check_installed('matplotlib')
+    check_installed('plotly')
     if os.path.lexists(folder):
         raise LinkageError(folder, 'exists already', 'name a new folder; nothing is overwritten')
 
 
 def write_page(results: Results, folder: Path) -> None:
     """
-    Write a page: the folder is there when all has been written, or not at all.
+    Write a page: its folder appears complete, or not at all.
 
     Parameters
     ----------
     results
-        What it tells.
+        The results.
     folder
-        Where it goes. It is made here; one that exists is never touched.
+        Folder of the page. It is created; an existing one is never changed.
 
     Raises
     ------
     LinkageError
-        Where the folder exists or cannot be written, or what draws is not installed.
+        If the folder exists or cannot be written, or a plotting library is not installed.
 
     """
     check_folder(folder)
@@ -105,9 +99,9 @@ def page_files(results: Results) -> dict[str, bytes]:
     Raises
     ------
     LinkageError
-        Where what draws is not installed.
+        If a plotting library is not installed.
     ValueError
-        A key is no name of a file, or two parts have the same.
+        If a key is not a valid file name, or two parts have the same key.
 
     """
     diagrams = [diagram for part in results.parts for diagram in part.diagrams]
@@ -132,80 +126,132 @@ def _check_keys(keys: list[str]) -> None:
 
 
 _MARK = 'measured'
+_SHOWN = (0.1, 1e-2, 1e-3, 1e-6, 1e-12)
+"""Wanted accuracies in the table of the page, in [rad]."""
 
 
 def write_markdown(results: Sequence[Results], page: Path) -> None:
     """
-    Write a page of Markdown, and its pictures into a folder of the page's name.
+    Write a page of Markdown, and a folder of the page's name with its pictures and tables.
+
+    The page has the answers and for each part its headlines, with the picture of the first scene
+    that has one. The method of measurement is written to ``method.md`` in the folder.
 
     Parameters
     ----------
     results
-        Of some scenes, which have different names.
+        Results of scenes with different names.
     page
-        Where it goes. If it exists and has the marks ``measured``, only the text between them is
-        replaced.
+        The page. If it exists and has the marks ``measured``, only the text between them is
+        replaced; likewise that of the method.
 
     Raises
     ------
     LinkageError
-        Where matplotlib is not installed.
+        If matplotlib is not installed.
 
     """
     styles = styles_of(results)
-    pictures = page.with_suffix('')
-    text = '\n'.join(line for each in results for line in _scene(each, pictures.name))
-    old = page.read_text('utf-8') if page.exists() else f'{"".join(marks(_MARK))}\n'
+    folder = page.with_suffix('')
     for each in results:
-        _draw(each, styles, pictures / _folder(each))
-    page.write_text(filled(old, _MARK, text), 'utf-8')
+        _write_files(each, styles, folder / _folder(each))
+    for file, lines in (
+        (page, _page(results, folder.name)),
+        (folder / 'method.md', _method(results)),
+    ):
+        old = file.read_text('utf-8') if file.exists() else f'{"".join(marks(_MARK))}\n'
+        file.write_text(filled(old, _MARK, '\n'.join(lines)), 'utf-8')
 
 
-def _draw(results: Results, styles: Styles, folder: Path) -> None:
+def _write_files(results: Results, styles: Styles, folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for part in results.parts:
         for diagram in part.diagrams:
             (folder / f'{diagram.key}.svg').write_bytes(diagram_svg(diagram, styles))
+        for table in part.tables:
+            (folder / f'{table.key}.csv').write_text(table_csv(table), 'utf-8')
 
 
-def _scene(results: Results, pictures: str) -> Iterator[str]:
-    yield f'## {_escaped(results.scene)}'
+def _page(results: Sequence[Results], folder: str) -> Iterator[str]:
+    yield from (f'- **{_escaped(each.scene)}**{_tail(each)}' for each in results)
     yield ''
-    yield f'{_escaped(", ".join(f"{name} {value}" for name, value in results.machine))}.'
-    yield ''
-    for part in results.parts:
-        yield from _part(part, f'{pictures}/{_folder(results)}')
-    advised = [part for part in results.parts if part.advice]
-    if advised:
-        yield '### What to take'
+    parts = {part.key: part.title for each in results for part in each.parts}
+    keys = sorted(parts, key=PARTS.index)
+    solved = next((each for each in results if replies(each)), None)
+    if solved is not None:
+        yield from _picture(solved, solved.parts[0].diagrams[0], folder)
+        heads = ('accuracy', 'write into the scene', 'a tick costs', 'tick rates that use it')
+        answers = replies(solved)
+        rows = (
+            (f'{number_text(wanted)} rad', *map(_escaped, reply(answers, wanted)[1:]))
+            for wanted in _SHOWN
+        )
+        yield f'What to take for {_escaped(solved.scene)}:'
         yield ''
-        for part in advised:
-            yield f'{_escaped(part.title)}:'
-            yield from (f'- {_escaped(advice)}' for advice in part.advice)
+        yield from table_lines(heads, rows)
+        yield ''
+        yield field_html({each.scene: replies(each) for each in results if replies(each)})
+        yield ''
+    for key in keys:
+        yield f'## {_escaped(parts[key])}'
+        yield ''
+        yield from _part(results, key, folder)
+
+
+def _tail(results: Results) -> str:
+    """Return the headline behind the name of the scene."""
+    return _escaped(results.headline.removeprefix(results.scene))
+
+
+def _part(results: Sequence[Results], key: str, folder: str) -> Iterator[str]:
+    """Yield a part: the headlines of all scenes, the picture and the sentences of one."""
+    found = [(each, part) for each in results for part in each.parts if part.key == key]
+    yield from (f'- {_escaped(each.scene)}: {_escaped(part.headline)}' for each, part in found)
+    yield ''
+    shown, part = next((one for one in found if one[1].diagrams), found[0])
+    # The first picture of the first part stands at the head of the page.
+    first = min(len(part.diagrams) - 1, 1) if part is shown.parts[0] else 0
+    if part.diagrams:
+        yield from _picture(shown, part.diagrams[first], folder)
+    if part.sentences:
+        yield _escaped(f'{shown.scene}: {" ".join(part.sentences)}')
+        yield ''
+    for each, one in found:
+        place = f'{folder}/{_folder(each)}'
+        files = [f'[{diagram.key}.svg]({place}/{diagram.key}.svg)' for diagram in one.diagrams]
+        files += [f'[{table.key}.csv]({place}/{table.key}.csv)' for table in one.tables]
+        if files:
+            yield f'Files of {_escaped(each.scene)}: {", ".join(files)}.'
             yield ''
 
 
-def _part(part: Part, pictures: str) -> Iterator[str]:
-    yield f'### {_escaped(part.title)}'
+def _picture(results: Results, diagram: Diagram, folder: str) -> Iterator[str]:
+    yield f'![{_escaped(diagram.title)}]({folder}/{_folder(results)}/{diagram.key}.svg)'
     yield ''
-    for paragraph in part.text:
-        yield _escaped(paragraph)
-        yield ''
-    for diagram in part.diagrams:
-        yield f'![{_escaped(diagram.title)}]({pictures}/{diagram.key}.svg)'
-        yield ''
-    for table in part.tables:
-        yield from _table(table)
 
 
-def _table(table: Table) -> Iterator[str]:
-    numbers = numeric_columns(table)
-    yield f'{_escaped(table.title)}:'
+def _method(results: Sequence[Results]) -> Iterator[str]:
+    """Yield the method of each part, and the machine of each scene."""
+    for key in sorted({part.key for each in results for part in each.parts}, key=PARTS.index):
+        scene, part = next(
+            (each, part) for each in results for part in each.parts if part.key == key
+        )
+        yield f'## {_escaped(part.title)}'
+        yield ''
+        for paragraph in part.method:
+            yield _escaped(paragraph)
+            yield ''
+        if part.advice:
+            yield f'For {_escaped(scene.scene)}:'
+            yield ''
+            yield from (f'- {_escaped(advice)}' for advice in part.advice)
+            yield ''
+    yield '## Machine'
     yield ''
-    rows = ([_escaped(cell_text(cell)) for cell in row] for row in (table.columns, *table.rows))
-    yield from table_lines(next(rows), rows, numbers)
-    yield ''
+    for each in results:
+        machine = ', '.join(f'{name} {value}' for name, value in each.machine)
+        yield f'- {_escaped(each.scene)}: {_escaped(machine)}'
 
 
 def _folder(results: Results) -> str:

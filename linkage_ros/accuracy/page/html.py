@@ -19,16 +19,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
+import json
 from math import log10
 from textwrap import wrap
 from typing import Any
 
-from linkage_ros.accuracy.page.diagrams import Placed, places, Range, Style, Styles
+from linkage_ros.accuracy.answer import replies, Reply
+from linkage_ros.accuracy.page.diagrams import (
+    Placed,
+    PlacedCurve,
+    places,
+    Range,
+    Style,
+    Styles,
+)
 from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
 from linkage_ros.accuracy.results import Diagram, Part, Results, Table
 from linkage_ros.pages.document import document, facts_html, picture, table_html
 
-_ADVICE = 'What to take'
 _HERE = 'linkage_ros.accuracy.page'
 
 
@@ -39,23 +47,24 @@ def results_html(results: Results, styles: Styles, pictures: Mapping[str, bytes]
     Parameters
     ----------
     results
-        What it tells.
+        The results.
     styles
-        What each method looks like.
+        Style of each method.
     pictures
-        The diagrams as SVG, by their keys; for print, and for where no script runs.
+        The diagrams as SVG, by their keys; for print, and for browsers without scripts.
 
     Raises
     ------
     LinkageError
-        Where plotly is not installed.
+        If plotly is not installed.
 
     """
     title = title_of(results)
     diagrams = [diagram for part in results.parts for diagram in part.diagrams]
     data = {'diagrams': {diagram.key: plot(diagram, styles) for diagram in diagrams}}
     body = _body(title, results, pictures)
-    return document(title, body, data, [(_HERE, 'page.css')], [(_HERE, 'page.js')])
+    scripts = [(_HERE, 'page.js'), (_HERE, 'field.js')]
+    return document(title, body, data, [(_HERE, 'page.css')], scripts)
 
 
 def title_of(results: Results) -> str:
@@ -65,36 +74,52 @@ def title_of(results: Results) -> str:
 
 def _body(title: str, results: Results, pictures: Mapping[str, bytes]) -> Iterator[str]:
     yield f'<header><h1>{escape(title)}</h1>'
-    yield from facts_html(results.machine)
-    advised = [part for part in results.parts if part.advice]
-    yield '<nav aria-label="Parts"><ul>'
-    for part in results.parts:
-        yield f'<li><a href="#{escape(part.key)}">{escape(part.title)}</a></li>'
-    if advised:
-        yield f'<li><a href="#advice">{_ADVICE}</a></li>'
-    yield '</ul></nav></header>'
+    yield f'<p class="headline">{escape(results.headline)}</p></header>'
     yield '<main>'
+    first = next((part.diagrams[0] for part in results.parts if part.diagrams), None)
+    if first is not None:
+        yield from _diagram(first, pictures[first.key])
+    answers = replies(results)
+    if answers:
+        yield field_html({results.scene: answers})
     for part in results.parts:
-        yield from _part(part, pictures)
-    if advised:
-        yield f'<section id="advice"><h2>{_ADVICE}</h2>'
-        yield '<div class="advice">'
-        for part in advised:
-            yield f'<h3>{escape(part.title)}</h3>'
-            yield '<ul>'
-            yield from (f'<li>{escape(advice)}</li>' for advice in part.advice)
-            yield '</ul>'
-        yield '</div></section>'
-    yield '</main>'
+        yield from _part(part, [each for each in part.diagrams if each is not first], pictures)
+    yield '</main><footer>'
+    yield from facts_html(results.machine)
+    yield '</footer>'
 
 
-def _part(part: Part, pictures: Mapping[str, bytes]) -> Iterator[str]:
+def field_html(answers: Mapping[str, Sequence[Reply]]) -> str:
+    """
+    Return the field for a wanted accuracy, which field.js fills with its input and answers.
+
+    Parameters
+    ----------
+    answers
+        The answers by scene.
+
+    """
+    data = {scene: [each._asdict() for each in some] for scene, some in answers.items()}
+    return f'<div class="wanted" data-replies="{escape(json.dumps(data, allow_nan=False))}"></div>'
+
+
+def _part(part: Part, diagrams: Sequence[Diagram], pictures: Mapping[str, bytes]) -> Iterator[str]:
     yield f'<section id="{escape(part.key)}"><h2>{escape(part.title)}</h2>'
-    yield from (f'<p>{escape(paragraph)}</p>' for paragraph in part.text)
-    for diagram in part.diagrams:
+    yield f'<p class="headline">{escape(part.headline)}</p>'
+    for diagram in diagrams[:1]:
         yield from _diagram(diagram, pictures[diagram.key])
-    for table in part.tables:
-        yield from _table(table)
+    if part.sentences:
+        yield f'<p>{escape(" ".join(part.sentences))}</p>'
+    if part.method or part.tables:
+        yield '<details><summary>What to take, how it was measured, tables and CSV</summary>'
+        if part.advice:
+            yield f'<ul>{"".join(f"<li>{escape(each)}</li>" for each in part.advice)}</ul>'
+        yield from (f'<p>{escape(paragraph)}</p>' for paragraph in part.method)
+        for diagram in diagrams[1:]:
+            yield from _diagram(diagram, pictures[diagram.key])
+        for table in part.tables:
+            yield from _table(table)
+        yield '</details>'
     yield '</section>'
 
 
@@ -122,28 +147,28 @@ _NAME_LETTERS, _HOVER_LETTERS = 28, 48
 _ENTITIES = str.maketrans({letter: f'&#{ord(letter)};' for letter in '&<>$'})
 
 _SLACK = 1e-6
-"""By so much of its length an axis is longer: Plotly leaves out what rounding puts beyond it."""
+"""Relative extension of an axis: Plotly omits points that rounding puts beyond its end."""
 
 
 def plot(diagram: Diagram, styles: Styles) -> dict[str, Any]:
-    """Return a diagram as page.js takes it."""
+    """Return a diagram in the form that page.js reads."""
     placed = places(diagram)
     traces = []
     for curve in placed.curves:
         style = styles[curve.curve.name]
-        name = _lines([curve.curve.name], _NAME_LETTERS)
         joined = curve.curve.joined and len(curve.points) > 1
-        within = any(curve.within) or not curve.on_edge
-        if within:
-            traces.append(_trace(name, curve.within, style, joined=joined))
+        if any(curve.within) or not curve.on_edge:
+            traces.append(_trace(curve.within, style, joined=joined))
         if curve.on_edge:
-            traces.append(_on_edge(_trace(name, curve.on_edge, style, joined=False), within))
+            traces.append(_on_edge(_trace(curve.on_edge, style, joined=False)))
     return {
         'title': diagram.title,
         'x': _axis(placed.x),
         'y': _axis(placed.y),
         'empty': placed.empty,
         'traces': traces,
+        'names': [_name(curve, styles) for curve in placed.curves if curve.named],
+        'front': [[point.x for point in placed.front], [point.y for point in placed.front]],
     }
 
 
@@ -158,20 +183,24 @@ def _axis(shown: Range) -> dict[str, Any]:
     }
 
 
-def _trace(
-    name: str,
-    points: Sequence[Placed | None],
-    style: Style,
-    *,
-    joined: bool,
-) -> dict[str, Any]:
+def _name(curve: PlacedCurve, styles: Styles) -> dict[str, Any]:
+    assert curve.named is not None, 'a curve that is not drawn has no name'
     return {
-        'name': name,
-        'in_legend': True,
+        'lines': [_escaped(line) for line in wrap(curve.curve.name, _NAME_LETTERS)],
+        'x': curve.named.x,
+        'y': curve.named.y,
+        'colour': styles[curve.curve.name].colour,
+        'pale': curve.named.pale,
+    }
+
+
+def _trace(points: Sequence[Placed | None], style: Style, *, joined: bool) -> dict[str, Any]:
+    return {
         'x': [point and point.x for point in points],
         'y': [point and point.y for point in points],
         'x_arms': _arms([point and point.x_arms for point in points]),
         'y_arms': _arms([point and point.y_arms for point in points]),
+        'pale': [bool(point and point.pale) for point in points],
         'text': ['' if point is None else _hover(point) for point in points],
         'colour': style.colour,
         'symbol': style.mark.plotly,
@@ -181,10 +210,9 @@ def _trace(
     }
 
 
-def _on_edge(trace: dict[str, Any], named: bool) -> dict[str, Any]:
-    """Return the hollow marks of a curve, which may have other marks that name it."""
-    symbol = f'{trace["symbol"]}-open'
-    return {**trace, 'symbol': symbol, 'in_legend': not named, 'on_edge': True}
+def _on_edge(trace: dict[str, Any]) -> dict[str, Any]:
+    """Return the hollow marks of a curve."""
+    return {**trace, 'symbol': f'{trace["symbol"]}-open', 'on_edge': True}
 
 
 def _arms(arms: Sequence[tuple[float, float] | None]) -> list[list[float]]:

@@ -29,18 +29,15 @@ import io
 from math import ceil, floor, inf, isfinite, log10
 from numbers import Integral, Real
 
-from linkage_ros.accuracy.results import Diagram, Table
+from linkage_ros.accuracy.results import Cell, Diagram, Table
 from linkage_ros.measuring import Spread
 
-Cell = float | int | str | Spread | None
-"""What a table holds."""
-
 _SMALL, _LARGE = 1e-3, 1e6
-"""Beyond these a number has an exponent."""
+"""Smaller and larger numbers are written with an exponent."""
 
 _DIGITS = 3
 _MOST_DIGITS = 4
-"""However close the quartiles are."""
+"""Maximum number of digits, even if the quartiles are closer."""
 
 
 def cell_text(cell: Cell) -> str:
@@ -71,9 +68,9 @@ def number_text(value: float | Integral) -> str:
 
 def spread_text(spread: Spread) -> str:
     """
-    Return median and quartiles, with the digits that the quartiles leave.
+    Return median and quartiles, with as many digits as distinguish the quartiles.
 
-    Where all three are the same, as of a single measurement, it is that number alone.
+    If all three are equal, as for a single measurement, return that number alone.
     """
     if spread.low == spread.middle == spread.high:
         return number_text(spread.middle)
@@ -85,10 +82,10 @@ def spread_text(spread: Spread) -> str:
     if not _SMALL <= largest < _LARGE:
         near = abs(spread.middle) > _SMALL * largest
         exponent = _power(spread.middle if near else largest)
-    # As decimals: of the least double no power of ten is left to divide by.
+    # As decimals: the smallest double cannot be divided by its power of ten.
     scaled = [float(Decimal(value).scaleb(-exponent)) for value in spread]
     decimals = _decimals(*scaled)
-    # A negative zero is what rounding makes of a small loss.
+    # Rounding makes a negative zero of a small negative number.
     low, middle, high = (f'{round(value, decimals) + 0.0:.{decimals}f}' for value in scaled)
     text = f'{middle} ({_range(low, high)})'
     return f'{text}e{exponent}' if exponent else text

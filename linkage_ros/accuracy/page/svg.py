@@ -13,12 +13,13 @@
 # limitations under the License.
 
 
-"""A diagram as SVG, drawn by matplotlib: for print, and where no script runs."""
+"""A diagram as SVG, drawn by matplotlib: for print, and for browsers without scripts."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from io import BytesIO
+from itertools import pairwise
 from math import ceil, floor, log10, nan
 from textwrap import wrap
 from typing import Any
@@ -34,15 +35,15 @@ from linkage_ros.accuracy.page.diagrams import (
     Styles,
 )
 from linkage_ros.accuracy.results import Diagram
-from linkage_ros.drawing.painting import INK, settings
+from linkage_ros.drawing.painting import INK, Label, place_labels, settings
 
 _MOST = 8
 _SLACK = 1e-9
-"""Of a step: what rounding may take from an end of the axis."""
+"""Rounding error of an end of the axis, relative to a step."""
 
 _SUPERSCRIPT = str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹')
 _PLAIN = (-2, 4)
-"""Powers of ten that are written out."""
+"""Lowest and highest power of ten that is written out."""
 
 
 def ticks(shown: Range) -> list[tuple[float, str]]:
@@ -90,19 +91,24 @@ def _text(value: float) -> str:
     return _power(exponent) if digit == 1 else f'{digit}·{_power(exponent)}'
 
 
-_WIDTH = 7.2
-_LEAST_HEIGHT, _FRAME = 4.0, 0.9
-"""Of the picture, and of what it has beside its legend, in inches."""
+_WIDTH, _HEIGHT = 6.0, 4.2
+"""Size of the picture, in inches."""
 
-_TITLE_LETTERS, _NAME_LETTERS = 78, 26
-_NAME_LINE = 0.165
-"""Height of a line in the legend, in inches."""
+_TITLE_LETTERS, _NAME_LETTERS = 66, 26
+_FONT, _LETTER, _LINE = 8.0, 0.55, 1.2
+"""Size of a name, in points; width and height of a letter, as a part of it."""
+
+_PARTS = 6
+"""Parts of a line between whose ends no name should stand."""
+
+_PALE = 0.3
+"""Opacity of a point that is worse than another on both axes."""
 
 _LINES: dict[str, Any] = dict(
     zip(DASHES, ('solid', (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5))), strict=True)
 )
 _MOST_MARKS = 40
-"""On a curve; of more, every so manieth has one."""
+"""Maximum number of markers on a curve."""
 
 
 def diagram_svg(diagram: Diagram, styles: Styles) -> bytes:
@@ -112,7 +118,7 @@ def diagram_svg(diagram: Diagram, styles: Styles) -> bytes:
     Raises
     ------
     LinkageError
-        Where matplotlib is not installed.
+        If matplotlib is not installed.
 
     """
     context = settings()
@@ -120,17 +126,13 @@ def diagram_svg(diagram: Diagram, styles: Styles) -> bytes:
 
     placed = places(diagram)
     with context:
-        names = ['\n'.join(wrap(curve.curve.name, _NAME_LETTERS)) for curve in placed.curves]
-        lines = sum(name.count('\n') + 1 for name in names)
-        figure = Figure(
-            figsize=(_WIDTH, max(_LEAST_HEIGHT, _FRAME + lines * _NAME_LINE)), layout='constrained'
-        )
+        figure = Figure(figsize=(_WIDTH, _HEIGHT), layout='constrained')
         axes = figure.subplots()
         _set_axes(axes, placed)
         for number, curve in enumerate(placed.curves):
             style = styles[curve.curve.name]
             _draw(axes, curve.within, style, joined=curve.curve.joined,
-                  gid=f'curve_{number + 1}', name=_plain(names[number]))  # fmt: skip
+                  gid=f'curve_{number + 1}')  # fmt: skip
             _draw_on_edge(
                 axes,
                 curve.on_edge,
@@ -138,15 +140,18 @@ def diagram_svg(diagram: Diagram, styles: Styles) -> bytes:
                 styles[curve.curve.name].colour,
             )
         if placed.on_edge:
-            # Only for the legend.
-            _draw_on_edge(axes, [_NOWHERE], 'o', '0.4', f'hollow: {placed.on_edge}')
-        if placed.curves:
-            figure.legend(
-                loc='outside right upper', frameon=False, fontsize=8.0, handlelength=2.4,
-                labelspacing=0.35, borderaxespad=0.2,
-            )  # fmt: skip
+            axes.text(1.0, 1.0, f'hollow, on the edge: {placed.on_edge}', ha='right', va='bottom',
+                      transform=axes.transAxes, color=INK)  # fmt: skip
+        axes.step(
+            [point.x for point in placed.front], [point.y for point in placed.front],
+            where='post', color=INK, linewidth=0.9, zorder=1.5, clip_on=False,
+        )  # fmt: skip
         title = '\n'.join(wrap(diagram.title, _TITLE_LETTERS))
         figure.suptitle(_plain(title), x=0.01, ha='left', fontsize=10.0, color=INK)
+        figure.draw_without_rendering()
+        # Names are placed in this layout; they must not change it.
+        figure.set_layout_engine('none')
+        _write_names(axes, placed, styles)
         stored = BytesIO()
         about = {'Date': None, 'Creator': 'linkage_ros', 'Title': diagram.title}
         with catch_warnings():
@@ -182,43 +187,97 @@ def _set_axis(axis: Any, shown: Range) -> None:
     axis.set_minor_locator(NullLocator())
 
 
-def _draw(
-    axes: Any, points: list[Placed | None], style: Style, *, joined: bool, gid: str, name: str
-) -> None:
+def _draw(axes: Any, points: list[Placed | None], style: Style, *, joined: bool, gid: str) -> None:
     where: list[Any] = [point or _NOWHERE for point in points] or [_NOWHERE]
     xs, ys = [point.x for point in where], [point.y for point in where]
+    pale = any(point.pale for point in where)
     axes.errorbar(
         xs, ys,
         xerr=[[point.x_arms[side] for point in where] for side in (0, 1)],
         yerr=[[point.y_arms[side] for point in where] for side in (0, 1)],
         fmt='none', ecolor=style.colour, elinewidth=0.8, clip_on=False,
+        alpha=_PALE if pale else 1.0,
     )  # fmt: skip
+    look: dict[str, Any] = {
+        'color': style.colour,
+        'marker': style.mark.matplotlib,
+        'markersize': 7.0 if style.mark.matplotlib == '*' else 4.8,
+        'markeredgewidth': 0.0,
+        'clip_on': False,
+    }
     (line,) = axes.plot(
         xs, ys,
-        color=style.colour,
-        marker=style.mark.matplotlib,
-        markersize=7.0 if style.mark.matplotlib == '*' else 4.8,
-        markeredgewidth=0.0,
         markevery=max(1, len(where) // _MOST_MARKS),
         linestyle=_LINES[style.dash] if joined and len(where) > 1 else 'none',
         linewidth=1.3,
-        label=name,
-        clip_on=False,
+        alpha=_PALE if pale else 1.0,
+        **look,
     )  # fmt: skip
     line.set_gid(gid)
+    best = [point for point in points if point and pale and not point.pale]
+    axes.plot([point.x for point in best], [point.y for point in best], linestyle='none', **look)
 
 
-def _draw_on_edge(
-    axes: Any, points: list[Placed], mark: str, colour: str, name: str = '_nolegend_'
-) -> None:
-    axes.plot(
-        [point.x for point in points], [point.y for point in points],
-        linestyle='none', marker=mark, markersize=6.0, markerfacecolor='white',
-        markeredgecolor=colour, markeredgewidth=1.1, clip_on=False, zorder=4, label=name,
-    )  # fmt: skip
+def _draw_on_edge(axes: Any, points: list[Placed], mark: str, colour: str) -> None:
+    for point in points:
+        axes.plot(
+            point.x, point.y,
+            linestyle='none', marker=mark, markersize=6.0, markerfacecolor='white',
+            markeredgecolor=colour, markeredgewidth=1.1, clip_on=False, zorder=4,
+            alpha=_PALE if point.pale else 1.0,
+        )  # fmt: skip
 
 
-_NOWHERE = Placed(nan, nan, (0.0, 0.0), (0.0, 0.0), on_edge=False, text=())
+def _write_names(axes: Any, placed: Places, styles: Styles) -> None:
+    """Write each name beside its point, where it hides least."""
+    curves = [curve for curve in placed.curves if curve.named]
+    curves.sort(key=lambda curve: bool(curve.named and curve.named.pale))
+    names = ['\n'.join(wrap(curve.curve.name, _NAME_LETTERS)) for curve in curves]
+    unit = axes.figure.dpi / 72.0 * _FONT
+
+    def place(point: Placed) -> complex:
+        return complex(*axes.transData.transform((point.x, point.y)))
+
+    labels = [
+        Label(
+            (place(curve.named),),
+            _LETTER * unit * max(map(len, name.split('\n'))),
+            _LINE * unit * (name.count('\n') + 1),
+            0.6 * unit,
+        )
+        for curve, name in zip(curves, names, strict=True)
+        if curve.named
+    ]
+    obstacles = [place(point) for curve in placed.curves for point in curve.points if point]
+    lines = [
+        pair
+        for curve in placed.curves
+        if curve.curve.joined
+        for pair in pairwise(place(point) for point in curve.points if point)
+    ]
+    for one, other in pairwise(map(place, placed.front)):
+        corner = complex(other.real, one.imag)
+        lines += [(one, corner), (corner, other)]
+    for one, other in lines:
+        obstacles += [one + part / _PARTS * (other - one) for part in range(1, _PARTS)]
+    frame = axes.get_window_extent()
+    found = place_labels(labels, obstacles, (complex(*frame.p0), complex(*frame.p1)))
+    for curve, name, label, (centre, anchor) in zip(curves, names, labels, found, strict=True):
+        pale = curve.named is not None and curve.named.pale
+        colour = styles[curve.curve.name].colour
+        to_data = axes.transData.inverted().transform
+        axes.annotate(
+            _plain(name),
+            to_data((anchor.real, anchor.imag)),
+            to_data((centre.real, centre.imag)),
+            ha='center', va='center', fontsize=_FONT, color=colour, annotation_clip=False,
+            alpha=0.7 if pale else 1.0, fontweight='normal' if pale else 'bold',
+            arrowprops={'arrowstyle': '-', 'color': colour, 'linewidth': 0.5, 'alpha': 0.5}
+            if abs(centre - anchor) > 0.5 * label.width + 2.0 * unit else None,
+        )  # fmt: skip
+
+
+_NOWHERE = Placed(nan, nan, (0.0, 0.0), (0.0, 0.0), on_edge=False, pale=False, text=())
 
 
 def _plain(text: str) -> str:

@@ -1,5 +1,10 @@
 /* Copyright 2026 The linkage_ros authors. Licensed under the Apache License, Version 2.0. */
-/* The linkage on a canvas: the shapes of `linkage draw`, moved with the links that carry them. */
+/*
+ * The linkage on a canvas: the shapes of `linkage draw`, moved with the links that carry them.
+ *
+ * `Linkage` has recorded poses. A canvas needs of it only `drawn`, `times`, `reach`, `place` and
+ * `hasPose`, so a page that computes its poses draws them here, too.
+ */
 
 const Picture = (() => {
   const TRAIL = 1.0; // s: how long a traced point leaves a strong line behind

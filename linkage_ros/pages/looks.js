@@ -1,10 +1,11 @@
 /* Copyright 2026 The linkage_ros authors. Licensed under the Apache License, Version 2.0. */
-/* What the picture and all plots have in common: colours, edges, axes, and how numbers are told. */
+/* What all pictures and plots share: colours, margins, axes, legends, and numbers as text. */
 
 const Looks = (() => {
   const MARGIN = { l: 66, r: 14, t: 12, b: 50 };
   const NARROW_MARGIN = { l: 54, r: 8, t: 10, b: 44 };
   const LEGEND_ROW = 22;
+  const LETTER = 6.6; // pixels: mean width at 12 pixels
   const LONGEST = 36; // letters of a name in a plot; the tables have all of them
   const DASHES = ['solid', 'dash', 'dot', 'dashdot'];
   // Of the same hue, and bright enough for dark paper.
@@ -14,17 +15,14 @@ const Looks = (() => {
     '#009E73': '#2fc49b',
     '#56B4E9': '#a6dbfa',
   };
-  const DURATIONS = /^(lateness|age)$/;
   const { data } = Page;
-  const dark = matchMedia('(prefers-color-scheme: dark)');
-  const paper = matchMedia('print');
   const places = new Map();
-  for (const plot of data.plots) {
-    if (DURATIONS.test(plot.key)) continue;
-    for (const { name } of plot.curves) if (!places.has(name)) places.set(name, places.size);
+
+  /** Give each name a colour of its own, in this order. */
+  function order(names) {
+    for (const name of names) if (!places.has(name)) places.set(name, places.size);
   }
 
-  const isDark = () => dark.matches && !paper.matches;
   const isNarrow = (width) => width < Page.NARROW;
   const margin = (width) => (isNarrow(width) ? NARROW_MARGIN : MARGIN);
   const shown = (number) => Number(number.toPrecision(9)).toString();
@@ -34,7 +32,7 @@ const Looks = (() => {
   function colour(i, ink) {
     const own = data.colours[i % data.colours.length];
     if (own === '#000000') return ink;
-    return isDark() ? ON_DARK[own] ?? own : own;
+    return Page.isDark() ? ON_DARK[own] ?? own : own;
   }
 
   /** Return colour and dashes of a joint, the same in all plots; the first has the ink's. */
@@ -66,7 +64,7 @@ const Looks = (() => {
 
   /** Return the part of a layout that is about the legend, and how high it is. */
   function legend(names, width) {
-    const letters = names.map((name) => 48 + 6.6 * short(name).length);
+    const letters = names.map((name) => 48 + LETTER * short(name).length);
     const across = Math.max(1, Math.floor((width - 70) / Math.max(1, ...letters)));
     const height = LEGEND_ROW * Math.ceil(names.length / across) + 6;
     return [height, {
@@ -86,7 +84,7 @@ const Looks = (() => {
   }
 
   return {
-    DURATIONS, colour, duration, isDark, isNarrow, label, legend, line, margin, paper, shown, timeAxis,
+    LETTER, colour, duration, isNarrow, label, legend, line, margin, order, short, shown, timeAxis,
     when,
   };
 })();

@@ -1,5 +1,5 @@
 /* Copyright 2026 The linkage_ros authors. Licensed under the Apache License, Version 2.0. */
-/* Curves as the page holds them, and as few points of them as a plot has room for. */
+/* Curves as a page holds them, reduced to as many points as a plot has room for. */
 
 const Curves = (() => {
   const USUAL = 5; // times as far apart as rows are: there is nothing between them
@@ -50,6 +50,20 @@ const Curves = (() => {
     return [one, other];
   }
 
+  /** Return a column of angles without the steps of a turn. */
+  function unwrapped([first, second]) {
+    const parts = first === second ? [first.slice()] : [first.slice(), second.slice()];
+    let last = NaN;
+    for (let i = 0; i < first.length; i++) {
+      for (const values of parts) {
+        if (!Number.isFinite(values[i])) continue;
+        if (!Number.isNaN(last)) values[i] += Angles.wrap(values[i] - last) - (values[i] - last);
+        last = values[i];
+      }
+    }
+    return [parts[0], parts[parts.length - 1]];
+  }
+
   class Level {
     constructor(begins, ends, columns) {
       this.begins = begins;
@@ -83,16 +97,27 @@ const Curves = (() => {
         return [first, said.second ? unpacked(said.second[i], Float64Array) : first];
       });
       this.rows = said.rows;
+      this.unwrapped = new Map();
       this.level = new Level(begins, ends, columns);
       const span = begins.length ? ends[ends.length - 1] - begins[0] : 0;
       this.usual = span / Math.max(1, said.of - 1);
       this.apart = Math.max(USUAL * this.usual, 2e-3);
     }
 
+    /** Return the finest level of a column, and its number there; angles without steps of a turn. */
+    continuous(column) {
+      if (!this.unwrapped.has(column)) {
+        const { begins, ends, columns } = this.level;
+        this.unwrapped.set(column, new Level(begins, ends, [unwrapped(columns[column])]));
+      }
+      return [this.unwrapped.get(column), 0];
+    }
+
     /** Return how far the values of a column are from each other. */
-    span(column) {
+    span(column, unwrap) {
+      const [level, number] = unwrap ? this.continuous(column) : [this.level, column];
       let [low, high] = [Infinity, -Infinity];
-      for (const values of this.level.columns[column]) {
+      for (const values of level.columns[number]) {
         for (const value of values) {
           if (value < low) low = value;
           if (value > high) high = value;
@@ -102,11 +127,16 @@ const Curves = (() => {
     }
 
     /**
-     * Return a column from a time to another, in about so many intervals: x, y, and for what
-     * stands for several rows what it stands for.
+     * Return a part of a column.
+     *
+     * `from`, `to`: its times; `most`: in about so many intervals. `angle`: for angles whether they
+     * jump by a turn in the record (`recorded`), and whether they shall here (`wrapped`). Returns
+     * x, y and, for a point of an interval of several rows, the interval's extremes and times.
      */
-    part(column, from, to, most, wraps) {
-      let level = this.level;
+    part(column, from, to, most, angle = {}) {
+      const { recorded = false, wrapped = false } = angle;
+      const fold = wrapped && !recorded;
+      let [level, at] = recorded && !wrapped ? this.continuous(column) : [this.level, column];
       let rows = this.rows;
       let first;
       let last;
@@ -127,7 +157,7 @@ const Curves = (() => {
       };
       const tear = (x) => put(x, NaN, null);
       const take = (held, i, of) => {
-        const [one, other] = [held.columns[column][0][i], held.columns[column][1][i]];
+        let [one, other] = [held.columns[at][0][i], held.columns[at][1][i]];
         const [begin, until] = [held.begins[i], held.ends[i]];
         const torn = until - begin > this.apart + (of - 1) * this.usual;
         // Where a silence lies within, what is before it and behind it is told apart.
@@ -136,17 +166,24 @@ const Curves = (() => {
           if (2 * i + 1 < held.finer.begins.length) take(held.finer, 2 * i + 1, of / 2);
           return;
         }
+        const edge = other > one ? Math.PI : -Math.PI;
+        const through = fold && Math.abs(Angles.wrap(other) - Angles.wrap(one) - (other - one)) > 1;
+        if (fold) [one, other] = [Angles.wrap(one), Angles.wrap(other)];
         const before = found.y[found.y.length - 1];
-        const turned = wraps && of === 1 && Math.abs(one - before) > Math.PI;
+        const turned = wrapped && (of === 1 || fold) && Math.abs(one - before) > Math.PI;
         if (end !== null && (begin - end > this.apart || turned)) tear(begin);
         end = until;
         if (of === 1) {
           put(begin, one, null);
           return;
         }
-        const told = [one, other, begin, until];
+        const told = [through ? -edge : one, through ? edge : other, begin, until];
         put(begin, one, told);
-        if (torn) tear(begin);
+        if (through) {
+          put(begin, edge, told);
+          tear(begin);
+          put(until, -edge, told);
+        } else if (torn) tear(begin);
         put(until, other, told);
       };
       for (let i = first; i < last; i++) take(level, i, rows);
