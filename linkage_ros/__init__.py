@@ -96,7 +96,7 @@ _HOMES = {
     'linkage_ros.scene.scene': 'Scene',
     'linkage_ros.synthesis.defects': 'assess Assessment',
     'linkage_ros.synthesis.design': 'Design',
-    'linkage_ros.synthesis.function.generate': 'generate_function',
+    'linkage_ros.synthesis.function.task': 'generate_function',
     'linkage_ros.synthesis.motion': 'from_fixed_pivots from_moving_pivots Pose',
     'linkage_ros.synthesis.path.curves': 'PathTask',
     'linkage_ros.synthesis.path.generate': 'generate_path',

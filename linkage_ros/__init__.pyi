@@ -53,7 +53,7 @@ from linkage_ros.scene.scene import Scene as Scene
 from linkage_ros.resources import linkage_names as linkage_names, scene_names as scene_names
 from linkage_ros.synthesis.defects import assess as assess, Assessment as Assessment
 from linkage_ros.synthesis.design import Design as Design
-from linkage_ros.synthesis.function.generate import generate_function as generate_function
+from linkage_ros.synthesis.function.task import generate_function as generate_function
 from linkage_ros.synthesis.motion import (
     from_fixed_pivots as from_fixed_pivots,
     from_moving_pivots as from_moving_pivots,

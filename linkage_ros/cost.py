@@ -187,6 +187,9 @@ def _with(member: SceneLinkage, named: Names) -> SceneLinkage:
     return replace(member, effects=effects, loads=member.loads if forced else None)
 
 
+Progress = Callable[[int, int], None]
+"""Takes the amount done and the total."""
+
 _BLOCK = 100
 """Ticks of a variant per block: long enough to warm the caches, short compared with a drift."""
 
@@ -281,6 +284,7 @@ def measure(
     *,
     leave_out: bool = True,
     stopped: Callable[[], bool] = lambda: False,
+    progress: Progress = lambda _done, _of: None,
 ) -> SceneCost | None:
     """
     Measure a scene on this machine.
@@ -295,6 +299,8 @@ def measure(
         Whether to measure also how much leaving each effect out saves.
     stopped
         Called now and then; if it returns True, the measurement ends and returns None.
+    progress
+        Called now and then with the ticks of each variant that are done, and all of them.
 
     Raises
     ------
@@ -317,7 +323,7 @@ def measure(
         if leave_out and not bringing(name, named)
     }
     built = list(variants.built.values())
-    if not _run([(feed(scene, built[0].pipeline), built)], ticks, stopped):
+    if not _run([(feed(scene, built[0].pipeline), built)], ticks, stopped, progress):
         return None
 
     effects = []
@@ -374,6 +380,7 @@ def compare(
     ticks: int,
     *,
     stopped: Callable[[], bool] = lambda: False,
+    progress: Progress = lambda _done, _of: None,
 ) -> dict[str, Times] | None:
     """
     Measure by how much the ticks of other scenes differ from those of a bare one.
@@ -384,7 +391,7 @@ def compare(
         The scene to compare with.
     others
         Scenes that differ from it in one thing each, by name; all at the same rate.
-    ticks, stopped
+    ticks, stopped, progress
         See `measure`.
 
     Returns
@@ -397,7 +404,7 @@ def compare(
     first = Variant(Pipeline(bare))
     each = [(feed(bare, first.pipeline), [first])]
     each += [(feed(others[name], one.pipeline), [one]) for name, one in variants.items()]
-    if not _run(each, ticks, stopped):
+    if not _run(each, ticks, stopped, progress):
         return None
     return {name: _difference(one.ticks, first.ticks) for name, one in variants.items()}
 
@@ -406,18 +413,9 @@ def _run(
     fed: Sequence[tuple[Iterator[tuple[int, bytes]], Sequence[Variant]]],
     ticks: int,
     stopped: Callable[[], bool],
+    progress: Progress,
 ) -> bool:
-    """
-    Let variants tick in turn; return False if stopped.
-
-    Parameters
-    ----------
-    fed
-        Times with crank messages, each with the variants that tick by them.
-    ticks, stopped
-        See `measure`.
-
-    """
+    """Let variants tick in turn, each by its times and messages; return False if stopped."""
     contenders = [(number, one) for number, (_, ones) in enumerate(fed) for one in ones]
     shuffle = Random(0).shuffle
     for number, size in enumerate((_WARM_UP, *_blocks(ticks))):
@@ -430,6 +428,7 @@ def _run(
             contender.run(*blocks[by])
             if number == 0:
                 contender.forget()
+        progress(min(number * _BLOCK, ticks), ticks)
     return True
 
 

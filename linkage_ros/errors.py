@@ -25,6 +25,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from copyreg import __newobj__  # type: ignore[attr-defined]
 from difflib import get_close_matches
+from importlib.util import find_spec
 from os import PathLike
 from typing import Any
 
@@ -135,6 +136,12 @@ def missing_packages_reported() -> Iterator[None]:
         else:
             remedy = "source the setup.bash of ROS 2, or pip install 'linkage_ros[ros]'"
         raise LinkageError(name, 'is not installed', remedy) from None
+
+
+def check_installed(package: str, remedy: str = "pip install 'linkage_ros[report]'") -> None:
+    """Raise LinkageError if a Python package is not installed that only some users need."""
+    if find_spec(package) is None:
+        raise LinkageError(package, 'is not installed', remedy)
 
 
 def did_you_mean(name: str, names: Iterable[str], otherwise: str) -> str:

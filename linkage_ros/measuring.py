@@ -51,6 +51,10 @@ class Spread(NamedTuple):
     middle: float
     high: float
 
+    def scaled(self, factor: float) -> Spread:
+        """Return the quartiles in a unit that is smaller by a factor."""
+        return Spread(*(factor * value for value in self))
+
 
 def percentile(values: Sequence[float], percent: float) -> float:
     """Return a percentile, interpolated between neighbours; NaN of an empty sequence."""

@@ -51,6 +51,11 @@ _BOUNDED = (
 """Runs Python with the arguments after the first, for at most that many seconds."""
 
 
+def private_domain() -> int:
+    """Return a domain id for this process; its ports are safe on every operating system."""
+    return 1 + os.getpid() % 101
+
+
 class MeasurementError(Exception):
     """A process, or another part of a measurement, failed."""
 

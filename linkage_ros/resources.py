@@ -22,7 +22,7 @@ from os import PathLike
 from pathlib import Path
 import sys
 
-from linkage_ros.errors import FileError, listed, quoted
+from linkage_ros.errors import did_you_mean, FileError, listed, quoted
 
 
 def share_folders(package: str) -> list[Path]:
@@ -71,16 +71,19 @@ def scene_names() -> list[str]:
     return _names('scenes')
 
 
-def named_file(named: str | PathLike[str], folder: str) -> Path:
+def named_file(named: str | PathLike[str], *folders: str) -> Path:
     """
     Return the path of a file given by its path, or by the name of a shipped file.
+
+    A text without folder and suffix is a name first: a file ``demo`` is ``./demo`` beside the
+    scene that is shipped.
 
     Parameters
     ----------
     named
         A path; or the name of a shipped file, without folder and suffix.
-    folder
-        Folder of that file under ``config/``.
+    folders
+        Folders of such files under ``config/``; the first that has the name decides.
 
     Raises
     ------
@@ -90,21 +93,25 @@ def named_file(named: str | PathLike[str], folder: str) -> Path:
         If ``named`` cannot be a path.
 
     """
+    known = {name: folder for folder in reversed(folders) for name in _names(folder)}
     try:
         path = Path(named)
     except TypeError:
         message = f'{quoted(named)} is neither a path nor a name; name a file, or one of '
-        raise TypeError(message + listed(_names(folder))) from None
-    names = _names(folder)
-    if named in names and (path.is_dir() or not path.exists()):
-        return shipped(f'{folder}/{named}.yaml')
-    if named and (named != path.stem or path.exists()):
+        raise TypeError(message + listed(known)) from None
+    if isinstance(named, str) and named in known:
+        return shipped(f'{known[named]}/{named}.yaml')
+    exists = os.path.exists(path)  # noqa: PTH110 (Path's raises where a name is too long)
+    if str(path) == path.name and path.suffix and path.stem in known and not exists:
+        raise FileError(named, '', 'is not a file', f'did you mean {path.stem!r}?')
+    if named and (named != path.stem or exists):
         return path
+    reason = 'is neither a file nor a name of what comes with the package'
     raise FileError(
         named or "''",
         '',
-        'is neither a file nor a name of what comes with the package',
-        f'name a file, or one of {listed(names)}',
+        'is a shipped scene, not a linkage' if named in scene_names() else reason,
+        did_you_mean(str(named), known, f'name a file, or one of {listed(known)}'),
     )
 
 

@@ -13,58 +13,66 @@
 # limitations under the License.
 
 """
-Show what accuracy costs in time, on a scene and on this machine: tables here, a page in a folder.
+Show what accuracy costs in time, on a scene and on this machine: twelve lines here, and a page.
 
-How exactly loops are solved and how fast; what the rate of ticks buys; what effects cost; what the
-steps of the torque drive cost; what the recording costs. Every error is one against a reference
-that is known to 50 digits; every time is a median with its quartiles.
+The lines say how exactly the loops are solved and how fast; what to write into the scene for some
+accuracies, what a tick then costs and at which rate of ticks a subscriber notices; then what
+effects, steps of the torque drive and recording cost. The page has pictures, a field for the
+accuracy that you need, and all tables. Every error is one against a reference that is known to 50
+digits; every time is a median with its quartiles.
 """
 
 from __future__ import annotations
 
 import argparse
-from importlib.util import find_spec
+import json
 from pathlib import Path
+from textwrap import wrap
 from threading import Event
 
-from linkage_ros.accuracy.measure import measure_accuracy, PARTS
+from linkage_ros.accuracy import measure_accuracy, PARTS
+from linkage_ros.accuracy.answer import replies, reply
 from linkage_ros.accuracy.page.files import check_folder, PAGE, write_page
-from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
+from linkage_ros.accuracy.page.numbers import number_text
 from linkage_ros.accuracy.results import Results
-from linkage_ros.accuracy.results import Table as Measured
-from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
-from linkage_ros.errors import did_you_mean, LinkageError, listed
+from linkage_ros.cli.arguments import add_set, SCENE_HELP
+from linkage_ros.cli.terminal import progress
+from linkage_ros.errors import check_installed, did_you_mean, LinkageError, listed
 from linkage_ros.scene.load import load_scene
 
-# The printed result: the tables of each part, and the advice.
+EXAMPLE = 'linkage accuracy worn_press --quick'
+
+_WIDTH = 80
+"""Columns of the printed result."""
+
+_WANTED = (1e-2, 1e-4, 1e-8)
+"""Wanted accuracies in the printed result, in [rad]."""
 
 
 def print_results(results: Results) -> None:
-    """Print all tables, each part under its title, and the advice of all parts at the end."""
-    for part in results.parts:
-        print(f'{part.title}\n')
-        for table in part.tables:
-            show(printed(table))
-            print()
-    for part in results.parts:
-        if part.advice:
-            print(part.title)
-            for advice in part.advice:
-                print(f'  {advice}')
+    """Print the headline, the answers for some accuracies, and the headline of each part."""
+    said = [results.headline]
+    answers = replies(results)
+    for wanted in _WANTED if answers else ():
+        answer = reply(answers, wanted)
+        cost = f'{number_text(wanted)} rad: {answer.tick} a tick'
+        said.append(f'{cost}; {answer.rate}; {answer.write}')
+    # The other headlines are in the first line, or in the answers.
+    said += [each.headline for each in results.parts if not (each.clause or each.rates)]
+    for text in said:
+        print('\n'.join(wrap(text, _WIDTH, subsequent_indent='  ')))
 
 
-def printed(table: Measured) -> Table:
-    """Return a table as texts; columns of numbers are aligned to the right."""
-    columns = zip(table.columns, numeric_columns(table), strict=True)
-    return Table(
-        table.title,
-        [f'>{name}' if number else name for name, number in columns],
-        [[cell_text(cell) for cell in row] for row in table.rows],
-    )
+def results_json(results: Results, page: Path) -> str:
+    """Return the same as JSON, with the three sentences of each part."""
+    parts = [
+        {'key': each.key, 'headline': each.headline, 'sentences': [*each.sentences]}
+        for each in results.parts
+    ]
+    answers = [each._asdict() for each in replies(results)]
+    said = {'scene': results.scene, 'headline': results.headline, 'machine': dict(results.machine)}
+    return json.dumps({**said, 'answers': answers, 'parts': parts, 'page': str(page)}, indent=2)
 
-
-_REFERENCE = 'mpmath'
-"""The package that computes the reference; it comes with the extra `report`."""
 
 _SHARES = {'solving': 60, 'ticking': 45, 'effects': 5, 'dynamics': 25, 'recording': 30}
 """Approximate relative durations of the parts."""
@@ -74,9 +82,13 @@ class _StoppedError(Exception):
     """A stop was requested."""
 
 
+EXAMPLE = 'linkage accuracy demo --quick -o accuracy_demo'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('scene', help='the scene file, or a linkage file')
+    parser.add_argument('scene', metavar='SCENE', help=SCENE_HELP)
+    add_set(parser)
     parser.add_argument(
         '-o',
         '--output',
@@ -90,6 +102,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='in some 15 s, with fewer points and no other packages',
     )
     parser.add_argument(
+        '--json',
+        action='store_true',
+        help='print JSON: headline, answers, and the result of each part',
+    )
+    parser.add_argument(
         '--only',
         default=','.join(PARTS),
         metavar='PARTS',
@@ -100,41 +117,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Measure, print and write; return 1 if stopped."""
     parts = _parts(arguments.only)
-    if find_spec(_REFERENCE) is None:
-        raise LinkageError(_REFERENCE, 'is not installed', 'pip install linkage_ros[report]')
-    scene = load_scene(arguments.scene)
+    check_installed('mpmath')  # computes the reference
+    scene = load_scene(arguments.scene, arguments.set)
     folder = arguments.output or Path(f'accuracy_{scene.name}')
     check_folder(folder)
     try:
-        with progress(f'accuracy of {scene.name}') as told:
+        with progress(f'accuracy of {scene.name}') as advance:
+            done = dict.fromkeys(parts, 0.0)
+
+            def report(name: str, share: float) -> None:
+                """Convert the progress of a part to the progress of the whole."""
+                if stop.is_set():
+                    raise _StoppedError
+                done[name] = share
+                whole = sum(_SHARES[part] for part in done)
+                advance(round(sum(_SHARES[part] * done[part] for part in done)), whole)
+
             results = measure_accuracy(
-                scene,
-                parts,
-                arguments.quick,
-                folder.absolute().parent,
-                _Overall(parts, told, stop),
+                scene, parts, arguments.quick, folder.absolute().parent, report
             )
     except _StoppedError:
         return 1
-    print_results(results)
     write_page(results, folder)
-    print(f'page      {folder / PAGE}')
+    if arguments.json:
+        print(results_json(results, folder / PAGE))
+    else:
+        print_results(results)
+        print(f'page      {folder / PAGE}')
     return 0
-
-
-class _Overall:
-    """Converts the progress of a part to the progress of the whole."""
-
-    def __init__(self, parts: list[str], told: ProgressCallback, stop: Event) -> None:
-        self._told, self._stop = told, stop
-        self._done = dict.fromkeys(parts, 0.0)
-
-    def __call__(self, name: str, share: float) -> None:
-        if self._stop.is_set():
-            raise _StoppedError
-        self._done[name] = share
-        done = sum(_SHARES[part] * part_done for part, part_done in self._done.items())
-        self._told(round(done), sum(_SHARES[part] for part in self._done))
 
 
 def _parts(text: str) -> list[str]:

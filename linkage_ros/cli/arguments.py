@@ -12,24 +12,94 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Arguments that several commands share: values of the inputs of a linkage, files, output."""
+"""Arguments that several commands share: outputs, keys of a scene, numbers, units of angles."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from math import degrees, isfinite, pi, radians, remainder, tau
 from pathlib import Path
-import sys
+from typing import Any, NamedTuple
 
-from linkage_ros.errors import LinkageError
-from linkage_ros.files.atomic_write import atomic_write
-from linkage_ros.files.linkage_file import read_closure
-from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.errors import LinkageError, listed
+from linkage_ros.files.file_access import check_suffix
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.robot_models.part import Part, PartError
-from linkage_ros.scene.load import kind_of
-from linkage_ros.scene.robot_model import scene_model, Write
+
+PICTURES = ('.png', '.svg', '.pdf')
+"""Suffixes of the pictures that matplotlib writes."""
+
+LINKAGES = ('.yaml', '.yml')
+"""Suffixes of linkage and scene files."""
+
+
+SCENE_HELP = 'scene file or linkage file, or a name of linkage gallery'
+
+
+def add_file(parser: argparse.ArgumentParser) -> None:
+    """Declare the linkage file."""
+    parser.add_argument('file', metavar='FILE', help='linkage file, or a name of linkage gallery')
+
+
+def add_bag(parser: argparse.ArgumentParser) -> None:
+    """Declare the bag."""
+    parser.add_argument('bag', type=Path, metavar='BAG', help="the bag's folder or its .mcap file")
+
+
+def add_output(
+    parser: argparse._ActionsContainer, suffixes: Collection[str], otherwise: str = ''
+) -> None:
+    """
+    Declare ``-o`` for a file; one that exists is replaced when the new one is complete.
+
+    Parameters
+    ----------
+    parser
+        The parser of the command, or a group of it.
+    suffixes
+        The suffixes that the command can write; any other is refused.
+    otherwise
+        What happens without ``-o``; '' if it is required.
+
+    """
+    kinds = listed([f'OUTPUT{suffix}' for suffix in suffixes], ' or ')
+    parser.add_argument(
+        '-o',
+        '--output',
+        type=output(suffixes),
+        metavar='OUTPUT',
+        required=not otherwise,
+        help=f'file to write, {kinds}{otherwise and f"; without it {otherwise}"}',
+    )
+
+
+def output(suffixes: Collection[str]) -> Callable[[str], Path]:
+    """Return a reader of the name of a file to write, which refuses other suffixes."""
+
+    def read(text: str) -> Path:
+        file = Path(text)
+        check_suffix(file, suffixes)
+        return file
+
+    return read
+
+
+def add_set(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--set``, for `load_scene`."""
+    parser.add_argument(
+        '--set',
+        action='append',
+        default=[],
+        metavar='KEY=VALUE',
+        help='set a key of the scene, as --set rate=500 or --set drive.sine.amplitude=0.3; '
+        'VALUE is YAML; may be repeated',
+    )
+
+
+def check_no_settings(settings: Sequence[str]) -> None:
+    """Raise if keys are set and no scene is named."""
+    if settings:
+        raise LinkageError(f'--set {settings[0]}', 'is for a scene', 'name one')
 
 
 def add_at(parser: argparse.ArgumentParser, text: str) -> None:
@@ -54,6 +124,20 @@ def values(text: str) -> tuple[float, ...]:
     if not numbers or not all(map(isfinite, numbers)):
         raise argparse.ArgumentTypeError(f'{text!r} is no number; write 40, or 40,20')
     return numbers
+
+
+def bounded(least: float, most: float, kind: type[float] = float) -> Callable[[str], Any]:
+    """Return a reader of a number within bounds, which is an integer if its kind is `int`."""
+
+    def read(text: str) -> float:
+        value = kind(text)
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f'{text} is not between {least:g} and {most:g}')
+        return value
+
+    # argparse shows this name: "invalid number value".
+    read.__name__ = 'whole number' if kind is int else 'number'
+    return read
 
 
 def inputs(
@@ -87,63 +171,63 @@ def wrapped(angle: float) -> float:
     return pi if rest <= -pi else rest
 
 
+def finite(value: float) -> float | None:
+    """Return a number as JSON holds it: None stands for infinity and for NaN."""
+    return value if isfinite(value) else None
+
+
 def fixed(value: float, digits: int) -> str:
     """Return a number with fixed decimals; never a negative zero."""
     written = f'{value:.{digits}f}'
     return written.lstrip('-') if float(written) == 0.0 else written
 
 
-def angle_text(angle: float, digits: int = 3) -> str:
-    """Return an angle in degrees."""
-    return f'{fixed(degrees(angle), digits)}°'
+class AngleUnit(NamedTuple):
+    """
+    The unit in which a person types and reads angles; files hold radians whatever it is.
+
+    Attributes
+    ----------
+    name
+        ``°`` or ``rad``.
+
+    """
+
+    name: str
+
+    @property
+    def in_degrees(self) -> bool:
+        """Return whether angles are in degrees."""
+        return self is DEGREES
+
+    def of(self, angle: float) -> float:
+        """Return an angle in [rad], or its rate, in this unit."""
+        return degrees(angle) if self.in_degrees else angle
+
+    def text(self, angle: float, digits: int = 3) -> str:
+        """Return an angle in [rad] as text; ``digits`` are the decimals of degrees."""
+        return angle_text(angle, digits) if self.in_degrees else f'{angle + 0.0:.6g} rad'
+
+    def value_text(self, value: float, turning: bool) -> str:
+        """Return the value of an input or a joint, in [rad] if it turns, else in [m]."""
+        return self.text(value) if turning else f'{value + 0.0:.6g} m'
 
 
-def value_text(value: float, turning: bool) -> str:
-    """Return the value of an input for a reader: degrees and radians, or metres."""
-    if turning:
-        return f'{angle_text(value)} ({value + 0.0:.6g} rad)'
-    return f'{value + 0.0:.6g} m'
+DEGREES, RADIANS = AngleUnit('°'), AngleUnit('rad')
 
 
-# Shared by the commands that write robot models: a linkage or scene file, and the output.
-
-
-def add_files(parser: argparse.ArgumentParser, kind: str) -> None:
-    """Declare the input file, and ``-o``."""
-    parser.add_argument('file', help='the linkage file or the scene file')
-    add_output(parser, kind)
-
-
-def add_output(parser: argparse.ArgumentParser, kind: str) -> None:
-    """Declare ``-o``."""
+def add_radians(parser: argparse.ArgumentParser, what: str = 'show angles') -> None:
+    """Declare ``--radians``; the attribute ``angles`` is then an `AngleUnit`."""
     parser.add_argument(
-        '-o', '--output', type=Path, metavar='FILE', help=f'{kind} to write; else it is printed'
+        '--radians',
+        dest='angles',
+        action='store_const',
+        const=RADIANS,
+        default=DEGREES,
+        help=f'{what} in radians instead of degrees',
     )
 
 
-def model_of(file: str, write: Write) -> bytes:
-    """
-    Return the model of a linkage or scene file.
-
-    Linkages of a scene are those that the node would solve, with the deviations of their parts.
-    """
-    content, _ = read_yaml(file)
-    if kind_of(content) == 'scene':
-        from linkage_ros.pipeline.pipeline import Pipeline
-        from linkage_ros.scene.load import load_scene
-
-        scene = load_scene(file)
-        return scene_model(scene, Pipeline(scene).closures, write)
-    try:
-        return write(Path(file).stem, [Part(read_closure(content))])
-    except PartError as error:
-        raise content.error(error.where, error.reason, error.remedy) from None
-
-
-def put(data: bytes, output: Path | None) -> None:
-    """Write a model to a file and say so, or print it."""
-    if output is None:
-        sys.stdout.write(data.decode())
-    else:
-        atomic_write(output, data)
-        print(output)
+def angle_text(angle: float, digits: int = 3) -> str:
+    """Return an angle in degrees."""
+    return f'{fixed(degrees(angle), digits)}°'

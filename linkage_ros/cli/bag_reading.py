@@ -17,17 +17,17 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from itertools import count
-from math import isfinite
 from pathlib import Path
 import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.contents import Contents, Layout, layout_of, TOLD_EVERY
+from linkage_ros.bag.contents import Contents, Layout, layout_of, REPORT_EVERY
+from linkage_ros.bag.metadata import counts_in, FAILURE
 from linkage_ros.bag.reader import (
     Bag,
     BagMessage,
@@ -36,14 +36,14 @@ from linkage_ros.bag.reader import (
     read_bag,
     serialized_metadata,
 )
-from linkage_ros.bag.recording_stats import counts_in, FAILURE
 from linkage_ros.bag.recover import NOTHING_LOST, RECOVERED
-from linkage_ros.bag.run_events import lost_beginning, run_account, run_said, RunAccount
+from linkage_ros.bag.run_events import lost_beginning, raw_account, run_account, RunAccount
+from linkage_ros.cli.arguments import finite
 from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import BagError, clean, listed
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.replay.worst_residuals import Examined, WorstResiduals
+from linkage_ros.replay.verify import Examined, WorstResiduals
 from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heeded, StoppedError
 
@@ -68,7 +68,7 @@ def opened(path: Path, stop: Event) -> Bag:
         if stop.is_set():
             raise StoppedError
 
-    bag = read_bag(path, allow_truncated=True, told=look)
+    bag = read_bag(path, allow_truncated=True, progress=look)
     if bag.passed_over:
         line = (
             f'linkage: {path}: attachments beyond {MOST_ATTACHED // _MIB} MiB are not read: '
@@ -88,7 +88,7 @@ def add_trust(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def scene_of(bag: Bag, *, trust_effects: bool) -> Scene:
+def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> Scene:
     """
     Return the scene that a bag carries; list the modules it imports first, if it may.
 
@@ -98,7 +98,7 @@ def scene_of(bag: Bag, *, trust_effects: bool) -> Scene:
         See `recorded_scene`.
 
     """
-    scene = recorded_scene(bag)
+    scene = recorded_scene(bag, settings=settings)
     if not trust_effects or not scene.not_imported:
         return scene
     from linkage_ros.effects.user_effects import found_in
@@ -107,7 +107,7 @@ def scene_of(bag: Bag, *, trust_effects: bool) -> Scene:
         where = found_in(name)
         line = f'linkage: {bag.path} is trusted: imports {name}, and the name leads to {where}'
         print(clean(line), file=sys.stderr, flush=True)
-    return recorded_scene(bag, trust_effects=True)
+    return recorded_scene(bag, trust_effects=True, settings=settings)
 
 
 def beside(bag: Path, suffix: str) -> Path:
@@ -133,7 +133,7 @@ def run_or_blank(bag: Bag) -> RunAccount:
 
 def gaps(bag: Bag) -> Iterator[str]:
     """Yield the gaps within a bag; what follows a gap may differ in a replay."""
-    diagnostics = run_said(bag).get('diagnostics_topic')
+    diagnostics = raw_account(bag).get('diagnostics_topic')
     dropped = sum(
         count for topic, count in counts_in(bag.custom, 'dropped').items() if topic != diagnostics
     )
@@ -166,20 +166,20 @@ class BagReading:
         self.stopped = False
         """True if a signal stopped the reading."""
         self._bag, self._stop = bag, stop
-        self._told: Callable[[int, int], None] = lambda _done, _of: None
+        self._advance: Callable[[int, int], None] = lambda _done, _of: None
         self._size = max(1, sum(layout_of(file).content for file in bag.files) // _MIB)
 
     def glance(self) -> Iterator[BagMessage]:
         """Yield the messages without progress; raise StoppedError if a signal came."""
         for number, message in enumerate(self._bag.messages(), 1):
             yield message
-            if not number % TOLD_EVERY and self._stop.is_set():
+            if not number % REPORT_EVERY and self._stop.is_set():
                 raise StoppedError
 
     @contextmanager
-    def told(self) -> Iterator[Iterator[BagMessage]]:
+    def with_progress(self) -> Iterator[Iterator[BagMessage]]:
         """Give an iterator over the messages, and show the progress on the terminal."""
-        with heeded(), progress('replayed [MiB]') as self._told:
+        with heeded(), progress('replayed [MiB]') as self._advance:
             yield self._messages()
 
     def _messages(self) -> Iterator[BagMessage]:
@@ -195,8 +195,8 @@ class BagReading:
                 return
             read += len(message.data) + _BESIDE
             yield message
-            if not number % TOLD_EVERY:
-                self._told(read // _MIB, max(self._size, read // _MIB))
+            if not number % REPORT_EVERY:
+                self._advance(read // _MIB, max(self._size, read // _MIB))
                 if self._stop.is_set():
                     self.stopped = True
                     return
@@ -212,9 +212,9 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
     within = next((layout.rosbag2 for layout in layouts if layout.rosbag2), None)
     if not metadata and within is not None:
         metadata = serialized_metadata(within)
-    run = run_said(bag)
+    run = raw_account(bag)
     # Only bags that have metadata left out say so.
-    let_go = counts_in(bag.custom, 'let_go')
+    discarded = counts_in(bag.custom, 'let_go')
     counted = {word: counts_in(bag.custom, word) for word in ('received', 'dropped')}
     return {
         'bag': str(bag.path),
@@ -245,7 +245,9 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
                 'qos_understood': topic.qos.understood,
                 'received': counted['received'].get(topic.name),
                 'dropped': counted['dropped'].get(topic.name),
-                'let_go': let_go.get(topic.name, 0) if let_go or counted['received'] else None,
+                'let_go': discarded.get(topic.name, 0)
+                if discarded or counted['received']
+                else None,
             }
             for each in contents.topics
             for topic, messages, size, _, _ in [each]
@@ -292,11 +294,10 @@ def worst_account(worst: WorstResiduals) -> dict[str, Any]:
         }  # fmt: skip
     if worst.nearest is not None:
         near, place = worst.nearest
-        distance = near.toggle_distance
         account['nearest_to_toggle'] = {
             'conditioning': near.conditioning,
             'transmission_angle_rad': near.transmission_angle,
-            'input_to_toggle': distance if isfinite(distance) else None,
+            'input_to_toggle': finite(near.toggle_distance),
             'time_ns': place.time,
             'inputs': list(place.inputs),
         }
@@ -323,7 +324,7 @@ def _linkage(member: SceneLinkage) -> dict[str, Any]:
         'name': member.name,
         'links': len(linkage.links),
         'inputs': [
-            {'joint': name, 'unit': 'm' if given.slider else 'rad'}
+            {'joint': name, 'unit': given.unit}
             for name, given in zip(member.inputs, linkage.inputs, strict=True)
         ],
         'joints': list(member.joints),

@@ -18,17 +18,18 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
-from math import isfinite, tau
+from collections.abc import Iterator, Mapping, Sequence
+import json
+from math import tau
+import sys
 from threading import Event
+from typing import Any
 
-from linkage_ros.cli.arguments import angle_text, value_text
-from linkage_ros.cli.terminal import show, Table
+from linkage_ros.cli.arguments import add_file, add_radians, AngleUnit, finite
+from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
-from linkage_ros.kinematics.linkage import Limits
-from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,
@@ -39,69 +40,214 @@ from linkage_ros.kinematics.sweep_analysis import (
     worst_residual,
 )
 from linkage_ros.kinematics.topology import Driven, Dyad, Group, Iterated
+from linkage_ros.scene.notes import linkage_notes
 
-_SINGULAR = (
-    ('toggles', Status.TOGGLE),
-    ('change points', Status.CHANGE_POINT),
-    ('without a pose', Status.INDETERMINATE),
-)
+_SINGULAR = {
+    Status.TOGGLE: 'toggles',
+    Status.CHANGE_POINT: 'change points',
+    Status.INDETERMINATE: 'without a pose',
+}
 """Names of singular inputs, by kind."""
 
 _PLACES = 4
 """Maximum number of places shown for one extreme value."""
 
 
+EXAMPLE = 'linkage check jansen_leg'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('file', help='the linkage file')
+    add_file(parser)
+    parser.add_argument('--json', action='store_true', help='the same as JSON, in SI units')
+    add_radians(parser)
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Check the linkage; an invalid file raises before this returns."""
     closure = load(arguments.file)
-    for number, table in enumerate(tables(closure, arguments.file)):
-        if number:
-            print()
-        show(table)
+    for note in linkage_notes(closure.linkage):
+        print(f'linkage check: note: {arguments.file}: {note}', file=sys.stderr)
+    with progress('parts examined') as advance:
+        account = {'file': arguments.file, **account_of(closure, advance)}
+    if arguments.json:
+        print(json.dumps(account, indent=1, allow_nan=False))
+    else:
+        show(*tables(account, arguments.angles))
     return 0
 
 
-def tables(closure: Closure, title: str) -> Iterator[Table]:
-    """Yield the tables that describe a linkage."""
-    way = InputSweep(closure) if len(closure.linkage.inputs) == 1 else None
-    yield Table(title, ('', ''), list(_facts(closure, way)))
-    yield Table(
-        'Solved in this order', ('>', 'group', 'links', 'how', 'assembly'), _groups(closure)
-    )
-    yield from _other_assemblies(closure)
-    loops = [
-        (
-            str(bar.group + 1),
-            ', '.join(bar.links),
-            ', '.join(f'{length:.6g}' for length in bar.lengths),
-            f'{bar.kind.margin:+.4g}' if bar.kind.margin else '0',
-            bar.kind.code,
-            bar.kind.name,
+# The description of a linkage as JSON holds it: values are in SI units, and their keys say so, or
+# the 'unit' beside them.
+
+
+def account_of(
+    closure: Closure, advance: ProgressCallback = lambda _done, _of: None
+) -> dict[str, Any]:
+    """Return the description of a linkage, as JSON holds it."""
+    linkage, structure = closure.linkage, closure.structure
+    moving = len(structure.links) - 1
+    pins = sum(joint.kind == 'R' for joint in structure.joints)
+    named = [point for points in linkage.links.values() for point in points]
+    units = dict(zip(linkage.joints, map(_unit, closure.turning), strict=True))
+    units |= {given.joint: _unit(not given.slider) for given in linkage.inputs}
+    way = InputSweep(closure) if len(linkage.inputs) == 1 else None
+    # Most of the time goes by here.
+    parts = (_reach, _residual, _other_assemblies, _transmission, _conditioning)
+    examined: dict[str, Any] = {}
+    for number, part in enumerate(parts):
+        advance(number, len(parts))
+        examined |= part(closure, way)
+    return {
+        'moving_links': len(linkage.links) - 1,
+        'slot_blocks': moving + 1 - len(linkage.links),
+        'pins': pins,
+        'shared_pins': any(named.count(point) > 2 for point in named),
+        'sliders': len(structure.joints) - pins,
+        'loops': len(structure.joints) - moving,
+        'degrees_of_freedom': structure.freedom,
+        'inputs': [
+            {
+                'joint': given.joint,
+                'unit': units[given.joint],
+                'slider': given.slider or None,
+                'parent': given.parent or None,
+                'child': given.child or None,
+            }
+            for given in linkage.inputs
+        ],
+        'limits': [
+            {
+                'joint': name,
+                'unit': units[name],
+                'low': finite(limits.low),
+                'high': finite(limits.high),
+                'velocity': finite(limits.velocity),
+                'effort': finite(limits.effort),
+            }
+            for name, limits in linkage.limits.items()
+        ],
+        'groups': [_group(closure, number) for number in range(len(structure.groups))],
+        'four_bars': [
+            {
+                'group': bar.group + 1,
+                'links': list(bar.links),
+                'lengths_m': list(bar.lengths),
+                'grashof_margin_m': bar.kind.margin,
+                'barker': bar.kind.code,
+                'name': bar.kind.name,
+            }
+            for bar in four_bars(structure)
+        ],
+        **examined,
+    }
+
+
+def _group(closure: Closure, number: int) -> dict[str, Any]:
+    kind, links, method, assembly = describe_group(closure, number)
+    return {'kind': kind, 'links': links.split(', '), 'method': method, 'assembly': assembly}
+
+
+def _unit(turning: bool) -> str:
+    return 'rad' if turning else 'm'
+
+
+def _reach(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
+    """Return ranges and singular inputs; None if they depend on several inputs."""
+    if way is None:
+        return {'ranges': None, 'singular_inputs': None}
+    return {
+        'ranges': [
+            {
+                'low': interval.lowest,
+                'high': interval.highest,
+                'whole': interval.whole,
+                'turns': interval.turns,
+                'limited': list(interval.limited),
+                'limited_by': [by or None for by in interval.by],
+            }
+            for interval in way.ranges
+        ],
+        'singular_inputs': [
+            {
+                'status': singular.status.value,
+                'input': singular.value,
+                'within_limits': _is_reached(way, singular.value),
+            }
+            for singular in closure.singular_inputs
+        ],
+    }
+
+
+def _is_reached(way: InputSweep, value: float) -> bool:
+    """Return whether a value of the input, up to full turns, is within the limits."""
+    turns = (0.0, -tau, tau) if way.turning else (0.0,)
+    return not way.closure.bounds or any(way.range_about(value + turn) for turn in turns)
+
+
+def _residual(closure: Closure, _way: InputSweep | None) -> dict[str, Any]:
+    found = worst_residual(closure)
+    if found is None:
+        return {'worst_residual': None}
+    residual, inputs, count = found
+    return {'worst_residual': {'residual_m': residual, 'inputs': list(inputs), 'positions': count}}
+
+
+def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, Any]:
+    """Return for each iterated group the other assemblies that a pose could name."""
+    pose = closure.linkage.pose
+    groups = []
+    for number, group in enumerate(closure.structure.groups):
+        if not isinstance(group, Iterated) or pose is None:
+            continue
+        # local import: it loads numpy
+        from linkage_ros.kinematics.assembly_modes import other_assemblies, STARTS
+
+        groups.append(
+            {
+                'group': number + 1,
+                'starts': STARTS,
+                'inputs': list(pose.inputs),
+                'assemblies': [
+                    {
+                        'points_m': {
+                            name: [place.real + 0.0, place.imag + 0.0]
+                            for name, place in one.points.items()
+                        },
+                        'turns': one.turns,
+                    }
+                    for one in other_assemblies(closure, number)
+                ],
+            }
         )
-        for bar in four_bars(closure.structure)
+    return {'other_assemblies': groups}
+
+
+def _transmission(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
+    found = transmission_angles(way) if way is not None else {}
+    return {'transmission_angles': _curves(closure, found, 'angle_rad')}
+
+
+def _conditioning(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
+    found = conditionings(way) if way is not None else {}
+    return {'conditioning': _curves(closure, found, 'conditioning')}
+
+
+def _curves(closure: Closure, found: Mapping[int, MinMaxCurve], key: str) -> list[dict[str, Any]]:
+    """Return the extreme values by group, and the inputs where they occur; none if constant."""
+
+    def extreme(one: Extreme) -> dict[str, Any]:
+        return {key: finite(one.value), 'inputs': list(one.at)}
+
+    return [
+        {
+            'group': number + 1,
+            'links': _group(closure, number)['links'],
+            'least': extreme(curve.lowest),
+            'greatest': extreme(curve.highest),
+        }
+        for number, curve in found.items()
     ]
-    if loops:
-        yield Table(
-            'Four-bars: input, coupler, output and the frame that they are seen from',
-            ('>', 'links', 'lengths [m]', '>Grashof margin [m]', 'Barker', 'name'),
-            loops,
-        )
-    if way is not None:
-        angles = transmission_angles(way)
-        if angles:
-            rows = [_extremes(closure, i, ends, way.turning) for i, ends in angles.items()]
-            heads = ['>', 'links', '>least', 'at', '>greatest', 'at']
-            yield Table('Transmission angles over the range, acute', heads, rows)
-        ratios = conditionings(way)
-        if ratios:
-            rows = [_conditioning(closure, i, ends, way.turning) for i, ends in ratios.items()]
-            heads = ['>', 'links', '>least', 'at']
-            yield Table('Conditioning over the range, of what is iterated', heads, rows)
 
 
 def describe_group(closure: Closure, number: int) -> tuple[str, str, str, str]:
@@ -127,107 +273,6 @@ def describe_group(closure: Closure, number: int) -> tuple[str, str, str, str]:
     )
 
 
-def _facts(closure: Closure, way: InputSweep | None) -> Iterator[tuple[str, str]]:
-    linkage, structure = closure.linkage, closure.structure
-    moving = len(structure.links) - 1
-    pins = sum(joint.kind == 'R' for joint in structure.joints)
-    sliders = len(structure.joints) - pins
-    blocks = moving + 1 - len(linkage.links)
-    beside = f' and {blocks} block(s) in slots' if blocks else ''
-    yield 'moving links', f'{len(linkage.links) - 1}{beside}'
-    named = [point for points in linkage.links.values() for point in points]
-    shared = any(named.count(point) > 2 for point in named)
-    twice = ' (one of three links counts twice)' if shared else ''
-    yield 'joints', f'{pins} pins{twice}, {sliders} sliders'
-    yield 'loops', str(len(structure.joints) - moving)
-    yield 'degrees of freedom', f'{structure.freedom}, as many as there are inputs'
-    for given in linkage.inputs:
-        driven = (
-            f'slide of {given.slider} [m]'
-            if given.slider
-            else f'angle of {given.child} to {given.parent}'
-        )
-        yield 'input', f'{given.joint}: {driven}'
-    turning = dict(zip(linkage.joints, closure.turning, strict=True))
-    turning |= {given.joint: not given.slider for given in linkage.inputs}
-    for name, limits in linkage.limits.items():
-        yield 'limits', f'{name}: {_limits_text(limits, turning[name])}'
-    yield from _reach(closure, way)
-    found = worst_residual(closure)
-    if found is None:
-        yield 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
-        return
-    worst, at, count = found
-    names = [not given.slider for given in linkage.inputs]
-    place = ', '.join(value_text(value, turning) for value, turning in zip(at, names, strict=True))
-    yield 'worst residual', f'{worst:.1e} m, of {count} positions, at {place}'
-
-
-def _reach(closure: Closure, way: InputSweep | None) -> Iterator[tuple[str, str]]:
-    if way is None:
-        yield 'range', 'no single one: it depends on every input'
-        return
-    for interval in way.ranges:
-        turns = round((interval.highest - interval.lowest) / tau)
-        if not interval.whole:
-            each = '; each turn has poses of its own' if way.turning and not interval.turns else ''
-            ends = '' if any(interval.limited) or not each else ', and was not followed farther'
-            yield 'range', f'{_range_text(interval)}{each}{ends}'
-        elif turns > 1:
-            count = 'two' if turns == 2 else str(turns)
-            yield 'range', f'every angle; the motion repeats after {count} turns'
-        else:
-            yield 'range', 'every angle'
-    places: dict[Status, list[str]] = {status: [] for _, status in _SINGULAR}
-    for singular in closure.singular_inputs:
-        said = value_text(singular.value, way.turning)
-        beyond = '' if _is_reached(way, singular.value) else ' beyond the limits'
-        places[singular.status].append(said + beyond)
-    for name, status in _SINGULAR:
-        if places[status] or status is not Status.INDETERMINATE:
-            yield name, ', '.join(places[status]) or 'none'
-
-
-def _is_reached(way: InputSweep, value: float) -> bool:
-    """Return whether a value of the input, up to full turns, is within the limits."""
-    turns = (0.0, -tau, tau) if way.turning else (0.0,)
-    return not way.closure.bounds or any(way.range_about(value + turn) for turn in turns)
-
-
-def _limits_text(limits: Limits, turning: bool) -> str:
-    texts = []
-    if limits.bounded:
-        low, high = (
-            value_text(end, turning) if isfinite(end) else '' for end in (limits.low, limits.high)
-        )
-        texts.append(
-            f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}'
-        )
-    if isfinite(limits.velocity):
-        texts.append(f'at most {limits.velocity:.6g} {"rad" if turning else "m"}/s')
-    if isfinite(limits.effort):
-        texts.append(f'at most {limits.effort:.6g} {"N·m" if turning else "N"}')
-    return ', '.join(texts)
-
-
-def _range_text(interval: InputRange) -> str:
-    """Return a range; if limits end it, with their names."""
-    low, high = (value_text(value, interval.turning) for value in interval[:2])
-    if interval.by == ('', ''):
-        return f'{low} to {high}'
-    ends = []
-    for end, by in zip((low, high), interval.by, strict=True):
-        ends.append(f'{end}, {f"limit of {by}" if by else "toggle"}')
-    if interval.limited == (True, True):
-        return f'{ends[0]}, to {ends[1]}'
-    return f'{ends[0]}, and on' if interval.limited[0] else f'up to {ends[1]}'
-
-
-def _groups(closure: Closure) -> list[tuple[str, ...]]:
-    count = len(closure.structure.groups)
-    return [(str(number + 1), *describe_group(closure, number)) for number in range(count)]
-
-
 def _assembly(closure: Closure, dyad: Dyad) -> str:
     first, second = dyad.outer
     closing = dyad.inner.name
@@ -243,34 +288,188 @@ def _assembly(closure: Closure, dyad: Dyad) -> str:
     return 'the only one'
 
 
-def _other_assemblies(closure: Closure) -> Iterator[Table]:
-    """Yield for each iterated group the other assemblies that a pose could name."""
-    pose = closure.linkage.pose
-    for number, group in enumerate(closure.structure.groups):
-        if not isinstance(group, Iterated) or pose is None:
-            continue
-        # local import: it loads numpy
-        from linkage_ros.kinematics.assembly_modes import other_assemblies, STARTS
-
-        others = other_assemblies(closure, number)
-        inputs = ', '.join(f'{value + 0.0:.9g}' for value in pose.inputs)
-        rows = [
-            (f'{{inputs: [{inputs}], points: {{{_points(one.points)}}}}}', _turns(one.turns))
-            for one in others
-        ]
-        yield Table(
-            f'Other assemblies of group {number + 1} at the inputs of the pose: '
-            f'{len(others)} found from {STARTS} starts',
-            ('pose', "on the pose's branch") if rows else ('',),
-            rows or [('none',)],
-        )
+# The same as tables.
 
 
-def _points(points: Mapping[str, complex]) -> str:
-    return ', '.join(
-        f'{name}: [{place.real + 0.0:.7g}, {place.imag + 0.0:.7g}]'
-        for name, place in points.items()
+def tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[Table]:
+    """Yield the tables that describe a linkage."""
+    yield Table(account['file'], ('', ''), list(_facts(account, angles)))
+    yield Table(
+        'Solved in this order',
+        ('>', 'group', 'links', 'how', 'assembly'),
+        [
+            (
+                str(number),
+                group['kind'],
+                ', '.join(group['links']),
+                group['method'],
+                group['assembly'],
+            )
+            for number, group in enumerate(account['groups'], 1)
+        ],
     )
+    for group in account['other_assemblies']:
+        yield _assemblies_table(group)
+    bars = [
+        (
+            str(bar['group']),
+            ', '.join(bar['links']),
+            ', '.join(f'{length:.6g}' for length in bar['lengths_m']),
+            f'{bar["grashof_margin_m"]:+.4g}' if bar['grashof_margin_m'] else '0',
+            bar['barker'],
+            bar['name'],
+        )
+        for bar in account['four_bars']
+    ]
+    if bars:
+        yield Table(
+            'Four-bars: input, coupler, output and the frame that they are seen from',
+            ('>', 'links', 'lengths [m]', '>Grashof margin [m]', 'Barker', 'name'),
+            bars,
+        )
+    turning = account['inputs'][0]['unit'] == 'rad'
+    rows = [
+        (
+            str(one['group']),
+            ', '.join(one['links']),
+            *(
+                cell
+                for extreme in (one['least'], one['greatest'])
+                for cell in (
+                    '' if extreme['angle_rad'] is None else angles.text(extreme['angle_rad'], 2),
+                    _places(extreme['inputs'], turning, angles),
+                )
+            ),
+        )
+        for one in account['transmission_angles']
+    ]
+    if rows:
+        heads = ['>', 'links', '>least', 'at', '>greatest', 'at']
+        yield Table('Transmission angles over the range, acute', heads, rows)
+    rows = [
+        (
+            str(one['group']),
+            ', '.join(one['links']),
+            f'{one["least"]["conditioning"]:.4f}',
+            _places(one['least']['inputs'], turning, angles),
+        )
+        for one in account['conditioning']
+    ]
+    if rows:
+        heads = ['>', 'links', '>least', 'at']
+        yield Table('Conditioning over the range, of what is iterated', heads, rows)
+
+
+def _facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str, str]]:
+    blocks, inputs = account['slot_blocks'], account['inputs']
+    beside = f' and {blocks} block(s) in slots' if blocks else ''
+    yield 'moving links', f'{account["moving_links"]}{beside}'
+    twice = ' (one of three links counts twice)' if account['shared_pins'] else ''
+    yield 'joints', f'{account["pins"]} pins{twice}, {account["sliders"]} sliders'
+    yield 'loops', str(account['loops'])
+    yield 'degrees of freedom', f'{account["degrees_of_freedom"]}, as many as there are inputs'
+    for given in inputs:
+        driven = (
+            f'slide of {given["slider"]} [m]'
+            if given['slider']
+            else f'angle of {given["child"]} to {given["parent"]}'
+        )
+        yield 'input', f'{given["joint"]}: {driven}'
+    for limits in account['limits']:
+        yield 'limits', f'{limits["joint"]}: {_limits_text(limits, angles)}'
+    yield from _reach_facts(account, angles)
+    worst = account['worst_residual']
+    if worst is None:
+        yield 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
+        return
+    place = ', '.join(
+        angles.value_text(value, given['unit'] == 'rad')
+        for value, given in zip(worst['inputs'], inputs, strict=True)
+    )
+    yield (
+        'worst residual',
+        f'{worst["residual_m"]:.1e} m, of {worst["positions"]} positions, at {place}',
+    )
+
+
+def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str, str]]:
+    if account['ranges'] is None:
+        yield 'range', 'no single one: it depends on every input'
+        return
+    turning = account['inputs'][0]['unit'] == 'rad'
+    for interval in account['ranges']:
+        turns = round((interval['high'] - interval['low']) / tau)
+        if not interval['whole']:
+            each = '; each turn has poses of its own' if turning and not interval['turns'] else ''
+            followed = any(interval['limited']) or not each
+            ends = '' if followed else ', and was not followed farther'
+            yield 'range', f'{_range_text(interval, turning, angles)}{each}{ends}'
+        elif turns > 1:
+            count = 'two' if turns == 2 else str(turns)
+            yield 'range', f'every angle; the motion repeats after {count} turns'
+        else:
+            yield 'range', 'every angle'
+    for status, name in _SINGULAR.items():
+        places = [
+            angles.value_text(one['input'], turning)
+            + ('' if one['within_limits'] else ' beyond the limits')
+            for one in account['singular_inputs']
+            if one['status'] == status.value
+        ]
+        if places or status is not Status.INDETERMINATE:
+            yield name, ', '.join(places) or 'none'
+
+
+def _limits_text(limits: Mapping[str, Any], angles: AngleUnit) -> str:
+    turning = limits['unit'] == 'rad'
+    texts = []
+    low, high = (
+        '' if limits[end] is None else angles.value_text(limits[end], turning)
+        for end in ('low', 'high')
+    )
+    if low or high:
+        texts.append(
+            f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}'
+        )
+    if limits['velocity'] is not None:
+        velocity = angles.of(limits['velocity']) if turning else limits['velocity']
+        texts.append(f'at most {velocity:.6g} {angles.name if turning else "m"}/s')
+    if limits['effort'] is not None:
+        texts.append(f'at most {limits["effort"]:.6g} {"N·m" if turning else "N"}')
+    return ', '.join(texts)
+
+
+def _range_text(interval: Mapping[str, Any], turning: bool, angles: AngleUnit) -> str:
+    """Return a range; if limits end it, with their names."""
+    low, high = (angles.value_text(interval[end], turning) for end in ('low', 'high'))
+    if interval['limited_by'] == [None, None]:
+        return f'{low} to {high}'
+    ends = [
+        f'{end}, {f"limit of {by}" if by else "toggle"}'
+        for end, by in zip((low, high), interval['limited_by'], strict=True)
+    ]
+    if all(interval['limited']):
+        return f'{ends[0]}, to {ends[1]}'
+    return f'{ends[0]}, and on' if interval['limited'][0] else f'up to {ends[1]}'
+
+
+def _assemblies_table(group: Mapping[str, Any]) -> Table:
+    """Return the other assemblies of a group, each as a pose to paste into the file."""
+    inputs = ', '.join(f'{value + 0.0:.9g}' for value in group['inputs'])
+    rows = [
+        (f'{{inputs: [{inputs}], points: {{{_points(one["points_m"])}}}}}', _turns(one['turns']))
+        for one in group['assemblies']
+    ]
+    return Table(
+        f'Other assemblies of group {group["group"]} at the inputs of the pose: '
+        f'{len(rows)} found from {group["starts"]} starts',
+        ('pose', "on the pose's branch") if rows else ('',),
+        rows or [('none',)],
+    )
+
+
+def _points(points: Mapping[str, Sequence[float]]) -> str:
+    return ', '.join(f'{name}: [{x:.7g}, {y:.7g}]' for name, (x, y) in points.items())
 
 
 def _turns(turns: int) -> str:
@@ -279,33 +478,9 @@ def _turns(turns: int) -> str:
     return f'{abs(turns)} turn{"s" if abs(turns) > 1 else ""} {"on" if turns > 0 else "back"}'
 
 
-def _links(closure: Closure, number: int) -> str:
-    return describe_group(closure, number)[1]
-
-
-def _extremes(closure: Closure, number: int, curve: MinMaxCurve, turning: bool) -> tuple[str, ...]:
-    lowest, highest = curve
-    return (
-        str(number + 1),
-        _links(closure, number),
-        angle_text(lowest.value, 2),
-        _places(lowest, turning),
-        angle_text(highest.value, 2),
-        _places(highest, turning),
-    )
-
-
-def _conditioning(
-    closure: Closure, number: int, found: MinMaxCurve, turning: bool
-) -> tuple[str, ...]:
-    lowest = found.lowest
-    links = _links(closure, number)
-    return str(number + 1), links, f'{lowest.value:.4f}', _places(lowest, turning)
-
-
-def _places(extreme: Extreme, turning: bool) -> str:
-    if not extreme.at:
+def _places(inputs: Sequence[float], turning: bool, angles: AngleUnit) -> str:
+    if not inputs:
         return 'everywhere'
-    places = [angle_text(at, 2) if turning else f'{at + 0.0:.6g} m' for at in extreme.at[:_PLACES]]
-    more = len(extreme.at) - _PLACES
+    places = [angles.text(at, 2) if turning else f'{at + 0.0:.6g} m' for at in inputs[:_PLACES]]
+    more = len(inputs) - _PLACES
     return ', '.join(places) + (f' and {more} more' if more > 0 else '')

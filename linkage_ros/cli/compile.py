@@ -28,8 +28,9 @@ from pathlib import Path
 import re
 from threading import Event
 
+from linkage_ros.cli.arguments import add_file, add_output
 from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quoted
-from linkage_ros.files.atomic_write import atomic_write
+from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
@@ -37,6 +38,7 @@ from linkage_ros.kinematics.compiling.c import C
 from linkage_ros.kinematics.compiling.javascript import JavaScript
 from linkage_ros.kinematics.compiling.python_module import PythonModule
 from linkage_ros.kinematics.compiling.source import Language, source, Subject
+from linkage_ros.resources import named_file
 
 LANGUAGES: dict[str, Callable[[Subject], Language]] = {
     '.c': lambda subject: C(subject.name, header=False),
@@ -47,13 +49,13 @@ LANGUAGES: dict[str, Callable[[Subject], Language]] = {
 """The languages, by file suffix."""
 
 
+EXAMPLE = 'linkage compile four_bar -o four_bar.c'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('file', help='the linkage file')
-    parser.add_argument(
-        '-o', '--output', type=Path, required=True, metavar='FILE',
-        help=f'source to write; its language is told by the ending: {", ".join(LANGUAGES)}',
-    )  # fmt: skip
+    add_file(parser)
+    add_output(parser, LANGUAGES)
     parser.add_argument(
         '--derivatives', type=int, choices=(0, 1, 2), default=2,
         help='0: positions; 1: rates too; 2: accelerations too (default)',
@@ -69,20 +71,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Write the source."""
     output: Path = arguments.output
-    language = LANGUAGES.get(output.suffix)
-    if language is None:
-        raise LinkageError(
-            output,
-            f'ends in {output.suffix!r}' if output.suffix else 'has no ending',
-            f'name a file that ends in {", ".join(LANGUAGES)}',
-        )
-    content, _ = read_yaml(arguments.file)
+    language = LANGUAGES[output.suffix.lower()]
+    file = named_file(arguments.file, 'linkages')
+    content, _ = read_yaml(file)
     closure = read_closure(content)
-    file = Path(arguments.file)
-    in_c = output.suffix in ('.c', '.h')
+    in_c = output.suffix.lower() in ('.c', '.h')
     subject = Subject(
         closure,
-        _name(arguments.file, arguments.name) if in_c else file.stem,
+        _name(file, arguments.name) if in_c else file.stem,
         file.name,
         arguments.derivatives,
         _joints(closure, arguments.joints),
@@ -96,11 +92,11 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     return 0
 
 
-def _name(file: str, typed: str | None) -> str:
+def _name(file: Path, typed: str | None) -> str:
     """Return an identifier: the typed one, or one made from the file's name."""
-    name = re.sub('[^0-9A-Za-z]+', '_', Path(file).stem).strip('_') if typed is None else typed
+    name = re.sub('[^0-9A-Za-z]+', '_', file.stem).strip('_') if typed is None else typed
     if not re.fullmatch('[A-Za-z][0-9A-Za-z_]*', name):
-        where, wrong = (file, Path(file).stem) if typed is None else ('--name', typed)
+        where, wrong = (str(file), file.stem) if typed is None else ('--name', typed)
         raise LinkageError(
             where, f'{quoted(wrong)} makes no name in C', 'write one, as --name four_bar'
         )

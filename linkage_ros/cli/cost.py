@@ -19,18 +19,23 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
+import json
 from math import tau
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli.terminal import show, Table
+from linkage_ros.cli.arguments import add_set, bounded, check_no_settings, SCENE_HELP
+from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
 from linkage_ros.cost import compare, EffectCost, measure, SceneCost, Times
 from linkage_ros.effects.stage import NEEDS
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
@@ -92,10 +97,13 @@ EVERY_FAULT = {
 """Every fault with its parameters, on the shipped four-bar."""
 
 
+EXAMPLE = 'linkage cost worn_press --ticks 2000'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     one = parser.add_mutually_exclusive_group(required=True)
-    one.add_argument('scene', nargs='?', help='the scene file, or a linkage file')
+    one.add_argument('scene', nargs='?', metavar='SCENE', help=SCENE_HELP)
     one.add_argument(
         '--all',
         action='store_true',
@@ -103,35 +111,78 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--ticks',
-        type=_ticks,
+        type=bounded(1, _MOST_TICKS, int),
         default=_TICKS,
         help=f'how often each variant of the scene ticks (here {_TICKS})',
     )
+    parser.add_argument('--json', action='store_true', help='the same as JSON, in microseconds')
+    add_set(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Measure; return 1 if stopped."""
+    ticks = arguments.ticks
     if arguments.all:
-        found = all_effects(arguments.ticks, stop.is_set)
-    else:
-        scene = load_scene(arguments.scene)
-        cost = measure(scene, arguments.ticks, stopped=stop.is_set)
-        if cost is not None and not cost.published:
-            raise LinkageError(
-                arguments.scene,
-                f'nothing is published in {arguments.ticks} ticks: there is nothing to measure',
-                'see that the linkage closes where the drive brings it',
-            )
-        found = table_of_scene(arguments.scene, cost, arguments.ticks) if cost else None
-    if found is None:
+        check_no_settings(arguments.set)
+    with progress('ticks of each variant') as advance:
+        if arguments.all:
+            costs = all_effects(ticks, stop.is_set, advance)
+        else:
+            scene = load_scene(arguments.scene, arguments.set)
+            cost = measure(scene, ticks, stopped=stop.is_set, progress=advance)
+            costs = None if cost is None else Costs(cost)
+    if costs is None:
         return 1
-    show(found)
+    if not arguments.all and not costs.scene.published:
+        raise LinkageError(
+            arguments.scene,
+            f'nothing is published in {ticks} ticks: there is nothing to measure',
+            'see that the linkage closes where the drive brings it',
+        )
+    if arguments.json:
+        account = {'file': arguments.scene, 'ticks': ticks, **account_of(costs)}
+        print(json.dumps(account, indent=1, allow_nan=False))
+    elif arguments.all:
+        show(table_of_all(costs, ticks))
+    else:
+        show(table_of_scene(arguments.scene, costs.scene, ticks))
     return 0
 
 
-def all_effects(ticks: int, stopped: Callable[[], bool] = lambda: False) -> Table | None:
+class Costs(NamedTuple):
+    """
+    Measured costs.
+
+    Attributes
+    ----------
+    scene
+        Cost of a scene, or of the scene of all effects.
+    drives
+        What each drive takes beyond the topic drive; empty unless all are measured.
+    faults
+        What each fault takes while it is not injected; empty unless all are measured.
+
+    """
+
+    scene: SceneCost
+    drives: Mapping[str, Times] = MappingProxyType({})
+    faults: Mapping[str, Times] = MappingProxyType({})
+
+
+def all_effects(
+    ticks: int,
+    stopped: Callable[[], bool] = lambda: False,
+    advance: ProgressCallback = lambda _done, _of: None,
+) -> Costs | None:
     """Measure every effect, drive and fault alone on the four-bar; return None if stopped."""
-    cost = measure(every_effect(), ticks, leave_out=False, stopped=stopped)
+
+    def first(done: int, of: int) -> None:
+        advance(done, 2 * of)
+
+    def second(done: int, of: int) -> None:
+        advance(of + done, 2 * of)
+
+    cost = measure(every_effect(), ticks, leave_out=False, stopped=stopped, progress=first)
     if cost is None:
         return None
     with TemporaryDirectory() as folder:
@@ -140,12 +191,38 @@ def all_effects(ticks: int, stopped: Callable[[], bool] = lambda: False) -> Tabl
         drives = {name: _of_four_bar(_with_drive(name), folder) for name in EVERY_DRIVE}
         del drives['topic']
         faults = {name: _of_four_bar(_with_fault(name)) for name in EVERY_FAULT}
-        found = compare(bare, {**drives, **faults}, ticks, stopped=stopped)
+        found = compare(bare, {**drives, **faults}, ticks, stopped=stopped, progress=second)
     if found is None:
         return None
-    return table_of_all(
-        cost, ticks, {name: found[name] for name in drives}, {name: found[name] for name in faults}
-    )
+    return Costs(cost, {name: found[name] for name in drives}, {n: found[n] for n in faults})
+
+
+def account_of(costs: Costs) -> dict[str, Any]:
+    """Return measured costs as JSON holds them; times are in [µs]."""
+    cost = costs.scene
+    return {
+        'published': cost.published,
+        'crank_message': _times_account(cost.offer),
+        'bare_tick': _times_account(cost.bare),
+        'whole_tick': _times_account(cost.whole),
+        'effects': [
+            {
+                'name': effect.name,
+                'adds': _times_account(effect.adds),
+                'added_beside': effect.beside or None,
+                'saves_us': effect.saves,
+                'left_out_with': effect.left_out_with or None,
+                'needed_by': list(effect.needed_by),
+            }
+            for effect in cost.effects
+        ],
+        'drives': {name: _times_account(times) for name, times in costs.drives.items()},
+        'faults': {name: _times_account(times) for name, times in costs.faults.items()},
+    }
+
+
+def _times_account(times: Times | None) -> dict[str, float] | None:
+    return times and {f'{name}_us': value for name, value in times._asdict().items()}
 
 
 def every_effect() -> Scene:
@@ -170,7 +247,7 @@ def _with_fault(name: str) -> str:
 
 def _record_samples(folder: Path) -> None:
     """Record a turn of the crank at 100 samples a second, for the drive that plays a bag."""
-    writer = BagWriter(folder, [Topic('/crank', 'sensor_msgs/msg/JointState', '', '')])
+    writer = BagWriter(folder, [Topic('/crank', JOINT_STATE, '', '')])
     write = JointStateWriter(['crank_joint']).write
     for number in range(100):
         stamp = number * 10_000_000 + 1
@@ -204,24 +281,9 @@ def table_of_scene(title: str, cost: SceneCost, ticks: int) -> Table:
     )
 
 
-def table_of_all(
-    cost: SceneCost, ticks: int, drives: Mapping[str, Times], faults: Mapping[str, Times]
-) -> Table:
-    """
-    Return the table of all effects, drives and faults, each alone beside the bare scene.
-
-    Parameters
-    ----------
-    cost
-        Cost of the scene of all effects.
-    ticks
-        Ticks of each variant.
-    drives
-        What each drive takes beyond the topic drive.
-    faults
-        What each fault takes while it is not injected.
-
-    """
+def table_of_all(costs: Costs, ticks: int) -> Table:
+    """Return the table of all effects, drives and faults, each alone beside the bare scene."""
+    cost = costs.scene
     rows = [
         (
             effect.name,
@@ -231,7 +293,10 @@ def table_of_all(
         )
         for effect in cost.effects
     ]
-    for found, beside in ((drives, 'in the place of topic'), (faults, 'not injected')):
+    for found, beside in (
+        (costs.drives, 'in the place of topic'),
+        (costs.faults, 'not injected'),
+    ):
         rows += [
             (name, *_adds(times), f'{times.median / cost.bare.median:+.2f}', beside)
             for name, times in found.items()
@@ -260,10 +325,3 @@ def _note(effect: EffectCost) -> str:
         f'needed by {", ".join(effect.needed_by)}' if effect.needed_by else '',
     ]
     return '; '.join(filter(None, notes))
-
-
-def _ticks(text: str) -> int:
-    ticks = int(text)
-    if not 1 <= ticks <= _MOST_TICKS:
-        raise argparse.ArgumentTypeError(f'{text} is out of bounds; write 1 to {_MOST_TICKS}')
-    return ticks

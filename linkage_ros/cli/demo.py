@@ -32,17 +32,17 @@ import subprocess
 import sys
 from threading import Event
 
+from linkage_ros.cli.gallery import first_sentence
 from linkage_ros.cli.plot import draw
 from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import did_you_mean, LinkageError, listed
-from linkage_ros.resources import shipped
+from linkage_ros.faults.fault import Fault
+from linkage_ros.processes import private_domain
+from linkage_ros.resources import scene_names, shipped
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heeded
-
-_DOMAINS = 101
-"""Domain ids up to this one have ports that are safe on every operating system."""
 
 _BESIDE = {
     'topic': ('linkage_ros.node.crank_source',),
@@ -51,28 +51,49 @@ _BESIDE = {
 """Companion processes of the drives that listen to a topic, with parameters."""
 
 
+_SECONDS = 10.0
+"""Duration of a demo without ``--seconds``, in [s]; longer if its faults end later."""
+
+_AFTERWARDS = 3.0
+"""How long a demo runs on after the last fault, in [s]."""
+EXAMPLE = 'linkage demo fault_drill --seconds 10'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('name', nargs='?', default='demo', help='the scene; without it, demo')
+    parser.add_argument(
+        'name', nargs='?', default='demo', metavar='SCENE', help='a shipped scene (default: demo)'
+    )
     parser.add_argument('--list', action='store_true', help='the scenes that there are')
     add_run_arguments(parser)
-    parser.set_defaults(seconds=10.0)
+    parser.set_defaults(seconds=None)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Run the demo."""
     if arguments.list:
-        show(Table('', ('scene', 'drive', 'recorded', ''), [_row(f) for f in _files().values()]))
+        rows = [_row(shipped(f'scenes/{name}.yaml')) for name in scene_names()]
+        show(Table('', ('scene', 'drive', 'recorded', ''), rows))
         return 0
-    file = _file(arguments.name)
-    scene = load_scene(file)
+    name, names = arguments.name, scene_names()
+    if name not in names:
+        remedy = did_you_mean(name, names, f'there are: {listed(names)}')
+        raise LinkageError(name, 'there is no such scene', remedy)
+    file = shipped(f'scenes/{name}.yaml')
+    scene = load_scene(file, arguments.set)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % _DOMAINS)
+    os.environ['ROS_DOMAIN_ID'] = str(private_domain())
+    if arguments.seconds is None:
+        ends = [max(fault.at) + fault.seconds for fault in scene.faults.values() if fault.at]
+        # Faults begin at their time after the first tick, and a look at the end is wanted.
+        arguments.seconds = max([_SECONDS, *(end + _AFTERWARDS for end in ends)])
     print(
         f'{scene.name}: {arguments.seconds:g} s; from a second terminal: '
         f'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]}',
         flush=True,  # needed during the run, also by a pipe
     )
+    if scene.faults:
+        print(f'faults    {listed(map(_fault, scene.faults, scene.faults.values()), "; ")}')
     with heeded(), _beside(scene, arguments.seconds):
         code, bag = run_scene(str(file), arguments, stop)
     if bag is not None:
@@ -98,7 +119,7 @@ def _beside(scene: Scene, seconds: float) -> Iterator[None]:
             start_new_session=True,  # Ctrl-C goes to this process only, which ends the others
         )
         for member in scene.members
-        for command in _commands(member, seconds)
+        if (command := _command(member, seconds))
     ]
     try:
         yield
@@ -109,48 +130,27 @@ def _beside(scene: Scene, seconds: float) -> Iterator[None]:
             process.wait()
 
 
-def _commands(member: SceneLinkage, seconds: float) -> Iterator[list[str]]:
-    """Yield the command of a linkage's companion, if it needs one."""
+def _command(member: SceneLinkage, seconds: float) -> list[str]:
+    """Return the command of a linkage's companion; empty if it needs none."""
     drive, _ = member.drive
-    if drive in _BESIDE:
-        module, *parameters = _BESIDE[drive]
-        # A time limit, so that it ends by itself even if this process is killed.
-        parameters += [f'joint:={member.inputs[0]}', f'seconds:={seconds + 10.0:.1f}']
-        yield [sys.executable, '-m', module, '--ros-args', *_each('-p', parameters)]
+    if drive not in _BESIDE:
+        return []
+    module, *parameters = _BESIDE[drive]
+    # A time limit, so that it ends by itself even if this process is killed.
+    parameters += [f'joint:={member.inputs[0]}', f'seconds:={seconds + 10.0:.1f}']
+    pairs = [part for parameter in parameters for part in ('-p', parameter)]
+    return [sys.executable, '-m', module, '--ros-args', *pairs]
 
 
-def _each(flag: str, values: list[str]) -> Iterator[str]:
-    for value in values:
-        yield from (flag, value)
-
-
-def _files() -> dict[str, Path]:
-    """Return the scenes that come with the package, by their names."""
-    folder = shipped('scenes/demo.yaml').parent
-    return {file.stem: file for file in sorted(folder.glob('*.yaml'))}
-
-
-def _file(name: str) -> Path:
-    files = _files()
-    if name in files:
-        return files[name]
-    remedy = did_you_mean(name, files, f'there are: {listed(files)}')
-    raise LinkageError(name, 'there is no such scene', remedy)
+def _fault(name: str, fault: Fault) -> str:
+    """Return a fault as text: its name, its kind, and when it happens."""
+    times = listed(f'{time:g}' for time in fault.at)
+    when = f'at {times} s for {fault.seconds:g} s' if fault.at else 'by service call'
+    return f'{name} ({fault.kind}) {when}'
 
 
 def _row(file: Path) -> tuple[str, ...]:
     """Return the list's text on a scene: its drives, and its own description."""
     scene = load_scene(file)
     drives = ' and '.join(dict.fromkeys(member.drive[0] for member in scene.members))
-    return scene.name, drives, 'yes' if scene.record else 'no', _first_sentence(file)
-
-
-def _first_sentence(file: Path) -> str:
-    """Return the description in the comment at the head of a file."""
-    comment = []
-    for line in file.read_text('utf-8').splitlines():
-        if not line.startswith('#'):
-            break
-        if not line.startswith('# yaml-language-server:'):
-            comment.append(line.lstrip('# '))
-    return ' '.join(comment).partition('. ')[0].rstrip('.')
+    return scene.name, drives, 'yes' if scene.record else 'no', first_sentence(file)

@@ -21,32 +21,61 @@ import argparse
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli.arguments import add_at, inputs
-from linkage_ros.drawing.figure import picture, view
+from linkage_ros.cli.arguments import add_at, add_file, add_output, inputs, PICTURES
+from linkage_ros.drawing.figure import assemblies_picture, picture, view
+from linkage_ros.files.assemblies import assemblies
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
+
+EXAMPLE = 'linkage draw jansen_leg -o jansen_leg.svg --names'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('file', help='the linkage file')
-    parser.add_argument(
-        '-o', '--output', type=Path, help='PNG, SVG or PDF; without it FILE.png in this folder'
-    )
+    add_file(parser)
+    add_output(parser, PICTURES, 'FILE.png in this folder')
     add_at(
         parser,
         'pose to draw, in degrees, or metres for a slide; further ones are drawn in light grey',
     )
     parser.add_argument('--names', action='store_true', help='write the names of pins and links')
+    parser.add_argument(
+        '--assemblies',
+        action='store_true',
+        help='draw each choice of assembly sides that closes, with the line for the file',
+    )
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Draw the linkage."""
+    if arguments.assemblies:
+        return _draw_assemblies(arguments)
     closure = load(arguments.file)
     typed = [inputs(closure.linkage, at, '--at') for at in arguments.at]
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem
     file = arguments.output or Path(f'{name}.png')
     picture(view(closure, pose, ghosts), name, file, names=arguments.names)
+    print(file)
+    return 0
+
+
+def _draw_assemblies(arguments: argparse.Namespace) -> int:
+    """Draw all assemblies at the same inputs; one that is open there, at inputs of its own."""
+    found = assemblies(arguments.file)
+    first = next(iter(found.values()))
+    if arguments.at:
+        pose = inputs(first.linkage, arguments.at[0], '--at')
+        closed = {text: each for text, each in found.items() if each.position(*pose).joints}
+        # If it closes in no assembly there, `view` says so.
+        views = {text: view(each, pose) for text, each in (closed or {'': first}).items()}
+    else:
+        pose = usual_inputs(first)
+        views = {
+            text: view(each, pose if each.position(*pose).joints else usual_inputs(each))
+            for text, each in found.items()
+        }
+    file = arguments.output or Path(f'{Path(arguments.file).stem}.png')
+    assemblies_picture(views, file)
     print(file)
     return 0

@@ -32,12 +32,13 @@ import sys
 from threading import Event
 from typing import NamedTuple
 
-from linkage_ros.bag.contents import layout_of, TOLD_EVERY
+from linkage_ros.bag.contents import layout_of, REPORT_EVERY
 from linkage_ros.bag.reader import Bag
+from linkage_ros.cli.arguments import add_bag, add_output
 from linkage_ros.cli.bag_reading import opened, run_or_blank, unfinished_text
 from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError, listed
-from linkage_ros.files.tables import block_rows, check_kind, table_file
+from linkage_ros.files.tables import block_rows, check_kind, KINDS, table_file
 from linkage_ros.messages.joint_values import (
     FORCE_X,
     JOINT_STATE,
@@ -221,7 +222,7 @@ def _ticks(
     read = 0
     for number, (topic, logged, published, data) in enumerate(source.bag.messages(), 1):
         read += len(data)
-        if not number % TOLD_EVERY:
+        if not number % REPORT_EVERY:
             report_progress(read)
         reader = readers.get(topic)
         values = reader.read(data) if reader is not None else None
@@ -245,12 +246,13 @@ def _ticks(
 _MIB = 2**20
 
 
+EXAMPLE = 'linkage export my_bag -o my_bag.csv'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
-    parser.add_argument(
-        '-o', '--output', type=Path, required=True, metavar='FILE', help='FILE.csv or FILE.parquet'
-    )
+    add_bag(parser)
+    add_output(parser, KINDS)
     parser.add_argument('--topic', help='a topic to write alone, a row for each message')
 
 
@@ -301,25 +303,25 @@ def export(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Found:
     source = _source(bag, scene, topic)
     turning = turning_joints(scene) if scene is not None else {}
 
-    def bounded(told: Callable[[int, int], None], of: int) -> Callable[[int], None]:
+    def bounded(advance: Callable[[int, int], None], of: int) -> Callable[[int], None]:
         def tell(read: int) -> None:
             if stop.is_set():
                 raise StoppedError
-            told(read // _MIB, max(of, read // _MIB))
+            advance(read // _MIB, max(of, read // _MIB))
 
         return tell
 
     size = sum(layout_of(path).content for path in bag.files) // _MIB
-    with progress('columns looked for [MiB]') as told:
-        found = survey(source, [] if scene is None else scene.joints, bounded(told, size))
+    with progress('columns looked for [MiB]') as advance:
+        found = survey(source, [] if scene is None else scene.joints, bounded(advance, size))
     if not found.rows:
         raise _nothing(source, found)
     heads = [TIME, STAMP, PUBLISHED, LOGGED, *(_head(key, turning) for key in found.keys)]
     with (
         table_file(file, heads, (STAMP, PUBLISHED, LOGGED)) as write,
-        progress('written [MiB]') as told,
+        progress('written [MiB]') as advance,
     ):
-        rows = rows_of(source, found.keys, bounded(told, size))
+        rows = rows_of(source, found.keys, bounded(advance, size))
         while block := list(islice(rows, block_rows(len(heads)))):
             write(block)
     return found

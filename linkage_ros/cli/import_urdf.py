@@ -27,11 +27,12 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.cli.arguments import add_output, put
+from linkage_ros.cli.arguments import add_output, LINKAGES
+from linkage_ros.cli.robot_model import write_or_print
 from linkage_ros.errors import LinkageError
+from linkage_ros.files.file_access import read_regular
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.linkage_text import linkage_text
-from linkage_ros.files.regular_file import read_regular
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.robot_models.from_urdf import from_urdf
 from linkage_ros.robot_models.urdf_file import read_urdf
@@ -39,9 +40,14 @@ from linkage_ros.robot_models.urdf_file import read_urdf
 _LARGEST_FILE = 10_000_000
 
 
+EXAMPLE = 'linkage import four_bar.urdf --input crank_joint -o my_four_bar.yaml'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('file', type=Path, help='the URDF; of xacro, what xacro makes of it')
+    parser.add_argument(
+        'file', type=Path, metavar='URDF', help='the URDF; of xacro, what xacro makes of it'
+    )
     parser.add_argument(
         '--close',
         action='append',
@@ -64,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--no-limits', action='store_true', help='leave out what <limit> says of the joints'
     )
-    add_output(parser, 'linkage file')
+    add_output(parser, LINKAGES, 'the linkage file is printed')
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
@@ -88,7 +94,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     read_linkage(parse_yaml(text.encode(), f'{file}, as a linkage'))
     for part in made.left_out:
         print(f'left out: {part}, which belongs to no loop', file=sys.stderr)
-    put(text.encode(), arguments.output)
+    write_or_print(text.encode(), arguments.output)
     return 0
 
 

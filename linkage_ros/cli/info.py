@@ -25,17 +25,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from functools import partial
 import json
-from math import degrees
-from pathlib import Path
 import sys
 from threading import Event
 from typing import Any
 
 from linkage_ros.bag.contents import contents_of, layout_of
 from linkage_ros.bag.reader import Bag
-from linkage_ros.cli.arguments import value_text, wrapped
+from linkage_ros.cli.arguments import add_bag, add_radians, AngleUnit, wrapped
 from linkage_ros.cli.bag_reading import (
     account_of,
     add_trust,
@@ -47,16 +44,20 @@ from linkage_ros.cli.bag_reading import (
 )
 from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import clean, LinkageError
-from linkage_ros.replay.worst_residuals import examine
+from linkage_ros.replay.verify import examine
 from linkage_ros.signals import heeded
 
 _MIB = 2**20
 
 
+EXAMPLE = 'linkage info my_bag'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
+    add_bag(parser)
     parser.add_argument('--json', action='store_true', help='the same as JSON')
+    add_radians(parser)
     add_trust(parser)
 
 
@@ -68,10 +69,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
     else:
-        for number, table in enumerate(tables(account)):
-            if number:
-                print()
-            show(table)
+        show(*tables(account, arguments.angles))
     if account['stopped']:
         print('linkage info: stopped; not all of the bag was read', file=sys.stderr)
     return int(account['stopped'])
@@ -89,16 +87,18 @@ def info(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any
     """
     layouts = [layout_of(file) for file in bag.files]
     size = max(1, sum(layout.content for layout in layouts) // _MIB)
-    with progress('read [MiB]') as told:
-        contents = contents_of(bag, lambda read: told(read // _MIB, size), stop.is_set)
+    with progress('read [MiB]') as advance:
+        contents = contents_of(bag, lambda read: advance(read // _MIB, size), stop.is_set)
     account = account_of(bag, layouts, contents)
     account |= {'scene': None, 'scene_missing': None, 'replay': None}
     try:
         scene = scene_of(bag, trust_effects=trust_effects)
         account['scene'] = scene_account(scene)
         states = max((topic['messages'] for topic in account['topics']), default=0)
-        with progress('states looked at') as told:
-            examined = examine(bag, scene, partial(_told, told, states), stop.is_set)
+        with progress('states looked at') as advance:
+            examined = examine(
+                bag, scene, lambda done: advance(done, max(done, states)), stop.is_set
+            )
     except LinkageError as error:
         account['scene_missing'] = f'{error.where}: {error.reason}'
         return account
@@ -109,19 +109,15 @@ def info(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any
     return account
 
 
-def _told(told: Any, of: int, done: int) -> None:
-    told(done, max(done, of))
-
-
-def tables(account: dict[str, Any]) -> Iterator[Table]:
+def tables(account: dict[str, Any], angles: AngleUnit) -> Iterator[Table]:
     """Yield the description of a bag as tables."""
     yield _table(account['bag'], _facts(account))
-    told = [
+    words = [
         word
         for word in ('received', 'dropped', 'let_go')
         if word == 'dropped' or _sum(account, word)
     ]
-    counted = [f'>{word.replace("_", " ")}' for word in told]
+    counted = [f'>{word.replace("_", " ")}' for word in words]
     heads = ('topic', 'type', '>messages', '>rate [Hz]', *counted, 'QoS')
     rows = [
         (
@@ -129,7 +125,7 @@ def tables(account: dict[str, Any]) -> Iterator[Table]:
             clean(topic['type']),
             str(topic['messages']),
             '' if topic['rate_hz'] is None else f'{topic["rate_hz"]:.6g}',
-            *('?' if topic[word] is None else str(topic[word]) for word in told),
+            *('?' if topic[word] is None else str(topic[word]) for word in words),
             _qos(topic),
         )
         for topic in account['topics']
@@ -137,7 +133,7 @@ def tables(account: dict[str, Any]) -> Iterator[Table]:
     yield Table('Topics', heads, rows)
     for linkage in (account['scene'] or {'linkages': []})['linkages']:
         title = f'Linkage {linkage["name"]}' if linkage['name'] else 'Linkage'
-        yield _table(title, _linkage(linkage, account['begin_ns']))
+        yield _table(title, _linkage(linkage, account['begin_ns'], angles))
 
 
 def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -156,13 +152,15 @@ def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if account['recording_failure']:
         yield 'FAILED', account['recording_failure']
     yield 'messages', str(account['messages'])
-    received, dropped, let_go = (_sum(account, word) for word in ('received', 'dropped', 'let_go'))
+    received, dropped, discarded = (
+        _sum(account, word) for word in ('received', 'dropped', 'let_go')
+    )
     if received is not None:
         yield 'received', str(received)
-    told = 'not told: no recorder of ours closed the bag' if dropped is None else str(dropped)
-    yield 'dropped', told
-    if let_go:
-        yield 'let go', f'{let_go}, with files that made way for newer ones'
+    unknown = 'not told: no recorder of ours closed the bag'
+    yield 'dropped', unknown if dropped is None else str(dropped)
+    if discarded:
+        yield 'let go', f'{discarded}, with files that made way for newer ones'
     yield 'versions', ', '.join(_versions(account['versions'])) or 'not told'
     scene = account['scene']
     if scene:
@@ -185,7 +183,9 @@ def _sum(account: dict[str, Any], word: str) -> int | None:
     return sum(counts) if counts and None not in counts else None
 
 
-def _linkage(linkage: dict[str, Any], begin: int | None) -> Iterator[tuple[str, str]]:
+def _linkage(
+    linkage: dict[str, Any], begin: int | None, angles: AngleUnit
+) -> Iterator[tuple[str, str]]:
     bars = [
         f'{bar["kind"]} ({", ".join(f"{length:g}" for length in bar["lengths_m"])} m)'
         for bar in linkage.get('four_bars', ())
@@ -203,27 +203,32 @@ def _linkage(linkage: dict[str, Any], begin: int | None) -> Iterator[tuple[str, 
     yield 'states', f'{linkage["states"]} closed{toggles}{limited}'
     worst, near = linkage['worst_residual'], linkage['nearest_to_toggle']
     if worst:
-        yield 'worst residual', f'{worst["residual_m"]:.1e} m, {_place(worst, inputs, begin)}'
+        yield (
+            'worst residual',
+            f'{worst["residual_m"]:.1e} m, {_place(worst, inputs, begin, angles)}',
+        )
     if near:
         distance = near['input_to_toggle']
-        away = '' if distance is None else f', {_input(distance, inputs[0])} from one'
-        angle = f'transmission angle {degrees(near["transmission_angle_rad"]):.4g}°'
+        away = '' if distance is None else f', {_input(distance, inputs[0], angles)} from one'
+        angle = f'transmission angle {angles.text(near["transmission_angle_rad"])}'
         nearness = f'conditioning {near["conditioning"]:.4g}, {angle}{away}'
-        yield 'nearest toggle', f'{nearness}, {_place(near, inputs, begin)}'
+        yield 'nearest toggle', f'{nearness}, {_place(near, inputs, begin, angles)}'
 
 
-def _place(found: dict[str, Any], inputs: list[dict[str, str]], begin: int | None) -> str:
+def _place(
+    found: dict[str, Any], inputs: list[dict[str, str]], begin: int | None, angles: AngleUnit
+) -> str:
     """Return the time and place of an event."""
     values = ', '.join(
-        f'{given["joint"]} {_input(value, given)}'
+        f'{given["joint"]} {_input(value, given, angles)}'
         for given, value in zip(inputs, found['inputs'], strict=True)
     )
     return f'at {(found["time_ns"] - (begin or 0)) / 1e9:+.6f} s, {values}'
 
 
-def _input(value: float, given: dict[str, str]) -> str:
+def _input(value: float, given: dict[str, str], angles: AngleUnit) -> str:
     turning = given['unit'] == 'rad'
-    return value_text(wrapped(value) if turning else value, turning)
+    return angles.value_text(wrapped(value) if turning else value, turning)
 
 
 def _compression(found: dict[str, Any]) -> str:

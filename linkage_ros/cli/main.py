@@ -18,19 +18,30 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from importlib import import_module
+import os
 import sys
 from threading import Event
+from types import ModuleType
+from typing import Any, NoReturn
 
 from linkage_ros import __version__
 from linkage_ros.cli.terminal import clean_output
-from linkage_ros.errors import LinkageError, missing_packages_reported
+from linkage_ros.errors import (
+    did_you_mean,
+    LinkageError,
+    listed,
+    missing_packages_reported,
+    quoted,
+)
 from linkage_ros.signals import end_soon, raising, stop_on_signals, StoppedError
 
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
     'demo': 'run the demo scene with a crank of its own, on a ROS graph of its own',
     'play': 'publish a bag on the graph, at its own pace or another',
+    'echo': 'print the messages of a topic as YAML, or their rate',
     'plot': 'draw the joints of a bag over the angle of its crank',
     'info': 'say what a bag holds, how well its loops closed, and where a toggle was nearest',
     'report': 'write a run as one HTML page: its linkage moving, plots, events, counts',
@@ -40,19 +51,22 @@ COMMANDS = {
     'scene': 'say what a scene consists of; list all effects; print the schemas of the files',
     'cost': 'say what each effect of a scene costs on this machine',
     'accuracy': 'show what accuracy costs in time, on a scene: tables, and a page with pictures',
+    'gallery': 'list the linkages and scenes that come with the package; print or copy one',
     'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
     'draw': 'draw a linkage, and its joints over its range',
+    'animate': 'animate a linkage over its range, or a part of a run: GIF, MP4 or SVG',
     'compile': 'write a linkage as source in C, JavaScript or Python that needs nothing else',
     'urdf': 'write a linkage or a scene as URDF, for robot_state_publisher and RViz',
     'mjcf': 'write a linkage or a scene as MJCF, for MuJoCo, with its closed loops',
     'import': 'make a linkage file of a URDF and the pins that close it',
     'synthesize': 'design a four-bar: from pairs of angles, a function, a curve or poses',
+    'completion': 'print the completion script of a shell: bash, zsh or fish',
 }
 """Each subcommand, usually also the name of its module in this folder, and its description."""
 
-_MODULES = {'import': 'import_urdf'}
-"""Modules that cannot have their command's name, since it is a keyword of Python."""
+_MODULES = {'import': 'import_urdf', 'urdf': 'robot_model', 'mjcf': 'robot_model'}
+"""Modules with another name than their command: a keyword of Python, and one for two commands."""
 
 
 def module_of(command: str) -> str:
@@ -60,8 +74,72 @@ def module_of(command: str) -> str:
     return f'linkage_ros.cli.{_MODULES.get(command, command)}'
 
 
+EXIT_CODES = {
+    0: 'success',
+    1: 'a run failed or was stopped, or no result is what was asked for',
+    2: 'wrong input; one line names it, the place and the remedy',
+    3: 'something is lost (recover) or differs (replay)',
+}
+"""The exit codes of all commands."""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that answers a wrong word in one line, with the nearest right one."""
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse; refuse unknown options first, which argparse reports only after all others."""
+        options = [option for action in self._actions for option in action.option_strings]
+        for word in args or ():
+            if word in ('--', '--ros-args'):  # what follows are no options of this command
+                break
+            name = word.partition('=')[0]
+            if name.startswith('--') and not any(option.startswith(name) for option in options):
+                remedy = did_you_mean(name, options, 'leave it out')
+                self.error(f'there is no option {quoted(name)}; {remedy}')
+        return super().parse_args(args, namespace)
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            choices = list(map(str, action.choices))
+            remedy = did_you_mean(str(value), choices, f'write one of {listed(choices)}')
+            raise argparse.ArgumentError(action, f'there is no {quoted(value)}; {remedy}')
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line, and exit as for any wrong input."""
+        self.exit(2, f'{self.prog}: {message} (see {self.prog} --help)\n')
+
+
+def parser_of(name: str, module: ModuleType) -> Parser:
+    """Return the parser of a subcommand; its help ends with the example."""
+    parser = Parser(prog=f'linkage {name}', description=module.__doc__)
+    parser.set_defaults(command=name)
+    module.add_arguments(parser)
+    example = module.EXAMPLE
+    # A group without arguments: argparse folds an epilog, and this is to be copied.
+    parser.add_argument_group('example', example if isinstance(example, str) else example[name])
+    return parser
+
+
+def top_parser() -> Parser:
+    """Return the parser of ``linkage`` itself, which reads the name of the subcommand."""
+    commands = '\n'.join(f'  {name:<10} {text}' for name, text in COMMANDS.items())
+    codes = '\n'.join(f'  {code}  {text}' for code, text in EXIT_CODES.items())
+    parser = Parser(
+        prog='linkage',
+        description=f'Planar linkages for ROS 2.\n\ncommands:\n{commands}\n\nexit codes:\n{codes}',
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog='linkage COMMAND --help says more.\n\nexample:\n  linkage check jansen_leg',
+    )
+    parser.add_argument('--version', action='version', version=f'linkage_ros {__version__}')
+    parser.add_argument('command', choices=COMMANDS, metavar='COMMAND', help='one of those above')
+    return parser
+
+
 def main(arguments: list[str] | None = None) -> int:
-    """Run ``linkage``; return 0, 1 for a failed run, 2 for wrong input, 3 for a loss."""
+    """Run ``linkage`` and return one of `EXIT_CODES`."""
+    if '_ARGCOMPLETE' in os.environ:  # a shell asks how to complete a line
+        import_module(module_of('completion')).complete()  # ends the process, if it can
+        return 1
     # First of all: from here on a signal ends a command in order, and a run closes its bag.
     stop = stop_on_signals()
     clean_output()
@@ -82,24 +160,13 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
 
 
-def _run(arguments: list[str], stop: Event) -> int:
-    commands = '\n'.join(f'  {name:<10} {text}' for name, text in COMMANDS.items())
-    parser = argparse.ArgumentParser(
-        prog='linkage',
-        description=f'Planar linkages for ROS 2.\n\ncommands:\n{commands}',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog='linkage COMMAND --help says more.',
-    )
-    parser.add_argument('--version', action='version', version=f'linkage_ros {__version__}')
-    parser.add_argument('command', choices=COMMANDS, metavar='COMMAND')
-    name = parser.parse_args(arguments[:1]).command
-
+def _run(arguments: Sequence[str], stop: Event) -> int:
+    name = top_parser().parse_args(arguments[:1]).command
     try:
         with missing_packages_reported():
             module = import_module(module_of(name))
-            subparser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
-            module.add_arguments(subparser)
-            return int(module.run(subparser.parse_args(arguments[1:]), stop))
+            parser = parser_of(name, module)
+            return int(module.run(parser.parse_args(arguments[1:]), stop))
     except LinkageError as error:
         print(f'linkage {name}: {error}', file=sys.stderr)
         return 2

@@ -26,12 +26,12 @@ from linkage_ros.bag.reader import Bag, RUN_FILE
 from linkage_ros.bag.run_events import (
     BEGUN,
     FaultEvent,
-    OWN_EFFECTS,
+    raw_account,
     Reset,
-    run_said,
     RunAccount,
     SampleEvent,
     SEED,
+    USER_EFFECTS,
     WITH_THE_RUN,
 )
 from linkage_ros.bag.topic import QosProfile, Topic
@@ -40,8 +40,8 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.replay.counterfactual import Counterfactual, Done
-from linkage_ros.replay.replay import own_effects_here, versions_here
+from linkage_ros.replay.counterfactual import Counterfactual, ReplayEvent
+from linkage_ros.replay.replay import user_effects_here, versions_here
 from linkage_ros.scene.scene import Scene
 
 _FLUSHED_EVERY = 50_000
@@ -92,7 +92,7 @@ class Names(NamedTuple):
     extras: tuple[str, ...]
 
 
-def names_for(source: Source, scene: Scene, what_if: Counterfactual) -> Names:
+def names_for(source: Source, scene: Scene, counterfactual: Counterfactual) -> Names:
     """Return the names of the topics that a scene publishes."""
     run = source.run
     known: dict[str, str] = {}
@@ -122,7 +122,7 @@ def names_for(source: Source, scene: Scene, what_if: Counterfactual) -> Names:
         resolved('~/faults'),
         resolved('~/withheld'),
         resolved('~/resets'),
-        tuple(resolved(extra.topic) for extra in what_if.extras),
+        tuple(resolved(extra.topic) for extra in counterfactual.extras),
     )
 
 
@@ -134,7 +134,7 @@ class NewBag:
     ----------
     folder
         Folder of the new bag; an existing one is never overwritten.
-    source, scene, what_if, names
+    source, scene, counterfactual, names
         Its content.
 
     Raises
@@ -145,7 +145,12 @@ class NewBag:
     """
 
     def __init__(
-        self, folder: Path, source: Source, scene: Scene, what_if: Counterfactual, names: Names
+        self,
+        folder: Path,
+        source: Source,
+        scene: Scene,
+        counterfactual: Counterfactual,
+        names: Names,
     ) -> None:
         bag = source.bag
         own = {topic.name: topic for topic in bag.topics}
@@ -157,16 +162,16 @@ class NewBag:
             topics.append(('resets_topic', names.resets, _TIME, QosProfile()))
         if scene.faults:
             topics.append(('faults_topic', names.faults, 'std_msgs/msg/String', _CHANGES_QOS))
-        if what_if.withholds:
+        if counterfactual.withholds:
             topics.append(('withheld_topic', names.withheld, _TIME, QosProfile()))
-        self._what_if = what_if
+        self._counterfactual = counterfactual
         self._numbers = {key: number for number, (key, *_) in enumerate(topics)}
         self._first_extra = len(topics)
         named = {key: name for key, name, _, _ in topics}
         described = [_described(bag, name, kind, qos) for _, name, kind, qos in topics]
         described += [
             _described(bag, name, extra.message, QosProfile())
-            for name, extra in zip(names.extras, what_if.extras, strict=True)
+            for name, extra in zip(names.extras, counterfactual.extras, strict=True)
         ]
         account = {
             'scene': scene.name,
@@ -175,9 +180,9 @@ class NewBag:
             'extra_topics': list(names.extras),
             BEGUN: WITH_THE_RUN,
             SEED: scene.seed,
-            **({OWN_EFFECTS: own_effects} if (own_effects := own_effects_here(scene)) else {}),
+            **({USER_EFFECTS: user_effects} if (user_effects := user_effects_here(scene)) else {}),
             **versions_here(),
-            'made_from': {'bag': str(bag.path.resolve()), 'run': run_said(bag)},
+            'made_from': {'bag': str(bag.path.resolve()), 'run': raw_account(bag)},
         }
         files = {name: ('application/yaml', data) for name, data in scene.files.items()}
         files[RUN_FILE] = ('application/json', json.dumps(account).encode())
@@ -191,7 +196,7 @@ class NewBag:
         """Return the number of messages written on each topic."""
         return dict(zip((topic.name for topic in self._topics), self._written, strict=True))
 
-    def add(self, event: Done) -> None:
+    def add(self, event: ReplayEvent) -> None:
         """Write an event; raise RecordingError if it cannot be written."""
         if isinstance(event, SampleEvent):
             self._write(self._numbers['crank_topic'], *event)
@@ -208,7 +213,7 @@ class NewBag:
             for number, message in enumerate(tick.extras, self._first_extra):
                 if message:
                     self._write(number, log_time, time, message)
-            if self._what_if.withheld(tick):
+            if self._counterfactual.withheld(tick):
                 withheld = time_message(time)
                 self._write(self._numbers['withheld_topic'], log_time, time, withheld)
 

@@ -23,41 +23,44 @@ What cannot be published is left out, and said.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from math import inf, isfinite
-from pathlib import Path
+from math import inf
 import sys
 from threading import Event
 
 from linkage_ros.bag.order import LogTimeOrder
 from linkage_ros.bag.reader import Bag, is_in_use
 from linkage_ros.bag.topic import Topic
+from linkage_ros.cli.arguments import add_bag, bounded
 from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.terminal import progress, ProgressCallback
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.bag_topics import offer
 from linkage_ros.node.playback import LATE, Part, Playback
-from linkage_ros.node.player import CLOCK, play, player_node, Wishes
+from linkage_ros.node.player import CLOCK, play, PlaybackOptions, player_node
 from linkage_ros.signals import heeded
 
 _CLOCK_RATE = 40.0  # as ``ros2 bag play``
 
 
+EXAMPLE = 'linkage play my_bag --rate 0.5'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
+    add_bag(parser)
     parser.add_argument(
         '--rate',
-        type=_number(0.01, 1000.0),
+        type=bounded(0.01, 1000.0),
         default=1.0,
         metavar='R',
         help='seconds of the bag a second, 0.01 to 1000; without it 1',
     )
     parser.add_argument(
         '--clock',
-        type=_number(0.1, 10_000.0),
+        type=bounded(0.1, 10_000.0),
         nargs='?',
         const=_CLOCK_RATE,
         default=0.0,
@@ -69,21 +72,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--start',
-        type=_number(0.0, 1e9),
+        type=bounded(0.0, 1e9),
         default=0.0,
         metavar='SECONDS',
         help="begin so much of the bag's time after its beginning",
     )
     parser.add_argument(
         '--seconds',
-        type=_number(1e-9, 1e9),
+        type=bounded(1e-9, 1e9),
         default=inf,
         help="end after so much of the bag's time; without it, at its end",
     )
     parser.add_argument('--loop', action='store_true', help='begin again at the end')
     parser.add_argument(
         '--wait',
-        type=_number(0.0, 1e6),
+        type=bounded(0.0, 1e6),
         default=0.0,
         metavar='SECONDS',
         help='wait until somebody listens to one of the topics, for so long at most',
@@ -113,15 +116,15 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             f'it lasts {(order.end - begin) / 1e9:g} s',
         )
     ros = ['--ros-args', *arguments.ros_args] if arguments.ros_args else []
-    with heeded(), player_node(ros) as node, progress('played [s]') as told:
+    with heeded(), player_node(ros) as node, progress('played [s]') as advance:
         publishers = offer(node, topics, _say)
         if not publishers:
             raise BagError(bag.path, 'has no topic that can be published', 'nothing to play')
         part = Part(first, first + arguments.seconds * NANOSECONDS, publishers, arguments.loop)
-        wishes = Wishes(arguments.rate, arguments.clock, arguments.wait)
+        options = PlaybackOptions(arguments.rate, arguments.clock, arguments.wait)
         last = min(part.last, inf if order.end is None else order.end)
-        tell = partial(_tell, told, first, last)
-        playback, error = play(node, publishers, order, part, wishes, stop, tell)
+        tell = partial(_tell, advance, first, last)
+        playback, error = play(node, publishers, order, part, options, stop, tell)
     if not any(playback.counts.values()) and not stop.is_set():
         raise error or BagError(
             bag.path, 'holds no message of these topics at these times', 'nothing to play'
@@ -169,9 +172,9 @@ def _say(error: LinkageError, what: str = 'left out: ') -> None:
     print(f'linkage play: {what}{clean(str(error))}', file=sys.stderr)
 
 
-def _tell(told: ProgressCallback, first: int, last: float, now: int) -> None:
+def _tell(advance: ProgressCallback, first: int, last: float, now: int) -> None:
     end = now if last == inf else int(last)
-    told((now - first) // NANOSECONDS, (end - first) // NANOSECONDS)
+    advance((now - first) // NANOSECONDS, (end - first) // NANOSECONDS)
 
 
 def _summary(playback: Playback, rate: float) -> str:
@@ -185,16 +188,3 @@ def _summary(playback: Playback, rate: float) -> str:
         ('late', f'{late}; at most {playback.latest / 1e6:.1f} ms'),
     ]
     return '\n'.join(f'{head:<8}{text}' for head, text in rows)
-
-
-def _number(least: float, most: float) -> Callable[[str], float]:
-    """Return a reader of a number within bounds."""
-
-    def read(text: str) -> float:
-        value = float(text)
-        if not isfinite(value) or not least <= value <= most:
-            raise argparse.ArgumentTypeError(f'{text} is not between {least:g} and {most:g}')
-        return value
-
-    read.__name__ = 'number'  # argparse shows this name: "invalid number value"
-    return read

@@ -18,31 +18,37 @@
 from __future__ import annotations
 
 import argparse
-from importlib.util import find_spec
+from collections.abc import Sequence
 from math import nan, pi, tau
 from pathlib import Path
 from threading import Event
-from typing import Any
 
+from linkage_ros.cli.arguments import add_bag, add_output, PICTURES
 from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
-from linkage_ros.drawing.painting import save
-from linkage_ros.effects.angle_unwrap import wrapped
-from linkage_ros.errors import BagError, LinkageError, shortened
-from linkage_ros.kinematics.linkage import Input, RevoluteJoint
+from linkage_ros.drawing.curves import Curve, sweep
+from linkage_ros.drawing.figure import joint_axes, label_joints, plot_joints
+from linkage_ros.drawing.painting import save, settings, show_lengths
+from linkage_ros.errors import BagError, shortened
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
+from linkage_ros.kinematics.results import InputRange
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.messages.joint_state import JointStateReader, Rejection
 from linkage_ros.replay.replay import replay
 from linkage_ros.signals import StoppedError
+import numpy as np
 
-_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
-"""Colours by Okabe and Ito, which colour-blind readers can distinguish."""
+Values = tuple[float, ...]
+"""Values of joints, in [rad] or [m], and per second."""
 
-Curves = dict[str, tuple[list[float], list[float]]]
+
+EXAMPLE = 'linkage plot my_bag -o my_bag.png'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
-    parser.add_argument('-o', '--output', type=Path, help='PNG, SVG or PDF; without it BAG.png')
+    add_bag(parser)
+    add_output(parser, PICTURES, 'BAG.png')
     add_trust(parser)
 
 
@@ -56,9 +62,10 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = False) -> None:
     """
-    Draw a bag: each published joint, and its rate if recorded, over one turn of the crank.
+    Draw a bag: each published joint, and its rate if recorded, over the range of the crank.
 
-    A sliding crank is drawn over the length of its motion.
+    Angles are continuous over this range, as in `linkage draw`, in whichever turn they were
+    recorded.
 
     Raises
     ------
@@ -68,25 +75,15 @@ def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = Fa
         The event was set.
 
     """
-    if find_spec('matplotlib') is None:
-        raise LinkageError(
-            'matplotlib', 'is not installed', 'pip install linkage_ros[report], or apt its package'
-        )
+    settings()  # without matplotlib, say so before the bag is read
     bag = opened(bag_path, stop)
     scene = scene_of(bag, trust_effects=trust_effects)
     # The x axis is the crank of the first linkage; its joints are drawn.
     member = scene.members[0]
-    linkage = member.linkage
-    driven = linkage.inputs[0]
-    drawn = {
-        name: (place, isinstance(joint, RevoluteJoint))
-        for place, (name, joint) in enumerate(linkage.joints.items())
-        if name != driven.joint
-    }
-    positions: Curves = {name: ([], []) for name in drawn}
-    rates: Curves = {name: ([], []) for name in drawn}
     reader = JointStateReader(member.joints)
-    states = 0
+    cranks: list[Values] = []
+    positions: list[Values] = []
+    rates: list[Values] = []
     for _, recorded, _, tick in replay(bag, scene):
         if stop.is_set():
             raise StoppedError
@@ -98,81 +95,116 @@ def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = Fa
             continue
         if isinstance(sample, Rejection):
             raise BagError(bag_path, f'a joint state: {sample.value}', 'name another bag')
-        states += 1
-        crank = crank_state.angles[0]
-        if not driven.slider:
-            crank %= tau
-        for name, (place, turning) in drawn.items():
-            value = sample.angles[place]
-            _add(positions[name], crank, wrapped(value) if turning else value, turning)
-            if sample.rates:
-                _add(rates[name], crank, sample.rates[place], False)
-    if not states:
+        cranks.append(tuple(crank_state.angles))
+        positions.append(sample.angles)
+        rates.append(sample.rates or ())
+    if not positions:
         raise BagError(bag_path, 'holds no joint states', 'record a run with a crank')
-    over = driven.joint if driven.slider else f'one turn of {driven.joint}'
-    title = f'{scene.name}: dependent joints over {over} ({states} joint states)'
-    turns = [turning for _, turning in drawn.values()]
-    used = (('rad', any(turns)), ('m', not all(turns)))
-    units = [unit for unit, is_used in used if is_used]
-    _figure(title, driven, units, positions, rates, picture)
+    joints, joint_rates = curves(member.linkage, cranks, positions, rates)
+    if not joints:
+        raise BagError(bag_path, 'holds no joint but its crank', 'name another bag')
+    title = f'{scene.name}: {len(positions)} joint states'
+    _paint(title, member.linkage.inputs[0], joints, joint_rates, picture)
 
 
-def _add(curve: tuple[list[float], list[float]], x: float, y: float, turning: bool) -> None:
-    """Add a point; break the curve where crank or joint begins a new turn."""
-    xs, ys = curve
-    if xs and (abs(x - xs[-1]) > pi or (turning and abs(y - ys[-1]) > pi)):
-        xs.append(nan)
-        ys.append(nan)
-    xs.append(x)
-    ys.append(y)
+def curves(
+    linkage: Linkage,
+    cranks: Sequence[Values],
+    positions: Sequence[Values],
+    rates: Sequence[Values],
+) -> tuple[list[Curve], list[Curve]]:
+    """
+    Return the joints over the crank, and their rates if they were recorded.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    cranks
+        Its inputs at each joint state, in [rad] or [m].
+    positions, rates
+        Its joints, in [rad] or [m], and per second; () for rates that were not recorded.
+
+    """
+    driven = linkage.inputs[0]
+    way = InputSweep(Closure(linkage), cranks[0])
+    about = (each for each in way.ranges if _is_within(cranks[0][0], each))
+    interval = next(about, way.widest_range)
+    ideal = sweep(way, interval).joints if interval else ()
+    crank = np.array([inputs[0] for inputs in cranks])
+    if interval and not driven.slider:
+        crank = crank + np.array([interval.shift(value) for value in crank.tolist()])
+    # The curves end at the greatest angle, where their names stand.
+    end = int(crank.argmax()) + 1
+    order = [*range(end, len(crank)), *range(end)]
+    crank = crank[order]
+    begins = np.arange(len(crank)) == len(crank) - end
+    if not driven.slider:
+        begins[1:] |= np.abs(np.diff(crank)) > pi
+    joints, joint_rates = [], []
+    for place, (name, joint) in enumerate(linkage.joints.items()):
+        if name == driven.joint:
+            continue
+        turning, label = isinstance(joint, RevoluteJoint), _plain(name, 40)
+        values = np.array([positions[i][place] for i in order])
+        breaks = begins.copy()
+        if turning:
+            breaks[1:] |= np.abs(np.diff(values)) > pi
+            # Whatever turn a piece was recorded in, it is drawn in that of the ideal motion.
+            near = np.interp(crank, ideal[place].x, ideal[place].y) if ideal else 0.0 * crank
+            turns = np.round((values - near) / tau)
+            for piece in np.split(np.arange(len(values)), np.flatnonzero(breaks)):
+                known = piece[np.isfinite(values[piece])]
+                if len(known):
+                    values[known] -= tau * np.round(np.median(turns[known]))
+        gaps = np.flatnonzero(breaks)
+        x = tuple(np.insert(crank, gaps, nan).tolist())
+        joints.append(Curve(label, turning, x, tuple(np.insert(values, gaps, nan).tolist())))
+        if any(rates):
+            # At a toggle there are no rates.
+            its_rates = np.array([rates[i][place] if rates[i] else nan for i in order])
+            y = tuple(np.insert(its_rates, gaps, nan).tolist())
+            joint_rates.append(Curve(label, turning, x, y))
+    return joints, joint_rates
 
 
-def _figure(
-    title: str, driven: Input, units: list[str], positions: Curves, rates: Curves, picture: Path
+def _is_within(value: float, interval: InputRange) -> bool:
+    return interval.lowest <= value + interval.shift(value) <= interval.highest
+
+
+def _paint(
+    title: str, driven: Input, joints: Sequence[Curve], rates: Sequence[Curve], picture: Path
 ) -> None:
-    import matplotlib as mpl  # local import: an optional dependency, and slow to load
+    context = settings()
+    from matplotlib.figure import Figure  # local import: an extra, and slow to load
+    from matplotlib.ticker import AutoLocator
 
-    mpl.use('Agg')
-    from matplotlib import pyplot as plt
-
-    panels = [(f'joint position [{", ".join(units)}]', positions)]
-    if any(xs for xs, _ in rates.values()):
-        per_second = ', '.join(f'{unit}/s' for unit in units)
-        panels.append((f'joint rate [{per_second}]', rates))
-    figure, axes = plt.subplots(
-        len(panels), 1, sharex=True, squeeze=False, figsize=(8, 1 + 3 * len(panels)), dpi=120
-    )
-    for (label, curves), axis in zip(panels, axes[:, 0], strict=True):
-        _panel(axis, label, curves)
-    if driven.slider:
-        axes[-1, 0].set_xlabel(f'{_plain(driven.joint, 80)} [m]')
-    else:
-        axes[-1, 0].set_xlabel('crank angle [rad]')
-        axes[-1, 0].set_xlim(0.0, tau)
-        ticks = [0.0, pi / 2, pi, 3 * pi / 2, tau]
-        axes[-1, 0].set_xticks(ticks, ['0', 'π/2', 'π', '3π/2', '2π'])
-    figure.suptitle(_plain(title, 160), fontsize=11)
-    figure.tight_layout()
-    try:
+    parts = [part for part in (joints, rates) if part]
+    panels_each = len({joint.turning for joint in joints})
+    with context:
+        figure = Figure(
+            figsize=(8.0, 0.8 + 2.6 * panels_each * len(parts)), dpi=120, layout='constrained'
+        )
+        grid = figure.add_gridspec(len(parts), 1)
+        drawn = []
+        for number, part in enumerate(parts):
+            panels = joint_axes(grid[number], part)
+            drawn.append((panels, part, plot_joints(panels, part, degrees_x=not driven.slider)))
+            for axes in panels.values() if part is rates else ():
+                axes.yaxis.set_major_locator(AutoLocator())
+                axes.set_ylabel(f'rate of {axes.get_ylabel()[:-1]}/s]')
+        lowest = list(drawn[-1][0].values())[-1]
+        if driven.slider:
+            show_lengths(lowest.xaxis, _plain(driven.joint, 80), max(map(abs, lowest.get_xlim())))
+        else:
+            lowest.set_xlabel(f'{_plain(driven.joint, 80)} [°]')
+        figure.suptitle(_plain(title, 160))
+        figure.draw_without_rendering()  # only now axes and texts have a size
+        for panels, part, lines in drawn:
+            label_joints(panels, part, lines)
         save(figure, picture)
-    finally:
-        plt.close(figure)
 
 
 def _plain(text: str, most: int) -> str:
     """Escape dollar signs: matplotlib reads a text between two of them as mathematics."""
     return shortened(text, most).replace('$', r'\$')
-
-
-def _panel(axis: Any, label: str, curves: Curves) -> None:
-    for number, (name, (xs, ys)) in enumerate(curves.items()):
-        axis.plot(
-            xs,
-            ys,
-            label=_plain(name, 80),
-            color=_COLOURS[number % len(_COLOURS)],
-            linewidth=1.6,
-        )
-    axis.set_ylabel(label)
-    axis.grid(alpha=0.3)
-    axis.legend(loc='best', frameon=False)

@@ -23,6 +23,7 @@ import sys
 from threading import Event
 
 from linkage_ros.bag.recover import recover, Recovery
+from linkage_ros.cli.arguments import add_bag
 from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import clean
 
@@ -32,21 +33,21 @@ _MOST_SHOWN = 20
 """Maximum number of losses shown; a worn-out disk may cause thousands."""
 
 
+EXAMPLE = 'linkage recover my_bag -o whole_bag'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file; only read")
+    add_bag(parser)
     parser.add_argument(
         '-o', '--output', type=Path, metavar='FOLDER', help='new folder; without it BAG_recovered'
-    )
-    parser.epilog = (
-        'exit code: 0 nothing was lost, 3 something was, 2 there is nothing to save, 1 stopped'
     )
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Recover the bag; return 0 without loss, 3 with losses, 1 if stopped."""
-    with progress('bytes') as told:
-        recovery = recover(arguments.bag, arguments.output, told, stop.is_set)
+    with progress('bytes') as advance:
+        recovery = recover(arguments.bag, arguments.output, advance, stop.is_set)
     if recovery is None:
         print('stopped; nothing was written', file=sys.stderr)
         return STOPPED

@@ -19,8 +19,9 @@ Every joint state, and what else was published, is made anew and held against th
 Exit code 0: all are the same; 3: some differ; 1: it could not be told, was stopped, or the bag
 is damaged and what lies before the damage is the same.
 
-With --scene another scene is run, and its joints are compared with the recorded ones; -o writes
-it to a new bag, which replays by itself. Then a difference is no failure.
+With --scene another scene is run, with --set that of the bag with other values; its joints are
+compared with the recorded ones. -o writes it to a new bag, which replays by itself. Then a
+difference is no failure.
 """
 
 from __future__ import annotations
@@ -29,7 +30,6 @@ import argparse
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 import json
-from math import isfinite
 from pathlib import Path
 import sys
 from threading import Event
@@ -37,6 +37,7 @@ from typing import Any
 
 from linkage_ros.bag.reader import Bag, RUN_FILE
 from linkage_ros.bag.run_events import recorded_events, run_account, RunAccount
+from linkage_ros.cli.arguments import add_bag, add_set, finite, SCENE_HELP
 from linkage_ros.cli.bag_reading import (
     add_trust,
     BagReading,
@@ -57,10 +58,10 @@ from linkage_ros.replay.counterfactual import (
     Remade,
 )
 from linkage_ros.replay.replay import (
-    own_effects_here,
     own_joint_states,
     recorded_scene,
     ReplayedTick,
+    user_effects_here,
     versions_here,
 )
 from linkage_ros.replay.verify import (
@@ -94,24 +95,12 @@ def bag_account(bag: Bag, scene: Scene, reading: BagReading, begin: list[int]) -
     }
 
 
-def proof_account(
+def _proof_account(
     proof: ReplayVerification,
     turning: Mapping[str, bool],
     versions: Mapping[str, Mapping[str, str]],
 ) -> dict[str, Any]:
-    """
-    Return the result of a verified replay as JSON holds it.
-
-    Parameters
-    ----------
-    proof
-        The result.
-    turning
-        For each joint True if it is revolute, False if it is prismatic.
-    versions
-        Versions of the packages that wrote the ``bag``, and of those installed ``here``.
-
-    """
+    """Return the result of a verified replay as JSON holds it."""
     comparison = proof.comparison
     return {
         'verdict': proof.verdict,
@@ -119,10 +108,10 @@ def proof_account(
         'compared_ticks': comparison.ticks,
         'different_ticks': comparison.differing,
         'withheld_ticks': comparison.withheld,
-        'untold_ticks': proof.untold,
+        'untold_ticks': proof.undecided,
         'beginning_missing': beginning_text(proof) if proof.beginning else None,
         'topics': [topic_account(topic) for topic in comparison.topics],
-        'first_difference': first_account(comparison.first or proof.first_untold, turning),
+        'first_difference': first_account(comparison.first or proof.first_undecided, turning),
         'last_different_tick': at_account(comparison.last) if comparison.last else None,
         'greatest': greatest(comparison, turning),
         'versions': {name: dict(of) for name, of in versions.items()},
@@ -151,9 +140,9 @@ def first_account(first: First | None, turning: Mapping[str, bool]) -> dict[str,
         account |= {
             'joint': first.joint,
             'unit': unit_of(first.joint, first.what, turning),
-            'recorded': _finite(first.recorded),
-            'now': _finite(first.now),
-            'difference': _finite(abs(first.now - first.recorded)),
+            'recorded': finite(first.recorded),
+            'now': finite(first.now),
+            'difference': finite(abs(first.now - first.recorded)),
             'ulp': ulps(first.recorded, first.now),
         }
     return account
@@ -180,7 +169,7 @@ def greatest(comparison: Comparison, turning: Mapping[str, bool]) -> list[dict[s
                 where = {'joint': joint, **at_account(deviation.ulps_at)}
                 row |= {'ulp': deviation.ulps, 'ulp_at': where}
     return [
-        {'quantity': quantity, 'unit': unit, **row, 'difference': _finite(row['difference'])}
+        {'quantity': quantity, 'unit': unit, **row, 'difference': finite(row['difference'])}
         for (quantity, unit), row in rows.items()
     ]
 
@@ -200,8 +189,8 @@ def joints_account(comparison: Comparison, turning: Mapping[str, bool]) -> list[
                     'unit': unit_of(joint, quantity, turning),
                     'compared': deviation.compared,
                     'different': deviation.differing,
-                    'rms': _finite(deviation.rms),
-                    'greatest': _finite(deviation.greatest),
+                    'rms': finite(deviation.rms),
+                    'greatest': finite(deviation.greatest),
                     'greatest_at': at_account(deviation.at) if deviation.differing else None,
                 },
             )
@@ -293,55 +282,33 @@ def _number(value: float | None) -> str:
     return 'no number' if value is None else f'{value:.3g}'
 
 
-def _finite(value: float) -> float | None:
-    return value if isfinite(value) else None
-
-
 # Counterfactual replay: another scene runs over the samples of a bag.
 
 
-def replayed_with(
+def _replayed_with(
     bag: Bag, reading: BagReading, scene: Scene, crank_topic: str | None, output: Path | None
 ) -> dict[str, Any]:
-    """
-    Run another scene over a bag's samples; return the comparison with the recorded run.
-
-    Parameters
-    ----------
-    bag, reading
-        The bag.
-    scene
-        The scene.
-    crank_topic
-        Topic of the crank samples, as the user typed it.
-    output
-        Folder of the new bag; None to write none.
-
-    Raises
-    ------
-    LinkageError
-        If the scene cannot be run over the bag, if there is nothing to compare and no bag to
-        write, or if the new bag cannot be written.
-
-    """
+    """Run another scene over a bag's samples; return the comparison with the recorded run."""
     check_drives(scene, scene.members[0].content.file)
     run, recorded = _own_account(bag)
     topic = find_crank_topic(bag, reading.glance(), scene, run, recorded, crank_topic)
     source = Source(bag, run, recorded, topic)
-    what_if = Counterfactual(scene, recorded)
-    names = names_for(source, scene, what_if)
+    counterfactual = Counterfactual(scene, recorded)
+    names = names_for(source, scene, counterfactual)
     _check_joints(bag, scene, recorded, output)
     kinds = {run.joint_states_topic: JOINT_STATE}
-    kinds |= dict(zip(names.extras, (extra.message for extra in what_if.extras), strict=True))
+    kinds |= dict(
+        zip(names.extras, (extra.message for extra in counterfactual.extras), strict=True)
+    )
     shared = [name for name in (run.joint_states_topic, *run.extras) if name and name in kinds]
     comparison = Comparison([(name, kinds[name]) for name in shared])
-    new_bag = NewBag(output, source, scene, what_if, names) if output is not None else None
+    new_bag = NewBag(output, source, scene, counterfactual, names) if output is not None else None
     own = own_joint_states(recorded) if recorded is not None else bool
     begin: list[int] = []
     published = 0
     try:
-        with reading.told() as messages:
-            for event in what_if.run(recorded_events(run, own, messages, topic)):
+        with reading.with_progress() as messages:
+            for event in counterfactual.run(recorded_events(run, own, messages, topic)):
                 if new_bag is not None:
                     new_bag.add(event)
                 if isinstance(event, Remade):
@@ -408,17 +375,22 @@ def _side_by_side(
 EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
 
 
+EXAMPLE = 'linkage replay my_bag --set angles=wrapped'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
-    parser.add_argument('--scene', type=Path, help='another scene to run, or a linkage')
+    add_bag(parser)
+    parser.add_argument('--scene', metavar='SCENE', help=f'another scene to run: {SCENE_HELP}')
+    add_set(parser)
     parser.add_argument(
-        '-o', '--output', type=Path, metavar='NEWBAG', help='folder of a new bag; with --scene'
+        '-o', '--output', type=Path, metavar='FOLDER', help='new bag; with --scene or --set'
     )
     parser.add_argument(
         '--crank-topic',
-        help="the samples' topic, with --scene; absent, the run's own, /crank_states, or the only "
-        'one that has the input joints',
+        metavar='TOPIC',
+        help="the samples' topic, with --scene or --set; absent, the run's own, /crank_states, or "
+        'the only one that has the input joints',
     )
     parser.add_argument('--json', action='store_true', help='the same as JSON')
     add_trust(parser)
@@ -426,30 +398,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Replay the bag; return the exit code that the module docstring describes."""
+    other = arguments.scene is not None or bool(arguments.set)
     for option, value in (('-o', arguments.output), ('--crank-topic', arguments.crank_topic)):
-        if value is not None and arguments.scene is None:
-            raise LinkageError(option, 'is for another scene', 'name it with --scene')
+        if value is not None and not other:
+            raise LinkageError(option, 'is for another scene', 'name it with --scene or --set')
     bag = opened(arguments.bag, stop)
     reading = BagReading(bag, stop)
-    if arguments.scene is None:
+    if not other:
         account = replayed(bag, reading, trust_effects=arguments.trust_effects)
         code = {IDENTICAL: 0, DIFFERENT: EXIT_DIFFERENT}.get(account['verdict'], EXIT_INCOMPLETE)
     else:
-        scene = load_scene(arguments.scene)
+        scene = _other_scene(bag, arguments)
         if RUN_FILE in bag.attachments and 'seed' not in scene.members[0].content:
             # The same seeds: the scene makes the difference, not the noise.
             scene = replace(scene, seed=run_account(bag).seed)
-        account = replayed_with(bag, reading, scene, arguments.crank_topic, arguments.output)
+        account = _replayed_with(bag, reading, scene, arguments.crank_topic, arguments.output)
         code = 0
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
-    elif arguments.scene is None:
+    elif not other:
         _show_proof(account)
     else:
-        _show_what_if(account)
+        _show_counterfactual(account)
     for line in _shortcomings(account):
         print(f'linkage replay: {line}', file=sys.stderr)
     return code or (EXIT_INCOMPLETE if reading.damage or reading.stopped else 0)
+
+
+def _other_scene(bag: Bag, arguments: argparse.Namespace) -> Scene:
+    """Return the scene of --scene, or that of the bag, with the keys of --set."""
+    if arguments.scene is not None:
+        return load_scene(arguments.scene, arguments.set)
+    return scene_of(bag, trust_effects=arguments.trust_effects, settings=arguments.set)
 
 
 def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> dict[str, Any]:
@@ -468,20 +448,20 @@ def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> d
         raise BagError(error.where, error.reason, 'name a scene to run with --scene') from None
     begin: list[int] = []
 
-    def look(tick: ReplayedTick) -> None:
+    def observe(tick: ReplayedTick) -> None:
         if not begin:
             begin.append(tick.time)
 
-    with reading.told() as messages:
-        proof = verify_replay(bag, scene, messages, look)
+    with reading.with_progress() as messages:
+        proof = verify_replay(bag, scene, messages, observe)
     if not begin and not reading.damage and not reading.stopped:
         raise BagError(bag.path, 'holds no joint states', 'record a run with a crank')
     run = run_account(bag)
     versions = {
-        'bag': {**run.versions, **run.own_effects},
-        'here': {**versions_here(), **own_effects_here(scene)},
+        'bag': {**run.versions, **run.user_effects},
+        'here': {**versions_here(), **user_effects_here(scene)},
     }
-    account = proof_account(proof, turning_joints(scene), versions)
+    account = _proof_account(proof, turning_joints(scene), versions)
     return bag_account(bag, scene, reading, begin) | account
 
 
@@ -517,7 +497,7 @@ def _show_proof(account: dict[str, Any]) -> None:
         show(greatest_table(account, begin))
 
 
-def _show_what_if(account: dict[str, Any]) -> None:
+def _show_counterfactual(account: dict[str, Any]) -> None:
     print(
         f'{account["bag"]}, as {account["scene"]}: {account["joint_states"]} joint states, '
         f'from {clean(account["crank_topic"])}'

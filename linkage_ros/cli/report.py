@@ -25,9 +25,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from functools import partial
-from importlib.util import find_spec
-from math import isfinite
 import os
 from pathlib import Path
 from threading import Event
@@ -35,53 +32,43 @@ from typing import Any
 
 from linkage_ros.bag.contents import layout_of
 from linkage_ros.bag.reader import Bag
+from linkage_ros.cli.arguments import add_bag, add_output, DEGREES
 from linkage_ros.cli.bag_reading import (
     account_of,
-    add_trust,
     beside,
     gaps,
     opened,
     scene_account,
-    scene_of,
 )
 from linkage_ros.cli.info import tables
-from linkage_ros.cli.terminal import progress
-from linkage_ros.errors import LinkageError
-from linkage_ros.files.atomic_write import atomic_replace
-from linkage_ros.report.blocks import Progress
+from linkage_ros.cli.part_of_run import add_window, read_part, window_of
+from linkage_ros.errors import check_installed, LinkageError
+from linkage_ros.files.file_access import atomic_write
 from linkage_ros.report.html import ReportHeader, run_html, TableOf
 from linkage_ros.report.labels import seconds_text
-from linkage_ros.report.reading import read_run
 from linkage_ros.report.run import Run, Window
 from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
 
-_MIB = 2**20
-_LONGEST = 2**62
+EXAMPLE = 'linkage report my_bag -o my_bag.html'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
-    parser.add_argument(
-        '-o', '--output', type=Path, metavar='FILE', help='FILE.html; without it BAG.html'
-    )
-    for name, what in (('since', 'beginning'), ('until', 'end')):
-        parser.add_argument(
-            f'--{name}', type=float, metavar='S', help=f'{what} of a part, in seconds of the run'
-        )
-    add_trust(parser)
+    add_bag(parser)
+    add_output(parser, ('.html', '.htm'), 'BAG.html')
+    add_window(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Write the page."""
     file = arguments.output or beside(arguments.bag, '.html')
     _check(file)
-    window = _window(arguments.since, arguments.until)
+    window = window_of(arguments.since, arguments.until)
     # Undecodable bytes, of a file name for example, are written as escapes.
     page = report(arguments.bag, window, stop, trust_effects=arguments.trust_effects)
     data = page.encode('utf-8', 'backslashreplace')
-    _write(file, data)
+    atomic_write(file, data)
     print(f'{file}: {len(data) / 1e6:.1f} MB')
     return 0
 
@@ -111,15 +98,7 @@ def report(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool =
     """
     bag = opened(bag_path, stop)
     layouts = [layout_of(path) for path in bag.files]
-    size = max(1, sum(layout.content for layout in layouts) // _MIB)
-    with progress('read [MiB]') as told:
-        found, scene, missing = read_run(
-            bag,
-            window,
-            Progress(lambda read: told(read // _MIB, max(size, read // _MIB)), stop.is_set),
-            partial(scene_of, trust_effects=trust_effects),
-        )
-    _heed(stop)
+    found, scene, missing = read_part(bag, layouts, window, stop, trust_effects=trust_effects)
     account = account_of(bag, layouts, found.contents)
     account |= {'scene': None, 'scene_missing': None, 'replay': None}
     # A page is passed on to others: it shows the bag's name, not its path.
@@ -149,7 +128,7 @@ def _heed(stop: Event) -> None:
 
 
 def _tables(account: dict[str, Any]) -> list[TableOf]:
-    bag, *others = (TableOf(*table) for table in tables(account))
+    bag, *others = (TableOf(*table) for table in tables(account, DEGREES))
     return [bag._replace(title='Bag'), *others]
 
 
@@ -193,35 +172,11 @@ def _warnings(
         yield f'The part begins after the end of the run, at {seconds_text(found.end)} s.'
 
 
-def _window(since: float | None, until: float | None) -> Window:
-    ends = []
-    for option, value, default in (('--since', since, 0), ('--until', until, _LONGEST)):
-        if value is not None and (not isfinite(value) or not 0.0 <= value < 1e9):
-            raise LinkageError(option, f'{value} is no time in a run', 'write seconds from 0 on')
-        ends.append(default if value is None else round(value * 1e9))
-    if ends[0] >= ends[1]:
-        raise LinkageError('--until', f'{until} is not after --since', 'write a later one')
-    return Window(*ends)
-
-
 def _check(file: Path) -> None:
     """Raise if the page could not be written, before the bag is read."""
-    if find_spec('plotly') is None:
-        raise LinkageError('plotly', 'is not installed', 'pip install linkage_ros[report]')
-    if file.suffix.lower() not in ('.html', '.htm'):
-        raise LinkageError(file, 'is no name of a page', 'name FILE.html with -o')
+    check_installed('plotly')
     # `Path.is_dir` raises for a name that is too long.
     if os.path.isdir(file):  # noqa: PTH112
         raise LinkageError(file, 'is a folder', 'name another file with -o')
     if not os.path.isdir(file.absolute().parent):  # noqa: PTH112
         raise LinkageError(file, 'lies in no folder that there is', 'name another file with -o')
-
-
-def _write(file: Path, page: bytes) -> None:
-    """Write a file completely or not at all."""
-    try:
-        # The target of a symbolic link is replaced, not the link.
-        atomic_replace(Path(os.path.realpath(file)), page)
-    except OSError as error:
-        reason = f'cannot be written: {error.strerror or error}'
-        raise LinkageError(file, reason, 'name another file with -o') from None

@@ -17,17 +17,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 import sys
 from threading import Event
 from time import monotonic
-from typing import Any
+from typing import Any, NamedTuple
 
 from linkage_ros.bag.reader import read_bag
+from linkage_ros.cli.arguments import add_radians, add_set, AngleUnit, bounded, SCENE_HELP
 from linkage_ros.cli.bag_reading import gaps
+from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.node.node import LinkageNode
@@ -35,21 +37,36 @@ from linkage_ros.node.run import run_linkage_node
 from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import recorded_scene, ReplayedTick
-from linkage_ros.replay.verify import beginning_text, DIFFERENT, UNTOLD, verify_replay
+from linkage_ros.replay.verify import (
+    beginning_text,
+    DIFFERENT,
+    turning_joints,
+    UNDECIDED,
+    verify_replay,
+)
 from linkage_ros.signals import heeded
 
 _RICH = find_spec('rich') is not None
 if _RICH:
     from rich.console import Console, Group
     from rich.live import Live
-    from rich.table import Table
+    from rich.table import Table as RichTable
     from rich.text import Text
 
 _LIVE_PERIOD, _PLAIN_PERIOD = 0.25, 1.0
+_TOLD = 1000
+"""Ticks between two reports of the progress."""
+
 _MOST_SHOWN = 24
 """Maximum number of joints that fit on a screen."""
 
-_Shown = tuple[str, float, float | None]
+
+class Shown(NamedTuple):
+    """A joint as the display shows it; its rate is '' if it is unknown."""
+
+    name: str
+    value: str
+    rate: str
 
 
 class Display:
@@ -60,10 +77,13 @@ class Display:
     ----------
     plain
         Whether to print lines even where a live display is possible.
+    angles
+        Unit in which angles are shown.
 
     """
 
-    def __init__(self, *, plain: bool) -> None:
+    def __init__(self, *, plain: bool, angles: AngleUnit) -> None:
+        self._angles = angles
         live = not plain and _RICH and sys.stdout.isatty()
         self._live: Any = None
         if live:
@@ -89,20 +109,23 @@ class Display:
         ticks = node.loop.counts.ticks
         rate = (ticks - self._before[0]) / (now - self._before[1])
         self._before = (ticks, now)
+        age, joints = _state(node.loop, turning_joints(node.scene), self._angles)
         if self._live is None:
-            print(_line(node.loop, rate), flush=True)
+            print(_line(node.loop, rate, age, joints), flush=True)
             return
         if not self._entered:
             self._live.start()
             self._entered = True
-        self._live.update(_table(node.loop, rate), refresh=True)
+        self._live.update(_table(node.loop, rate, age, joints), refresh=True)
 
 
-def _state(loop: TickLoop) -> tuple[str, list[_Shown]]:
-    """Return the input's age as text; name, value and rate of inputs and joints."""
+def _state(
+    loop: TickLoop, turning: Mapping[str, bool], angles: AngleUnit
+) -> tuple[str, list[Shown]]:
+    """Return the input's age as text, and the inputs and joints to show."""
     tick = loop.counts.last
     age = 'no crank'
-    values: list[_Shown] = []
+    values: list[tuple[str, float, float | None]] = []
     for line, (crank, position, _, reading) in zip(
         loop.pipeline.lines, tick.looks if tick else (), strict=False
     ):
@@ -120,18 +143,23 @@ def _state(loop: TickLoop) -> tuple[str, list[_Shown]]:
         if reading is not None:
             rates = reading.rates or [None] * len(reading.joints)
             values += zip(member.joints, reading.joints, rates, strict=True)
-    return age, values[:_MOST_SHOWN]
+    return age, [_shown(*each, turning[each[0]], angles) for each in values[:_MOST_SHOWN]]
 
 
-def _line(loop: TickLoop, rate: float) -> str:
-    age, values = _state(loop)
+def _shown(name: str, value: float, rate: float | None, turning: bool, angles: AngleUnit) -> Shown:
+    rate_text = ''
+    if rate is not None:
+        rate_text = f'{angles.of(rate):.4f} {angles.name}/s' if turning else f'{rate:.4f} m/s'
+    return Shown(name, angles.value_text(value, turning), rate_text)
+
+
+def _line(loop: TickLoop, rate: float, age: str, joints: Sequence[Shown]) -> str:
     counts = loop.counts
-    shown = '  '.join(f'{name} {value:+.4f}' for name, value, _ in values)
+    shown = '  '.join(f'{joint.name} {joint.value}' for joint in joints)
     return f'{rate:7.1f} ticks/s  lost {counts.lost}  late {counts.late}  age {age}  {shown}'
 
 
-def _table(loop: TickLoop, rate: float) -> Any:
-    age, values = _state(loop)
+def _table(loop: TickLoop, rate: float, age: str, joints: Sequence[Shown]) -> Any:
     counts = loop.counts
     status = Text(
         f'{rate:.1f} ticks/s   {counts.late} late   {counts.lost} lost   input age {age}   '
@@ -139,23 +167,23 @@ def _table(loop: TickLoop, rate: float) -> Any:
         no_wrap=True,
         overflow='ellipsis',
     )
-    table = Table()
+    table = RichTable()
     table.add_column('joint')
-    table.add_column('position [rad, m]', justify='right', min_width=18)
-    table.add_column('rate [1/s]', justify='right', min_width=14)
-    for name, value, speed in values:
-        table.add_row(name, f'{value:+.6f}', '' if speed is None else f'{speed:+.5f}')
+    table.add_column('position', justify='right', min_width=18)
+    table.add_column('rate', justify='right', min_width=18)
+    for joint in joints:
+        table.add_row(*joint)
     return Group(status, table)
 
 
 # The summary at the end of a run.
 
 
-def summary(node: LinkageNode) -> str:
+def summary(node: LinkageNode) -> Table:
     """Return the summary of a node's last run."""
     loop = node.loop
     if loop is None:
-        return 'nothing ran'
+        return Table('', ('',), [('nothing ran',)])
     counts = loop.counts
     per_second = counts.ticks / loop.seconds
     rows = [('ticks', f'{counts.ticks} in {loop.seconds:.2f} s, {per_second:.1f} a second')]
@@ -182,7 +210,7 @@ def summary(node: LinkageNode) -> str:
         rows += [
             (
                 'memory',
-                f'{t.name}: {t.received} received, {t.kept} in it at the end, {t.let_go} let go'
+                f'{t.name}: {t.received} received, {t.kept} in it at the end, {t.discarded} let go'
                 + (f', {t.dropped} dropped' if t.dropped else ''),
             )
             for t in memory.topics
@@ -193,22 +221,26 @@ def summary(node: LinkageNode) -> str:
             (
                 'recorded',
                 f'{t.name}: {t.recorded} of {t.received}, {t.dropped} dropped'
-                + (f', {t.let_go} let go with the oldest files' if t.let_go else ''),
+                + (f', {t.discarded} let go with the oldest files' if t.discarded else ''),
             )
             for t in recording.topics
         ]
-        rows += [('bag', str(recording.folder)), ('proof', _proof(recording.folder))]
+        ticks = max((t.recorded for t in recording.topics), default=0)
+        rows += [('bag', str(recording.folder)), ('proof', _proof(recording.folder, ticks))]
     if node.recording.failure:
         rows.append(('FAILED', node.recording.failure))
-    return '\n'.join(f'{name:<14}{text}' for name, text in rows)
+    return Table('', ('', ''), rows)
 
 
-def _proof(folder: Path) -> str:
+def _proof(folder: Path, ticks: int) -> str:
     """Replay a bag: check that it gives the same bytes, and how well its loop closed."""
-    worst = 0.0
+    worst, done = 0.0, 0
 
-    def look(replayed: ReplayedTick) -> None:
-        nonlocal worst
+    def observe(replayed: ReplayedTick) -> None:
+        nonlocal worst, done
+        done += 1
+        if done % _TOLD == 0:
+            advance(done, max(done, ticks))
         for closure, seen in zip(closures, replayed.tick.looks, strict=True):
             if seen.position is not None and seen.position.joints:
                 worst = max(worst, closure.residual(seen.position))
@@ -219,11 +251,12 @@ def _proof(folder: Path) -> str:
         scene = recorded_scene(bag, trust_effects=True)
         pipeline = Pipeline(scene)
         closures = pipeline.closures
-        proof = verify_replay(bag, scene, bag.messages(), look)
+        with progress('ticks replayed') as advance:
+            proof = verify_replay(bag, scene, bag.messages(), observe)
     except LinkageError as error:
         return str(error)
-    if proof.verdict == UNTOLD:
-        return f'{UNTOLD}: {beginning_text(proof)}'
+    if proof.verdict == UNDECIDED:
+        return f'{UNDECIDED}: {beginning_text(proof)}'
     names = ['joint states', *(extra.topic.removeprefix('~/') for extra in pipeline.extras)]
     same = ' and '.join(
         f'{topic.same} of {topic.recorded} {name}'
@@ -236,9 +269,12 @@ def _proof(folder: Path) -> str:
     return f'{same} replay to the same bytes; {"; ".join(notes)}'
 
 
+EXAMPLE = 'linkage run worn_press --seconds 5 --set rate=500'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('scene', help='the scene file; or a linkage file, which it moves')
+    parser.add_argument('scene', metavar='SCENE', help=f'{SCENE_HELP}; a linkage is moved')
     add_run_arguments(parser)
     parser.add_argument(
         '--ros-args', nargs=argparse.REMAINDER, default=[], help='remappings, parameters, QoS'
@@ -247,11 +283,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments that all commands with a run share."""
+    add_set(parser)
     parser.add_argument(
-        '--seconds', type=_seconds, default=inf, help='how long; without it, until Ctrl-C'
+        '--seconds',
+        type=bounded(1e-9, 1e9),
+        default=inf,
+        help='how long; without it, until Ctrl-C',
     )
     parser.add_argument('--runs', default='', metavar='FOLDER', help="folder of the bags' folders")
     parser.add_argument('--plain', action='store_true', help='a line a second, no live display')
+    add_radians(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
@@ -269,22 +310,19 @@ def run_scene(
 
     def at_end(node: LinkageNode) -> None:
         bags.extend(recording.folder for recording in node.recording.ended)
-        print(summary(node))
+        show(summary(node))
 
     with heeded():
         code = run_linkage_node(
             stop,
             ros,
-            {'scene': scene, 'runs_directory': arguments.runs},
+            {
+                'scene': scene,
+                'runs_directory': arguments.runs,
+                **({'set': arguments.set} if arguments.set else {}),  # rclpy: no empty list
+            },
             seconds=arguments.seconds,
-            view=Display(plain=arguments.plain),
+            view=Display(plain=arguments.plain, angles=arguments.angles),
             at_end=at_end,
         )
     return code, bags[-1] if bags else None
-
-
-def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not 0.0 < seconds < 1e9:
-        raise argparse.ArgumentTypeError(f'{text} is not a time; write seconds, more than 0')
-    return seconds

@@ -12,7 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Say what a scene consists of, or all that is wrong with it; or what scenes can name."""
+"""
+Say what a scene consists of, or all that is wrong with it; or what scenes can name.
+
+Where the library jsonschema is installed, everything that is wrong with the files is said at once;
+elsewhere the first thing.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +25,14 @@ import argparse
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from importlib.util import find_spec
+import json
 from os.path import isfile
 from pathlib import Path
 import sys
 from threading import Event
-from typing import Any
+from typing import Any, NamedTuple
 
+from linkage_ros.cli.arguments import add_set, check_no_settings, finite, SCENE_HELP
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.dispatch import bringing, module_of
@@ -35,8 +42,11 @@ from linkage_ros.faults.fault import FAULTS
 from linkage_ros.files.parameters import declared, default_of, is_required, parameter_rows, summary
 from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
+from linkage_ros.resources import named_file
 from linkage_ros.scene.load import kind_of, load_scene
+from linkage_ros.scene.notes import scene_notes
 from linkage_ros.scene.scene import Scene
 from linkage_ros.scene.schema import as_text, linkage_schema, scene_schema
 from linkage_ros.solvers.registry import SOLVERS
@@ -51,7 +61,6 @@ _WHERE = {
 }
 """Place of an effect within a tick, by the function that builds it."""
 
-_JOINT_STATE = 'sensor_msgs/msg/JointState'
 _MOST_NAMES = 4
 _LONGEST = 60
 
@@ -62,15 +71,12 @@ def tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
     for lines in _alike(pipeline.lines):
         names = _some([line.member.name for line in lines if line.member.name])
         heads = ('>', 'stage', 'where', 'what it does', 'as said here', '')
-        yield Table(f'Stages of {names}' if names else 'Stages', heads, list(_stages(lines[0])))
+        yield Table(
+            f'Stages of {names}' if names else 'Stages', heads, list(_stage_rows(lines[0]))
+        )
     if scene.faults:
         yield Table('Faults', ('name', 'kind', 'as said here', 'by itself'), list(_faults(scene)))
     yield Table('Topics', ('', 'topic', 'message', ''), list(_topics(scene, pipeline)))
-
-
-def brought_in_by(stage: str, named: Any) -> str:
-    """Return the named effects that require an unnamed one, separated by commas."""
-    return ', '.join(bringing(stage, named))
 
 
 def _facts(scene: Scene) -> Iterator[tuple[str, str]]:
@@ -97,8 +103,8 @@ def _solvers(lines: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
             yield 'solver', f'{name}for an accuracy of {line.member.accuracy:g}: {line.choice.why}'
         elif line.member.solver is not None:
             solver, parameters = line.member.solver
-            said = _said(parameters)
-            yield 'solver', f'{name}{solver}{said and ", "}{said}'
+            text = _parameters_text(parameters)
+            yield 'solver', f'{name}{solver}{text and ", "}{text}'
 
 
 def _alike(lines: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:
@@ -109,22 +115,40 @@ def _alike(lines: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:
     return list(groups.values())
 
 
-def _stages(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
+class Stage(NamedTuple):
+    """A stage of a tick: its place, its parameters, and the effects of the file that need it."""
+
+    name: str
+    where: str
+    parameters: Any
+    needed_by: tuple[str, ...]
+
+
+def _stages(line: LinkagePipeline) -> Iterator[Stage]:
+    """Yield the drive of a linkage and its effects, in the order of a tick."""
     name, parameters = line.member.drive
-    module = import_module(DRIVES[name])
-    yield '0', name, 'drive', summary(module.PARAMETERS), _said(parameters), ''
-    for number, stage in enumerate(line.stages, 1):
+    yield Stage(name, 'drive', parameters, ())
+    given = line.member.effects
+    for stage in line.stages:
         module = module_of(stage)
-        named = line.member.effects
+        where = next(
+            (where for has, where in _WHERE.items() if hasattr(module, has)), 'in the forces'
+        )
+        if stage in given:
+            yield Stage(stage, where, given[stage], ())
+        else:
+            yield Stage(stage, where, module.PARAMETERS(), bringing(stage, given))
+
+
+def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
+    for number, stage in enumerate(_stages(line)):
         yield (
             str(number),
-            stage,
-            next(
-                (where for has, where in _WHERE.items() if hasattr(module, has)), 'in the forces'
-            ),
-            summary(module.PARAMETERS),
-            _said(named[stage]) if stage in named else '',
-            '' if stage in named else f'brought in by {brought_in_by(stage, named)}',
+            stage.name,
+            stage.where,
+            summary(type(stage.parameters)),
+            _parameters_text(stage.parameters),
+            f'brought in by {", ".join(stage.needed_by)}' if stage.needed_by else '',
         )
 
 
@@ -132,13 +156,13 @@ def _faults(scene: Scene) -> Iterator[tuple[str, ...]]:
     for name, fault in scene.faults.items():
         times = ', '.join(f'{time:g}' for time in fault.at)
         when = f'at {times} s, for {fault.seconds:g} s' if fault.at else 'on demand only'
-        yield name, fault.kind, _said(fault.parameters), when
+        yield name, fault.kind, _parameters_text(fault.parameters), when
 
 
 def _topics(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
     if pipeline.topic:
-        yield 'listens to', pipeline.topic, _JOINT_STATE, ''
-    yield 'publishes', 'joint_states', _JOINT_STATE, f'{len(scene.joints)} joints'
+        yield 'listens to', pipeline.topic, JOINT_STATE, ''
+    yield 'publishes', 'joint_states', JOINT_STATE, f'{len(scene.joints)} joints'
     for extra in pipeline.extras:
         yield 'publishes', extra.topic, extra.message, ''
     if scene.faults:
@@ -147,15 +171,16 @@ def _topics(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
         yield 'serves', _some(services), 'std_srvs/srv/SetBool', ''
 
 
-def _said(parameters: Any) -> str:
+def _parameters_text(parameters: Any) -> str:
     """Return the parameters that differ from their defaults."""
-    said = [
+    texts = [
         f'{entry.name} {_shown(getattr(parameters, entry.name))}'
-        for entry, _ in declared(type(parameters))
+        + (f' {kind.unit}' if kind.unit else '')
+        for entry, kind in declared(type(parameters))
         if is_required(entry)
         or _shown(getattr(parameters, entry.name)) != _shown(default_of(entry))
     ]
-    text = ', '.join(said)
+    text = ', '.join(texts)
     return text if len(text) <= _LONGEST else f'{text[: _LONGEST - 1]}…'
 
 
@@ -165,8 +190,66 @@ def _shown(value: Any) -> str:
     if isinstance(value, dict):
         return f'{{{", ".join(f"{key}: {_shown(one)}" for key, one in value.items())}}}'
     if hasattr(value, '__dataclass_fields__'):
-        return f'{{{_said(value)}}}'
+        return f'{{{_parameters_text(value)}}}'
     return f'{value:g}' if isinstance(value, float) else str(value)
+
+
+def account_of(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
+    """Return the description of a scene that has been built, as JSON holds it."""
+    # local import: the modules that read bags take time to load, and only --json needs these
+    from linkage_ros.cli.bag_reading import scene_account
+
+    account = scene_account(scene)
+    for linkage, line in zip(account['linkages'], pipeline.lines, strict=True):
+        solver = line.member.solver
+        linkage['solver'] = None if solver is None else _named_parameters(*solver)
+        linkage['accuracy'] = line.member.accuracy
+        linkage['stages'] = [
+            {
+                **_named_parameters(stage.name, stage.parameters),
+                'where': stage.where,
+                'needed_by': list(stage.needed_by),
+            }
+            for stage in _stages(line)
+        ]
+    record = scene.record
+    return account | {
+        'joints': list(scene.joints),
+        'wrapped': scene.wrapped,
+        'record': record and {'directory': record.directory, 'name': record.name or None},
+        'fault_parameters': [
+            {
+                **_named_parameters(name, fault.parameters),
+                'kind': fault.kind,
+                'at_s': list(fault.at),
+                'seconds': fault.seconds,
+            }
+            for name, fault in scene.faults.items()
+        ],
+        'topics': [
+            {'name': name, 'type': kind, 'what': what}
+            for what, name, kind, _ in _topics(scene, pipeline)
+            if what != 'serves'
+        ],
+        'services': [f'~/inject/{name}' for name in scene.faults],
+    }
+
+
+def _named_parameters(name: str, parameters: Any) -> dict[str, Any]:
+    return {'name': name, 'parameters': _as_json(parameters)}
+
+
+def _as_json(value: Any) -> Any:
+    """Return the value of a parameter as JSON holds it; null stands for infinity."""
+    if hasattr(value, '__dataclass_fields__'):
+        return {entry.name: _as_json(getattr(value, entry.name)) for entry, _ in declared(value)}
+    if isinstance(value, dict):
+        return {key: _as_json(one) for key, one in value.items()}
+    if isinstance(value, tuple | list):
+        return list(map(_as_json, value))
+    if isinstance(value, float):
+        return finite(value)
+    return value if value is None or isinstance(value, str | int) else str(value)
 
 
 def _some(names: list[str]) -> str:
@@ -202,14 +285,13 @@ SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
 """Functions that make the JSON Schema of each kind of file."""
 
 
+EXAMPLE = 'linkage scene worn_press --set rate=500'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.epilog = (
-        'Where the library jsonschema is installed, everything that is wrong with the files is '
-        'said at once; elsewhere the first thing.'
-    )
     one = parser.add_mutually_exclusive_group(required=True)
-    one.add_argument('file', nargs='?', help='the scene file, or a linkage file')
+    one.add_argument('file', nargs='?', metavar='SCENE', help=SCENE_HELP)
     one.add_argument(
         '--list',
         nargs='*',
@@ -218,30 +300,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'all of them, or those named',
     )
     one.add_argument('--schema', choices=SCHEMAS, help='the JSON Schema of scene or linkage files')
+    parser.add_argument(
+        '--json', action='store_true', help='the description of the file as JSON, in SI units'
+    )
+    add_set(parser)
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Check a scene, list, or print a schema."""
+    if arguments.json and arguments.file is None:
+        raise LinkageError('--json', 'describes one file', 'name a scene or a linkage file')
     if arguments.schema:
+        check_no_settings(arguments.set)
         print(as_text(SCHEMAS[arguments.schema]()), end='')
         return 0
     if arguments.file is None:
-        found = list(_named(arguments.list))
-        for number, (what, name) in enumerate(found):
-            if number:
-                print()
-            show(table_of(what, name))
+        check_no_settings(arguments.set)
+        show(*(table_of(what, name) for what, name in _named(arguments.list)))
         return 0
-    wrong = _violations(arguments.file)
+    wrong = _violations(named_file(arguments.file, 'scenes', 'linkages'))
     for error in wrong:
         print(f'linkage scene: {error}', file=sys.stderr)
     if wrong:
         return 2
-    scene = load_scene(arguments.file)
-    for number, table in enumerate(tables(scene, Pipeline(scene), arguments.file)):
-        if number:
-            print()
-        show(table)
+    scene = load_scene(arguments.file, arguments.set)
+    for note in scene_notes(scene):
+        print(f'linkage scene: note: {note}', file=sys.stderr)
+    pipeline = Pipeline(scene)
+    if arguments.json:
+        account = {'file': arguments.file, **account_of(scene, pipeline)}
+        print(json.dumps(account, indent=1, allow_nan=False))
+    else:
+        show(*tables(scene, pipeline, arguments.file))
     return 0
 
 
@@ -265,7 +355,7 @@ def _named(names: list[str]) -> Iterator[tuple[str, str]]:
         yield from found
 
 
-def _violations(file: str) -> list[FileError]:
+def _violations(file: Path) -> list[FileError]:
     """Return all violations of the schemas in a scene and the linkages that it names."""
     if find_spec('jsonschema') is None:
         return []
@@ -279,7 +369,7 @@ def _violations(file: str) -> list[FileError]:
         return wrong
     for linkage in dict.fromkeys(_linkages(content)):
         # The reader reports a missing file, with the line that names it.
-        path = Path(file).parent / linkage
+        path = file.parent / linkage
         if isfile(path):  # noqa: PTH113 (Path's raises where a name is too long)
             wrong += violations(read_yaml(path)[0], linkage_schema())
     return wrong

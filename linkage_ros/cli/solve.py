@@ -16,7 +16,8 @@
 """
 Solve a linkage at some inputs or over its range.
 
-Angles are in degrees and in (-180, 180], unless --radians is given; slides are in metres.
+Angles are in (-π, π] rad. They are typed, and shown in the table, in degrees unless --radians is
+given; CSV and JSON hold radians. Slides are in metres.
 """
 
 from __future__ import annotations
@@ -27,21 +28,38 @@ import csv
 import io
 import json
 from math import degrees, radians
-from pathlib import Path
 import sys
 from threading import Event
 from typing import Any, NamedTuple
 
-from linkage_ros.cli.arguments import add_at, fixed, inputs, values, wrapped
-from linkage_ros.cli.terminal import show, Table, text
+from linkage_ros.cli.arguments import (
+    add_at,
+    add_file,
+    add_output,
+    add_radians,
+    AngleUnit,
+    bounded,
+    fixed,
+    inputs,
+    values,
+    wrapped,
+)
+from linkage_ros.cli.terminal import progress, show, Table, text
+from linkage_ros.drawing.curves import traced_carriers
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.atomic_write import atomic_write
+from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _STEPS = 36
+_MOST = 1e300
 _DIGITS = 6
+_TOLD = 1000
+"""States between two reports of the progress."""
+FORMATS = {'.csv': 'csv', '.json': 'json', '.txt': 'table'}
+"""Formats of a file, by its suffix."""
+
 _ORDERS = ('', ' rate', ' acceleration')
 _PER = ('', '/s', '/s²')
 
@@ -66,23 +84,29 @@ class Column(NamedTuple):
         return f'{self.name} [{self.unit}]' if self.unit else self.name
 
 
+EXAMPLE = 'linkage solve four_bar --at 40 --at 90'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('file', help='the linkage file')
+    add_file(parser)
     add_at(parser, 'an input to solve for; may be repeated')
     parser.add_argument(
         '--sweep', action='store_true', help='solve over the range; the default where no --at is'
     )
-    parser.add_argument('--from', dest='first', type=_number, help='where a sweep begins')
-    parser.add_argument('--to', dest='last', type=_number, help='where a sweep ends')
     parser.add_argument(
-        '--steps', type=_count, default=_STEPS, help=f'steps of a sweep (default: {_STEPS})'
+        '--from', dest='first', type=bounded(-_MOST, _MOST), help='where a sweep begins'
     )
-    unit = parser.add_mutually_exclusive_group()
-    unit.add_argument(
-        '--degrees', action='store_true', help='angles in degrees, typed and told; the default'
+    parser.add_argument(
+        '--to', dest='last', type=bounded(-_MOST, _MOST), help='where a sweep ends'
     )
-    unit.add_argument('--radians', action='store_true', help='angles in radians, typed and told')
+    parser.add_argument(
+        '--steps',
+        type=bounded(1, 1_000_000, int),
+        default=_STEPS,
+        help=f'steps of a sweep (default: {_STEPS})',
+    )
+    add_radians(parser, 'type angles, and show them in the table,')
     parser.add_argument(
         '--rate', type=values, metavar='VALUE', help='rate of the input, per second: adds rates'
     )
@@ -94,21 +118,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--points', action='store_true', help='add the traced points, in the frame of the ground'
     )
     parser.add_argument(
-        '--format', choices=('table', 'csv', 'json'), help='default: by the name of -o, else table'
+        '--format', choices=('table', 'csv', 'json'), help='of what is printed (default: table)'
     )
-    parser.add_argument('-o', '--output', type=Path, help='file to write to')
+    add_output(parser, FORMATS, 'the result is printed')
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Solve the linkage."""
+    if arguments.format and arguments.output is not None:
+        raise LinkageError(
+            f'--format {arguments.format}',
+            'is for what is printed, and -o names a file',
+            'leave it out: the suffix of the file says its format',
+        )
     closure = load(arguments.file)
     question = _question(closure, arguments)
     columns = list(_columns(closure, question))
-    rows = [_row(closure, question, state) for state in question.states]
-    ending = arguments.output.suffix[1:].lower() if arguments.output else ''
-    kind = arguments.format or (ending if ending in ('csv', 'json') else 'table')
-    table = _table(columns, rows)
+    rows = []
+    with progress('states solved') as advance:
+        for number, given in enumerate(question.inputs):
+            if number % _TOLD == 0:
+                advance(number, len(question.inputs))
+            rows.append(_row(closure, question, given))
+    kind = arguments.format or 'table'
+    if arguments.output is not None:
+        kind = FORMATS[arguments.output.suffix.lower()]
     if kind == 'table':
+        table = _table(columns, rows, arguments.angles)
         if arguments.output is None:
             show(table)
             return 0
@@ -125,47 +161,37 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     return 0
 
 
-class State(NamedTuple):
-    """Inputs as the user reads them, and in [rad] and [m]."""
-
-    told: tuple[float, ...]
-    inputs: tuple[float, ...]
-
-
 class Question(NamedTuple):
     """
     The requested computation.
 
     Attributes
     ----------
-    states
-        The inputs to solve for.
+    inputs
+        The values of the inputs to solve for, in [rad] and [m].
     rates, accelerations
         Of the inputs; empty if not requested.
-    degrees
-        Whether angles are shown in degrees.
     points
         For each traced point, a link that carries it.
 
     """
 
-    states: list[State]
+    inputs: list[tuple[float, ...]]
     rates: tuple[float, ...] | None
     accelerations: tuple[float, ...] | None
-    degrees: bool
     points: dict[str, str]
 
 
 def _question(closure: Closure, arguments: argparse.Namespace) -> Question:
     linkage = closure.linkage
-    in_degrees = not arguments.radians
+    in_degrees = arguments.angles.in_degrees
 
     def read(typed: Sequence[float] | None, option: str) -> tuple[float, ...] | None:
         if typed is None:
             return None
         return inputs(linkage, typed, option, in_degrees=in_degrees)
 
-    asked = [State(at, inputs(linkage, at, '--at', in_degrees=in_degrees)) for at in arguments.at]
+    asked = [inputs(linkage, at, '--at', in_degrees=in_degrees) for at in arguments.at]
     swept = arguments.sweep or arguments.first is not None or arguments.last is not None
     if swept or not asked:
         if len(linkage.inputs) > 1:
@@ -184,24 +210,21 @@ def _question(closure: Closure, arguments: argparse.Namespace) -> Question:
     rate = read(arguments.rate, '--rate')
     if rate is None and acceleration is not None:
         rate = (0.0,) * len(linkage.inputs)
-    carriers = {
-        point: next(link for link, points in linkage.links.items() if point in points)
-        for point in linkage.traced
-    }
+    carriers = traced_carriers(linkage)
     if arguments.points and not carriers:
         raise LinkageError(
             '--points', 'the linkage traces none', 'name them in the file: traced: [P]'
         )
-    return Question(asked, rate, acceleration, in_degrees, carriers if arguments.points else {})
+    return Question(asked, rate, acceleration, carriers if arguments.points else {})
 
 
 def _sweep(
     way: InputSweep, first: float | None, last: float | None, steps: int, *, in_degrees: bool
-) -> Iterator[State]:
+) -> Iterator[tuple[float, ...]]:
     """
     Yield inputs from end to end at equal steps; without ends, over every range.
 
-    The ends of a range are solved with all their digits: shown in degrees they are rounded, and
+    The ends of a range are solved with all their digits: by way of degrees they are rounded, and
     the rounded end may miss a toggle.
     """
     ranges = list(way.ranges)
@@ -209,30 +232,28 @@ def _sweep(
         reached = way.widest_range
         assert reached is not None, 'reading the file has proved that it closes somewhere'
         ranges = [reached]
-    told, read = (degrees, radians) if in_degrees else (float, float)
+    show, read = (degrees, radians) if in_degrees else (float, float)
     for interval in ranges:
-        low = told(interval.lowest) if first is None else first
-        high = told(interval.highest) if last is None else last
+        low = show(interval.lowest) if first is None else first
+        high = show(interval.highest) if last is None else last
         for i in range(steps + 1):
-            shown = low + (high - low) * i / steps if i < steps else high
-            value = read(shown)
+            value = read(low + (high - low) * i / steps if i < steps else high)
             if i == 0 and first is None:
                 value = interval.lowest
             elif i == steps and last is None:
                 value = interval.highest
-            yield State((shown,), (value,))
+            yield (value,)
 
 
 def _columns(closure: Closure, question: Question) -> Iterator[Column]:
     linkage = closure.linkage
-    angle = '°' if question.degrees else 'rad'
     for given in linkage.inputs:
-        yield Column(given.joint, 'm' if given.slider else angle)
+        yield Column(given.joint, given.unit)
     yield Column('status', '')
     yield Column('gap', 'm')
     for order in _orders(question):
         for name, turning in zip(linkage.joints, closure.turning, strict=True):
-            unit = angle if turning else 'm'
+            unit = 'rad' if turning else 'm'
             yield Column(f'{name}{_ORDERS[order]}', f'{unit}{_PER[order]}')
         for point in question.points:
             for axis in 'xy':
@@ -243,18 +264,16 @@ def _orders(question: Question) -> range:
     return range(1 + (question.rates is not None) + (question.accelerations is not None))
 
 
-def _row(closure: Closure, question: Question, state: State) -> list[Any]:
+def _row(closure: Closure, question: Question, given: tuple[float, ...]) -> list[Any]:
     """Return the cells of a state; empty cells where there is no value."""
-    unit = degrees if question.degrees else float
-    given = state.inputs
-    row: list[Any] = [*state.told]
+    row: list[Any] = [*given]
     position = closure.position(*given)
     row += [position.status.value, position.gap]
     count = len(closure.turning) + 2 * len(question.points)
     if not position.joints:
         return row + [None] * (count * len(_orders(question)))
     row += [
-        unit(wrapped(value)) if turning else value
+        wrapped(value) if turning else value
         for value, turning in zip(position.joints, closure.turning, strict=True)
     ]
     points = closure.points(position) if question.points else {}
@@ -269,12 +288,9 @@ def _row(closure: Closure, question: Question, state: State) -> list[Any]:
     changes = question.accelerations or (0.0,) * len(given)
     acceleration = closure.acceleration(position, velocity, *changes)
     motion = closure.point_motion(position, velocity, acceleration) if question.points else {}
-    told = (velocity.joints, acceleration.joints)[: len(_orders(question)) - 1]
-    for order, joints in enumerate(told, start=1):
-        row += [
-            unit(value) if turning else value
-            for value, turning in zip(joints, closure.turning, strict=True)
-        ]
+    rates = (velocity.joints, acceleration.joints)[: len(_orders(question)) - 1]
+    for order, joints in enumerate(rates, start=1):
+        row += joints
         for point, link in question.points.items():
             row += _xy(motion[link, point][order])
     return row
@@ -284,20 +300,20 @@ def _xy(place: complex) -> tuple[float, float]:
     return place.real, place.imag
 
 
-def _table(columns: Sequence[Column], rows: Sequence[Sequence[Any]]) -> Table:
-    heads = [str(column) if not column.unit else f'>{column}' for column in columns]
-    cells = [
-        [
-            value
-            if isinstance(value, str)
-            else ''
-            if value is None
-            else (f'{value:.3g}' if column.name == 'gap' else fixed(value, _DIGITS))
-            for column, value in zip(columns, row, strict=True)
-        ]
-        for row in rows
-    ]
-    return Table('', heads, cells)
+def _table(columns: Sequence[Column], rows: Sequence[Sequence[Any]], angles: AngleUnit) -> Table:
+    def cell(column: Column, value: Any) -> str:
+        if isinstance(value, str) or value is None:
+            return value or ''
+        if column.name == 'gap':
+            return f'{value:.3g}'
+        return fixed(angles.of(value) if column.unit.startswith('rad') else value, _DIGITS)
+
+    shown = [column._replace(unit=column.unit.replace('rad', angles.name)) for column in columns]
+    return Table(
+        '',
+        [f'>{column}' if column.unit else str(column) for column in shown],
+        [[cell(*pair) for pair in zip(columns, row, strict=True)] for row in rows],
+    )
 
 
 def _csv(columns: Sequence[Column], rows: Sequence[Sequence[Any]]) -> str:
@@ -319,20 +335,3 @@ def _json(columns: Sequence[Column], rows: Sequence[Sequence[Any]]) -> str:
         ],
     }
     return json.dumps(answer, indent=1, ensure_ascii=False, allow_nan=False) + '\n'
-
-
-def _number(written: str) -> float:
-    number = values(written)
-    if len(number) > 1:
-        raise argparse.ArgumentTypeError(f'{written} is no number')
-    return number[0]
-
-
-def _count(written: str) -> int:
-    try:
-        count = int(written)
-    except ValueError:
-        count = 0
-    if not 1 <= count <= 1_000_000:
-        raise argparse.ArgumentTypeError(f'{written} is no number of steps; write 1 to 1000000')
-    return count

@@ -254,9 +254,9 @@ def _function(typed: argparse.Namespace, search: Search) -> list[Answer]:
         error = structural_error(
             answer.design, lambda angles: wanted_rocker(task, angles), *task.crank_range
         )
-        told = list(_structural(task, error))
+        facts = list(_structural(task, error))
         curve = list(error.crank), list(error.error)
-        found.append(answer._replace(facts=[*answer.facts, *told], curve=curve))
+        found.append(answer._replace(facts=[*answer.facts, *facts], curve=curve))
     return found
 
 

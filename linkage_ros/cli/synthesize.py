@@ -28,7 +28,14 @@ from shlex import quote
 import sys
 from threading import Event
 
-from linkage_ros.cli.arguments import angle_text
+from linkage_ros.cli.arguments import (
+    add_output,
+    angle_text,
+    bounded,
+    LINKAGES,
+    output,
+    PICTURES,
+)
 from linkage_ros.cli.synthesis_tasks import Answer, answers, CANDIDATES, Search
 from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
 from linkage_ros.errors import LinkageError
@@ -122,6 +129,9 @@ _LISTED = 3
 """Default number of solutions that a search lists."""
 
 
+EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.yaml'
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     _add_tasks(parser)
@@ -146,17 +156,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     needs.add_argument('--usable', action='store_true', help='no order, branch or circuit defect')
     written = parser.add_argument_group('what is written')
-    written.add_argument(
-        '-o', '--output', type=Path, metavar='FILE', help='linkage file of the solution'
-    )
+    add_output(written, LINKAGES, 'no linkage file is written')
     written.add_argument(
         '--pick', type=int, default=1, metavar='N', help='the solution to write (here the first)'
     )
     written.add_argument(
         '--draw',
-        type=Path,
-        metavar='FILE',
-        help='PNG, SVG or PDF: the solution at its positions; of several FILE-1, FILE-2, …',
+        type=output(PICTURES),
+        metavar='OUTPUT',
+        help='picture of the solution at its positions, OUTPUT.png, .svg or .pdf; of several '
+        'OUTPUT-1, OUTPUT-2, …',
     )
 
 
@@ -170,7 +179,7 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         metavar=('CRANK', 'ROCKER'),
         help='angles of crank and rocker in one position, in degrees; three or more times',
     )
-    pairs.add_argument('--pairs', type=Path, metavar='FILE', help='CSV of two columns, in degrees')
+    pairs.add_argument('--pairs', type=Path, metavar='CSV', help='CSV of two columns, in degrees')
     pairs.add_argument(
         '--ground', type=float, default=1.0, metavar='M', help='length of the ground (here 1)'
     )
@@ -186,7 +195,11 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
             help=f"the {link}'s angles over the range, in degrees",
         )
     function.add_argument(
-        '--points', type=_whole, default=3, metavar='N', help='points, by Chebyshev (here 3)'
+        '--points',
+        type=bounded(0, 2**53 - 1, int),
+        default=3,
+        metavar='N',
+        help='points, by Chebyshev (here 3)',
     )
     function.add_argument(
         '--at', nargs='+', type=float, metavar='X', help='points of your own, instead'
@@ -198,8 +211,8 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
     path.add_argument(
         '--path',
         type=Path,
-        metavar='FILE',
-        help='CSV: x, y in metres, and the crank angle in degrees where that is wanted too',
+        metavar='CSV',
+        help='columns x, y in metres, and the crank angle in degrees where that is wanted too',
     )
     path.add_argument('--closed', action='store_true', help='the last point leads to the first')
     path.add_argument(
@@ -237,17 +250,19 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
         help='only how far crank and rocker turn matters, not from where: with three pairs the '
         'best are searched for, with four and five all are listed, with more they are fitted',
     )
-    freedoms.add_argument('--seed', type=_whole, default=0, help='of the search (here 0)')
+    freedoms.add_argument(
+        '--seed', type=bounded(0, 2**53 - 1, int), default=0, help='of the search (here 0)'
+    )
     freedoms.add_argument(
         '--candidates',
-        type=_count,
+        type=bounded(1, 2**53 - 1, int),
         default=CANDIDATES,
         metavar='N',
         help=f'how many are tried in a search (here {CANDIDATES})',
     )
     freedoms.add_argument(
         '--best',
-        type=_count,
+        type=bounded(1, 2**53 - 1, int),
         metavar='K',
         help=f'how many are listed (of a search {_LISTED}, else all)',
     )
@@ -261,8 +276,8 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Design; return 1 if no solution meets the requirements."""
-    with progress('candidates') as told:
-        found, meeting = solutions(arguments, told)
+    with progress('candidates') as advance:
+        found, meeting = solutions(arguments, advance)
     if not meeting:
         print(f'None of {len(found)} solution(s) has what is needed. Nearest to it:\n')
     needs = needs_of(arguments)
@@ -276,29 +291,15 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     return 0
 
 
-def solutions(typed: argparse.Namespace, told: ProgressCallback) -> tuple[list[Answer], bool]:
+def solutions(typed: argparse.Namespace, advance: ProgressCallback) -> tuple[list[Answer], bool]:
     """Return the solutions that meet the requirements and True; or the nearest ones and False."""
     needs = needs_of(typed)
     keep = typed.best or _LISTED
-    found = answers(typed, Search(needs, typed.seed, typed.candidates, keep, typed.dask, told))
+    found = answers(typed, Search(needs, typed.seed, typed.candidates, keep, typed.dask, advance))
     meeting = [one for one in found if not misses(one.assessment, needs)]
     if meeting:
         return meeting, True
     return sorted(found, key=lambda one: distance(one.assessment, needs)), False
-
-
-def _whole(text: str) -> int:
-    number = int(text)
-    if not 0 <= number < 2**53:
-        raise argparse.ArgumentTypeError(f'{text} is no number to count by; write 0 or more')
-    return number
-
-
-def _count(text: str) -> int:
-    number = _whole(text)
-    if not number:
-        raise argparse.ArgumentTypeError('0 is none; write 1 or more')
-    return number
 
 
 def needs_of(typed: argparse.Namespace) -> Needs:
@@ -340,4 +341,5 @@ def _write(arguments: argparse.Namespace, shown: Sequence[Answer]) -> None:
     defects = [f'{one.name} defect: {one.text}' for one in answer.assessment.defects]
     lines = [f'Designed: {answer.title}', command, *defects]
     write_linkage(answer.design.four_bar.linkage(first), arguments.output, lines)
-    print(arguments.output)
+    names = ' and '.join(one.name for one in answer.assessment.defects)
+    print(f'{arguments.output}  ({names} defect: see above)' if names else arguments.output)

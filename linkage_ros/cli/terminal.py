@@ -19,13 +19,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
+from itertools import zip_longest
+from shutil import get_terminal_size
 import sys
+from textwrap import fill
 from time import monotonic
 from typing import Any, NamedTuple, TextIO
 
 from linkage_ros.errors import clean, shortened
 
 _LONGEST_CELL = 4000
+
+_NARROWEST = 16
+"""Width below which no column is wrapped: a narrower one is hard to read."""
+
+_BORDER = 3
+"""Characters that the frame of a table adds to each column."""
 
 
 class Table(NamedTuple):
@@ -39,7 +48,7 @@ class Table(NamedTuple):
     columns
         Headings; a leading ``>`` aligns to the right. If all are empty, none is written.
     rows
-        The cells, as text.
+        The cells, as text. A line break in a cell begins a new line within its row.
 
     """
 
@@ -48,47 +57,118 @@ class Table(NamedTuple):
     rows: Sequence[Sequence[str]]
 
 
-def show(table: Table) -> None:
+def show(*tables: Table) -> None:
     """
-    Print a table.
+    Print tables, with an empty line between two.
 
-    Output into a file or a pipe, or wider than the terminal, has no frames: it can be searched,
-    and no name is broken in two.
+    On a terminal they are folded to its width. Output into a file or a pipe has no frames, and a
+    row is one line however long it is: ``grep`` and ``awk`` find whole rows.
     """
+    width = get_terminal_size().columns if sys.stdout.isatty() else 0
+    shown = [
+        part
+        for table in map(_cleaned, tables)
+        for part in (folded(table, width) if width else [table])
+    ]
+    for number, table in enumerate(shown):
+        if number:
+            print()
+        _show(table, width)
+
+
+def _cleaned(table: Table) -> Table:
     rows = [[shortened(clean(cell), _LONGEST_CELL) for cell in row] for row in table.rows]
-    table = Table(clean(table.title), table.columns, rows)
-    if sys.stdout.isatty() and find_spec('rich') is not None:
+    return Table(clean(table.title), list(map(clean, table.columns)), rows)
+
+
+def _show(table: Table, width: int) -> None:
+    # A word that is wider than the terminal is not broken; a frame would break it.
+    if find_spec('rich') is not None and _framed(_widths(table)) <= width:
         from rich.console import Console
 
-        console = Console(file=sys.__stdout__)
-        if _width(table) <= console.width:
-            console.print(_drawn(table))
-            return
-    print(text(table))
+        Console(file=sys.__stdout__, width=width).print(_drawn(table))
+    else:
+        print(text(table))
+
+
+def folded(table: Table, width: int) -> list[Table]:
+    """
+    Return a table as tables that are at most ``width`` characters wide with their frames.
+
+    Long cells and headings are wrapped at spaces. If that is not enough, the columns are divided
+    among several tables, each of which begins with the first column. No word is broken.
+    """
+    if _framed(_widths(table)) <= width:
+        return [table]
+    columns = list(zip(_heads(table), *table.rows, strict=True))
+    narrow = [_width(cells, _NARROWEST) for cells in columns]
+    blocks: list[list[int]] = [[0]]
+    for number in range(1, len(columns)):
+        block = blocks[-1]
+        if len(block) > 1 and _framed([narrow[i] for i in [*block, number]]) > width:
+            block = [0]
+            blocks.append(block)
+        block.append(number)
+    tables: list[Table] = []
+    for block in blocks:
+        most = max(_width(columns[i]) for i in block)
+        while most > _NARROWEST and _framed([_width(columns[i], most) for i in block]) > width:
+            most -= 1
+        wrapped = [[_wrapped(cell, most) for cell in columns[i]] for i in block]
+        heads, *rows = zip(*wrapped, strict=True)
+        marks = ('>' * table.columns[i].startswith('>') for i in block)
+        tables.append(
+            Table(
+                '' if tables else _wrapped(table.title, width),
+                [mark + head for mark, head in zip(marks, heads, strict=True)],
+                rows,
+            )
+        )
+    return tables
+
+
+def _wrapped(cell: str, most: int) -> str:
+    """Return a cell with line breaks at spaces, if it is wider than ``most``."""
+    if len(cell) <= most:
+        return cell
+    return fill(cell, most, break_long_words=False, break_on_hyphens=False)
+
+
+def _width(cells: Sequence[str], most: int = sys.maxsize) -> int:
+    """Return the width of a column whose cells are wrapped to ``most``; a word may be wider."""
+    width = max(len(line) for cell in cells for line in cell.split('\n'))
+    if width <= most:
+        return width
+    return max(most, *(len(word) for cell in cells for word in cell.split()))
+
+
+def _widths(table: Table) -> list[int]:
+    return [_width(cells) for cells in zip(_heads(table), *table.rows, strict=True)]
+
+
+def _framed(widths: Sequence[int]) -> int:
+    """Return the width of a table with its frame."""
+    return sum(widths) + _BORDER * len(widths) + 1
+
+
+def _heads(table: Table) -> list[str]:
+    return [column.removeprefix('>') for column in table.columns]
 
 
 def text(table: Table) -> str:
     """Return a table as plain text."""
-    headed = any(column.lstrip('>') for column in table.columns)
-    lines = [[column.lstrip('>') for column in table.columns]] if headed else []
-    lines += [list(row) for row in table.rows]
-    widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
+    heads = _heads(table)
+    widths = _widths(table)
     right = [column.startswith('>') for column in table.columns]
-    written = [
+    lines = [
         '  '.join(
             cell.rjust(width) if align else cell.ljust(width)
             for cell, width, align in zip(line, widths, right, strict=True)
         ).rstrip()
-        for line in lines
+        for row in ([heads] if any(heads) else []) + list(table.rows)
+        for line in zip_longest(*(cell.split('\n') for cell in row), fillvalue='')
     ]
-    if table.title:
-        written.insert(0, table.title)
-    return '\n'.join(written)
-
-
-def _width(table: Table) -> int:
-    lines = [table.columns, *table.rows]
-    return sum(max(map(len, cells)) + 3 for cells in zip(*lines, strict=True)) + 1
+    return '\n'.join([table.title, *lines] if table.title else lines)
 
 
 def _drawn(table: Table) -> object:
@@ -96,19 +176,17 @@ def _drawn(table: Table) -> object:
     from rich.table import Table as Drawn
     from rich.text import Text
 
-    headed = any(column.lstrip('>') for column in table.columns)
+    heads = _heads(table)
     # As Text: rich would read brackets, such as those of a unit, as markup.
     drawn = Drawn(
         title=Text(table.title, style='bold') if table.title else None,
         title_justify='left',
-        show_header=headed,
-        box=box.ROUNDED if headed else None,
+        show_header=any(heads),
+        box=box.ROUNDED if any(heads) else None,
     )
-    for column in table.columns:
+    for head, column in zip(heads, table.columns, strict=True):
         right = column.startswith('>')
-        drawn.add_column(
-            Text(column.lstrip('>')), justify='right' if right else 'left', no_wrap=True
-        )
+        drawn.add_column(Text(head), justify='right' if right else 'left', no_wrap=True)
     for row in table.rows:
         drawn.add_row(*(Text(cell) for cell in row))
     return drawn
@@ -119,8 +197,8 @@ def _drawn(table: Table) -> object:
 ProgressCallback = Callable[[int, int], None]
 """Takes the amount done and the total."""
 
-_EVERY = 5.0
-"""Seconds between two lines."""
+_FIRST, _EVERY = 2.0, 30.0
+"""Seconds until the first line, and between two."""
 
 
 @contextmanager
@@ -141,21 +219,25 @@ def progress(what: str) -> Iterator[ProgressCallback]:
             task = bars.add_task(what, total=None)
             yield lambda done, of: bars.update(task, completed=done, total=of)
         return
-    told = monotonic()
+    begin = monotonic()
+    due, shown = begin + _FIRST, False
 
     def line(done: int, of: int) -> None:
-        nonlocal told
-        if monotonic() - told >= _EVERY:
-            told = monotonic()
+        nonlocal due, shown
+        now = monotonic()
+        if now >= due and of:
+            due, shown = now + _EVERY, True
             print(f'{what}: {done} of {of}', file=sys.stderr, flush=True)
 
     yield line
+    if shown:
+        print(f'{what}: ended after {monotonic() - begin:.1f} s', file=sys.stderr, flush=True)
 
 
 # Output is escaped: a topic's name in a file may contain control characters of the terminal.
 
 
-class Outlet:
+class PrintableStream:
     """
     A text stream whose lines are made printable; everything else is passed to the stream.
 
@@ -181,4 +263,4 @@ class Outlet:
 
 def clean_output() -> None:
     """Replace standard output and standard error by escaped ones; rich keeps the originals."""
-    sys.stdout, sys.stderr = Outlet(sys.stdout), Outlet(sys.stderr)
+    sys.stdout, sys.stderr = PrintableStream(sys.stdout), PrintableStream(sys.stderr)

@@ -12,24 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+"""``python -m linkage_ros`` is ``linkage``, also where no script of that name is installed."""
 
-"""Write a linkage as URDF: a tree of its published joints, frames where its loops are cut."""
+from linkage_ros.cli.main import main
 
-from __future__ import annotations
-
-import argparse
-from threading import Event
-
-from linkage_ros.cli.arguments import add_files, model_of, put
-from linkage_ros.robot_models.urdf import urdf
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_files(parser, 'URDF')
-
-
-def run(arguments: argparse.Namespace, _stop: Event) -> int:
-    """Write the model."""
-    put(model_of(arguments.file, urdf), arguments.output)
-    return 0
+if __name__ == '__main__':
+    raise SystemExit(main())

@@ -1,0 +1,116 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+List the linkages and scenes that come with the package; print one, or copy it.
+
+Their names stand for them in all commands: linkage check jansen_leg. With -o the file is copied,
+and with a scene the linkage files that it names, into the same folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import re
+from threading import Event
+
+from linkage_ros.cli.arguments import add_output, LINKAGES
+from linkage_ros.cli.terminal import show, Table
+from linkage_ros.errors import FileError
+from linkage_ros.files.file_access import atomic_write
+from linkage_ros.resources import linkage_names, named_file, scene_names, shipped
+
+EXAMPLE = 'linkage gallery worn_press -o my_press.yaml'
+
+_FOLDERS = ('linkages', 'scenes')
+
+_SCHEMA = re.compile(r'^# yaml-language-server:.*\n')
+_REFERENCE = re.compile(r'^( *linkage: +)\.\./linkages/(\S+)', re.MULTILINE)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        'name', nargs='?', metavar='NAME', help='linkage or scene; without it, all are listed'
+    )
+    parser.add_argument(
+        '--scene',
+        action='store_true',
+        help='the scene, where a linkage and a scene have the same name',
+    )
+    add_output(parser, LINKAGES, 'the file is printed')
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """List, print or copy."""
+    if arguments.name is None:
+        if arguments.output is not None:
+            raise FileError('-o', '', 'needs a NAME', 'name what to copy')
+        show(*(_listed(folder) for folder in _FOLDERS))
+        return 0
+    file = _shipped(arguments.name, ('scenes',) if arguments.scene else _FOLDERS)
+    if arguments.output is None:
+        print(file.read_text('utf-8'), end='')
+        return 0
+    for copy, text in _copies(file, arguments.output).items():
+        atomic_write(copy, text.encode())
+        print(copy)
+    return 0
+
+
+def _listed(folder: str) -> Table:
+    names = {'linkages': linkage_names, 'scenes': scene_names}[folder]()
+    rows = [(name, first_sentence(shipped(f'{folder}/{name}.yaml'))) for name in names]
+    return Table('', (folder, ''), rows)
+
+
+def _shipped(name: str, folders: tuple[str, ...]) -> Path:
+    """Return a file of the gallery; a path is none, even of a file that exists."""
+    file = named_file(name, *folders)
+    if file.parent.parent != shipped(''):
+        raise FileError(name, '', 'is not in the gallery', 'linkage gallery lists its names')
+    return file
+
+
+def _copies(file: Path, output: Path) -> dict[Path, str]:
+    """
+    Return the files of a copy and their texts: the file, and the linkages that it names.
+
+    The copies name each other by their new places. Their schemas, which stand in the checkout,
+    are left out.
+    """
+    text = _SCHEMA.sub('', file.read_text('utf-8'))
+    copies = {output: _REFERENCE.sub(r'\1\2', text)}
+    for found in _REFERENCE.finditer(text):
+        copy, linkage = output.with_name(found[2]), shipped(f'linkages/{found[2]}')
+        linkage_text = _SCHEMA.sub('', linkage.read_text('utf-8'))
+        if copy == output or (copy.exists() and copy.read_bytes() != linkage_text.encode()):
+            raise FileError(
+                copy, '', 'is another file, and the scene needs a linkage of this name',
+                'name a file in another folder with -o',
+            )  # fmt: skip
+        copies[copy] = linkage_text
+    return copies
+
+
+def first_sentence(file: Path) -> str:
+    """Return the first sentence of the comment at the head of a file."""
+    comment = []
+    for line in file.read_text('utf-8').splitlines():
+        if not line.startswith('#'):
+            break
+        if not line.startswith('# yaml-language-server:'):
+            comment.append(line.lstrip('# '))
+    return ' '.join(comment).partition('. ')[0].rstrip('.')

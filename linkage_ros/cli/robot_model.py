@@ -1,0 +1,92 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Write a linkage or a scene as a robot model.
+
+URDF is a tree of the published joints, with frames where loops are cut. MJCF, MuJoCo's format, has
+bodies, masses, springs and the closed loops.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+from threading import Event
+
+from linkage_ros.cli.arguments import add_output, SCENE_HELP
+from linkage_ros.files.file_access import atomic_write
+from linkage_ros.files.linkage_file import read_closure
+from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.resources import named_file
+from linkage_ros.robot_models.mjcf import mjcf
+from linkage_ros.robot_models.part import Part, PartError
+from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.scene.load import kind_of
+from linkage_ros.scene.robot_model import scene_model, Write
+
+WRITERS: dict[str, Write] = {'urdf': urdf, 'mjcf': mjcf}
+"""Writers of models, by the command's name."""
+
+
+SUFFIXES = {'urdf': ('.urdf', '.xml'), 'mjcf': ('.xml', '.mjcf')}
+"""Suffixes of the models, by the command's name."""
+
+EXAMPLE = {
+    'urdf': 'linkage urdf jansen_leg -o jansen_leg.urdf',
+    'mjcf': 'linkage mjcf worn_press -o worn_press.xml',
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('file', metavar='FILE', help=SCENE_HELP)
+    add_output(parser, SUFFIXES[parser.get_default('command')], 'the model is printed')
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """Write the model."""
+    write_or_print(model_of(arguments.file, WRITERS[arguments.command]), arguments.output)
+    return 0
+
+
+def model_of(named: str, write: Write) -> bytes:
+    """
+    Return the model of a linkage or scene, given by its file or its shipped name.
+
+    Linkages of a scene are those that the node would solve, with the deviations of their parts.
+    """
+    file = named_file(named, 'linkages', 'scenes')
+    content, _ = read_yaml(file)
+    if kind_of(content) == 'scene':
+        from linkage_ros.pipeline.pipeline import Pipeline
+        from linkage_ros.scene.load import load_scene
+
+        scene = load_scene(file)
+        return scene_model(scene, Pipeline(scene).closures, write)
+    try:
+        return write(file.stem, [Part(read_closure(content))])
+    except PartError as error:
+        raise content.error(error.where, error.reason, error.remedy) from None
+
+
+def write_or_print(data: bytes, output: Path | None) -> None:
+    """Write a model to a file and say so, or print it."""
+    if output is None:
+        sys.stdout.write(data.decode())
+    else:
+        atomic_write(output, data)
+        print(output)
