@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""``python -m bench``: measure, print the tables beside their targets, and keep them in a file."""
+"""``python -m bench``: measure, and print and store tables with their targets."""
 
 from __future__ import annotations
 
@@ -26,13 +26,12 @@ from tempfile import TemporaryDirectory
 import time
 
 from bench.coming import ComersPlan, measure_comers
-from bench.compiled import CompiledPlan, measure_arrays, measure_chains, measure_gallery
-from bench.empty_scene import EmptyPlan, measure_empty_scene
+from bench.compiled import measure_arrays, measure_chains, measure_gallery
+from bench.empty_scene import measure_empty_scene
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
 from bench.report import FOLDER, machine_table, PAGES, say, show, Table, write_page
 from bench.ticks import (
-    asking,
     bare,
     cost_table,
     idiomatic,
@@ -41,6 +40,7 @@ from bench.ticks import (
     measure_ticks,
     ours,
     TickPlan,
+    with_parameters,
 )
 from linkage_ros.processes import Graph, MeasurementError
 
@@ -50,13 +50,9 @@ _TICKS = TickPlan(rounds=5, warm_up=0.7, window=1.7)
 _TICKS_QUICK = TickPlan(rounds=1, warm_up=0.2, window=0.6)
 _LATENCY = LatencyPlan(rate=1000.0, size=500, parts=12)
 _LATENCY_QUICK = LatencyPlan(rate=1000.0, size=200, parts=3)
-_EMPTY = EmptyPlan(rounds=31, ticks=5000)
-_EMPTY_QUICK = EmptyPlan(rounds=3, ticks=1000)
 _SPEED = SpeedPlan(rounds=11, states=5000, batch=1_000_000)
 _COMERS = ComersPlan(comers=200, listens=0.05, busy=2)
 _COMERS_QUICK = ComersPlan(comers=2, listens=0.05, busy=0)
-_COMPILED = CompiledPlan(rounds=11, states=2000)
-_COMPILED_QUICK = CompiledPlan(rounds=1, states=100)
 _SPEED_QUICK = SpeedPlan(rounds=3, states=1000, batch=100_000)
 
 
@@ -69,11 +65,9 @@ def main() -> int:
         choices=('a', 'b', 'c', 'many', 'empty', 'kinematics', 'compiled', 'real_time', 'comers'),
         help='only one of the comparisons',
     )
+    parser.add_argument('--runs', type=Path, default=Path('runs'), help='folder of the tables')
     parser.add_argument(
-        '--runs', type=Path, default=Path('runs'), help='where the tables are kept'
-    )
-    parser.add_argument(
-        '--write', action='store_true', help=f'keep them as a page too: {" or ".join(PAGES)}'
+        '--write', action='store_true', help=f'write a page too, for {" or ".join(PAGES)}'
     )
     arguments = parser.parse_args()
     if arguments.write and arguments.only not in PAGES:
@@ -105,17 +99,17 @@ def main() -> int:
                 tables.append(measure_comers(graph, folder, rates, plan_of_comers))
             if arguments.only in (None, 'empty'):
                 say('a tick of the empty scene')
-                tables.append(measure_empty_scene(_EMPTY_QUICK if arguments.quick else _EMPTY))
+                tables.append(measure_empty_scene(*((3, 1000) if arguments.quick else (31, 5000))))
             if arguments.only in (None, 'kinematics'):
                 say('kinematics: linkages solved with acceleration')
                 tables.append(measure_speed(_SPEED_QUICK if arguments.quick else _SPEED))
             if arguments.only in (None, 'compiled'):
-                say('compiled linkages beside their plain steps')
-                compiled_plan = _COMPILED_QUICK if arguments.quick else _COMPILED
+                say('compiled linkages against their plain steps')
+                amount = (1, 100) if arguments.quick else (11, 2000)
                 picture = FOLDER / 'chains.svg' if arguments.write else None
-                tables += [measure_gallery(compiled_plan), measure_chains(compiled_plan, picture)]
-                arrays_plan = (1, 20_000) if arguments.quick else (11, 1_000_000)
-                tables.append(measure_arrays(folder, *arrays_plan))
+                tables += [measure_gallery(*amount), measure_chains(*amount, picture)]
+                amount = (1, 20_000) if arguments.quick else (11, 1_000_000)
+                tables.append(measure_arrays(folder, *amount))
     except MeasurementError as error:
         print(f'bench: {error}', file=sys.stderr)
         return 1
@@ -129,7 +123,7 @@ def main() -> int:
     arguments.runs.mkdir(parents=True, exist_ok=True)
     file = arguments.runs / f'bench_{begin:%Y-%m-%d_%H-%M-%S}.md'
     file.write_text('\n'.join(table.markdown() for table in tables), encoding='utf-8')
-    say(f'{time.monotonic() - started:.0f} s; kept in {file}')
+    say(f'{time.monotonic() - started:.0f} s; written to {file}')
     return 0
 
 
@@ -138,7 +132,7 @@ def _ticks(graph: Graph, folder: Path, wanted: str, quick: bool) -> list[Table]:
     slow_idiomatic, fast_idiomatic = idiomatic(folder, SLOW), idiomatic(folder, FAST)
     slow_bare, fast_bare = bare(SLOW), bare(FAST)
     slow_recording, fast_recording = ours(folder, SLOW, True), ours(folder, FAST, True)
-    # Contenders that are compared run next to each other.
+    # Compared contenders run next to each other.
     contenders = [
         *([slow_idiomatic] if 'a' in wanted else []),
         slow,
@@ -169,11 +163,13 @@ def _ticks(graph: Graph, folder: Path, wanted: str, quick: bool) -> list[Table]:
 
 
 def _real_time(graph: Graph, folder: Path, rate: float, quick: bool) -> Table:
-    """Measure ticks under load with real-time priority; report it if the system refuses."""
+    """Measure ticks under load, with real-time priority among others."""
     busy = os.cpu_count() or 1
     say(f'{busy} busy processes, {rate:g} Hz')
-    asked = ('thread_priority:=80', f'cpu_affinity:=[{busy - 1}]', 'lock_memory:=true')
-    contenders = [asking(folder, rate, *asked[:count]) for count in range(len(asked) + 1)]
+    parameters = ('thread_priority:=80', f'cpu_affinity:=[{busy - 1}]', 'lock_memory:=true')
+    contenders = [
+        with_parameters(folder, rate, *parameters[:count]) for count in range(len(parameters) + 1)
+    ]
     plan = _TICKS_QUICK if quick else _TICKS
     found = measure_ticks(graph, contenders, plan, busy)
     return lateness_table(contenders, found, f' beside {busy} busy processes')

@@ -16,8 +16,8 @@
 """
 The minimum of a tick: sleep until it is due, take bytes until none are left, publish.
 
-It decodes no crank sample and solves nothing; only the stamp of each message is new. The
-difference to this loop is the cost of the node's work.
+It decodes no crank sample and solves no linkage; only the stamp of each message changes. The
+difference between the node and this loop is the cost of the node's work.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Use all idle time of a processor, until a signal or the alarm of `processes.Graph`."""
+"""Keep a processor busy until a signal or the alarm of `processes.Graph`."""
 
 if __name__ == '__main__':
     while True:

@@ -15,9 +15,9 @@
 """
 Subscribers of ``joint_states`` that come and go in turn, each a DDS participant of its own.
 
-Arguments: the number of subscribers, and how long each listens, in [s]. At the end it prints a
-line of JSON: the number of subscribers, how many received nothing, the messages received, and
-those missed between the first and the last of each.
+Arguments: the number of subscribers, and the time for which each listens, in [s]. At the end it
+prints a line of JSON: the number of subscribers, the number that received nothing, the number of
+messages received, and the number missed between the first and the last message of each.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ _DEPTH = 2000
 def main() -> None:
     """Create subscribers one after the other, until all are done or a signal comes."""
     stop = stop_on_signals()
-    count, listens = int(sys.argv[1]), float(sys.argv[2])
+    count, duration = int(sys.argv[1]), float(sys.argv[2])
     del sys.argv[1:]
-    found = {'came': 0, 'deaf': 0, 'heard': 0, 'missed': 0}
-    while found['came'] < count and not stop.is_set():
-        numbers = set(_listen(listens))
-        found['came'] += 1
-        found['deaf'] += not numbers
-        found['heard'] += len(numbers)
+    counts = {'subscribers': 0, 'silent': 0, 'received': 0, 'missed': 0}
+    while counts['subscribers'] < count and not stop.is_set():
+        numbers = set(_listen(duration))
+        counts['subscribers'] += 1
+        counts['silent'] += not numbers
+        counts['received'] += len(numbers)
         if numbers:
-            found['missed'] += max(numbers) - min(numbers) + 1 - len(numbers)
-    print(json.dumps(found), flush=True)
+            counts['missed'] += max(numbers) - min(numbers) + 1 - len(numbers)
+    print(json.dumps(counts), flush=True)
 
 
-def _listen(listens: float) -> Iterator[int]:
-    """Yield the publisher's numbers of the messages received in so many seconds."""
+def _listen(duration: float) -> Iterator[int]:
+    """Yield the publisher's numbers of the messages received in a time in [s]."""
     with node('comer') as comer:
         take = taker(subscription(comer, 'joint_states', keep_last(_DEPTH)))
         until = monotonic() + _PATIENCE
@@ -62,7 +62,7 @@ def _listen(listens: float) -> Iterator[int]:
         while monotonic() < until:
             while (taken := take()) is not None:
                 if first:
-                    first, until = False, monotonic() + listens
+                    first, until = False, monotonic() + duration
                 yield taken[1]['publication_sequence_number']
             sleep(_POLL)
 

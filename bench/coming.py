@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Cost of subscribers that come and go for the ticks, by the transport of Fast DDS.
+Effect on the ticks of subscribers that come and go, by the transport of Fast DDS.
 
-A publisher opens the shared-memory port of every new subscriber, on the thread that publishes. If
-nobody has written to that port for long, its check waits for a third of the
+A publisher opens the shared-memory port of every new subscriber, on the publishing thread. If no
+process has written to that port for long, its check waits for a third of the
 ``healthy_check_timeout_ms`` of the process that created the port: 0.33 s (Fast-DDS issue 6535).
 """
 
@@ -37,7 +37,7 @@ from linkage_ros.resources import shipped
 _APPEARING = 15.0
 """Time limit for the node's first tick, in [s]."""
 
-_TELLING = 1.3
+_DIAGNOSTICS = 1.3
 """Time after which the node has published new diagnostics, in [s]."""
 
 _TIMEOUT = 30
@@ -76,38 +76,24 @@ class ComersPlan:
 def measure_comers(
     graph: Graph, folder: Path, rates: tuple[float, ...], plan: ComersPlan
 ) -> Table:
-    """
-    Let subscribers come and go for each transport, rate and load, and return the table.
-
-    Parameters
-    ----------
-    graph
-        Where they run.
-    folder
-        Folder of scenes and profiles.
-    rates
-        Ticks per second.
-    plan
-        Amount of the measurement.
-
-    """
+    """Let subscribers come and go for each transport, rate and load, and return the table."""
     table = Table(
-        f'{plan.comers} subscribers on defaults come and go',
-        ('', 'stood still for 0.33 s', 'ticks lost', 'of', 'longest µs', 'CPU µs a tick',
-         'waited for CPU', 'comers that heard nothing', 'messages missed'),
+        f'{plan.comers} subscribers with default settings come and go',
+        ('', 'stalls of 0.33 s', 'ticks lost', 'of', 'longest µs', 'CPU µs a tick',
+         'waited for CPU', 'subscribers without a message', 'messages missed'),
     )  # fmt: skip
     for rate in rates:
         scene = write_turning(folder, rate)
         for busy in dict.fromkeys((0, plan.busy)):
-            for name, more in _ways(folder).items():
+            for name, environment in _transports(folder).items():
                 load = f', {busy} busy processes' if busy else ''
-                cells = _measure(graph, scene, more, busy, plan)
+                cells = _measure(graph, scene, environment, busy, plan)
                 table.rows.append((f'{name}, {rate / 1e3:g} kHz{load}', *cells))
                 say('  ' + ', '.join(table.rows[-1]))
     return table
 
 
-def _ways(folder: Path) -> Mapping[str, Mapping[str, str]]:
+def _transports(folder: Path) -> Mapping[str, Mapping[str, str]]:
     """Return the node's environment for each transport; all stay on the machine."""
     local = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}
     profile = shipped('fastdds/local.xml')
@@ -131,47 +117,47 @@ def _ways(folder: Path) -> Mapping[str, Mapping[str, str]]:
 
 
 def _measure(
-    graph: Graph, scene: Path, more: Mapping[str, str], busy: int, plan: ComersPlan
+    graph: Graph, scene: Path, environment: Mapping[str, str], busy: int, plan: ComersPlan
 ) -> Sequence[str]:
     """Return one row of the table."""
     with ExitStack() as stack:
         run = stack.enter_context
         listener = run(graph.run('bench.listener'))
         ours = ('--ros-args', '-p', f'scene:={scene}')
-        node = run(graph.run('linkage_ros.node.linkage_node', ours, more))
-        before = _heard(listener, node)
+        node = run(graph.run('linkage_ros.node.linkage_node', ours, environment))
+        before = _report(listener, node)
         for _ in range(busy):
             run(graph.run('bench.busy'))
         ran, waited = cpu_time(node.pid)
         comers = run(graph.run('bench.comers', (str(plan.comers), f'{plan.listens:g}')))
-        came = comers.read(60.0 + plan.comers * (plan.listens + 2.0))
+        counts = comers.read(60.0 + plan.comers * (plan.listens + 2.0))
         ran_then, waited_then = cpu_time(node.pid)
-        time.sleep(_TELLING)
+        time.sleep(_DIAGNOSTICS)
         listener.ask('forget')
-        after = _heard(listener, node)
+        after = _report(listener, node)
     ticks, lost = (
         int(after['health'][key]) - int(before['health'][key])
         for key in ('Events since startup', 'Lost ticks')
     )
     wait = (waited_then - waited) / (after['time'] - before['time'])
     return (
-        str(after['stood'] - before['stood']),
+        str(after['stalls'] - before['stalls']),
         str(lost),
         str(ticks + lost),
         f'{float(after["health"]["Lateness max (us)"]):.0f}',
         f'{(ran_then - ran) / max(ticks, 1) / 1e3:.1f}',
         f'{wait:.0%}',
-        str(came['deaf']),
-        f'{came["missed"]} of {came["heard"]}',
+        str(counts['silent']),
+        f'{counts["missed"]} of {counts["received"]}',
     )
 
 
-def _heard(listener: Process, node: Process) -> dict[str, Any]:
+def _report(listener: Process, node: Process) -> dict[str, Any]:
     """Return the listener's report, as soon as it has diagnostics of the node."""
     until = time.monotonic() + _APPEARING
-    while not (heard := listener.ask('?'))['health']:
+    while not (report := listener.ask('?'))['health']:
         node.check()
         if time.monotonic() > until:
             raise MeasurementError(f'{node.name}: no diagnostics in {_APPEARING:g} s')
         time.sleep(0.1)
-    return dict(heard)
+    return dict(report)

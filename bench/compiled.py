@@ -14,17 +14,16 @@
 
 
 """
-Gain of compiling: shipped linkages against their uncompiled steps, chains of dyads, and arrays.
+Speed of compiled linkages: shipped linkages against plain steps, chains of dyads, and arrays.
 
-Many states of each shipped linkage are solved by `solve` and by its generated C with full
-optimisation. Both come from the same tape and differ only in what executes it.
+Many states of each shipped linkage are solved by `solve` and by the generated C code with full
+optimisation. Both come from the same tape.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 import ctypes
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 import random
@@ -34,8 +33,8 @@ import time
 
 from bench import ROOT
 from bench.report import in_turn, ratios, say, spread, Table
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import parse_yaml, read_yaml
+from linkage_ros.files.linkage_file import load, read_linkage
+from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.batch import Array
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.c import C
@@ -53,41 +52,23 @@ _ITERATED_STATES = 50
 Numbers = tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class CompiledPlan:
-    """
-    Amount of the measurement.
-
-    Attributes
-    ----------
-    rounds
-        Number of measurements of each, in turn.
-    states
-        In a round.
-
-    """
-
-    rounds: int
-    states: int
-
-
-def measure_gallery(plan: CompiledPlan) -> Table:
-    """Return the time of a motion for each shipped linkage, compiled and in plain steps."""
+def measure_gallery(rounds: int, states: int) -> Table:
+    """Return the time of a state for each shipped linkage, compiled and in plain steps."""
     table = Table(
         'shipped linkages with rates and accelerations, µs a state; one run, in turn',
         ('', 'compiled', 'plain steps', 'ratio', 'target', 'compiling, ms', 'target'),
     )
     for file in sorted((ROOT / 'config' / 'linkages').glob('*.yaml')):
-        closure = Closure(read_linkage(read_yaml(file)[0]))
+        closure = load(file)
         slow = iterated(closure)
-        count = min(plan.states, _ITERATED_STATES) if slow else plan.states
-        states = list(islice(_closed_states(closure), count))
+        count = min(states, _ITERATED_STATES) if slow else states
+        inputs = list(islice(_closed_states(closure), count))
         begun = time.perf_counter()
         compiled = Compiled(closure, 2)
         took = 1e3 * (time.perf_counter() - begun)
         found = in_turn(
-            {'compiled': _over(compiled.fast, states), 'plain': _over(compiled.plain, states)},
-            plan.rounds,
+            {'compiled': _over(compiled.fast, inputs), 'plain': _over(compiled.plain, inputs)},
+            rounds,
         )
         fast, plain = ([1e6 * s / count for s in found[name]] for name in ('compiled', 'plain'))
         table.rows.append(
@@ -104,18 +85,8 @@ def measure_gallery(plan: CompiledPlan) -> Table:
     return table
 
 
-def measure_chains(plan: CompiledPlan, picture: Path | None = None) -> Table:
-    """
-    Return the time of chains of four-bars by the number of their dyads.
-
-    Parameters
-    ----------
-    plan
-        Amount of the measurement.
-    picture
-        File of the diagram; None for none.
-
-    """
+def measure_chains(rounds: int, states: int, picture: Path | None = None) -> Table:
+    """Return the time of chains of four-bars over their number of dyads, and draw it."""
     table = Table(
         'chains of crank-rockers with rates and accelerations; one run, in turn',
         ('dyads', 'µs a state', 'µs a state and dyad', 'compiling, ms'),
@@ -127,11 +98,11 @@ def measure_chains(plan: CompiledPlan, picture: Path | None = None) -> Table:
         begun = time.perf_counter()
         compiled = Compiled(closure, 2)
         compiling[str(dyads)] = 1e3 * (time.perf_counter() - begun)
-        states = list(islice(_closed_states(closure), max(1, plan.states // dyads)))
-        contenders[str(dyads)] = _over(compiled.fast, states)
+        inputs = list(islice(_closed_states(closure), max(1, states // dyads)))
+        contenders[str(dyads)] = _over(compiled.fast, inputs)
     found = {}
-    for name, seconds in in_turn(contenders, plan.rounds).items():
-        states_of = max(1, plan.states // int(name))
+    for name, seconds in in_turn(contenders, rounds).items():
+        states_of = max(1, states // int(name))
         found[int(name)] = [1e6 * s / states_of for s in seconds]
         each = [value / int(name) for value in found[int(name)]]
         cells = spread(found[int(name)], 2), spread(each, 2), f'{compiling[name]:.1f}'
@@ -142,7 +113,7 @@ def measure_chains(plan: CompiledPlan, picture: Path | None = None) -> Table:
 
 
 def chain_of(dyads: int) -> str:
-    """Return the linkage file of crank-rockers, each of which is driven by the rocker before."""
+    """Return the linkage file of a chain of crank-rockers; each drives the next by its rocker."""
     ground = ', '.join(f'O{i}: [{0.1 * i:g}, 0]' for i in range(dyads + 1))
     cranks = ['{O0: [0, 0], A0: [0.04, 0]}']
     for i in range(1, dyads + 1):
@@ -205,8 +176,7 @@ def _draw(found: dict[int, list[float]], picture: Path) -> None:
     figure.savefig(picture, metadata={'Date': None, 'Creator': 'linkage_ros'})
 
 
-# Without errno a square root is one instruction. Nothing here may change a result by more than
-# the last digit.
+# Without errno a square root is one instruction. No flag may change more than the last digit.
 _FLAGS = ('-O3', '-march=native', '-fno-math-errno', '-shared', '-fPIC')
 
 _AGREEMENT = 1e-9
@@ -239,29 +209,17 @@ _Solve = Callable[[Array, Array], int]
 
 
 def measure_arrays(folder: Path, rounds: int, states: int) -> Table:
-    """
-    Return the number of closed states per second, with rates and accelerations, for both.
-
-    Parameters
-    ----------
-    folder
-        Folder of the compiled files.
-    rounds
-        Number of measurements of each, in turn.
-    states
-        In a round.
-
-    """
+    """Return the closed states per second, with rates and accelerations, for `solve` and C."""
     table = Table(
         f'{states:,} states at once, with rates and accelerations, million a second; one run, '
         'in turn',
-        ('', 'solve', 'emitted C, -O3', 'ratio', 'target'),
+        ('', 'solve', 'generated C, -O3', 'ratio', 'target'),
     )
     if shutil.which('cc') is None:
         say('  no C compiler (cc): left out')
         return table
     for file in sorted((ROOT / 'config' / 'linkages').glob('*.yaml')):
-        closure = Closure(read_linkage(read_yaml(file)[0]))
+        closure = load(file)
         if not iterated(closure):
             target = '≥ 0.9' if file.stem == 'four_bar' else '≥ 0.5'
             cells = _measured(folder, closure, file, rounds, states)
@@ -308,7 +266,7 @@ def _closed(closure: Closure, count: int) -> Array:
 
 
 def _compiled(folder: Path, closure: Closure, file: Path) -> _Solve:
-    """Return the emitted C of a linkage, in a loop over states."""
+    """Return the generated C code of a linkage, in a loop over states."""
     name, joints = file.stem, tuple(closure.linkage.joints)
     driven = len(closure.linkage.inputs)
     header = source(Subject(closure, name, file.name, 2, joints), C(name, header=True))

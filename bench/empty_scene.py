@@ -16,15 +16,14 @@
 """
 Cost of the empty scene beyond the formulas of its linkage and the encoding of its message.
 
-The yardstick is hand-written code for this four-bar on a topic: extrapolate the crank, close the
+The reference is hand-written code for this four-bar on a topic: extrapolate the crank, close the
 loop in straight-line code, encode the bytes. The scene does the same. In addition it checks
-whether the loop closes, continues angles over whole turns, and keeps the result for its callers.
+whether the loop closes, continues angles over whole turns, and stores the result for its callers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import atan2, cos, isclose, sin, sqrt
 
 from bench import ROOT
@@ -42,26 +41,8 @@ _CRANK = 0.3, 6.0
 """Angle and rate of the only sample, in [rad] and [rad/s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class EmptyPlan:
-    """
-    Amount of the measurement.
-
-    Attributes
-    ----------
-    rounds
-        Number of measurements of each, in turn.
-    ticks
-        Ticks in a round.
-
-    """
-
-    rounds: int
-    ticks: int
-
-
-def measure_empty_scene(plan: EmptyPlan) -> Table:
-    """Measure a tick of the empty scene against the hand-written one, and return the table."""
+def measure_empty_scene(rounds: int, ticks: int) -> Table:
+    """Measure ticks of the empty scene and of hand-written code in turn, and return the table."""
     empty, moving = _pipeline(''), _pipeline('effects: {velocity: {}}')
     by_hand = _by_hand(0.04, 0.12, 0.08, 0.1)
     (look,) = empty.tick(BEGIN).looks
@@ -69,14 +50,12 @@ def measure_empty_scene(plan: EmptyPlan) -> Table:
     if isinstance(joints, Rejection) or look.reading is None:
         raise MeasurementError('empty scene: publishes nothing')
     if not all(map(isclose, joints.angles, look.reading.joints)):
-        raise MeasurementError(
-            'empty scene: publishes something else than what is written by hand'
-        )
-    times = [BEGIN + PERIOD * number for number in range(plan.ticks)]
+        raise MeasurementError('empty scene: publishes other angles than the hand-written code')
+    times = [BEGIN + PERIOD * number for number in range(ticks)]
 
     def all_of(tick: Callable[[int], object]) -> Callable[[], None]:
         def run() -> None:
-            for now in times:  # nothing is kept, as in a node: garbage would be looked through
+            for now in times:  # no result is kept, as in a node: the collector would visit it
                 tick(now)
 
         return run
@@ -87,8 +66,8 @@ def measure_empty_scene(plan: EmptyPlan) -> Table:
         'with velocity': all_of(moving.tick),
     }
     found = {
-        name: [1e6 * seconds / plan.ticks for seconds in each]
-        for name, each in in_turn(contenders, plan.rounds).items()
+        name: [1e6 * seconds / ticks for seconds in each]
+        for name, each in in_turn(contenders, rounds).items()
     }
     table = Table(
         'a tick, without ROS, one run, in turn', ('', 'first', 'second', 'ratio', 'target')

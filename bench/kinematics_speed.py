@@ -17,8 +17,8 @@
 Speed of solving linkages with accelerations: one state at a time, and a million at once.
 
 They are compared with pylinkage, and with the formulas of a four-bar in one straight-line function
-without status, pose and steps. That function serves linkages whose crank turns fully and passes no
-change point. Its arithmetic is that of `linkage_ros.kinematics.dyads.rrr` over
+without status, pose and steps. That function is valid for linkages whose crank turns fully and
+passes no change point. Its arithmetic is that of `linkage_ros.kinematics.dyads.rrr` over
 `linkage_ros.kinematics.diagonals`.
 """
 
@@ -31,8 +31,7 @@ from math import atan2, cos, sin, sqrt, tau
 
 from bench import ROOT
 from bench.report import compare, in_turn, say, Table
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.batch import Batch
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
@@ -186,7 +185,7 @@ def _one_at_a_time(plan: SpeedPlan, table: Table) -> None:
     for angle in angles[:: plan.states // 10]:
         found = four_bar(angle, RATE, ACCELERATION)
         if found is None:
-            raise MeasurementError('four-bar: leaves the compiled way')
+            raise MeasurementError('four-bar: leaves the compiled function')
         for one, other in zip(found, line(angle, RATE, ACCELERATION), strict=True):
             _agree('straight line', one, other)
 
@@ -242,8 +241,7 @@ def _batches(plan: SpeedPlan, table: Table) -> None:
 
 
 def _closure(name: str) -> Closure:
-    content, _ = read_yaml(ROOT / 'config' / 'linkages' / f'{name}.yaml')
-    return Closure(read_linkage(content))
+    return load(ROOT / 'config' / 'linkages' / f'{name}.yaml')
 
 
 def _agree(name: str, one: ArrayLike, other: ArrayLike) -> None:

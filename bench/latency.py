@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""(c) Latency from a crank sample to its joint state, against a relay of bytes."""
+"""(c) Latency from a crank sample to its joint state, compared with a relay of bytes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class LatencyPlan:
     size
         Samples for each node in a part.
     parts
-        Number of parts with a median each; a first one in addition is not counted.
+        Number of parts, each with a median; an additional first part is not counted.
 
     """
 
@@ -54,19 +54,7 @@ class LatencyPlan:
 
 
 def measure_latency(graph: Graph, folder: Path, plan: LatencyPlan) -> Table:
-    """
-    Probe both nodes, sample by sample in turn, and return the table.
-
-    Parameters
-    ----------
-    graph
-        Where they run.
-    folder
-        Folder of the scene.
-    plan
-        Amount of the measurement.
-
-    """
+    """Probe both nodes in turn, sample by sample, and return the table."""
     scene = write_scene(folder, rate=0.0)
     say(f'(c) latency: {plan.parts} × {plan.size} samples each, in turn, {plan.rate:g} Hz in all')
     trips: dict[str, list[list[int]]] = {_OURS: [], _RELAY: []}
@@ -84,12 +72,12 @@ def measure_latency(graph: Graph, folder: Path, plan: LatencyPlan) -> Table:
         prober = run(graph.run('bench.prober', [*counts, _OURS, _RELAY]))
         patience = 20.0 + 2.0 * plan.size * 2 / plan.rate
         for part in range(plan.parts + 1):
-            heard = prober.read(patience)
+            answers = prober.read(patience)
             ours.check()
             relay.check()
             if part == 0:
                 continue
-            for name, (times, lost) in heard.items():
+            for name, (times, lost) in answers.items():
                 trips[name].append(times)
                 missing[name] += lost
             medians = {name: percentile(parts[-1], 50.0) / 1e3 for name, parts in trips.items()}
@@ -101,7 +89,7 @@ def measure_latency(graph: Graph, folder: Path, plan: LatencyPlan) -> Table:
 
 def _table(trips: dict[str, list[list[int]]], missing: dict[str, int]) -> Table:
     table = Table(
-        '(c) crank sample to joint state, there and back, rate: 0',
+        '(c) crank sample to joint state, round trip, rate: 0',
         ('', 'median µs', 'p99 µs', 'longest µs', 'unanswered', 'median: ratio', 'target'),
     )
     medians = {name: [percentile(p, 50.0) for p in parts] for name, parts in trips.items()}

@@ -17,9 +17,9 @@
 Listen to ``joint_states`` and ``/diagnostics`` and report on request.
 
 For every line on its standard input it answers with a line of JSON: the monotonic time, the
-publisher's number of the last message (counting could miss some), how many arrived, and the last
-diagnostics. On the line ``forget`` it drops those first. ``stood`` counts how often the stamps of
-the joint states stood still for as long as Fast DDS checks shared memory. It polls, so that its
+publisher's number of the last message (counting could miss some), the number of messages received,
+and the last diagnostics. The line ``forget`` drops the diagnostics first. ``stalls`` counts the
+gaps between stamps that are as long as the shared-memory check of Fast DDS. It polls, so that its
 own wake-ups take little processor time.
 """
 
@@ -51,7 +51,7 @@ def main() -> None:
         diagnostics = listener.create_subscription(
             DiagnosticArray, '/diagnostics', lambda _: None, keep_last(10)
         )
-        published = received = stood = stamp = 0
+        published = received = stalls = stamp = 0
         health: dict[str, str] = {}
         while not stop.is_set():
             asked = bool(select.select([sys.stdin], [], [], _POLL)[0])
@@ -59,10 +59,10 @@ def main() -> None:
                 published = taken[1]['publication_sequence_number']
                 received += 1
                 before, stamp = stamp, _stamp(taken[0])
-                stood += _CHECK[0] < stamp - before < _CHECK[1]
+                stalls += _CHECK[0] < stamp - before < _CHECK[1]
             now = monotonic_ns()
-            while (heard := diagnostics.handle.take_message(DiagnosticArray, False)) is not None:
-                health = _values(heard[0])
+            while (message := diagnostics.handle.take_message(DiagnosticArray, False)) is not None:
+                health = _values(message[0])
             if asked:
                 question = sys.stdin.readline().strip()
                 if not question:
@@ -70,7 +70,7 @@ def main() -> None:
                 if question == 'forget':
                     health = {}
                 answer = {'time': now, 'published': published, 'received': received}
-                print(json.dumps({**answer, 'stood': stood, 'health': health}), flush=True)
+                print(json.dumps({**answer, 'stalls': stalls, 'health': health}), flush=True)
 
 
 def _stamp(message: bytes) -> int:

@@ -16,7 +16,7 @@
 """
 Send crank samples to several nodes in turn and measure the time until the joint state arrives.
 
-The stamp assigns an answer to its sample. Arguments: the rate of all samples together, in [Hz];
+An answer has the stamp of its sample. Arguments: the rate of all samples together, in [Hz];
 the number of samples per node in a part; the number of parts; then the namespaces of the nodes.
 For every part it prints a line of JSON: for each namespace the round trips, in [ns], and the
 number of samples without an answer.

@@ -38,11 +38,11 @@ class Table:
     Attributes
     ----------
     title
-        What it shows.
+        The title.
     head
-        The columns.
+        The names of the columns.
     rows
-        The cells, as many in each row as there are columns.
+        The cells of each row.
 
     """
 
@@ -74,7 +74,7 @@ def show(table: Table) -> None:
 
 
 def machine_table(begun: datetime, *rows: tuple[str, str]) -> Table:
-    """Return the facts needed to compare the numbers with those of another machine."""
+    """Return the facts needed to compare the results with those of another machine."""
     cpu_load = ', '.join(
         f'{load:.1f} over {minutes} min'
         for load, minutes in zip(os.getloadavg(), (1, 5, 15), strict=True)
@@ -88,12 +88,12 @@ def machine_table(begun: datetime, *rows: tuple[str, str]) -> Table:
     return Table('Machine', ('', ''), [*known])
 
 
-def write_page(file: Path, title: str, intro: str, found: Sequence[Table]) -> None:
-    """Write tables as a page of Markdown, after an introduction."""
+def write_page(file: Path, title: str, introduction: str, tables: Sequence[Table]) -> None:
+    """Write an introduction and tables as a page of Markdown."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    text = '\n'.join([f'# {title}', '', intro.strip(), '', *(t.markdown() for t in found)])
+    text = '\n'.join([f'# {title}', '', introduction.strip(), '', *(t.markdown() for t in tables)])
     file.write_text(text, encoding='utf-8')
-    say(f'kept in {file}')
+    say(f'written to {file}')
 
 
 def spread(values: Sequence[float], digits: int = 1) -> str:
@@ -105,38 +105,38 @@ def spread(values: Sequence[float], digits: int = 1) -> str:
 
 
 def ratios(over: Sequence[float], under: Sequence[float]) -> list[float]:
-    """Return the ratios of alternating measurements; a quotient of medians would mix rounds."""
+    """Return the ratios of alternating measurements, round by round."""
     return [a / b for a, b in zip(over, under, strict=True)]
 
 
 def in_turn(contenders: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """Return the times of each, in [s], round by round."""
-    found: dict[str, list[float]] = {name: [] for name in contenders}
+    """Return the durations of each contender, in [s], round by round."""
+    durations: dict[str, list[float]] = {name: [] for name in contenders}
     for run in contenders.values():
         run()
     for name in alternating([*contenders], rounds):
         begun = time.perf_counter()
         contenders[name]()
-        found[name].append(time.perf_counter() - begun)
-    say('  ' + ', '.join(f'{name} {min(times):.3g} s' for name, times in found.items()))
-    return found
+        durations[name].append(time.perf_counter() - begun)
+    say('  ' + ', '.join(f'{name} {min(times):.3g} s' for name, times in durations.items()))
+    return durations
 
 
 def compare(
     table: Table,
-    what: str,
+    quantity: str,
     first: str,
     second: str,
-    found: Mapping[str, Sequence[float]],
+    measured: Mapping[str, Sequence[float]],
     target: str,
 ) -> None:
     """Add a row to a table: the first over the second, measured alternately."""
     table.rows.append(
         (
-            f'{what}: {first} / {second}',
-            spread(found[first], 2),
-            spread(found[second], 2),
-            spread(ratios(found[first], found[second]), 2),
+            f'{quantity}: {first} / {second}',
+            spread(measured[first], 2),
+            spread(measured[second], 2),
+            spread(ratios(measured[first], measured[second]), 2),
             target,
         )
     )
@@ -145,48 +145,48 @@ def compare(
 FOLDER = ROOT / 'docs' / 'timing'
 
 _COMERS = """\
-Made by `python -m bench --only comers --write`. A node ticks with what stands in the first column;
-a client listens throughout, and other clients come one after the other, each a participant of its
-own that hears some messages and goes. All clients have the defaults of Fast DDS, with shared
-memory. *UDP only* is `config/fastdds/local.xml`; the shorter timeout is the node's, in such a
-profile.
+Made by `python -m bench --only comers --write`. A node ticks with the transport in the first
+column. One subscriber listens throughout. Other subscribers come one after the other, each with a
+participant of its own, receive some messages and go. All subscribers use the defaults of Fast DDS,
+with shared memory. *UDP only* is `config/fastdds/local.xml`; the shorter timeout is set for the
+node, in such a profile.
 
-- *stood still for 0.33 s*: gaps of 0.325 to 0.355 s between the stamps of two joint states. Where
-  processors are scarce a gap may have that length by chance; *waited for CPU* says how scarce they
-  were, as a sum over all threads of the node.
-- *lost*: ticks that were more than 20 ms late, of all that were due while clients came and went.
-- *longest*: the greatest lateness since the node began.
-- *messages missed*: between the first and the last that each client heard.
+- *stalls of 0.33 s*: gaps of 0.325 to 0.355 s between the stamps of two joint states. On a busy
+  machine a gap may have that length by chance; *waited for CPU* shows how busy it was, as a sum
+  over all threads of the node.
+- *ticks lost*: ticks that were more than 20 ms late, of all ticks due while subscribers came and
+  went.
+- *longest*: the greatest lateness since the start of the node.
+- *messages missed*: messages missing between the first and the last one of each subscriber.
 """
 
 _REAL_TIME = """\
-Made by `python -m bench --only real_time --write`: the node beside as many busy processes as there
-are processors, with nothing asked for and with each of the three parameters more. A crank comes at
-500 Hz, and one client listens. Lateness is that of all ticks, from the start of each run to its
-end.
+Made by `python -m bench --only real_time --write`. The node runs beside as many busy processes as
+there are processors: without the three parameters, then with one, two and all of them. Crank
+samples come at 500 Hz, and one subscriber listens. Lateness is that of all ticks, from the start
+of each run to its end.
 
-Discovery is LOCALHOST, which brings shared memory: of the ticks that are lost, those of a run
-whose longest lateness is 0.33 s stood still when the client came. What else is lost or late with a
-priority waited for threads that have none: for the interpreter's lock, or for one of the
-middleware.
+Discovery is LOCALHOST, which uses shared memory. In a run whose longest lateness is 0.33 s, the
+ticks were lost when the subscriber came. With a priority, all other late ticks waited for threads
+without one: for the interpreter's lock, or for a lock of the middleware.
 """
 
 _COMPILED = """\
-Made by `python -m bench --only compiled --write`. The plain steps of a linkage are run on symbols
-once, and what they do is kept as one straight Python function, which gives the same bits. Both are
-asked for all published joints with rates and accelerations, in turn, over the whole range of each
-linkage. `class_3` is iterated: its constraints are a straight line, the iteration is a call.
+Made by `python -m bench --only compiled --write`. The plain steps of a linkage are run once on
+symbols, and their operations become one Python function without branches, which gives the same
+bits. Both compute all published joints with rates and accelerations, in turn, over the whole range
+of each linkage. `class_3` is iterated: its constraints are compiled, the iteration is a call.
 
 Arrays of closed states, drawn at random from the whole range, are solved by `solve` (numpy in
-blocks) and by the C that `linkage compile` writes, in a loop over the states; both come of the
-same tape.
+blocks) and by the C code that `linkage compile` writes, in a loop over the states. Both come from
+the same tape.
 
-![What chains of crank-rockers take over their number of dyads](chains.svg)
+![Time of chains of crank-rockers over their number of dyads](chains.svg)
 """
 
 PAGES = {
     'compiled': ('Compiled linkages', _COMPILED),
-    'comers': ('Clients that come and go', _COMERS),
+    'comers': ('Subscribers that come and go', _COMERS),
     'real_time': ('Ticks beside busy processes', _REAL_TIME),
 }
 """Title and introduction of each page."""

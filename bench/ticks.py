@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""(a), (b) Cost and lateness of a tick, against the idiomatic node and the bare loop."""
+"""(a), (b) Cost and lateness of a tick, compared with the idiomatic node and the bare loop."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ from bench.report import ratios, say, spread, Table
 from linkage_ros.measuring import alternating
 from linkage_ros.processes import Graph, MeasurementError, Process
 
+_FOUR_BAR = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
+
 
 def cpu_time(pid: int) -> tuple[int, int]:
     """Return run time and wait time of all threads of a process, in [ns]."""
@@ -41,69 +43,34 @@ def cpu_time(pid: int) -> tuple[int, int]:
 
 
 def write_scene(folder: Path, rate: float, record: bool = False) -> Path:
-    """
-    Write a scene and return its file.
-
-    Parameters
-    ----------
-    folder
-        Folder of the scene and its bag.
-    rate
-        Ticks per second; 0 for one tick per sample.
-    record
-        Whether the scene records a bag.
-
-    """
-    file = folder / f'four_bar_{rate:g}{"_recorded" if record else ""}.yaml'
-    lines = [
-        f'linkage: {ROOT / "config" / "linkages" / "four_bar.yaml"}',
-        f'rate: {rate:g}',
-        'drive: {topic: {carry_forward: true, max_age: 0.2}}',
-        'effects: {velocity: {}}',
-    ]
+    """Write a scene with a rate in [Hz], 0 for a tick for each sample, and return its file."""
+    lines = [f'linkage: {_FOUR_BAR}', 'drive: {topic: {carry_forward: true, max_age: 0.2}}']
     if record:
         lines.append(f'record: {{directory: {folder / "bags"}}}')
-    file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
-    return file
+    return _write(folder / f'four_bar_{rate:g}{"_recorded" if record else ""}.yaml', rate, lines)
 
 
 def write_turning(folder: Path, rate: float) -> Path:
-    """Write a scene of a four-bar that turns by itself, at a rate in [Hz]; return its file."""
-    file = folder / f'turning_{rate:g}.yaml'
-    lines = [
-        f'linkage: {ROOT / "config" / "linkages" / "four_bar.yaml"}',
-        f'rate: {rate:g}',
-        'drive: {constant_rate: {rate: 1.0}}',
-        'effects: {velocity: {}}',
-    ]
-    file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
-    return file
+    """Write a scene of a four-bar that turns at a constant rate; return its file."""
+    lines = [f'linkage: {_FOUR_BAR}', 'drive: {constant_rate: {rate: 1.0}}']
+    return _write(folder / f'turning_{rate:g}.yaml', rate, lines)
 
 
 def write_many(folder: Path, rate: float, count: int) -> Path:
-    """
-    Write a scene of several four-bars that turn by themselves, each at a speed of its own.
-
-    Parameters
-    ----------
-    folder
-        The folder.
-    rate
-        Ticks per second.
-    count
-        How many.
-
-    """
-    file = folder / f'{count}_four_bars.yaml'
-    linkage = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
-    lines = [f'rate: {rate:g}', 'effects: {velocity: {}}', 'linkages:']
+    """Write a scene of four-bars that turn at different constant rates; return its file."""
+    lines = ['linkages:']
     for number in range(count):
         lines += [
             f'  - name: bar_{number}',
-            f'    linkage: {linkage}',
+            f'    linkage: {_FOUR_BAR}',
             f'    drive: {{constant_rate: {{rate: {1.0 + 0.01 * number:g}}}}}',
         ]
-    file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return _write(folder / f'{count}_four_bars.yaml', rate, lines)
+
+
+def _write(file: Path, rate: float, lines: Sequence[str]) -> Path:
+    common = f'rate: {rate:g}', 'effects: {velocity: {}}'
+    file.write_text('\n'.join([*common, *lines, '']), encoding='utf-8')
     return file
 
 
@@ -189,14 +156,14 @@ def ours(folder: Path, rate: float, record: bool = False) -> Contender:
     )
 
 
-def asking(folder: Path, rate: float, *parameters: str) -> Contender:
+def with_parameters(folder: Path, rate: float, *parameters: str) -> Contender:
     """Return our node with parameters, at a rate, in [Hz]."""
     node = ours(folder, rate)
-    given = [word for parameter in parameters for word in ('-p', parameter)]
+    options = [word for parameter in parameters for word in ('-p', parameter)]
     return replace(
         node,
         name=' + '.join([node.name, *(name.partition(':=')[0] for name in parameters)]),
-        arguments=(*node.arguments, *given),
+        arguments=(*node.arguments, *options),
     )
 
 
@@ -225,21 +192,7 @@ def bare(rate: float) -> Contender:
 def measure_ticks(
     graph: Graph, contenders: Sequence[Contender], plan: TickPlan, busy: int = 0
 ) -> dict[Contender, list[Measurement]]:
-    """
-    Measure every contender in turn, as many rounds as planned, and return what came.
-
-    Parameters
-    ----------
-    graph
-        Where they run.
-    contenders
-        Whom to measure.
-    plan
-        Amount of the measurement.
-    busy
-        How many processes beside them take all that they get of a processor.
-
-    """
+    """Measure every contender in turn, beside a number of busy processes."""
     found: dict[Contender, list[Measurement]] = {contender: [] for contender in contenders}
     with ExitStack() as stack:
         stack.enter_context(graph.run('linkage_ros.node.crank_source'))
@@ -258,9 +211,9 @@ def measure_ticks(
 
 
 def _measure(graph: Graph, contender: Contender, listener: Process, plan: TickPlan) -> Measurement:
-    heard = listener.ask('forget')
+    first = listener.ask('forget')
     with graph.run(contender.module, contender.arguments) as process:
-        _wait_for(lambda: listener.ask('?')['received'] > heard['received'], process)
+        _wait_for(lambda: listener.ask('?')['received'] > first['received'], process)
         time.sleep(plan.warm_up)
         before, (ran, waited) = listener.ask('?'), cpu_time(process.pid)
         time.sleep(plan.window)
@@ -292,21 +245,7 @@ Found = dict[Contender, list[Measurement]]
 
 
 def cost_table(title: str, ours: Contender, other: Contender, target: str, found: Found) -> Table:
-    """
-    Return the cost of a tick of ours beside that of another.
-
-    Parameters
-    ----------
-    title
-        Of the table.
-    ours, other
-        Whom to compare.
-    target
-        For the ratio; '' where there is none.
-    found
-        What was measured.
-
-    """
+    """Return the cost of a tick of our node and of another program, and its target ratio."""
     table = Table(title, ('', 'CPU µs a tick', 'ticks a second', 'ratio', 'target'))
     ratio = ratios([m.cpu for m in found[ours]], [m.cpu for m in found[other]])
     for contender in (ours, other):
@@ -323,19 +262,7 @@ def cost_table(title: str, ours: Contender, other: Contender, target: str, found
 
 
 def lateness_table(contenders: Sequence[Contender], found: Found, load: str = '') -> Table:
-    """
-    Return how late ticks were and how many were lost, from start to end of every run.
-
-    Parameters
-    ----------
-    contenders
-        Whom to show: nodes that tell in their diagnostics.
-    found
-        What was measured.
-    load
-        What else ran.
-
-    """
+    """Return the lateness of ticks and the number of lost ones, from start to end of every run."""
     table = Table(
         f'lateness{load} from start to end of each run; target: no tick lost on a quiet core',
         ('', 'p50 µs', 'p99 µs', 'longest µs', '> period', 'lost', 'of ticks', 'CPU µs',

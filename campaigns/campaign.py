@@ -13,37 +13,174 @@
 # limitations under the License.
 
 
-"""Shared by all campaigns: parts for several processes, progress lines, percentiles."""
+"""Shared by all campaigns: command-line options, processes, progress lines, tables."""
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from datetime import datetime
 import multiprocessing
+from pathlib import Path
 import time
-from typing import TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
-from bench.report import say
+from bench.report import machine_table, say, show, Table, write_page
 from linkage_ros.measuring import percentile
 
-Part = TypeVar('Part')
+Work = TypeVar('Work')
 Result = TypeVar('Result')
 
 _PERIOD = 10.0
-"""Between two lines of progress, in [s]."""
+"""Time between two progress lines, in [s]."""
 
 
-def results_of(do: Callable[[Part], Result], work: Sequence[Part], jobs: int) -> Iterator[Result]:
-    """Yield the results of all parts as they are done; one job runs in this process."""
+class Page(NamedTuple):
+    """The Markdown page of a campaign: its file, its title and its introduction."""
+
+    file: Path
+    title: str
+    introduction: str
+
+
+def parser_of(
+    name: str,
+    description: str | None,
+    *,
+    page: Page | None = None,
+    jobs: int = 2,
+    seed: bool = True,
+) -> argparse.ArgumentParser:
+    """Return a parser with the options that campaigns share; ``jobs`` is the default of --jobs."""
+    parser = argparse.ArgumentParser(f'python -m campaigns.{name}', description=description)
+    parser.add_argument('--jobs', type=int, default=jobs, help='number of processes')
+    if seed:
+        parser.add_argument('--seed', type=int, default=1, help='of all random numbers')
+    if page is not None:
+        parser.add_argument('--write', action='store_true', help=f'write the page {page.file}')
+    return parser
+
+
+def parse_families(
+    parser: argparse.ArgumentParser, families: Collection[str], place: str = 'LINKAGE'
+) -> argparse.Namespace:
+    """Parse the command line of a campaign with families, which adds --only and --show."""
+    parser.add_argument('--only', nargs='+', metavar='FAMILY', help='only these families')
+    parser.add_argument('--show', nargs=2, metavar=('FAMILY', place), help='repeat one case')
+    arguments = parser.parse_args()
+    for family in [*(arguments.only or []), *(arguments.show or [])[:1]]:
+        if family not in families:
+            parser.error(f'no family {family!r}; the families are: {", ".join(families)}')
+    return arguments
+
+
+def exit_code(main: Callable[[], int]) -> int:
+    """Run the main function of a campaign, and end in one line at Ctrl-C."""
+    try:
+        return main()
+    except KeyboardInterrupt:
+        say('stopped')
+        return 130
+
+
+def machine_of(
+    begin: datetime, arguments: argparse.Namespace, unit: str, count: int, *rows: tuple[str, str]
+) -> Table:
+    """Return the table of the machine, with the seed, the amount of work and its time."""
+    seconds = (datetime.now().astimezone() - begin).total_seconds()
+    amount = f'{count:,} in {seconds:.0f} s, {arguments.jobs} processes'
+    return machine_table(begin, *rows, ('seed', str(arguments.seed)), (unit, amount))
+
+
+def publish(tables: Sequence[Table], page: Page | None) -> None:
+    """Print tables, and write them to a page if there is one."""
+    for table in tables:
+        show(table)
+    if page is not None:
+        write_page(page.file, page.title, page.introduction, tables)
+
+
+def results_of(do: Callable[[Work], Result], work: Sequence[Work], jobs: int) -> Iterator[Result]:
+    """Yield the results of all parts of the work as they are done; one job needs no process."""
     if jobs == 1:
         yield from map(do, work)
         return
-    # Spawned, not forked: whoever calls may have threads.
+    # Spawned, not forked: the calling process may have threads.
     with multiprocessing.get_context('spawn').Pool(jobs) as pool:
         yield from pool.imap_unordered(do, work)
 
 
-def tried_in_parts(
+class Part(NamedTuple):
+    """Some linkages of a family, and the test to run on them."""
+
+    seed: int
+    family: str
+    first: int
+    size: int
+    test: str = ''
+
+    @property
+    def numbers(self) -> range:
+        """Return the numbers of its linkages."""
+        return range(self.first, self.first + self.size)
+
+
+def parts_of(seed: int, counts: Mapping[str, int], size: int, test: str = '') -> list[Part]:
+    """Return parts of at most ``size`` linkages, for the wanted number of each family."""
+    return [
+        Part(seed, family, first, min(size, count - first), test)
+        for family, count in counts.items()
+        for first in range(0, count, size)
+    ]
+
+
+class Mergeable(Protocol):
+    """A tally of findings that takes in the findings of another part."""
+
+    def merge(self, other: Any, /) -> None: ...
+
+
+TallyOf = TypeVar('TallyOf', bound=Mergeable)
+
+
+def tallies_of(
+    do: Callable[[Part], tuple[Part, TallyOf]],
+    work: Sequence[Part],
+    jobs: int,
+    new: Callable[[], TallyOf],
+    progress: Callable[[int], None] = lambda _: None,
+) -> dict[tuple[str, str], TallyOf]:
+    """
+    Run all parts and merge their findings.
+
+    Parameters
+    ----------
+    do
+        Runs one part.
+    work
+        The parts.
+    jobs
+        Number of processes.
+    new
+        Makes an empty tally.
+    progress
+        Called with the number of linkages of each part that is done.
+
+    Returns
+    -------
+    dict
+        The tally of each test and family, in the order of the work.
+
+    """
+    tallies = {(part.test, part.family): new() for part in work}
+    for part, tally in results_of(do, work, jobs):
+        tallies[part.test, part.family].merge(tally)
+        progress(part.size)
+    return tallies
+
+
+def attack_in_parts(
     do: Callable[[tuple[int, int, int]], tuple[Counter[str], list[str]]],
     count: int,
     seed: int,
@@ -51,23 +188,24 @@ def tried_in_parts(
     jobs: int,
 ) -> tuple[dict[str, int], list[str]]:
     """
-    Try so many things, each known by a seed and its number.
+    Try random inputs, each known by the seed and its number.
 
     Parameters
     ----------
     do
-        Tries the inputs of a seed in a range of numbers; returns the inputs and the findings.
+        Takes a seed and a range of numbers; tries these inputs and returns what `attack_in_parts`
+        returns.
     count, seed
         The number of inputs, and their seed.
     part
-        Number of inputs after which a process reports.
+        Number of inputs that a process tries before it reports.
     jobs
-        Number of processes that share them.
+        Number of processes.
 
     Returns
     -------
     tried : dict
-        Number of tries, by kind.
+        Number of tries, by command and by how it ended.
     findings : list
         The violations, one line each.
 
@@ -75,14 +213,14 @@ def tried_in_parts(
     parts = [(seed, begin, min(begin + part, count)) for begin in range(0, count, part)]
     tried: Counter[str] = Counter()
     findings: list[str] = []
-    for some, found in results_of(do, parts, jobs):
-        tried += some
-        findings += found
+    for counts, lines in results_of(do, parts, jobs):
+        tried += counts
+        findings += lines
     return dict(sorted(tried.items())), findings
 
 
-def progress_lines(total: float, what: str) -> Callable[[float], None]:
-    """Return a function that takes how many more are done; it prints a line every ten seconds."""
+def progress_lines(total: float, unit: str) -> Callable[[float], None]:
+    """Return a function that adds to the work done, and prints a line every ten seconds."""
     begun = printed = time.monotonic()
     done = 0.0
 
@@ -91,13 +229,13 @@ def progress_lines(total: float, what: str) -> Callable[[float], None]:
         done += more
         if time.monotonic() - printed > _PERIOD or done == total:
             printed = time.monotonic()
-            say(f'{done:,.0f} of {total:,.0f} {what}, {printed - begun:.0f} s')
+            say(f'{done:,.0f} of {total:,.0f} {unit}, {printed - begun:.0f} s')
 
     return advance
 
 
 def percentile_texts(values: Sequence[float], digits: int) -> list[str]:
-    """Return median, 99th percentile and greatest as texts; '' each where there are no values."""
+    """Return median, 99th percentile and maximum as text; '' each for no values."""
     if not values:
         return ['', '', '']
     return [f'{percentile(values, percent):.{digits}f}' for percent in (50.0, 99.0, 100.0)]

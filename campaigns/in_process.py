@@ -32,11 +32,11 @@ from linkage_ros.cli import main as command_line
 from linkage_ros.signals import Stop
 
 MEMORY = 2**32
-"""Addresses that a process may have, in bytes; numpy and matplotlib take one and a half GiB."""
+"""Limit of the address space of a process, in bytes; numpy and matplotlib take 1.5 GiB."""
 
 
 class _TooLongError(BaseException):
-    """No `Exception`: nothing that a command catches."""
+    """No subclass of `Exception`, so that no command catches it."""
 
 
 class Ended(NamedTuple):
@@ -46,37 +46,37 @@ class Ended(NamedTuple):
     Attributes
     ----------
     code
-        Its exit code, or how else it ended: 'no end' or 'traceback'.
-    said
-        What it said on standard error, or in place of it where and how it ended.
-    shown
+        Its exit code, 'no end' or 'traceback'.
+    stderr
+        Its standard error; without an exit code, the time limit or the exception, and its place.
+    stdout
         Its standard output.
 
     """
 
     code: Any
-    said: str
-    shown: str
+    stderr: str
+    stdout: str
 
 
 def in_process(arguments: list[str], seconds: float) -> Ended:
-    """Run ``linkage``, for at most a time in [s]."""
-    said, shown = io.StringIO(), io.StringIO()
+    """Run ``linkage`` with a time limit in [s]."""
+    stdout, stderr = io.StringIO(), io.StringIO()
     try:
-        with redirect_stdout(shown), redirect_stderr(said), _bounded(seconds):
-            return Ended(command_line.main(arguments), said.getvalue(), shown.getvalue())
+        with redirect_stdout(stdout), redirect_stderr(stderr), _bounded(seconds):
+            return Ended(command_line.main(arguments), stderr.getvalue(), stdout.getvalue())
     except _TooLongError:
         late = f'more than {seconds} s ({_place(traceback.format_exc())})'
-        return Ended('no end', late, shown.getvalue())
+        return Ended('no end', late, stdout.getvalue())
     except SystemExit as stopped:
-        return Ended(stopped.code, said.getvalue(), shown.getvalue())
-    except Exception:  # noqa: BLE001 - whatever it is, a user would see it
-        return Ended('traceback', _place(traceback.format_exc()), shown.getvalue())
+        return Ended(stopped.code, stderr.getvalue(), stdout.getvalue())
+    except Exception:  # noqa: BLE001 - a user would see any exception
+        return Ended('traceback', _place(traceback.format_exc()), stdout.getvalue())
 
 
 @contextmanager
 def confined() -> Iterator[Path]:
-    """Work in a new folder, which is removed after it, and with no more than `MEMORY`."""
+    """Work in a new folder, which is removed afterwards, and within `MEMORY`."""
     before = Path.cwd()
     most, hard = resource.getrlimit(resource.RLIMIT_AS)
     with tempfile.TemporaryDirectory() as folder:
@@ -90,7 +90,7 @@ def confined() -> Iterator[Path]:
 
 
 def _place(text: str) -> str:
-    """Return the last line of a traceback with the last place of ours in it."""
+    """Return the last line of a traceback, with the last place in linkage_ros."""
     lines = text.strip().splitlines()
     ours = [line.strip() for line in lines if 'linkage_ros/' in line and 'File' in line]
     place = ours[-1].rpartition('linkage_ros/')[2] if ours else ''
@@ -105,7 +105,7 @@ def _bounded(seconds: float) -> Iterator[None]:
     before = signal.signal(signal.SIGALRM, stop)
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
-        # The signals stay the campaign's: a pool ends its processes by them.
+        # The command must not install its signal handlers: a pool ends its processes by signals.
         with mock.patch.object(command_line, 'stop_on_signals', Stop):
             yield
     finally:

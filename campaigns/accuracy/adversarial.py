@@ -14,11 +14,11 @@
 
 
 """
-The hard cases, and why each is hard.
+The hard cases, and the difficulty of each.
 
-Linkages of one loop are made from their lengths, with frames as one would draw them. There are
-four-bars and sliders that are hard, each in its own way, and difficulties that linkages of every
-kind share: forced angles, large angles, sizes, and chains.
+Single-loop linkages are made from their lengths, with plain frames. There are hard four-bars and
+hard sliders, and difficulties that linkages of every kind share: exact angles, large angles, very
+large and small lengths, and chains.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def four_bar(
     fold, stretch
         Whether it passes change points where the crank lies along the ground.
     ties
-        How its lengths hang together.
+        The changes of its dependent lengths.
 
     """
     a, b, c, d = lengths
@@ -112,13 +112,14 @@ def inverted_slider_crank(
     Parameters
     ----------
     lengths
-        Crank a, ground d to the swivel, and what the rod's line passes the crank's pin by, left.
+        Crank a, ground d to the swivel, and the distance from the crank's pin to the rod's line,
+        positive to the left.
     side
         +1: the swivel lies ahead of the crank's pin along the rod, -1: behind.
     fold
-        Whether the pins meet where the crank lies along the ground, and the rod goes through.
+        Whether the pins coincide when the crank lies along the ground; the side changes there.
     ties
-        How its lengths hang together.
+        The changes of its dependent lengths.
 
     """
     a, d, offset = lengths
@@ -183,7 +184,7 @@ def kite_through_its_pivot(rng: random.Random) -> Case:
 
 
 def single_change_point(rng: random.Random) -> Case:
-    """Return lengths whose sums are exact, so that they make a change point exactly."""
+    """Return a four-bar with an exact change point: the sums of its lengths are exact."""
     a, b, d = (rng.randrange(2**16, 2**20) / 2**18 for _ in range(3))
     if a == d or a + d - b <= 0 or b in (a, d):
         return single_change_point(rng)
@@ -229,7 +230,7 @@ def needle(rng: random.Random) -> Case:
 
 
 def freudenstein(rng: random.Random) -> Case:
-    """Return a four-bar by synthesis, for the source's three pairs of angles or near them."""
+    """Return a four-bar designed for the source's three pairs of angles, or near them."""
     pairs = ((25, 30), (35, 40), (50, 60))
     wander = rng.choice((0.0, 0.1, 3.0))
     cranks, rockers = (
@@ -357,7 +358,7 @@ def _scotch_yoke(rng: random.Random, small: float) -> Mechanism:
 
 
 def _crossed_slots(rng: random.Random, small: float) -> Mechanism:
-    """Return a block along x that stands in a slot along the crank, or almost so."""
+    """Return a block on a line along x, in a slot that is parallel to the crank, or almost."""
     return Mechanism(
         {
             GROUND: {'O': (0.0, 0.0), 'Q': (length(rng), side(rng) * length(rng))},
@@ -383,7 +384,7 @@ def forced_angles(rng: random.Random) -> Case:
     build.put(GROUND, 'O', 0j)
     build.add_crank_by_points({'O': 0j, 'A': complex(ax, ay)})
     pin = complex(ax, ay) + b * rng.choice((1, 1j))
-    # The rocker along an axis too, or as a triangle of 3, 4 and 5.
+    # The rocker lies along an axis too, or has the direction of a 3-4-5 triangle.
     build.put(GROUND, 'D', pin - c * rng.choice((1, 1j, 0.6 + 0.8j)))
     if abs(build.where(Spot(GROUND, 'D')) - complex(ax, ay)) < 1e-3:
         return forced_angles(rng)
@@ -415,7 +416,7 @@ def wound_crank(rng: random.Random) -> Case:
 
 
 def scaled(*exponents: int) -> Callable[[random.Random], Case]:
-    """Return a generator of linkages whose lengths are times 10 to one of the exponents."""
+    """Return a generator of linkages with lengths scaled by 10 to one of the exponents."""
 
     def family(rng: random.Random) -> Case:
         build = start(rng, rng.uniform(-pi, pi))
@@ -433,7 +434,7 @@ def scaled(*exponents: int) -> Callable[[random.Random], Case]:
 
 
 def far_frames(rng: random.Random) -> Case:
-    """Return a linkage with links whose frames begin a million lengths away."""
+    """Return a linkage whose frames have their origins up to a million lengths away."""
     build = Builder(rng, rng.uniform(-pi, pi), plain=False)
     build.offset = 10.0 ** rng.uniform(2, 6)
     add_random(build, rng.choice(DYADS), CRANK, GROUND, first=True)
@@ -469,7 +470,7 @@ def chain_whose_pins_meet(rng: random.Random) -> Case:
 
 
 def chain_on_a_parallelogram(rng: random.Random) -> Case:
-    """Return dyads that hang on the coupler of a parallelogram, away from its change points."""
+    """Return dyads on the coupler of a parallelogram, away from its change points."""
     build = start(rng, side(rng) * rng.uniform(0.3, 2.8), plain=True)
     crank = build.crank()
     d = build.length()
@@ -490,23 +491,25 @@ def _two_dyads(rng: random.Random) -> tuple[Builder, list[str]]:
 
 
 class Hard(NamedTuple):
-    """Why a case is hard, and a function that makes a linkage with its input angles."""
+    """The difficulty of a case, and a function that makes a linkage with its input angles."""
 
-    why: str
+    difficulty: str
     make: Callable[[random.Random], Case]
 
 
 ADVERSARIAL = {
     'textbook divisor': Hard(
-        'Ax = d, and ±1e-9 rad about it: the textbook divides by d − Ax', textbook_divisor
+        'Ax = d, to ±1e-9 rad: the textbook formula divides by d − Ax', textbook_divisor
     ),
     'parallelogram': Hard(
         'change points at 0 and π, from 1e-3 to 1e-12 rad: two circles that almost coincide',
         parallelogram,
     ),
-    'folded kite': Hard('a = b, c = d, the same: B lies on the crank pivot', folded_kite),
+    'folded kite': Hard(
+        'a = b, c = d, change points as above: B lies on the crank pivot', folded_kite
+    ),
     'kite through its pivot': Hard(
-        'a = d, b = c: A passes D, and the diagonal with it turns about',
+        'a = d, b = c: A passes through D, and the diagonal reverses',
         kite_through_its_pivot,
     ),
     'single change point': Hard(
@@ -514,64 +517,63 @@ ADVERSARIAL = {
         single_change_point,
     ),
     'almost a change point': Hard(
-        'lengths 1e-3 to 1e-12 off a change point, the crank as near: both small terms count',
+        'lengths and crank 1e-3 to 1e-12 from a change point: both small terms matter',
         almost_a_change_point,
     ),
     'four-bar toggle': Hard(
-        'within 1e-3 to 1e-15 of stretched or folded, from both sides: a root of what cancels',
+        '1e-3 to 1e-15 from stretched or folded, on both sides: the root of a difference',
         toggle,
     ),
     'four-bar needle': Hard('length ratios up to 1e12: sums lose the short link', needle),
     'Freudenstein': Hard(
-        'the source’s design and its neighbours: a coupler of 3 % of the crank', freudenstein
+        'the source’s design and similar ones: the coupler is 3 % of the crank', freudenstein
     ),
     'pins that meet': Hard(
-        'a ≈ d, b ≈ c, φ ≈ 0, 1e-3 to 1e-12: the diagonal has no direction left', pins_meet
+        'a ≈ d, b ≈ c, φ ≈ 0, to 1e-3 to 1e-12: the diagonal almost vanishes', pins_meet
     ),
     'forced angles': Hard(
-        'links at 0, ±π/2, π exactly: tan and 1/sin of them, and signed zeros',
+        'links exactly at 0, ±π/2, π: poles of tan and 1/sin, and signed zeros',
         forced_angles,
     ),
     'forced input': Hard('the crank at 0, ±π/2, ±π, and within 1e-9 of it', forced_input),
     'subnormal input': Hard('the crank at ±0, ±5e-324, ±1e-310', subnormal_input),
-    'wound crank': Hard('1e6 rad: φ alone has lost ten digits', wound_crank),
+    'wound crank': Hard('1e6 rad: φ itself has lost ten digits', wound_crank),
     'swivel passed closely': Hard(
-        'crank as long as the way to the swivel, but for 1e-3 to 1e-12: r² cancels',
+        'the crank is as long as the ground, to 1e-3 to 1e-12: r² cancels',
         swivel_passed_closely,
     ),
     'rod through its swivel': Hard(
-        'a = d exactly, the crank pin passes the swivel', rod_through_its_swivel
+        'a = d exactly: the crank pin passes through the swivel', rod_through_its_swivel
     ),
-    'swivel toggle': Hard(
-        'the offset is all of the diagonal, but for 1e-3 to 1e-15', swivel_toggle
-    ),
+    'swivel toggle': Hard('the offset equals the diagonal, to 1e-3 to 1e-15', swivel_toggle),
     'slider-crank toggle': Hard(
-        'the rod stands across its line, but for 1e-3 to 1e-15', slider_toggle
+        'the rod is perpendicular to its line, to 1e-3 to 1e-15', slider_toggle
     ),
     'axis through the pivot': Hard(
-        'no offset; crank ≈ rod, where the slider passes the pivot', axis_through_the_pivot
+        'no offset; crank ≈ rod near the pose in which the slider passes the pivot',
+        axis_through_the_pivot,
     ),
-    'dead centre': Hard('the slider turns back: its rate is a difference', dead_centre),
+    'dead centre': Hard('the slider reverses: its rate is a difference', dead_centre),
     'slider-crank needle': Hard('length ratios up to 1e12', needle_slider_crank),
     'swivel needle': Hard('length ratios up to 1e12', needle_swivel),
     'lines almost parallel': Hard(
         'the two lines of a PRP or RPP at 1e-3 to 1e-12 rad', lines_almost_parallel
     ),
     'slots almost parallel': Hard(
-        'the crank turns a slot to within 1e-3 to 1e-12 rad of the other',
+        'the crank turns one slot to within 1e-3 to 1e-12 rad of the other',
         slots_almost_parallel,
     ),
-    'lengths × 1e±9': Hard('any threshold that is a length shows', scaled(-9, 9)),
+    'lengths × 1e±9': Hard('any threshold that is a length fails', scaled(-9, 9)),
     'lengths × 1e±150': Hard(
-        'squares and products of lengths over- or underflow soon', scaled(-150, 150)
+        'squares and products of lengths overflow or underflow', scaled(-150, 150)
     ),
     'far frames': Hard(
-        'frames begin up to a million lengths from the pins: coordinates cancel',
+        'frame origins up to a million lengths from the pins: coordinates cancel',
         far_frames,
     ),
     'chain of needles': Hard('three dyads, lengths from 1e-3 to 1e3', chain_of_needles),
     'chain at a toggle': Hard(
-        'the third dyad 1e-4 to 1e-15 from its toggle, with all that came before it',
+        'the third dyad 1e-4 to 1e-15 from its toggle, with the errors of the first two',
         chain_at_a_toggle,
     ),
     'chain whose pins meet': Hard(

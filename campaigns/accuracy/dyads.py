@@ -16,10 +16,13 @@
 """
 The dyads in closed form, in power series of balls.
 
-RRR: two links pinned together, each pinned to a link that is placed: a circle meets a circle.
-RRP: a link pinned to a placed one, its other pin on a placed line: a circle meets a line.
-RPR: a rod pinned to a placed link slides through a block that is pinned to another link.
-PRP and RPP: two sliders, where a line meets a line, once.
+A link is placed when its pose is known.
+
+- RRR: two links pinned together, each pinned to a placed link. A circle intersects a circle.
+- RRP: a link pinned to a placed link, with its other pin on a placed line. A circle intersects a
+  line.
+- RPR: a rod pinned to a placed link slides through a block that is pinned to another placed link.
+- PRP and RPP: two sliders. A line intersects a line, once.
 """
 
 from __future__ import annotations
@@ -28,13 +31,48 @@ from dataclasses import dataclass
 from typing import Any
 
 from campaigns.accuracy.mechanism import Mechanism, Spot
-from campaigns.accuracy.motion import conjugate, imag, inverse, Motion, real, root, Tangent, times
+from campaigns.accuracy.motion import (
+    Array,
+    conjugate,
+    imag,
+    inverse,
+    Motion,
+    real,
+    root,
+    Tangent,
+    times,
+)
 from flint import acb
 from linkage_ros.kinematics.linkage import Side
 
 
+class _Dyad:
+    """A dyad; by default it has one assembly, and passes on no angle and no slide."""
+
+    __slots__ = ()
+
+    @property
+    def assembly(self) -> tuple[str, Side] | None:
+        return None
+
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def ends(self) -> tuple[Spot | str, Spot | str]:
+        raise NotImplementedError
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return tuple(end if isinstance(end, Spot) else mechanism.start(end) for end in self.ends)
+
+
 @dataclass(frozen=True, slots=True)
-class RPR:
+class RPR(_Dyad):
     """
     Link ``rail`` from pin A, with a line that a block pinned at D slides on.
 
@@ -49,7 +87,7 @@ class RPR:
     side
         +1: D lies ahead of A along the line, -1: behind.
     fold
-        Whether the pins meet as the crank passes along the ground, and the rod goes through.
+        Whether the pins coincide when the crank lies along the ground; the side changes there.
 
     """
 
@@ -69,20 +107,16 @@ class RPR:
         return (self.rail,)
 
     @property
-    def slid(self) -> tuple[str, ...]:
-        return ()
-
-    @property
-    def seen(self) -> tuple[Spot | str, Spot | str]:
-        return self.a, self.d
-
-    def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
+    def ends(self) -> tuple[Spot | str, Spot | str]:
         return self.a, self.d
 
     def close(self, motion: Motion) -> None:
         start, end = motion.at(self.a), motion.at(self.d)
         diagonal = end - start
-        base = self._base(motion) * motion.constants.directions[self.slider].conjugate()
+        base = (
+            _pin_at_zero(motion, self.slider, self.a.point, self.d.point)
+            * motion.constants.directions[self.slider].conjugate()
+        )
         height = base.imag
         reach = root(real(diagonal * conjugate(diagonal)) - height * height)
         if (self.side < 0) != (self.fold and bool((motion.phi / 2).sin() < 0)):
@@ -94,33 +128,22 @@ class RPR:
         block = motion.mechanism.sliders[self.slider].block
         if block is not None:
             twist = motion.constants.twists[self.slider]
-            # It turns as the rail does, and that angle is handed on once.
+            # The block turns with the rail, whose angle is passed on once.
             motion.place(block, motion.unit[self.rail] * twist, self.d.point, end)
 
-    def _base(self, motion: Motion) -> Any:
-        """Return, in the rail's frame, where the block's pin is at slide 0, from the rail's."""
-        slide = motion.mechanism.sliders[self.slider]
-        base = motion.vector(self.rail, self.a.point, slide.through)
-        if slide.block is None or slide.point == self.d.point:
-            return base
-        arm = motion.vector(slide.block, slide.point, self.d.point)
-        return base + arm * motion.constants.twists[self.slider]
-
     def margin(self, motion: Motion) -> Any:
-        """Return by how much the pins are too far apart, in the constants' unit."""
+        """Return the distance to the toggle, in the constants' unit; negative if open."""
         diagonal = motion.at(self.d) - motion.at(self.a)
-        base = self._base(motion) * motion.constants.directions[self.slider].conjugate()
+        base = (
+            _pin_at_zero(motion, self.slider, self.a.point, self.d.point)
+            * motion.constants.directions[self.slider].conjugate()
+        )
         return abs(diagonal[0]) - abs(base.imag)
 
     def vary(self, tangent: Tangent) -> None:
         # E = (g + r·n)·u
         slide = tangent.mechanism.sliders[self.slider]
-        base, base_change = tangent.vector(self.rail, self.a.point, slide.through)
-        if slide.block is not None and slide.point != self.d.point:
-            arm, arm_change = tangent.vector(slide.block, slide.point, self.d.point)
-            twist, twist_change = tangent.twist[self.slider], tangent.twist_change[self.slider]
-            base = base + arm * twist
-            base_change = base_change + twist * (arm_change + 1j * arm * twist_change)
+        base, base_change = _vary_pin_at_zero(tangent, self.slider, self.a.point, self.d.point)
         unit = tangent.unit[self.rail]
         direction = tangent.direction[self.slider]
         direction_change = tangent.direction_change[self.slider]
@@ -138,7 +161,7 @@ class RPR:
 
 
 @dataclass(frozen=True, slots=True)
-class RRP:
+class RRP(_Dyad):
     """
     Link ``one`` from pin A to pin B, which a slider keeps on a line of a placed link.
 
@@ -149,7 +172,7 @@ class RRP:
     a
         Its outer pin on the link that carries it.
     pin
-        B; on the slider's block too where it has one.
+        B; also a point of the slider's block if it has one.
     slider
         Name of the slider.
     side
@@ -176,11 +199,8 @@ class RRP:
         return (self.slider,)
 
     @property
-    def seen(self) -> tuple[Spot | str, Spot | str]:
+    def ends(self) -> tuple[Spot | str, Spot | str]:
         return self.a, self.slider
-
-    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
-        return self.a, mechanism.start(self.slider)
 
     def close(self, motion: Motion) -> None:
         start = motion.at(self.a)
@@ -200,7 +220,7 @@ class RRP:
             motion.ride(self.slider, block, self.pin, start + arm)
 
     def margin(self, motion: Motion) -> object:
-        """Return what the link reaches farther than it must, in the unit of the constants."""
+        """Return the distance to the toggle, in the constants' unit; negative if open."""
         base, line, _ = motion.line(self.slider, self.pin)
         across = ((base - motion.at(self.a)) * conjugate(line))[0].imag
         return abs(motion.vector(self.one, self.a.point, self.pin)) - abs(across)
@@ -223,14 +243,14 @@ class RRP:
 
 
 @dataclass(frozen=True, slots=True)
-class RRR:
+class RRR(_Dyad):
     """
     Links ``one`` (from pin A) and ``two`` (from pin D), pinned together at B.
 
     Attributes
     ----------
     one, two
-        Links that are placed by it.
+        The links that the dyad places.
     a, d
         The outer pins on the links that carry them.
     pin
@@ -238,8 +258,8 @@ class RRR:
     side
         +1: B lies left of A→D, -1: right.
     fold, stretch
-        Whether the linkage folds or stretches with its crank along the ground only, and goes
-        through: the side is then that for 0 < φ < π and changes there.
+        Whether the linkage folds or stretches when the crank lies along the ground, and passes
+        this change point: ``side`` is then the side for 0 < φ < π, and changes there.
 
     """
 
@@ -261,14 +281,7 @@ class RRR:
         return self.one, self.two
 
     @property
-    def slid(self) -> tuple[str, ...]:
-        return ()
-
-    @property
-    def seen(self) -> tuple[Spot | str, Spot | str]:
-        return self.a, self.d
-
-    def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
+    def ends(self) -> tuple[Spot | str, Spot | str]:
         return self.a, self.d
 
     def close(self, motion: Motion) -> None:
@@ -280,7 +293,7 @@ class RRR:
             height = -height
         one = diagonal * (foot + height * 1j) / square
         two = one - diagonal
-        # two × one, which both rates are divided by.
+        # two × one, the divisor of both rates.
         motion.inverse.append(inverse(height))
         motion.place(self.one, one / b, self.a.point, start)
         motion.place(self.two, two / c, self.d.point, motion.at(self.d))
@@ -303,7 +316,7 @@ class RRR:
         return side
 
     def margin(self, motion: Motion) -> Any:
-        """Return by how much the links reach farther than needed, in the unit of the constants."""
+        """Return the distance to the toggle, in the constants' unit; negative if open."""
         diagonal = motion.at(self.d) - motion.at(self.a)
         s = abs(diagonal[0])
         b = abs(motion.vector(self.one, self.a.point, self.pin))
@@ -325,7 +338,7 @@ class RRR:
 
 
 @dataclass(frozen=True, slots=True)
-class PRP:
+class PRP(_Dyad):
     """
     Two blocks pinned together, each on a line of a placed link; the second may be virtual.
 
@@ -334,7 +347,7 @@ class PRP:
     one, two
         Names of the sliders.
     pin
-        What the blocks share; the point of slider ``two`` where its block is virtual.
+        The pin of both blocks; the point of slider ``two`` if its block is virtual.
 
     """
 
@@ -343,23 +356,12 @@ class PRP:
     pin: str
 
     @property
-    def assembly(self) -> None:
-        return None
-
-    @property
-    def turned(self) -> tuple[str, ...]:
-        return ()
-
-    @property
     def slid(self) -> tuple[str, ...]:
         return self.one, self.two
 
     @property
-    def seen(self) -> tuple[Spot | str, Spot | str]:
+    def ends(self) -> tuple[Spot | str, Spot | str]:
         return self.one, self.two
-
-    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
-        return mechanism.start(self.one), mechanism.start(self.two)
 
     def close(self, motion: Motion) -> None:
         base_one, line_one, block_one = motion.line(self.one, self.pin)
@@ -372,7 +374,7 @@ class PRP:
                 motion.ride(name, block, self.pin, where)
 
     def margin(self, motion: Motion) -> Any:
-        """Return how far the lines are from parallel, as a sine."""
+        """Return the sine of the angle between the lines."""
         lines = [motion.line(name, self.pin)[1] for name in (self.one, self.two)]
         return abs((lines[0] * conjugate(lines[1]))[0].imag)
 
@@ -391,9 +393,9 @@ class PRP:
 
 
 @dataclass(frozen=True, slots=True)
-class RPP:
+class RPP(_Dyad):
     """
-    A yoke that slides on a placed link's line, and in its own line a block pinned to a link.
+    A yoke that slides on the line of a placed link; in its slot slides a block, pinned to a link.
 
     Attributes
     ----------
@@ -411,30 +413,19 @@ class RPP:
     outer: str
 
     @property
-    def assembly(self) -> None:
-        return None
-
-    @property
-    def turned(self) -> tuple[str, ...]:
-        return ()
-
-    @property
     def slid(self) -> tuple[str, ...]:
         return (self.outer,)
 
     @property
-    def seen(self) -> tuple[Spot | str, Spot | str]:
+    def ends(self) -> tuple[Spot | str, Spot | str]:
         return self.a, self.outer
-
-    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
-        return self.a, mechanism.start(self.outer)
 
     def close(self, motion: Motion) -> None:
         inner, outer = (motion.mechanism.sliders[name] for name in (self.inner, self.outer))
         base, line, unit = motion.line(self.outer, outer.point)
         slot = unit * motion.constants.directions[self.inner]
         start = motion.at(self.a)
-        rest = start - base - unit * self._offset(motion)
+        rest = start - base - unit * _pin_at_zero(motion, self.inner, outer.point, self.a.point)
         over = _meet(motion, rest, slot, line)
         motion.slide[self.inner], motion.slide[self.outer] = over
         motion.ride(self.outer, unit, outer.point, base + line * over[1])
@@ -442,17 +433,8 @@ class RPP:
             turned = unit * motion.constants.twists[self.inner]
             motion.place(inner.block, turned, self.a.point, start)
 
-    def _offset(self, motion: Motion) -> Any:
-        """Return, in the yoke's frame, the block's pin at slide 0 from the yoke's point."""
-        inner, outer = (motion.mechanism.sliders[name] for name in (self.inner, self.outer))
-        offset = motion.vector(inner.along, outer.point, inner.through)
-        if inner.block is None or inner.point == self.a.point:
-            return offset
-        arm = motion.vector(inner.block, inner.point, self.a.point)
-        return offset + arm * motion.constants.twists[self.inner]
-
     def margin(self, motion: Motion) -> Any:
-        """Return how far the lines are from parallel, as a sine."""
+        """Return the sine of the angle between the lines."""
         outer = motion.mechanism.sliders[self.outer]
         _, line, unit = motion.line(self.outer, outer.point)
         return abs((unit * motion.constants.directions[self.inner] * conjugate(line))[0].imag)
@@ -460,13 +442,8 @@ class RPP:
     def vary(self, tangent: Tangent) -> None:
         inner, outer = (tangent.mechanism.sliders[name] for name in (self.inner, self.outer))
         line, line_change, base, turn = tangent.line(self.outer, outer.point)
-        assert turn is not None, 'a yoke is a block: it keeps its angle'
-        offset, offset_change = tangent.vector(inner.along, outer.point, inner.through)
-        if inner.block is not None and inner.point != self.a.point:
-            arm, arm_change = tangent.vector(inner.block, inner.point, self.a.point)
-            twist, twist_change = tangent.twist[self.inner], tangent.twist_change[self.inner]
-            offset = offset + arm * twist
-            offset_change = offset_change + twist * (arm_change + 1j * arm * twist_change)
+        assert turn is not None, 'a yoke is a block, and keeps its angle'
+        offset, offset_change = _vary_pin_at_zero(tangent, self.inner, outer.point, self.a.point)
         unit = tangent.unit[inner.along]
         slot = unit * tangent.direction[self.inner]
         slot_change = unit * tangent.direction_change[self.inner] + 1j * times(slot, turn)
@@ -483,6 +460,29 @@ class RPP:
             turn_block = turn.copy()
             turn_block[0] += tangent.twist_change[self.inner]
             tangent.place(inner.block, turn_block, self.a.point, start)
+
+
+def _pin_at_zero(motion: Motion, slider: str, origin: str, pin: str) -> Any:
+    """Return the block's pin at slide 0, from a point of the link with the line, in its frame."""
+    slide = motion.mechanism.sliders[slider]
+    place = motion.vector(slide.along, origin, slide.through)
+    if slide.block is None or slide.point == pin:
+        return place
+    arm = motion.vector(slide.block, slide.point, pin)
+    return place + arm * motion.constants.twists[slider]
+
+
+def _vary_pin_at_zero(
+    tangent: Tangent, slider: str, origin: str, pin: str
+) -> tuple[complex, Array]:
+    """Return the value of `_pin_at_zero` and its change."""
+    slide = tangent.mechanism.sliders[slider]
+    place, change = tangent.vector(slide.along, origin, slide.through)
+    if slide.block is None or slide.point == pin:
+        return place, change
+    arm, arm_change = tangent.vector(slide.block, slide.point, pin)
+    twist, twist_change = tangent.twist[slider], tangent.twist_change[slider]
+    return place + arm * twist, change + twist * (arm_change + 1j * arm * twist_change)
 
 
 def _meet(motion: Motion, rest: Any, one: Any, two: Any) -> tuple[Any, Any]:

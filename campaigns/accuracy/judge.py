@@ -14,9 +14,9 @@
 
 
 """
-One linkage, solved by the package and by the reference, and the differences.
+Compare the package with the reference for one linkage, and tally the errors of many.
 
-Millions of errors are kept as histograms and a few worst cases; the result does not depend on
+Millions of errors are kept as histograms and a few worst cases. The result does not depend on
 their order.
 """
 
@@ -52,21 +52,21 @@ FAULTS = ('wrong', 'missed', 'false', 'refused', 'crashed')
 AT_TOGGLE = 'position at a toggle'
 
 _SUSPICIOUS = 1000.0
-"""A position that is off by more, in u·κ, may be that of another assembly: a look is taken."""
+"""In u·κ. A position with a larger error is compared with the other assemblies."""
 
 _BAND = 2.0
 """
-Above this, in u·κ, it is asked whether a closed case lies at a limit.
+In u·κ. For a closed case with a larger error, it is checked whether the case lies at a limit.
 
-κ is of first order: it holds where rounding changes what a dyad reaches by less than that is.
-Nearer to a toggle a rate has no correct digit, whichever status is told.
+κ is a first-order estimate. It holds where rounding changes the distance to a toggle by less than
+that distance. Nearer to a toggle a rate has no correct digit, whatever the status.
 """
 
 _CORRECT = 2.0**-163
 """Maximum width of a result's enclosure, relative to κ, with u = 2⁻⁵³: fifty digits."""
 
 _LEAST = 2.0**-960
-"""Below this κ, u·κ is no normal number."""
+"""Below this κ, u·κ is subnormal."""
 
 Answer = tuple[tuple[float, ...], ...]
 """The package's positions, velocities and accelerations of the published joints."""
@@ -80,13 +80,13 @@ class Findings:
     Attributes
     ----------
     counts
-        How many cases: ``cases``, ``closed``, ``open``, ``at limit``, ``wrong`` (assembly),
-        ``missed``, ``false`` (closures), ``refused`` (regular, but said to be a toggle or
+        Number of cases: ``cases``, ``closed``, ``open``, ``at limit``, ``wrong`` (assembly),
+        ``missed``, ``false`` (closures), ``refused`` (regular, but reported as a toggle or
         indeterminate), ``crashed``.
     errors
         For each quantity (case, joint, error in u·κ).
     notes
-        For each case that is not as it should be, what.
+        For each case with a finding its description.
 
     """
 
@@ -94,10 +94,10 @@ class Findings:
     errors: dict[str, list[tuple[int, int, float]]] = field(default_factory=dict)
     notes: list[tuple[int, str]] = field(default_factory=list)
 
-    def count(self, case: int, what: str, note: str = '') -> None:
-        self.counts[what] += 1
-        if what not in {'open', 'at limit'}:
-            self.notes.append((case, f'{what} {note}'.strip()))
+    def count(self, case: int, outcome: str, note: str = '') -> None:
+        self.counts[outcome] += 1
+        if outcome not in {'open', 'at limit'}:
+            self.notes.append((case, f'{outcome} {note}'.strip()))
 
 
 def judge(mechanism: Mechanism, phi: list[float], alpha: list[float]) -> Findings:
@@ -118,15 +118,15 @@ def judge(mechanism: Mechanism, phi: list[float], alpha: list[float]) -> Finding
     for i, truth in enumerate(truths):
         try:
             status, answer = _ask(closure, phi[i], alpha[i])
-        except Exception as error:  # noqa: BLE001 - whatever it is, it is counted
+        except Exception as error:  # noqa: BLE001 - any exception is counted
             findings.count(i, 'crashed', repr(error))
             continue
-        what = _compare_status(reference, phi[i], truth, status)
-        if what == 'closed':
+        outcome = _compare_status(reference, phi[i], truth, status)
+        if outcome == 'closed':
             answers[i] = answer
-        elif what:
-            findings.count(i, what, f'{status.name}, in truth {truth.outcome.name}')
-            if what == 'at limit' and status is Status.TOGGLE and truth.joints and answer[0]:
+        elif outcome:
+            findings.count(i, outcome, f'{status.name}, in truth {truth.outcome.name}')
+            if outcome == 'at limit' and status is Status.TOGGLE and truth.joints and answer[0]:
                 toggles[i] = answer
     _measure(findings, reference, truths, phi, alpha, answers, QUANTITIES)
     _measure(findings, reference, truths, phi, alpha, toggles, (AT_TOGGLE,))
@@ -143,7 +143,7 @@ def _ask(closure: Any, phi: float, alpha: float) -> tuple[Status, Answer]:
 
 
 def _compare_status(reference: Reference, phi: float, truth: Truth, status: Status) -> str:
-    """Return ``closed`` where both are, or else what the package's status is."""
+    """Return the outcome of a comparison, a key of `Findings.counts`."""
     if truth.outcome is Outcome.CLOSED and status is Status.CLOSED:
         return 'closed'
     if truth.outcome is Outcome.OPEN and status is Status.OPEN:
@@ -171,21 +171,22 @@ def _measure(
     if reference.mechanism.ties is None:
         kappa = condition_numbers(reference, *arguments)
     else:
-        found = [exact_condition_numbers(reference, *a) for a in zip(*arguments[1:], strict=True)]
-        kappa = np.array(found)
+        kappa = np.array(
+            [exact_condition_numbers(reference, *a) for a in zip(*arguments[1:], strict=True)]
+        )
     for i, least in zip(cases, kappa, strict=True):
         condition = np.maximum(least, _LEAST)
         count = len(quantities)
-        off, width, nought = _differences(reference, truths[i], answers[i])
-        # An angle is published as it grows, not within a turn, and rounded at the size it has.
+        off, width, zero = _differences(reference, truths[i], answers[i])
+        # A published angle counts its turns, and is rounded relative to its size.
         for j, joint in enumerate(reference.mechanism.joints.values()):
             if isinstance(joint, Turn):
                 condition[j, 0] += max(0.0, abs(answers[i][0][j]) - pi)
-        # What does not move at all has a κ of 0, but terms that are not 0 are rounded to give it.
-        condition[nought] = np.maximum(condition[nought], 1.0)
+        # The κ of a joint that does not move is 0, but its terms are not 0 and are rounded.
+        condition[zero] = np.maximum(condition[zero], 1.0)
         while not (width <= _CORRECT * condition)[:, :count].all():
             truths[i] = reference.solve(phi[i], alpha[i], 2 * truths[i].precision)
-            off, width, nought = _differences(reference, truths[i], answers[i])
+            off, width, zero = _differences(reference, truths[i], answers[i])
         errors = off[:, :count] / (UNIT_ROUNDOFF * condition[:, :count])
         errors[off[:, :count] == 0.0] = 0.0
         errors[np.isnan(errors)] = np.inf
@@ -206,13 +207,13 @@ def _measure(
 
 
 def _differences(reference: Reference, truth: Truth, answer: Answer) -> tuple[Array, Array, Array]:
-    """Return by how much an answer is off, how wide the truth is, and whether it may be 0."""
+    """Return the errors of an answer, the widths of the truth, and whether the truth may be 0."""
     exponent = reference.constants().exponent
     ctx.prec = truth.precision
     unit = arb(2) ** -exponent
     off = np.zeros((len(truth.joints), 3))
     width = np.zeros((len(truth.joints), 3))
-    nought = np.zeros((len(truth.joints), 3), bool)
+    zero = np.zeros((len(truth.joints), 3), bool)
     joints = reference.mechanism.joints.values()
     for j, (joint, value) in enumerate(zip(joints, truth.joints, strict=True)):
         turns = isinstance(joint, Turn)
@@ -221,15 +222,15 @@ def _differences(reference: Reference, truth: Truth, answer: Answer) -> tuple[Ar
                 off[j, k] = np.inf
                 continue
             exact = value[k]
-            found = arb(numbers[j]) / FACTORIALS[k]
-            difference = exact - (found if turns else found * unit)
+            answered = arb(numbers[j]) / FACTORIALS[k]
+            difference = exact - (answered if turns else answered * unit)
             if turns and k == 0 and abs(float(difference)) > 3.0:
                 nearest = round(float(difference) / (2 * pi))
                 difference -= 2 * nearest * arb.pi()
             off[j, k] = abs(float(difference)) * FACTORIALS[k]
             width[j, k] = float(exact.rad()) * FACTORIALS[k]
-            nought[j, k] = exact == 0 or exact.contains(0)
-    return off, width, nought
+            zero[j, k] = exact == 0 or exact.contains(0)
+    return off, width, zero
 
 
 def _is_other_assembly(
@@ -245,8 +246,8 @@ def _is_other_assembly(
         other = Reference(replace(reference.mechanism, dyads=flipped))
         truth = other.solve(phi, alpha)
         if truth.outcome is Outcome.CLOSED:
-            found, _, _ = _differences(other, truth, answer)
-            if found[:, 0].max() < off / _SUSPICIOUS:
+            errors, _, _ = _differences(other, truth, answer)
+            if errors[:, 0].max() < off / _SUSPICIOUS:
                 return True
     return False
 
@@ -256,13 +257,13 @@ OCTAVE = 32
 
 _LOWEST, _HIGHEST = -24, 64
 BINS = (_HIGHEST - _LOWEST) * OCTAVE + 2
-"""The first has what is less than any other, the last what is more, and what is no number."""
+"""The first bin has all smaller errors, the last one all larger errors and NaN."""
 
 _KEPT = 3
 
 
 class Worst(NamedTuple):
-    """An error with where it was met; the worse sorts first."""
+    """An error and its place; the worst sorts first."""
 
     minus_error: float
     linkage: int
@@ -271,7 +272,7 @@ class Worst(NamedTuple):
 
 
 class Note(NamedTuple):
-    """Other faults, and their places."""
+    """Another fault and its place."""
 
     linkage: int
     case: int
@@ -318,15 +319,15 @@ class Quantity:
         """Return the greatest error, in u·κ."""
         return -self.worst[0].minus_error if self.worst else 0.0
 
-    def percentile(self, part: float) -> float:
-        """Return what a part of all errors does not exceed, to the width of a bin."""
-        place = int(np.searchsorted(np.cumsum(self.histogram), part * self.count()))
+    def percentile(self, share: float) -> float:
+        """Return the quantile of a share of all errors, to the width of a bin."""
+        place = int(np.searchsorted(np.cumsum(self.histogram), share * self.count()))
         return min(float(edges()[min(place, BINS - 2)]), self.greatest())
 
 
 @dataclass
 class Tally:
-    """All that was found in one family."""
+    """The findings for one family."""
 
     counts: Counter[str] = field(default_factory=Counter)
     quantities: dict[str, Quantity] = field(default_factory=dict)
@@ -342,8 +343,8 @@ class Tally:
     def merge(self, other: Tally) -> None:
         """Add the findings of another part of the campaign."""
         self.counts += other.counts
-        for quantity, found in other.quantities.items():
-            self.quantities.setdefault(quantity, Quantity()).merge(found)
+        for quantity, errors in other.quantities.items():
+            self.quantities.setdefault(quantity, Quantity()).merge(errors)
         self._keep(other.notes)
 
     def _keep(self, notes: list[Note]) -> None:

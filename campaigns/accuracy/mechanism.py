@@ -15,8 +15,8 @@
 """
 A linkage for the reference: links, sliders, and the dyads in the order of solution.
 
-The package finds the dyads from the linkage file's terms. The reference gets them from the
-generator of the linkage, so that neither can inherit a mistake from the other.
+The package derives the dyads from the linkage file. The reference gets them from the generator of
+the linkage, so that neither can inherit a mistake from the other.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ GROUND = 'ground'
 CRANK = 'crank'
 
 Key = tuple[str, str, str]
-"""Names one real number of a linkage: what it belongs to, which, and its component."""
+"""Names one real number of a linkage: its link or slider, its point, and its component."""
 
 
 class Spot(NamedTuple):
@@ -62,14 +62,14 @@ class Slide(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """A published angle: that of the child less that of the parent."""
+    """A published angle: the angle of the child relative to the parent."""
 
     parent: str
     child: str
 
 
 class Dyad(Protocol):
-    """Two links, or a link and a virtual block, that one closed form places."""
+    """Two links, or a link and a virtual block, placed by one closed form."""
 
     @property
     def assembly(self) -> tuple[str, Side] | None: ...
@@ -81,7 +81,7 @@ class Dyad(Protocol):
     def slid(self) -> tuple[str, ...]: ...
 
     @property
-    def seen(self) -> tuple[Spot | str, Spot | str]: ...
+    def ends(self) -> tuple[Spot | str, Spot | str]: ...
 
     def given(self, mechanism: Mechanism) -> tuple[Spot, ...]: ...
 
@@ -93,7 +93,7 @@ class Dyad(Protocol):
 
 
 Tie = Mapping[Key, float]
-"""What numbers change by, together, per unit of one free relative change."""
+"""The changes of dependent numbers per unit of one relative change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +110,8 @@ class Mechanism:
     joints
         The published joint: an angle, or the name of a slider.
     ties
-        Where lengths hang together (a parallelogram's), the free ways for them to change; None:
-        each number changes by itself.
+        For dependent lengths, as in a parallelogram, their independent changes; None: each number
+        changes independently.
 
     """
 
@@ -122,7 +122,7 @@ class Mechanism:
     ties: tuple[Tie, ...] | None = None
 
     def linkage(self) -> Linkage:
-        """Return it in the package's terms."""
+        """Return the linkage in the package's terms."""
         return Linkage(
             links=self.links,
             inputs=(Input('crank_joint', GROUND, CRANK),),
@@ -135,15 +135,15 @@ class Mechanism:
         )
 
     def numbers(self) -> dict[Key, float]:
-        """Return all numbers that the linkage is made of."""
-        found: dict[Key, float] = {}
+        """Return all numbers of the linkage."""
+        numbers: dict[Key, float] = {}
         for link, points in self.links.items():
             for point, (x, y) in points.items():
-                found[link, point, 'x'], found[link, point, 'y'] = x, y
+                numbers[link, point, 'x'], numbers[link, point, 'y'] = x, y
         for name, slide in self.sliders.items():
-            found[name, 'direction', 'x'], found[name, 'direction', 'y'] = slide.direction
-            found[name, 'direction', 'angle'] = slide.angle
-        return found
+            numbers[name, 'direction', 'x'], numbers[name, 'direction', 'y'] = slide.direction
+            numbers[name, 'direction', 'angle'] = slide.angle
+        return numbers
 
     def start(self, slider: str) -> Spot:
         """Return the origin of a slider's line."""
@@ -152,18 +152,18 @@ class Mechanism:
 
     def opening(self) -> float:
         """
-        Return the angle between what the first dyad sees on the crank and on the ground, at φ = 0.
+        Return the angle between the first dyad's ends on the crank and on the ground, at φ = 0.
 
-        Points are seen from the crank's pivot, lines in their direction.
+        The direction of a point is that from the crank's pivot; a line has its own.
         """
         pivot = next(iter(self.links[CRANK]))
         opening = 1 + 0j
-        for seen in self.dyads[0].seen:
-            if isinstance(seen, Spot):
-                link, points = seen.link, self.links[seen.link]
-                vector = complex(*points[seen.point]) - complex(*points[pivot])
+        for end in self.dyads[0].ends:
+            if isinstance(end, Spot):
+                link, points = end.link, self.links[end.link]
+                vector = complex(*points[end.point]) - complex(*points[pivot])
             else:
-                link, vector = self.sliders[seen].along, complex(*self.sliders[seen].direction)
+                link, vector = self.sliders[end].along, complex(*self.sliders[end].direction)
             opening *= vector if link == CRANK else vector.conjugate()
         return phase(opening)
 

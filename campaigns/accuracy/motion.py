@@ -16,18 +16,18 @@
 """
 A linkage at one input angle as power series in time, in balls of any precision (FLINT's Arb).
 
-Nothing is differentiated by hand: the crank's direction is the series of e^iφ(t) with
+Nothing is differentiated by hand. The crank's direction is the series of e^iφ(t) with
 φ(t) = φ + t + α·t²/2, every dyad is a closed form in such series, and velocity and acceleration
-are read from their second and third coefficients. A ball encloses its exact value, so that the
-number of correct digits is proved with each result.
+are read from their second and third coefficients. A ball encloses its exact value, so the number
+of correct digits is proven for each result.
 
 **Condition numbers** follow from the derivative of a motion with respect to each number of its
 linkage. The closing equation of a dyad, differentiated by a number, is linear in the derivatives
-of its two unknowns, at every time: again a power series, with the same determinant for all
+of its two unknowns at every time. It is again a power series, with the same determinant for all
 numbers. The directions of all links, the slides and the inverse of the determinant come from the
-reference and are right to the last digit of a double; nothing that cancels near a singularity is
-computed here. The remaining sums are as large as their terms, so double precision is enough for a
-condition number; a test compares it with differences of fifty digits.
+reference, and are correct to the last digit of a double. Terms that cancel near a singularity are
+not computed here. The remaining sums are as large as their terms, so double precision is enough
+for a condition number; a test compares it with differences of fifty digits.
 
 Arrays are [power of time, case, number].
 """
@@ -52,32 +52,32 @@ class OpenError(Exception):
 
 
 class UndecidedError(Exception):
-    """At the working precision a dyad is open as well as closed, or its links are in line."""
+    """The working precision cannot decide whether a dyad is open, or its links are in line."""
 
 
-class Handed(NamedTuple):
+class PassedResult(NamedTuple):
     """
-    A number that one dyad hands on to the next ones: a coefficient of a power series in time.
+    A number that a dyad passes to later dyads: a coefficient of a power series in time.
 
     Attributes
     ----------
     owner
         A link, a slider, or a point of a link.
-    what
-        ``turn``, the link's angle; ``x`` or ``y``, of the pin by which it is held, or of the point
+    quantity
+        ``turn``, the link's angle; ``x`` or ``y`` of the pin that holds the link, or of the point
         itself; ``slide``.
     power
-        Of time: 0, 1 or 2, for the position, the rate and half the acceleration.
+        Power of time: 0, 1 or 2, for the position, the rate and half the acceleration.
 
     """
 
     owner: str | Spot
-    what: str
+    quantity: str
     power: int
 
 
 class Constants:
-    """The numbers of a mechanism as balls; lengths by a power of 2 nearest to the greatest one."""
+    """The numbers of a mechanism as balls; lengths relative to a power of 2 near the largest."""
 
     def __init__(self, mechanism: Mechanism, numbers: Mapping[Key, Any]) -> None:
         self.exponent = max(
@@ -103,7 +103,7 @@ class Constants:
 
 class Motion:
     """
-    Where the links are and how they move; each dyad adds its own.
+    The pose and motion of all links; each dyad adds the links that it places.
 
     Attributes
     ----------
@@ -114,20 +114,20 @@ class Motion:
     slide
         For each slider the series of its point's distance from the start of the line.
     inverse
-        For each dyad the inverse of the determinant that its linear equations have.
-    shown
-        As ``unit``, before what is handed on is changed.
+        For each dyad the inverse determinant of its linear equations.
+    unchanged
+        As ``unit``, without the change of a passed result.
     held
-        For each link the series of where the pin is by which it is held.
+        For each link the series of the position of the pin that holds it.
 
     Parameters
     ----------
     mechanism, constants
-        What moves.
+        The mechanism and its numbers.
     pivot
         Name of the crank's pin on the ground.
     changed
-        What is handed on with a change, by how much; for condition numbers.
+        For condition numbers: a passed result to change, and by how much.
 
     """
 
@@ -136,7 +136,7 @@ class Motion:
         mechanism: Mechanism,
         constants: Constants,
         pivot: str,
-        changed: tuple[Handed, Any] | None = None,
+        changed: tuple[PassedResult, Any] | None = None,
     ) -> None:
         self._changed = changed
         self.mechanism = mechanism
@@ -156,15 +156,15 @@ class Motion:
             GROUND: acb_series([0]),
             CRANK: self._pivot - self._crank_pivot * crank,
         }
-        self.shown = dict(self.unit)
+        self.unchanged = dict(self.unit)
         self.held: dict[str, Any] = {}
         self.slide: dict[str, Any] = {}
         self.inverse: list[Any] = []
         self.phi = phi
-        self._behind = False
+        self._first_done = False
         for dyad in self.mechanism.dyads:
             dyad.close(self)
-            self._behind = True
+            self._first_done = True
 
     def at(self, spot: Spot) -> Any:
         """Return the position of a point of a placed link."""
@@ -172,7 +172,7 @@ class Motion:
         if spot.link == GROUND:
             return acb_series([z])
         place = self.origin[spot.link] + self.unit[spot.link] * z
-        if self._behind and self._changed is not None and self._changed[0].owner == spot:
+        if self._first_done and self._changed is not None and self._changed[0].owner == spot:
             place += self._change()
         return place
 
@@ -181,12 +181,12 @@ class Motion:
         return self.constants.points[Spot(link, end)] - self.constants.points[Spot(link, start)]
 
     def place(self, link: str, unit: Any, point: str, where: Any) -> None:
-        """Note where a link is, by its direction and one of its points."""
-        self.shown[link] = unit
+        """Set the pose of a link by its direction and one of its points."""
+        self.unchanged[link] = unit
         self.held[link] = where
         if self._changed is not None and self._changed[0].owner == link:
-            if self._changed[0].what == 'turn':
-                # To first order, as the differences are that this is for.
+            if self._changed[0].quantity == 'turn':
+                # To first order, like the differences that use it.
                 unit = unit * (1 + self._change() * acb(0, 1))
             else:
                 where = where + self._change()
@@ -194,7 +194,7 @@ class Motion:
         self.origin[link] = where - unit * self.constants.points[Spot(link, point)]
 
     def ride(self, slider: str, unit: Any, point: str, where: Any) -> None:
-        """Note where a block is that a slide places."""
+        """Set the pose of a block that a slide places."""
         slide = self.mechanism.sliders[slider]
         if self._changed is not None and self._changed[0].owner == slider:
             line = self.unit[slide.along] * self.constants.directions[slider]
@@ -203,14 +203,14 @@ class Motion:
 
     def _change(self) -> Any:
         assert self._changed is not None
-        (_, what, power), amount = self._changed
-        return acb_series([0] * power + [acb(0, amount) if what == 'y' else acb(amount)])
+        (_, quantity, power), amount = self._changed
+        return acb_series([0] * power + [acb(0, amount) if quantity == 'y' else acb(amount)])
 
     def line(self, name: str, point: str) -> tuple[Any, Any, Any]:
         """
         Return the line of a slider on a placed link as a start, a direction and the block's unit.
 
-        The start is that of the line's parallel through a point of the block.
+        The start is that of the parallel line on which the given point of the block moves.
         """
         slide = self.mechanism.sliders[name]
         start = self.at(Spot(slide.along, slide.through))
@@ -240,7 +240,7 @@ def imag(series: Any) -> Any:
 
 
 def root(square: Any) -> Any:
-    """Return the positive root of what a dyad's reach is squared."""
+    """Return the positive root of the square of a dyad's reach."""
     if square[0] < 0:
         raise OpenError
     if not square[0] > 0:
@@ -249,7 +249,7 @@ def root(square: Any) -> Any:
 
 
 def inverse(series: Any) -> Any:
-    """Return 1 by a determinant."""
+    """Return the inverse of a determinant."""
     if series[0].contains(0):
         raise UndecidedError
     return series.inv()
@@ -257,7 +257,7 @@ def inverse(series: Any) -> Any:
 
 def turning(series: Any) -> Any:
     """Return the angle of a unit vector in time."""
-    # The cut of the logarithm is turned to where the direction is not.
+    # The branch cut of the logarithm is turned away from the direction.
     if series[0].real < 0:
         logarithm = (-series).log()
         return imag(logarithm) + arb.pi()
@@ -275,8 +275,8 @@ def times(series: Array, change: Array) -> Array:
     return product
 
 
-def handed_on(mechanism: Mechanism) -> tuple[Handed, ...]:
-    """Return what dyads pass to later ones: pins, then angles and slides in order."""
+def passed_results(mechanism: Mechanism) -> tuple[PassedResult, ...]:
+    """Return the results that dyads pass to later ones: pins, then angles and slides."""
     if len(mechanism.dyads) < 2:
         return ()
     links = [link for link in mechanism.links if link not in {GROUND, CRANK}]
@@ -286,17 +286,17 @@ def handed_on(mechanism: Mechanism) -> tuple[Handed, ...]:
     for dyad in mechanism.dyads:
         names += [(link, 'turn') for link in dyad.turned]
         names += [(slider, 'slide') for slider in dyad.slid if mechanism.sliders[slider].block]
-    return tuple(Handed(*name, power) for name in names for power in range(ORDER))
+    return tuple(PassedResult(*name, power) for name in names for power in range(ORDER))
 
 
 def turn_values(unit: Array) -> Array:
-    """Return an angle's rate and half its acceleration, behind a 0, of the series of e^iθ."""
+    """Return 0, the rate and half the acceleration of an angle θ, from the series of e^iθ."""
     back = unit[0].conj()
     return np.array([np.zeros(len(back)), (unit[1] * back).imag, (unit[2] * back).imag])
 
 
 def turn_sizes(unit: Array) -> Array:
-    """Return their sizes, and π in place of the 0: an angle counts as half a turn at least."""
+    """Return the absolute values of `turn_values`, and π first: an angle counts as at least π."""
     sizes = np.abs(turn_values(unit))
     sizes[0] = pi
     return sizes
@@ -304,24 +304,24 @@ def turn_sizes(unit: Array) -> Array:
 
 class Tangent:
     """
-    Changes per unit of relative change of every number that is not zero, and of φ, ω and α.
+    The derivatives of a motion by the relative change of each nonzero number, and of φ, ω and α.
 
     Parameters
     ----------
     mechanism
-        The quantity that varies.
+        The mechanism whose numbers vary.
     constants
         Its numbers as balls.
     numbers
-        The same as doubles.
+        Its numbers as doubles.
     values
         Series of links, slides and inverse determinants, [power of time, case].
     held
-        Series of the pins that links are held by, and of the points that dyads are given.
+        Series of the pins that hold links, and of the points passed to dyads.
     phi, alpha
         Input angles and accelerations of the cases.
     opening
-        Of each case the angle that the first dyad sees, as far as it is a sum.
+        For each case the angle that the first dyad uses, if it is a rounded sum.
 
     """
 
@@ -340,11 +340,11 @@ class Tangent:
         self._constants = constants
         self._values = values
         self._cases = len(phi)
-        self._behind = False
+        self._first_done = False
         columns = [key for key, value in numbers.items() if value]
         self._column = {key: i for i, key in enumerate(columns)}
         self._inputs = len(columns)
-        self.handed = handed_on(mechanism)
+        self.handed = passed_results(mechanism)
         self._handed = {key: self._inputs + 4 + i for i, key in enumerate(self.handed)}
         self._count = len(columns) + 4 + len(self.handed)
         self._held = held
@@ -375,14 +375,14 @@ class Tangent:
         self.turn[CRANK][1, :, self._inputs + 1] = 1.0
         self.turn[CRANK][2, :, self._inputs + 2] = 0.5 * alpha
         self.turn[CRANK][0, :, self._inputs + 3] = opening
-        self.shown = dict(self.turn)
+        self.unchanged = dict(self.turn)
         self._origin = {GROUND: self._zeros(complex)}
         self.slide: dict[str, Array] = {}
         pivot = next(iter(mechanism.links[CRANK]))
         self.place(CRANK, self.turn[CRANK], pivot, self.at(Spot(GROUND, pivot)))
         for dyad in mechanism.dyads:
             dyad.vary(self)
-            self._behind = True
+            self._first_done = True
 
     def _links(self) -> list[str]:
         return [name for name in self.mechanism.links if name != GROUND]
@@ -410,17 +410,17 @@ class Tangent:
         return value, self._vectors[link, end] - self._vectors[link, start]
 
     def at(self, spot: Spot) -> Array:
-        """Return the change of where a point is."""
+        """Return the change of the position of a point."""
         change = self._origin[spot.link] + self._arm(spot)
-        if self._behind:
+        if self._first_done:
             self._round_pin(spot, change)
         return change
 
     def _round_pin(self, owner: str | Spot, change: Array) -> None:
         if (owner, 'x', 0) in self._handed:
             for power, place in enumerate(self._held[owner]):
-                change[power, :, self._handed[Handed(owner, 'x', power)]] += place.real
-                change[power, :, self._handed[Handed(owner, 'y', power)]] += 1j * place.imag
+                change[power, :, self._handed[PassedResult(owner, 'x', power)]] += place.real
+                change[power, :, self._handed[PassedResult(owner, 'y', power)]] += 1j * place.imag
 
     def _arm(self, spot: Spot) -> Array:
         unit = self.unit[spot.link]
@@ -431,32 +431,32 @@ class Tangent:
         return arm
 
     def place(self, link: str, turn: Array, point: str, where: Array) -> None:
-        """Note the change of a link's angle, and of where one of its points is."""
-        self.shown[link] = turn
+        """Set the change of a link's angle, and of the position of one of its points."""
+        self.unchanged[link] = turn
         if (link, 'turn', 0) in self._handed:
             turn = turn.copy()
             sizes = turn_sizes(self.unit[link][..., 0]) + np.abs(turn).sum(axis=2)
             for power, size in enumerate(sizes):
-                turn[power, :, self._handed[Handed(link, 'turn', power)]] += size
+                turn[power, :, self._handed[PassedResult(link, 'turn', power)]] += size
         where = where.copy()
         self._round_pin(link, where)
         self.turn[link] = turn
         self._origin[link] = where - self._arm(Spot(link, point))
 
     def ride(self, slider: str, pin: str, turn: Array, where: Array) -> None:
-        """Note the change of a block that a slide places."""
+        """Set the change of a block that a slide places."""
         slide = self.mechanism.sliders[slider]
         if (slider, 'slide', 0) in self._handed:
             moved = self._zeros(float)
             sizes = np.abs(self.slide[slider]).sum(axis=2)
             sizes += np.abs(self.slide_value[slider][..., 0])
             for power, size in enumerate(sizes):
-                moved[power, :, self._handed[Handed(slider, 'slide', power)]] = size
+                moved[power, :, self._handed[PassedResult(slider, 'slide', power)]] = size
             where = where + times(self.unit[slide.along] * self.direction[slider], moved)
         self.place(str(slide.block), turn, pin, where)
 
     def line(self, name: str, point: str) -> tuple[Array, Array, Array, Array | None]:
-        """Return a line's direction, its change, that of its start, and the block's turn."""
+        """Return a line's direction, the changes of direction and start, and the block's turn."""
         slide = self.mechanism.sliders[name]
         unit = self.unit[slide.along]
         line = unit * self.direction[name]

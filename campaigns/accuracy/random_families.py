@@ -16,9 +16,9 @@
 """
 Random linkages: one dyad of each type on a crank, and chains of three.
 
-A linkage is made from a pose: pins are placed, and the links follow. So it closes at the crank
-angle of that pose, whatever its dyads. Frames are plain (origin on the first pin, x axis towards
-the second) or arbitrary: a file may have either.
+A linkage is made from a pose: the pins are placed, and the links follow. So it closes at the crank
+angle of that pose, whatever its dyads. Frames are plain (origin at the first pin, x axis towards
+the second) or arbitrary, as in linkage files.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from flint import arb
 
 class Builder:
     """
-    A linkage in the making.
+    Builds a linkage.
 
     Parameters
     ----------
     rng
-        Source of everything random.
+        Random generator of all numbers.
     phi
         Crank angle of the pose.
     plain
@@ -71,7 +71,7 @@ class Builder:
         return not self._dyads
 
     def name(self, stem: str) -> str:
-        """Return a name that is not taken."""
+        """Return an unused name."""
         self._names += 1
         return f'{stem}{self._names}'
 
@@ -101,12 +101,12 @@ class Builder:
         return Spot(CRANK, 'A')
 
     def add_crank_by_points(self, points: dict[str, complex]) -> None:
-        """Add a crank whose frame lies in the ground's while the crank is at 0."""
+        """Add a crank whose frame coincides with the ground's at a crank angle of 0."""
         self._frames[CRANK] = (0j, 1 + 0j)
         self._links[CRANK] = {point: (z.real, z.imag) for point, z in points.items()}
 
     def put(self, link: str, point: str, where: complex) -> None:
-        """Add a point to a link where it is in the pose."""
+        """Add a point to a link, by its position in the pose."""
         origin, unit = self._frames[link]
         z = (where - origin) * unit.conjugate()
         self._links[link][point] = (z.real, z.imag)
@@ -164,18 +164,18 @@ class Builder:
         return self._frames[link][1]
 
     def add(self, dyad: Dyad, *joints: Turn | str) -> None:
-        """Add a dyad and what is published of it."""
+        """Add a dyad and its published joints."""
         self._dyads.append(dyad)
         for joint in joints:
             self._joints[self.name('joint')] = joint
 
     def parent(self) -> str:
-        """Return a link that a published angle may be counted from."""
+        """Return a random parent link for a published angle."""
         return self.rng.choice((GROUND, CRANK))
 
 
 _LEAST_SINE = 0.05
-"""Of the angle between the two lines of a dyad, in its pose."""
+"""Minimum sine of the angle between the two lines of a dyad, in its pose."""
 
 
 def add_rrr(
@@ -187,7 +187,7 @@ def add_rrr(
     fold: bool = False,
     stretch: bool = False,
 ) -> list[str]:
-    """Add two links pinned together, at a given place or a random one."""
+    """Add two links pinned together at a given or a random position."""
     start, end = build.where(a), build.where(d)
     where = start + polar(build.length(), build.direction()) if pin is None else pin
     name = build.name('B')
@@ -195,7 +195,7 @@ def add_rrr(
     two = build.link('link', {d.point: end, name: where})
     side = 1 if _cross(end - start, where - start) > 0 else -1
     dyad = RRR(one, two, a, d, name, 1, fold, stretch)
-    # The side that is told is the one for 0 < φ < π.
+    # RRR wants the side for 0 < φ < π.
     dyad = replace(dyad, side=side * dyad.side_at(arb(build.phi)))
     build.add(dyad, Turn(build.parent(), one), Turn('ground', two))
     return [one, two]
@@ -208,16 +208,12 @@ def add_rrp(build: Builder, a: Spot, along: str) -> list[str]:
     line = _line(build, along)
     pin = build.name('B')
     one = build.link('link', {a.point: start, pin: where})
-    links, block, point, on_line = [one], None, pin, where
-    if build.rng.random() < 0.5:
-        block, point, on_line = _block(build, pin, where, along)
-        links.append(block)
-    through = build.name('Q')
-    build.put(along, through, on_line - line * build.length() * build.rng.choice((1, -1)))
+    block, point, on_line = _perhaps_block(build, pin, where, along)
+    through = _through(build, along, on_line, line)
     slider = build.slide(line, along, through, point, block)
     side = 1 if ((where - start) * line.conjugate()).real > 0 else -1
     build.add(RRP(one, a, pin, slider, side), Turn(build.parent(), one), slider)
-    return links
+    return [link for link in (one, block) if link]
 
 
 def add_rpr(build: Builder, a: Spot, d: Spot) -> list[str]:
@@ -228,21 +224,17 @@ def add_rpr(build: Builder, a: Spot, d: Spot) -> list[str]:
     if straight:
         line = (end - start) / abs(end - start) * build.rng.choice((1, -1))
     rail = build.link('rail', {a.point: start}, axis=line)
-    links, block, point, on_line = [rail], None, d.point, end
-    if build.rng.random() < 0.5:
-        block, point, on_line = _block(build, d.point, end, rail)
-        links.append(block)
+    block, point, on_line = _perhaps_block(build, d.point, end, rail)
     through = a.point
     if not (straight and build.plain):
-        through = build.name('Q')
-        build.put(rail, through, on_line - line * build.length() * build.rng.choice((1, -1)))
+        through = _through(build, rail, on_line, line)
     elif block is not None:
-        # A block that stands beside its pin would move the line off the swivel.
+        # With another point of the block the line would not pass through the swivel.
         point = d.point
     slider = build.slide(line, rail, through, point, block)
     side = 1 if ((end - start) * line.conjugate()).real > 0 else -1
     build.add(RPR(rail, a, d, slider, side), Turn(build.parent(), rail), slider)
-    return links
+    return [link for link in (rail, block) if link]
 
 
 def add_prp(build: Builder, known: str, other: str) -> list[str]:
@@ -253,15 +245,12 @@ def add_prp(build: Builder, known: str, other: str) -> list[str]:
     line = 0j
     for i, along in enumerate((known, other)):
         line = _line(build, along, line)
-        block, point, on_line = None, pin, where
-        if i == 0 or build.rng.random() < 0.5:
-            block, point, on_line = _block(build, pin, where, along)
-            links.append(block)
-        through = build.name('Q')
-        build.put(along, through, on_line - line * build.length() * build.rng.choice((1, -1)))
+        block, point, on_line = _perhaps_block(build, pin, where, along, always=i == 0)
+        links.append(block)
+        through = _through(build, along, on_line, line)
         sliders.append(build.slide(line, along, through, point, block))
     build.add(PRP(sliders[0], sliders[1], pin), *sliders)
-    return links
+    return [link for link in links if link]
 
 
 def add_rpp(build: Builder, a: Spot, along: str) -> list[str]:
@@ -273,22 +262,33 @@ def add_rpp(build: Builder, a: Spot, along: str) -> list[str]:
     yoke = build.link('yoke', {yoke_point: guide}, axis=build.axis(along))
     build.put(along, through, guide - line * build.length())
     outer = build.slide(line, along, through, yoke_point, yoke)
-    links, block, point, on_line = [yoke], None, a.point, start
-    if build.rng.random() < 0.5:
-        block, point, on_line = _block(build, a.point, start, yoke)
-        links.append(block)
+    block, point, on_line = _perhaps_block(build, a.point, start, yoke)
     slot = _line(build, along, line)
     if build.plain and build.rng.random() < 0.5:
         slot = line * 1j
-    start_of_slot = build.name('Q')
-    build.put(yoke, start_of_slot, on_line - slot * build.length() * build.rng.choice((1, -1)))
-    inner = build.slide(slot, yoke, start_of_slot, point, block)
+    inner = build.slide(slot, yoke, _through(build, yoke, on_line, slot), point, block)
     build.add(RPP(a, inner, outer), inner, outer)
-    return links
+    return [link for link in (yoke, block) if link]
+
+
+def _perhaps_block(
+    build: Builder, pin: str, where: complex, along: str, *, always: bool = False
+) -> tuple[str | None, str, complex]:
+    """Return a new block as `_block` does, or none: then the pin itself is on the line."""
+    if always or build.rng.random() < 0.5:
+        return _block(build, pin, where, along)
+    return None, pin, where
+
+
+def _through(build: Builder, along: str, on_line: complex, line: complex) -> str:
+    """Add the start of a line, at a random distance from a point on it; return its name."""
+    through = build.name('Q')
+    build.put(along, through, on_line - line * build.length() * build.rng.choice((1, -1)))
+    return through
 
 
 def _block(build: Builder, pin: str, where: complex, along: str) -> tuple[str, str, complex]:
-    """Add a block; return it, its point on the line, and where that is."""
+    """Add a block; return it, its point on the line, and the position of that point."""
     axis = build.axis(along)
     if build.rng.random() < 0.5:
         return build.link('block', {pin: where}, axis=axis), pin, where
@@ -299,10 +299,10 @@ def _block(build: Builder, pin: str, where: complex, along: str) -> tuple[str, s
 
 def _line(build: Builder, along: str, other: complex = 0j) -> complex:
     """
-    Return a direction: that of the x axis of the link, or any; not along another.
+    Return the direction of the link's x axis, or a random one; not parallel to another line.
 
-    Only the first dyad has lines along axes: two sliders on parallel lines of links that do not
-    turn cancel each other, and nothing moves, or nothing can be told.
+    Only the first dyad has lines along axes. Two sliders on parallel lines of links that do not
+    turn would make a linkage that does not move, or that is indeterminate.
     """
     line = polar(1.0, build.direction())
     if build.plain and build.is_first() and build.rng.random() < 0.5:
@@ -320,7 +320,7 @@ Case = tuple[Mechanism, list[float]]
 DYADS = ('RRR', 'RRP', 'RPR', 'PRP', 'RPP')
 
 ANGLES = 50
-"""How many input angles each linkage is solved at."""
+"""Number of input angles of each linkage."""
 
 
 def _random_dyad(kind: str) -> Callable[[random.Random], Case]:
@@ -353,22 +353,22 @@ RANDOM: dict[str, tuple[float, Callable[[random.Random], Case]]] = {
     'RRR-RRR-RRR': (1.0, _chain(('RRR', 'RRR', 'RRR'))),
     'any three': (2.0, _chain(None)),
 }
-"""For each family its share of the cases and how one linkage is made."""
+"""For each family its share of the cases, and the function that makes a linkage."""
 
 
 def crank_angles(rng: random.Random, phi: float) -> list[float]:
-    """Return angles over two turns, and as many about one where the linkage closes."""
+    """Return angles over two turns, and as many near one at which the linkage closes."""
     near = [phi + rng.gauss(0.0, 0.3) for _ in range(ANGLES // 2)]
     return [rng.uniform(-2 * pi, 2 * pi) for _ in range(ANGLES - len(near))] + near
 
 
 def start(rng: random.Random, phi: float, plain: bool | None = None) -> Builder:
-    """Return a linkage in the making whose frames are plain, or anywhere, or either."""
+    """Return a builder with plain or arbitrary frames; None draws which."""
     return Builder(rng, phi, rng.random() < 0.5 if plain is None else plain)
 
 
 def add_random(build: Builder, kind: str, known: str, other: str, first: bool) -> list[str]:
-    """Add a random dyad of a type between two links; the first one has a crank made for it."""
+    """Add a random dyad of a kind between two links; for the first dyad, add the crank too."""
     if first:
         pin = build.crank()
     elif kind == 'PRP':

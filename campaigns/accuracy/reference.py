@@ -14,33 +14,35 @@
 
 
 """
-Reference at one input angle, to fifty digits and more, with its condition numbers.
+The reference solution at one input angle, to fifty digits and more, with its condition numbers.
 
-If there is no solution, the reference says so. If rounding of the inputs may decide whether there
-is one, the case is at a limit.
+The reference also decides whether a solution exists. If rounding of the inputs may change that
+decision, the case is at a limit.
 
 Condition numbers κ = Σ|xᵢ ∂y/∂xᵢ| + |y| of positions, velocities and accelerations.
 
 The sum goes over all coordinates, directions and angles of the linkage, the input angle at its
-size within (-π, π], its rate and its acceleration. A published angle counts as π at least: a
-direction is a sum of angles of up to half a turn, and where they cancel, rounding remains. |y| is
-the sum of the sizes of the two terms whose difference a joint is: the angles of two links, or
-their rates.
+size within (-π, π], its rate and its acceleration. A published angle counts as at least π: a
+direction is a sum of angles of up to half a turn, and if they cancel, their rounding errors
+remain. A joint is the difference of two terms, the angles of two links or their rates; |y| is the
+sum of the absolute values of the two terms.
 
-The dyads of a linkage are solved one after the other, and each passes doubles on. So the results
-of a dyad are data of all that follow. Let a stage return zₖ with an error of at most C·u·κₖ, κₖ
-its own condition. To first order the error of y is then at most C·u·Σ|∂y/∂zₖ|·κₖ: a sum over
-stages joins that over numbers, and a solver whose dyads are each within C·u·κ stays within it as a
-whole. No solver can avoid this: two data that come from one number are rounded independently, and
-errors that would cancel between them do not. The stages are
+The dyads of a linkage are solved one after the other, and each passes doubles to the next. So the
+results of a dyad are input data of all later dyads. Let stage k return zₖ with an error of at most
+C·u·κₖ, where κₖ is its own condition number. To first order the error of y is then at most
+C·u·Σ|∂y/∂zₖ|·κₖ. This sum over the stages is added to the sum over the numbers: a solver whose
+dyads are each accurate to C·u·κ is then accurate to C·u·κ as a whole. No solver can avoid this
+sum: two results that depend on the same number are rounded independently, so their errors do not
+cancel. The stages are
 
-- the angle of the first dyad between crank and ground: φ and a direction of the file, where that
-  is not 0, at the size of the sum;
-- the angles and slides that a dyad finds, their rates and accelerations, with the κ of each;
-- the pins by which links are held, and the points that are given to a later dyad, with their
-  velocities and accelerations, each coordinate at its own size: sums of terms already counted.
+- the angle between crank and ground that the first dyad uses: the sum of φ and a direction of the
+  file, if that is not 0, with the absolute value of the sum;
+- the angles and slides that a dyad computes, their rates and accelerations, each with its own κ;
+- the pins that hold the links, and the points passed to a later dyad, with their velocities and
+  accelerations. They are sums of terms already counted; each coordinate counts with its absolute
+  value.
 
-All of it is the reference's: ∂y/∂zₖ is found by changing zₖ between two of its dyads.
+The reference computes all of it: ∂y/∂zₖ is the effect of changing zₖ between two of its dyads.
 """
 
 from __future__ import annotations
@@ -55,12 +57,12 @@ from campaigns.accuracy.motion import (
     Array,
     conjugate,
     Constants,
-    Handed,
-    handed_on,
     imag,
     Motion,
     OpenError,
     ORDER,
+    passed_results,
+    PassedResult,
     Tangent,
     turn_sizes,
     turn_values,
@@ -71,7 +73,7 @@ from flint import arb, ctx
 import numpy as np
 
 PRECISIONS = (256, 512, 1024, 2048, 4096)
-"""In bits; the next is taken where a result has fewer than 50 digits in common with all others."""
+"""In bits. The next precision is used if a result has fewer than 50 proven digits."""
 
 
 class Outcome(Enum):
@@ -80,11 +82,11 @@ class Outcome(Enum):
     CLOSED = 'closed'
     OPEN = 'open'
     SINGULAR = 'singular'
-    """Exactly in line, parallel or pin on pin, as far as 4096 bits can tell."""
+    """Links in line, lines parallel or pins coincident, to the precision of 4096 bits."""
 
 
 class Truth(NamedTuple):
-    """The published joints; for each the series of its value, in the constants' unit."""
+    """The published joints as power series in time, in the constants' unit."""
 
     outcome: Outcome
     joints: tuple[Any, ...]
@@ -99,11 +101,11 @@ class Reference:
     Parameters
     ----------
     mechanism
-        What to solve.
+        The mechanism to solve.
     numbers
-        Instead of the mechanism's own; balls may be among them.
+        Replace the mechanism's own numbers; they may be balls.
     changed
-        As of `Motion`.
+        As for `Motion`.
 
     """
 
@@ -111,7 +113,7 @@ class Reference:
         self,
         mechanism: Mechanism,
         numbers: Mapping[Key, Any] | None = None,
-        changed: tuple[Handed, Any] | None = None,
+        changed: tuple[PassedResult, Any] | None = None,
     ) -> None:
         self._changed = changed
         self.mechanism = mechanism
@@ -120,16 +122,16 @@ class Reference:
 
     def solve(self, phi: Any, alpha: Any, lowest: int = PRECISIONS[0]) -> Truth:
         """
-        Solve at the lowest precision that decides whether it closes.
+        Solve at the lowest precision that decides whether the linkage closes.
 
         Parameters
         ----------
         phi
             Input angle, in [rad].
         alpha
-            Its acceleration where its rate is 1, in [rad/s²].
+            Its acceleration, in [rad/s²]; its rate is 1 rad/s.
         lowest
-            Precision to begin with, in bits.
+            First precision, in bits.
 
         """
         for precision in [p for p in PRECISIONS if p >= lowest] or [lowest]:
@@ -158,16 +160,16 @@ class Reference:
         return self._constants[PRECISIONS[0]]
 
     def _joints(self, motion: Motion) -> tuple[Any, ...]:
-        found = []
+        values = []
         for joint in self.mechanism.joints.values():
             if isinstance(joint, Turn):
-                unit = motion.shown[joint.child]
+                unit = motion.unchanged[joint.child]
                 if joint.parent != 'ground':
-                    unit = unit * conjugate(motion.shown[joint.parent])
-                found.append(turning(unit))
+                    unit = unit * conjugate(motion.unchanged[joint.parent])
+                values.append(turning(unit))
             else:
-                found.append(motion.slide[joint])
-        return tuple(found)
+                values.append(motion.slide[joint])
+        return tuple(values)
 
 
 def series(values: Any) -> list[complex]:
@@ -180,7 +182,7 @@ FACTORIALS = (1.0, 1.0, 2.0)
 
 _PRECISION = 1024
 _STEP = 300
-"""Exponent of the step of the differences: truncation and rounding are both beyond 50 digits."""
+"""Minus the exponent of the step of differences: both errors are then below 50 digits."""
 
 
 def condition_numbers(
@@ -215,8 +217,8 @@ def condition_numbers(
         values,
         {
             handed.owner: np.array([series(_place(m, handed.owner)) for m in motions]).T
-            for handed in handed_on(mechanism)
-            if handed.what == 'x' and not handed.power
+            for handed in passed_results(mechanism)
+            if handed.quantity == 'x' and not handed.power
         },
         np.array([remainder(angle, 2 * pi) for angle in phi]),
         np.array(alpha),
@@ -225,7 +227,7 @@ def condition_numbers(
     kappa = np.empty((len(truths), len(mechanism.joints), 3))
     for j, joint in enumerate(mechanism.joints.values()):
         if isinstance(joint, Turn):
-            change = tangent.shown[joint.child] - tangent.shown[joint.parent]
+            change = tangent.unchanged[joint.child] - tangent.unchanged[joint.parent]
         else:
             change = tangent.slide[joint]
         kappa[:, j] = np.abs(change).sum(axis=2).T
@@ -233,10 +235,10 @@ def condition_numbers(
 
 
 def exact_condition_numbers(
-    reference: Reference, phi: float, alpha: float, apart: bool = False
+    reference: Reference, phi: float, alpha: float, independent: bool = False
 ) -> Array | None:
     """
-    Return κ of one case by differences in balls, [joint, derivative]; None where it is singular.
+    Return κ of one case by differences of balls, [joint, derivative]; None if it is singular.
 
     Parameters
     ----------
@@ -244,8 +246,8 @@ def exact_condition_numbers(
         The linkage.
     phi, alpha
         Input angle and acceleration.
-    apart
-        Whether each number is to change by itself even where the linkage says what hangs together.
+    independent
+        Whether to vary each number independently, even if the linkage has dependent lengths.
 
     """
     base = reference.solve(phi, alpha, _PRECISION)
@@ -256,19 +258,19 @@ def exact_condition_numbers(
     step = arb(2) ** -_STEP
     numbers = reference.numbers
     ties = reference.mechanism.ties
-    if ties is None or apart:
+    if ties is None or independent:
         ties = tuple({key: value} for key, value in numbers.items() if value)
     kappa = np.zeros((len(base.joints), 3))
     exact = _coefficients(base)
-    found = handed_on(reference.mechanism)
-    conditions = [0.0] * len(found)
+    passed = passed_results(reference.mechanism)
+    conditions = [0.0] * len(passed)
 
     def add(changed: Truth) -> None:
         nonlocal kappa
         for j, (one, other) in enumerate(zip(exact, _coefficients(changed), strict=True)):
             for k in range(3):
                 kappa[j, k] += abs(float((other[k] - one[k]) / step))
-        for i, handed in enumerate(found):
+        for i, handed in enumerate(passed):
             conditions[i] += abs(float(_change(base.motion, changed.motion, handed) / step))
 
     for tie in ties:
@@ -280,26 +282,26 @@ def exact_condition_numbers(
     add(reference.solve(arb(phi) + step * arb(turned), alpha, precision))
     add(reference.solve(arb(phi) + step * arb(_opening(reference, phi)), alpha, precision))
     add(reference.solve(phi, arb(alpha) * (1 + step), precision))
-    # By the rate ω, which a motion has as 1: y' is as ω, and y'' = g·ω² + h·α.
+    # The derivative by the rate ω, which is 1: y' is proportional to ω, and y'' = g·ω² + h·α.
     for j, y in enumerate(exact):
         kappa[j, 1] += abs(float(y[1]))
     still = _coefficients(reference.solve(phi, 0.0, precision))
     for j, y in enumerate(still):
         kappa[j, 2] += 2 * abs(float(y[2]))
-    # Half of the acceleration is what the rate makes of itself: as α is, it counts twice.
+    # The part g·ω² of an acceleration, which remains where α is 0, counts twice.
     still_motion = reference.solve(phi, 0.0, precision).motion
-    for i, handed in enumerate(found):
-        if handed.what in {'turn', 'slide'} and handed.power:
+    for i, handed in enumerate(passed):
+        if handed.quantity in {'turn', 'slide'} and handed.power:
             of = base.motion if handed.power == 1 else still_motion
             conditions[i] += handed.power * abs(_value(of, handed))
-    for i, handed in enumerate(found):
+    for i, handed in enumerate(passed):
         amount = step * arb(_size(base.motion, handed) + conditions[i])
         changed = Reference(reference.mechanism, numbers, (handed, amount))
         add(changed.solve(phi, alpha, precision))
     kappa += _published(reference, [base.motion])[0]
     if ties is reference.mechanism.ties:
-        # What hangs together may not move at all: κ would be 0, but terms as great as the
-        # crank's own rate and acceleration are rounded to come to that.
+        # A joint of such a linkage may not move at all. Its κ would be 0, but its terms are as
+        # large as the crank's rate and acceleration, and are rounded.
         kappa[:, 1:] = np.maximum(kappa[:, 1:], (1.0, max(1.0, abs(alpha))))
     return kappa * FACTORIALS
 
@@ -309,18 +311,20 @@ def _coefficients(truth: Truth) -> list[list[Any]]:
 
 
 def _opening(reference: Reference, phi: float) -> float:
-    """Return the angle that the first dyad sees where it is a sum, and rounded; else 0."""
+    """Return the angle that the first dyad uses if it is a rounded sum; otherwise 0."""
     opening = reference.mechanism.opening()
     return remainder(phi + opening, 2 * pi) if opening else 0.0
 
 
 def _published(reference: Reference, motions: list[Motion]) -> Array:
-    """Return the sizes of what published joints are differences of, [case, joint, power]."""
+    """Return the absolute terms of the published joints, summed, [case, joint, power]."""
     sizes = np.zeros((len(motions), len(reference.mechanism.joints), 3))
     for j, joint in enumerate(reference.mechanism.joints.values()):
         if isinstance(joint, Turn):
             for link in {joint.child, joint.parent} - {GROUND}:
-                sizes[:, j] += turn_sizes(np.array([series(m.shown[link]) for m in motions]).T).T
+                sizes[:, j] += turn_sizes(
+                    np.array([series(m.unchanged[link]) for m in motions]).T
+                ).T
             sizes[:, j, 0] = pi
         else:
             sizes[:, j] = np.abs([series(m.slide[joint]) for m in motions])
@@ -331,36 +335,36 @@ def _place(motion: Motion, owner: str | Spot) -> Any:
     return motion.at(owner) if isinstance(owner, Spot) else motion.held[owner]
 
 
-def _size(motion: Motion, handed: Handed) -> float:
-    """Return the size of what a dyad hands on."""
-    if handed.what == 'turn' and not handed.power:
+def _size(motion: Motion, handed: PassedResult) -> float:
+    """Return the absolute value of a passed result."""
+    if handed.quantity == 'turn' and not handed.power:
         return pi
     return abs(_value(motion, handed))
 
 
-def _value(motion: Motion, handed: Handed) -> float:
-    owner, what, power = handed
-    if what == 'turn':
-        return float(turn_values(np.array([series(motion.shown[owner])]).T)[power, 0])
-    if what == 'slide':
+def _value(motion: Motion, handed: PassedResult) -> float:
+    owner, quantity, power = handed
+    if quantity == 'turn':
+        return float(turn_values(np.array([series(motion.unchanged[owner])]).T)[power, 0])
+    if quantity == 'slide':
         return series(motion.slide[owner])[power].real
     place = series(_place(motion, owner))[power]
-    return place.real if what == 'x' else place.imag
+    return place.real if quantity == 'x' else place.imag
 
 
-def _change(motion: Motion, changed: Motion, handed: Handed) -> Any:
-    """Return by how much an angle or a slide is another one; of pins only their size counts."""
-    owner, what, power = handed
-    if what == 'turn':
-        return imag(changed.shown[owner] * conjugate(motion.shown[owner]))[power]
-    if what == 'slide':
+def _change(motion: Motion, changed: Motion, handed: PassedResult) -> Any:
+    """Return the change of an angle or a slide; 0 for a pin, which counts with its size."""
+    owner, quantity, power = handed
+    if quantity == 'turn':
+        return imag(changed.unchanged[owner] * conjugate(motion.unchanged[owner]))[power]
+    if quantity == 'slide':
         return (changed.slide[owner] - motion.slide[owner])[power]
     return 0
 
 
 UNIT_ROUNDOFF = 2.0**-53
 TOLERANCE = 16.0 * UNIT_ROUNDOFF
-"""As a part of all lengths, and of the condition number of what the links reach too far."""
+"""Relative to the sum of all lengths and the condition number of the distance to a toggle."""
 
 _LIMIT_PRECISION = 1024
 _LIMIT_STEP = 300
@@ -368,17 +372,17 @@ _LIMIT_STEP = 300
 
 def is_at_limit(reference: Reference, phi: float) -> bool:
     """
-    Return whether a dyad is within the tolerance of a toggle, or of lines that are parallel.
+    Return whether a dyad is within the tolerance of a toggle, or of parallel lines.
 
-    What a dyad may reach farther is a length y(x) of the numbers x; the inputs' rounding changes
-    it by u·Σ|xᵢ ∂y/∂xᵢ|, which for a dyad at the end of a chain may be much more than u times all
+    The distance to a toggle is a length y(x) of the numbers x. Rounding the inputs changes it by
+    u·Σ|xᵢ ∂y/∂xᵢ|. For a dyad at the end of a chain this may be much more than u times all
     lengths.
     """
     return any(abs(margin) <= tolerance for margin, tolerance in margins(reference, phi))
 
 
 def margins(reference: Reference, phi: float) -> list[tuple[float, float]]:
-    """Return for each dyad, up to the first that is open, its margin and the tolerance of it."""
+    """Return the margin of each dyad up to the first open one, and its tolerance."""
     base = _margins(reference, arb(phi))
     step = arb(2) ** -_LIMIT_STEP
     numbers = reference.numbers

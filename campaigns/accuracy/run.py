@@ -17,7 +17,7 @@
 The work of the campaign, in parts that any number of processes share.
 
 Each linkage has a random generator of its own, seeded by the campaign's seed, its family and its
-number: the result does not depend on how the work was shared, and any linkage can be made again.
+number. So the result does not depend on how the work is shared, and any linkage can be made again.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import ceil
 import random
-from typing import NamedTuple
 
 from campaigns.accuracy.adversarial import ADVERSARIAL
 from campaigns.accuracy.judge import Findings, judge, QUANTITIES, Tally
@@ -39,21 +38,12 @@ from campaigns.accuracy.reference import (
     Reference,
     UNIT_ROUNDOFF,
 )
-from campaigns.campaign import results_of
+from campaigns.campaign import Part, parts_of, tallies_of
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
 
 _PART = 20
-"""Linkages that a process is given at a time: about a tenth of a second's work."""
-
-
-class Part(NamedTuple):
-    """Some linkages of a family, or the rest of them until there are cases enough."""
-
-    seed: int
-    family: str
-    first: int
-    size: int
+"""Number of linkages in a part: about a tenth of a second's work."""
 
 
 def make(seed: int, family: str, index: int) -> tuple[Mechanism, list[float], list[float]]:
@@ -70,26 +60,22 @@ def examine(seed: int, family: str, index: int) -> Findings:
 
 
 def parts(cases: int, adversarial: int, seed: int) -> list[Part]:
-    """Return the work for at least as many cases."""
+    """Return the work for at least so many random and so many adversarial cases."""
     shares = sum(share for share, _ in RANDOM.values())
     wanted = {
         family: ceil(cases * share / shares / ANGLES) for family, (share, _) in RANDOM.items()
     }
     for family in ADVERSARIAL:
-        # As many linkages as it takes by the number of angles that its first one has.
+        # All linkages of a family have as many angles as its first one.
         angles = len(make(seed, family, 0)[1])
         wanted[family] = ceil(adversarial / len(ADVERSARIAL) / angles)
-    return [
-        Part(seed, family, first, min(_PART, count - first))
-        for family, count in wanted.items()
-        for first in range(0, count, _PART)
-    ]
+    return parts_of(seed, wanted, _PART)
 
 
 def do(part: Part) -> tuple[Part, Tally]:
     """Do one part."""
     tally = Tally()
-    for index in range(part.first, part.first + part.size):
+    for index in part.numbers:
         tally.add(index, examine(part.seed, part.family, index))
     return part, tally
 
@@ -97,24 +83,10 @@ def do(part: Part) -> tuple[Part, Tally]:
 def run(
     work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, Tally]:
-    """
-    Run all parts and return the findings by family.
-
-    Parameters
-    ----------
-    work
-        The parts.
-    jobs
-        Number of processes; 1 runs in this one.
-    progress
-        Called with the number of linkages of each part that is done.
-
-    """
-    tallies = {family: Tally() for family in (*RANDOM, *ADVERSARIAL)}
-    for part, tally in results_of(do, work, jobs):
-        tallies[part.family].merge(tally)
-        progress(part.size)
-    return {family: tally for family, tally in tallies.items() if tally.counts}
+    """Run all parts as `tallies_of` does, and return the tally of each family with cases."""
+    tallies = tallies_of(do, work, jobs, Tally, progress)
+    families = ((family, tallies.get(('', family))) for family in (*RANDOM, *ADVERSARIAL))
+    return {family: tally for family, tally in families if tally and tally.counts}
 
 
 def show_case(seed: int, family: str, place: str) -> None:
@@ -143,9 +115,7 @@ def _show_angle(reference: Reference, phi: float, alpha: float) -> None:
     for dyad, (margin, tolerance) in zip(
         reference.mechanism.dyads, margins(reference, phi), strict=False
     ):
-        print(
-            f'{type(dyad).__name__}: reaches {margin:.3g} farther than it must (± {tolerance:.1g})'
-        )
+        print(f'{type(dyad).__name__}: margin to the next toggle {margin:.3g} (± {tolerance:.1g})')
     found: list[tuple[float, ...]] = []
     try:
         closure = Closure(reference.mechanism.linkage())

@@ -13,4 +13,4 @@
 # limitations under the License.
 
 
-"""Hostile input: files, bags, messages and calls, drawn at random."""
+"""Hostile input: random files, bags, messages, calls and signals."""

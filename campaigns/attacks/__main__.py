@@ -13,14 +13,13 @@
 # limitations under the License.
 
 """
-``python -m campaigns.attacks``: what comes from elsewhere, changed at random, through everything.
+``python -m campaigns.attacks``: random hostile input to everything that takes input.
 
-Nothing shows a traceback, hangs, fills the memory, or says more than a screen.
+No input may cause a traceback, a hang, unlimited memory, or more than a screen of output.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from datetime import datetime
 from functools import partial
@@ -28,64 +27,62 @@ from pathlib import Path
 import sys
 import time
 
-from bench.report import machine_table, say, show, Table, write_page
+from bench.report import machine_table, say, Table
 from campaigns.attacks import bags, files, graph, signals
+from campaigns.campaign import exit_code, Page, parser_of, publish
 
-PAGE = Path('docs/recordings/attacks.md')
-
-INTRO = """\
-Made by `make attacks`. All linkages and scenes that come with the package, URDFs made of them, and
-tables are changed at random: numbers by zeros, by the smallest and the greatest there are, by what
-is none; keys and values by others, by other types and by words that mean something elsewhere;
-lines left out, doubled and moved; bits flipped; files cut, and encoded otherwise. Each goes
-through a command that takes such a file, which has to end in time and within 4 GiB of addresses:
-with what it was asked for, or with exit code 2 and one line of at most 1,000 letters, without a
-warning of a library. `linkage scene` may say several things that are wrong, a line each. Bags have
-bits flipped, records taken out, doubled and moved, lengths and texts replaced, and go through the
-commands that look at one, likewise. Signals come to commands at random instants: the command ends
-with exit code 1 and a line, and leaves no file but what it was asked for. A node gets floods of
-messages, good and bad, small and of megabytes, and storms of calls: it goes on, and accounts for
-every message. Whatever else happens is a finding.
-"""
+PAGE = Page(
+    Path('docs/recordings/attacks.md'),
+    'Attacks',
+    """
+Made by `make attacks`. The linkages and scenes that come with the package, URDFs made from them,
+and tables are changed at random. Numbers are replaced by zeros, by the smallest and greatest
+floats, and by texts that are no numbers; keys and values by other keys and values, by other types
+and by words with a special meaning. Lines are removed, doubled and moved, bits are flipped, and
+files are truncated and encoded otherwise. Each file goes to a command that takes such a file. The
+command has to end within a time limit and 4 GiB of address space: with its result, or with exit
+code 2 and one line of at most 1,000 characters, and without a warning from a library. `linkage
+scene` may report several errors, one in a line. In bags, bits are flipped, records are removed,
+doubled and moved, and lengths and texts are replaced; the commands that read bags are run on them,
+with the same requirements. Signals are sent to commands at random instants: the command has to
+end with exit code 1 and one line, and to leave no file but its result. A node gets floods of valid
+and invalid messages, small ones and megabytes, and many calls at once: it has to go on, and to
+account for every message. Any other outcome is a finding.
+""",
+)
 
 _Attack = Callable[[], tuple[dict[str, int], list[str]]]
 
 
 def main() -> int:
-    """Attack; 1 where anything is found."""
-    parser = argparse.ArgumentParser('python -m campaigns.attacks', description=__doc__)
+    """Attack; return 1 if there are findings."""
+    parser = parser_of('attacks', __doc__, page=PAGE)
     parser.add_argument('--files', type=int, default=3000, help='changed files')
     parser.add_argument('--signals', type=int, default=60, help='commands that get a signal')
     parser.add_argument('--bags', type=int, default=300, help='hostile bags')
-    parser.add_argument('--seconds', type=float, default=60.0, help='of storms on the graph')
-    parser.add_argument('--jobs', type=int, default=2, help='processes that share the files')
-    parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--write', action='store_true', help=f'keep the outcome in {PAGE}')
-    given = parser.parse_args()
-    began, begin = time.monotonic(), datetime.now().astimezone()
+    parser.add_argument('--seconds', type=float, default=60.0, help='duration on the graph')
+    options = parser.parse_args()
+    started, begin = time.monotonic(), datetime.now().astimezone()
     attacks: dict[str, _Attack] = {
-        'Files': partial(files.attack, given.files, given.seed, given.jobs),
-        'Bags': partial(bags.attack, given.bags, given.seed, given.jobs),
-        'Signals': partial(signals.attack, given.signals, given.seed),
-        'Graph': partial(graph.attack, given.seconds, given.seed),
+        'Files': partial(files.attack, options.files, options.seed, options.jobs),
+        'Bags': partial(bags.attack, options.bags, options.seed, options.jobs),
+        'Signals': partial(signals.attack, options.signals, options.seed),
+        'Graph': partial(graph.attack, options.seconds, options.seed),
     }
-    tables, all_found = [], []
+    tables, any_findings = [], False
     for name, attack in attacks.items():
         tried, findings = attack()
         table = Table(f'{name}: {sum(tried.values()):,} tried, {len(findings)} findings', ('', ''))
-        table.rows.extend((how, f'{count:,}') for how, count in tried.items())
+        table.rows.extend((end, f'{count:,}') for end, count in tried.items())
         tables.append(table)
-        all_found += findings
+        any_findings |= bool(findings)
         for finding in findings:
             say(finding)
-    seconds = time.monotonic() - began
-    tables.append(machine_table(begin, ('seed', str(given.seed)), ('took', f'{seconds:.0f} s')))
-    for table in tables:
-        show(table)
-    if given.write:
-        write_page(PAGE, 'Attacks', INTRO, tables)
-    return int(bool(all_found))
+    took = f'{time.monotonic() - started:.0f} s'
+    tables.append(machine_table(begin, ('seed', str(options.seed)), ('took', took)))
+    publish(tables, PAGE if options.write else None)
+    return int(any_findings)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(exit_code(main))

@@ -14,12 +14,12 @@
 
 
 """
-Bags that are changed at random, through the commands that read one.
+Run the commands that read bags on randomly changed bags.
 
-Bits are flipped, files cut, records removed, doubled, moved and put into other bags, lengths and
-numbers replaced; mostly without checksums, which would reveal the change at once. The texts that a
-bag carries are changed too, with correct checksums. A command has to end in time and within
-memory, with the remaining content or with one line. Any other outcome is a finding.
+Bits are flipped, files truncated, records removed, doubled and moved, lengths and numbers
+replaced. Most checksums are removed, since they would reveal the change at once. The attachments
+of a bag are changed too, with correct checksums. A command has to end within the limits of time
+and memory, with the remaining content or with one line. Any other outcome is a finding.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from pathlib import Path
 from random import Random
 from struct import Struct
 
-from campaigns.campaign import tried_in_parts
-from campaigns.damage.run import KINDS, make
+from campaigns.campaign import attack_in_parts
+from campaigns.damage import KINDS, make
 from campaigns.in_process import confined, Ended, in_process
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reader import RUN_FILE
@@ -50,17 +50,17 @@ COMMANDS = {
     'export': ['-o', 'x.csv'],
     'plot': ['-o', 'x.png'],
 }
-"""Commands to try on each bag, with the arguments after its name."""
+"""Commands to run on each bag, with the arguments after its name."""
 
 _PART = 10
-"""Bags that a process takes."""
+"""Number of bags in a part."""
 
 _SECONDS = 60
-"""A command that takes longer has not ended. The slowest takes one, of a shared processor."""
+"""Time limit of a command, in [s]; on a shared processor the slowest takes one second."""
 
 _LONGEST_LINE = 7000
 _LINES = 4
-"""So many may go to standard error of a command that has told something."""
+"""Maximum number of lines on standard error of a successful command."""
 
 _SIZE = 12_000
 _BEGIN = 1_700_000_000_000_000_000
@@ -83,27 +83,8 @@ _AT_CHECKSUM = {Opcode.CHUNK: 33, Opcode.DATA_END: 9, Opcode.FOOTER: 25}
 
 
 def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[str]]:
-    """
-    Try commands on bags.
-
-    Parameters
-    ----------
-    count
-        Number of bags.
-    seed
-        Another seed changes them otherwise.
-    jobs
-        Number of processes that share them.
-
-    Returns
-    -------
-    tried : dict
-        By command and how it ended how often it did.
-    findings : list
-        The violations, one line each.
-
-    """
-    return tried_in_parts(_part, count, seed, _PART, jobs)
+    """Run the commands on a number of changed bags; return what `attack_in_parts` returns."""
+    return attack_in_parts(_part, count, seed, _PART, jobs)
 
 
 def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
@@ -112,39 +93,39 @@ def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
     with confined():
         for number in range(begin, end):
             Path('bag').mkdir()
-            done = changed(Path('bag'), Random(f'{seed} {number}'))
-            for command, typed in COMMANDS.items():
-                ended = in_process([command, 'bag', *typed], _SECONDS)
+            changes = change_bag(Path('bag'), Random(f'{seed} {number}'))
+            for command, arguments in COMMANDS.items():
+                ended = in_process([command, 'bag', *arguments], _SECONDS)
                 tried[f'{command}: {ended.code}'] += 1
-                if wrong := judged(ended):
-                    findings.append(f'bag {seed} {number}: {done}: {command}: {wrong}')
+                if fault := fault_of(ended):
+                    findings.append(f'bag {seed} {number}: {changes}: {command}: {fault}')
             for file in Path('bag').iterdir():
                 file.unlink()
             Path('bag').rmdir()
     return tried, findings
 
 
-def judged(ended: Ended) -> str:
-    """Return the fault of an end, in a line; None if it is correct."""
-    code, said, out = ended
+def fault_of(ended: Ended) -> str:
+    """Return the fault of an end, in a line; '' if it is correct."""
+    code, errors, out = ended
     # A missing end is reported in addition to other damage.
-    lines = [line for line in said.splitlines() if ': unfinished: ' not in line]
-    wrong = ''
+    lines = [line for line in errors.splitlines() if ': unfinished: ' not in line]
+    fault = ''
     if code not in (0, 1, 2):
-        wrong = f'{code}: {said.strip()}'
+        fault = f'{code}: {errors.strip()}'
     elif len(lines) > (1 if code == 2 else _LINES) or (code == 2 and not lines):
-        wrong = f'{len(lines)} lines: {said.strip()}'
+        fault = f'{len(lines)} lines: {errors.strip()}'
     elif not all(line.isprintable() for line in (*lines, *out.split('\n'))):
-        wrong = 'a line that is not printable'
+        fault = 'a line that is not printable'
     elif any(len(line) > _LONGEST_LINE for line in lines):
-        wrong = f'a line of {max(map(len, lines))} letters'
+        fault = f'a line of {max(map(len, lines))} characters'
     elif code == 0 and not out:
-        wrong = 'nothing is told'
-    return wrong[:300]
+        fault = 'no output'
+    return fault[:300]
 
 
-def changed(folder: Path, random: Random) -> str:
-    """Make a bag in an empty folder and change it; return in words what was done."""
+def change_bag(folder: Path, random: Random) -> str:
+    """Make a bag in an empty folder and change it; return the description of the changes."""
     kind = random.choice((*['of a scene'] * 6, *KINDS))
     texts = {RUN_FILE: b'', SCENE_FILE: _SCENE, LINKAGE_FILE: _LINKAGE}
     if kind != 'of a scene':
@@ -181,7 +162,7 @@ def changed(folder: Path, random: Random) -> str:
 
 
 def _record(folder: Path, edit: Callable[[str, bytes], bytes], random: Random) -> None:
-    """Record a short run; what its bag says of it is edited before."""
+    """Record a short run, with edited attachments."""
     files = {SCENE_FILE: _SCENE, LINKAGE_FILE: _LINKAGE}
     pipeline = Pipeline(parse_scene('attacked', 'here', files))
     run = {
@@ -213,7 +194,7 @@ def _record(folder: Path, edit: Callable[[str, bytes], bytes], random: Random) -
 
 
 def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield kind, beginning and end of each record, as far as they are whole."""
+    """Yield kind, begin and end of each record, up to the first broken one."""
     at = len(MCAP0_MAGIC)
     while at + _HEAD.size <= len(content) - len(MCAP0_MAGIC):
         kind, length = _HEAD.unpack_from(content, at)
@@ -225,27 +206,27 @@ def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def _without_checksums(content: bytes) -> bytes:
-    """Return a file in which no checksum tells that something has changed."""
+    """Return a file without checksums, which would reveal a change."""
     changed = bytearray(content)
     for kind, at, end in _records(content):
         place = end - 4 if kind == Opcode.ATTACHMENT else at + _AT_CHECKSUM.get(kind, 0)
         if place > at and place + 4 <= end:
             changed[place : place + 4] = bytes(4)
-    # Where a record is broken the walk ends before it comes to the footer.
+    # Behind a broken record the footer has not been reached.
     if len(changed) > _FOOTER:
         changed[-12:-8] = bytes(4)
     return bytes(changed)
 
 
 def _without_index(content: bytes) -> bytes:
-    """Return a file whose footer names no index, so that all before it is looked at."""
+    """Return a file whose footer names no index, so that the whole file is read."""
     return content[:-28] + bytes(20) + content[-8:] if len(content) > _FOOTER else content
 
 
 def _some(content: bytes, random: Random) -> tuple[int, int]:
-    """Return beginning and end of some record, or of a few bytes where there is none."""
-    found = [(at, end) for _, at, end in _records(content)]
-    return random.choice(found) if found else (0, min(8, len(content)))
+    """Return begin and end of a random record, or of a few bytes if there is none."""
+    records = [(at, end) for _, at, end in _records(content)]
+    return random.choice(records) if records else (0, min(8, len(content)))
 
 
 def _flipped(content: bytes, random: Random) -> bytes:
@@ -260,13 +241,13 @@ def _cut(content: bytes, random: Random) -> bytes:
 
 
 def _spliced(content: bytes, random: Random) -> bytes:
-    """Put a record, or several, where another begins."""
+    """Insert copies of a record before another one."""
     begin, end = _some(content, random)
     place, _ = _some(content, random)
     return content[:place] + content[begin:end] * random.choice((1, 1, 100)) + content[place:]
 
 
-def _taken_out(content: bytes, random: Random) -> bytes:
+def _removed(content: bytes, random: Random) -> bytes:
     begin, end = _some(content, random)
     return content[:begin] + content[end:]
 
@@ -285,7 +266,7 @@ def _another_kind(content: bytes, random: Random) -> bytes:
 
 
 def _extreme(content: bytes, random: Random) -> bytes:
-    """Replace a number in a record, or its length, by one at the end of its range."""
+    """Replace a number in a record, or its length, by an extreme one."""
     begin, end = _some(content, random)
     size = random.choice((2, 4, 8))
     place = random.randrange(begin, max(begin + 1, min(end, begin + 120)))
@@ -299,13 +280,13 @@ def _zeros(content: bytes, random: Random) -> bytes:
 
 
 _CHANGES: tuple[Callable[[bytes, Random], bytes], ...] = (
-    *(_flipped, _cut, _spliced, _taken_out, _swapped_lengths, _another_kind, _extreme, _extreme),
+    *(_flipped, _cut, _spliced, _removed, _swapped_lengths, _another_kind, _extreme, _extreme),
     _zeros,
 )
 
 
 def _edited(text: bytes, random: Random) -> bytes:
-    """Return a text with a part of it replaced, doubled or taken out."""
+    """Return a text with a part of it replaced, repeated or removed."""
     begin, end = sorted(random.randrange(len(text) + 1) for _ in range(2))
     end = min(end, begin + random.choice((1, 8, 40)))
     word = random.choice((*_WORDS, text[begin:end] * 3))

@@ -14,10 +14,10 @@
 
 
 """
-Files that are changed at random, through every command that takes one.
+Run every command that takes a file on randomly changed files.
 
-Each has to end in time and within memory: with its result, or with exit code 2 and a line that is
-no longer than a screen. Any other outcome is a finding.
+A command has to end within the limits of time and memory: with its result, or with exit code 2 and
+a line that is no longer than a screen. Any other outcome is a finding.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ import sys
 from typing import Any
 import warnings
 
-from campaigns.campaign import tried_in_parts
+from campaigns.campaign import attack_in_parts
 from campaigns.in_process import confined, in_process
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
@@ -68,12 +68,12 @@ _BYTES = (
 
 def mutated(data: bytes, rng: random.Random) -> tuple[str, bytes]:
     """Return a description of the changes, and a file with one or a few of them."""
-    done = []
+    changes = []
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         change = rng.choice(_CHANGES)
-        done.append(change.__name__.strip('_'))
+        changes.append(change.__name__.strip('_'))
         data = change(data, rng)
-    return ', '.join(done), data
+    return ', '.join(changes), data
 
 
 def _number(data: bytes, rng: random.Random) -> bytes:
@@ -81,7 +81,7 @@ def _number(data: bytes, rng: random.Random) -> bytes:
 
 
 def _near_number(data: bytes, rng: random.Random) -> bytes:
-    """Replace a number by another of the file, or by one that is next to itself."""
+    """Replace a number by another number of the file, or by one near it."""
     numbers = _NUMBER.findall(data) or [b'0']
     value = float(rng.choice(numbers))
     near = rng.choice((value, -value, value * (1.0 + 2e-16), value + 1e-9, value * 1e-6, 0.0))
@@ -97,13 +97,13 @@ def _list(data: bytes, rng: random.Random) -> bytes:
 
 
 def _name(data: bytes, rng: random.Random) -> bytes:
-    """Replace a name by another of the file, or by something else."""
+    """Replace a name by another name of the file, or by something else."""
     names = _NAME.findall(data) or [b'x']
     return _replaced(_NAME, data, rng, rng.choice((*rng.sample(names, 1), *_OTHERS)))
 
 
 def _line(data: bytes, rng: random.Random) -> bytes:
-    """Leave a line out, write it twice, move it, or push it in."""
+    """Remove, double, move or indent a line."""
     lines = data.splitlines(keepends=True) or [b'']
     i, j = rng.randrange(len(lines)), rng.randrange(len(lines))
     match rng.randrange(4):
@@ -119,7 +119,7 @@ def _line(data: bytes, rng: random.Random) -> bytes:
 
 
 def _bytes(data: bytes, rng: random.Random) -> bytes:
-    """Flip a bit, or put something in."""
+    """Flip a bit, or insert something."""
     place = rng.randrange(len(data) + 1)
     if rng.random() < 0.5 and place < len(data):
         return data[:place] + bytes([data[place] ^ 1 << rng.randrange(8)]) + data[place + 1 :]
@@ -127,7 +127,7 @@ def _bytes(data: bytes, rng: random.Random) -> bytes:
 
 
 def _whole(data: bytes, rng: random.Random) -> bytes:
-    """Do something to all of it: cut it, repeat it, encode it otherwise."""
+    """Change the whole file: truncate, repeat or encode it."""
     match rng.randrange(7):
         case 0:
             return data[: rng.randrange(len(data) + 1)]
@@ -152,7 +152,7 @@ _CHANGES: tuple[Callable[[bytes, random.Random], bytes], ...] = (
 
 
 def _replaced(pattern: re.Pattern[bytes], data: bytes, rng: random.Random, by: bytes) -> bytes:
-    places = [found.span() for found in pattern.finditer(data)]
+    places = [match.span() for match in pattern.finditer(data)]
     if not places:
         return data
     start, end = rng.choice(places)
@@ -160,15 +160,15 @@ def _replaced(pattern: re.Pattern[bytes], data: bytes, rng: random.Random, by: b
 
 
 _PART = 50
-"""Files that a process takes before it tells."""
+"""Number of files in a part."""
 
 _SECONDS = 60.0
-"""A command that takes longer has not ended. The slowest takes seconds, of a shared processor."""
+"""Time limit of a command, in [s]; on a shared processor the slowest takes seconds."""
 
 _LONGEST_LINE = 1000
 
 _BESIDE = 'left out: ', 'accuracy of '
-"""What is said beside an answer: what an import leaves out, and how far a measurement is."""
+"""Begin of lines beside a result: omissions of an import, progress of a measurement."""
 
 _NODE = {
     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF',
@@ -181,6 +181,7 @@ COMMANDS = {
     'check': [_FILE],
     'solve': [_FILE, '--steps', '8', '--rate', '1', '--points'],
     'draw': [_FILE, '-o', 'x.svg'],
+    'animate': [_FILE, '-o', 'x.gif', '--seconds', '0.2'],
     'compile': [_FILE, '-o', 'x.c'],
     'urdf': [_FILE],
     'mjcf': [_FILE],
@@ -200,27 +201,8 @@ _TABLES = {
 
 
 def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[str]]:
-    """
-    Try files.
-
-    Parameters
-    ----------
-    count
-        How many.
-    seed
-        Another seed changes them otherwise.
-    jobs
-        Number of processes that share them.
-
-    Returns
-    -------
-    tried : dict
-        By command and how it ended how often it did.
-    findings : list
-        The violations, one line each.
-
-    """
-    return tried_in_parts(_part, count, seed, _PART, jobs)
+    """Run commands on a number of changed files; return what `attack_in_parts` returns."""
+    return attack_in_parts(_part, count, seed, _PART, jobs)
 
 
 def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
@@ -230,19 +212,19 @@ def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
         warnings.simplefilter('default')
         originals = _originals(folder)
         for number in range(begin, end):
-            how, finding = _try(originals, f'{seed} {number}')
-            tried[how] += 1
+            outcome, finding = _try(originals, f'{seed} {number}')
+            tried[outcome] += 1
             if finding:
                 findings.append(f'file {seed} {number}: {finding}')
     return tried, findings
 
 
 def _originals(folder: Path) -> dict[str, dict[str, bytes]]:
-    """Return whole files by their kind and name, and lay the linkages beside the scenes."""
+    """Return unchanged files by kind and name, and link the linkages beside the scenes."""
     linkages = shipped('linkages/four_bar.yaml').parent
     (folder / 'linkages').symlink_to(linkages)
     (folder / 'scenes').mkdir()
-    found: dict[str, dict[str, bytes]] = {
+    originals: dict[str, dict[str, bytes]] = {
         'linkage': {file.name: file.read_bytes() for file in sorted(linkages.glob('*.yaml'))},
         'scene': {
             file.name: file.read_bytes()
@@ -253,13 +235,13 @@ def _originals(folder: Path) -> dict[str, dict[str, bytes]]:
     }
     for name in ('four_bar', 'slider_crank', 'watt_1'):
         in_process(['urdf', f'linkages/{name}.yaml', '-o', f'{name}.urdf'], _SECONDS)
-        found['urdf'][name] = Path(f'{name}.urdf').read_bytes()
-    _record(found['linkage'])
-    return found
+        originals['urdf'][name] = Path(f'{name}.urdf').read_bytes()
+    _record(originals['linkage'])
+    return originals
 
 
 def _record(linkages: Mapping[str, bytes]) -> None:
-    """Record samples of the inputs of all linkages, for the scenes that are replayed over them."""
+    """Record samples of the inputs of all linkages, for `linkage replay` with a changed scene."""
     inputs = {
         driven.joint: None
         for name, content in linkages.items()
@@ -276,11 +258,11 @@ def _record(linkages: Mapping[str, bytes]) -> None:
 
 
 def _try(originals: dict[str, dict[str, bytes]], seed: str) -> tuple[str, str]:
-    """Try a file; return the command, its end, and the violations."""
+    """Try a file; return the command with its end, and the violation."""
     rng = random.Random(seed)
     kind = rng.choice(('linkage', 'linkage', 'linkage', 'scene', 'scene', 'urdf', 'table'))
     name = rng.choice(sorted(originals[kind]))
-    done, data = mutated(originals[kind][name], rng)
+    changes, data = mutated(originals[kind][name], rng)
     Path(_FILE).write_bytes(data)
     match kind:
         case 'linkage' | 'scene':
@@ -291,15 +273,15 @@ def _try(originals: dict[str, dict[str, bytes]], seed: str) -> tuple[str, str]:
         case _:
             command, arguments = 'synthesize', ['synthesize', f'--{name}', _FILE]
             arguments += ['--candidates', '200']
-    code, said = _node(arguments) if command == 'run' else in_process(arguments, _SECONDS)[:2]
+    code, errors = _node(arguments) if command == 'run' else in_process(arguments, _SECONDS)[:2]
     for folder in ('page', 'runs'):
         rmtree(folder, ignore_errors=True)
-    wrong = judged(command, code, said)
-    return f'{command}: {code}', wrong and f'{name}: {done}: {" ".join(arguments)}: {wrong}'
+    fault = fault_of(command, code, errors)
+    return f'{command}: {code}', fault and f'{name}: {changes}: {" ".join(arguments)}: {fault}'
 
 
 def _node(arguments: list[str]) -> tuple[Any, str]:
-    """Run a command that starts a node, in a process of its own; return its end as `judged`."""
+    """Run a command that starts a node in a process of its own; return exit code and errors."""
     try:
         ended = subprocess.run(
             [sys.executable, '-m', 'linkage_ros.cli.main', *arguments],
@@ -312,22 +294,22 @@ def _node(arguments: list[str]) -> tuple[Any, str]:
         )
     except subprocess.TimeoutExpired:
         return 'no end', f'more than {_SECONDS} s'
-    # Log lines of the node are no answer.
+    # Leave out the log lines of the node.
     lines = [line for line in ended.stderr.splitlines() if not line.startswith(('INFO', 'WARN'))]
     return ended.returncode, '\n'.join(lines)
 
 
-def judged(command: str, code: Any, said: str) -> str:
-    """Return the fault of an end, in a line; None if it is correct."""
-    lines = [line for line in said.splitlines() if not line.startswith(_BESIDE)]
+def fault_of(command: str, code: Any, errors: str) -> str:
+    """Return the fault of an end, in a line; '' if it is correct."""
+    lines = [line for line in errors.splitlines() if not line.startswith(_BESIDE)]
     if command == 'replay' and code == 0:
         lines = [line for line in lines if not line.startswith('linkage replay: ')]
     if code == 0 or (command, code) == ('synthesize', 1):
-        return f'said {lines[0][:200]}' if lines else ''
+        return f'unexpected line: {lines[0][:200]}' if lines else ''
     if code != 2:
-        return f'{code}: {said.strip()[:300]}'
+        return f'{code}: {errors.strip()[:300]}'
     longest = max(map(len, lines), default=0)
     # With jsonschema, all errors of a scene are reported.
     if not lines or (len(lines) > 1 and command != 'scene'):
-        return f'{len(lines)} lines: {said.strip()[:300]}'
-    return f'a line of {longest} letters: {said[:100]}' if longest > _LONGEST_LINE else ''
+        return f'{len(lines)} lines: {errors.strip()[:300]}'
+    return f'a line of {longest} characters: {errors[:100]}' if longest > _LONGEST_LINE else ''

@@ -14,12 +14,13 @@
 
 
 """
-Floods and storms: a running node, and another that sends it whatever a graph can send.
+Attack a running node with everything that a ROS graph can send.
 
-First come messages as many and as large as possible, then calls of services, parameters and
-transitions in any order. Nothing may end the node, every joint state is the pose of a crank that
-was sent, and every message is accounted for. ``python -m campaigns.attacks.graph`` is the
-attacking node; `attack` starts both, each a process on a graph of its own.
+First come floods of messages, as many and as large as possible, then calls of services, parameters
+and transitions in any order. The node must not end, every joint state has to be the pose of a
+crank angle that was sent, and the node has to account for every message. ``python -m
+campaigns.attacks.graph`` is the attacking node; `attack` starts both nodes as processes on a graph
+of their own.
 """
 
 from __future__ import annotations
@@ -39,9 +40,7 @@ from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import read_yaml
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.files.linkage_file import load
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter
 from linkage_ros.processes import Graph, MeasurementError
 from linkage_ros.resources import shipped
@@ -53,11 +52,13 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
+import rclpy
 from rclpy.node import Node
+from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 SHUTDOWNS = {5, 6, 7}
-"""Transitions that end a node for good; they do what they are asked for."""
+"""Transitions that shut a node down; they are not tried."""
 
 _TRIGGERS = ('reset', 'start_recording', 'stop_recording', 'snapshot')
 _PARAMETERS = (
@@ -69,16 +70,16 @@ _NUMBERS = (nan, inf, -inf, -1.0, 0.0, 0.1, 1.0, 3600.0, 1e308)
 
 class Calls:
     """
-    Makes calls of one node.
+    Calls the services of a node.
 
     Parameters
     ----------
     node
-        Who calls.
+        The calling node.
     name
-        Full name of the node that is called.
+        Full name of the called node.
     random
-        Draws what is asked.
+        Random generator of the requests.
 
     """
 
@@ -102,7 +103,7 @@ class Calls:
         }
 
     def any(self) -> tuple[str, Any]:
-        """Call something; return what, and the future of its answer."""
+        """Call a random service; return its name and the future of its response."""
         random = self._random
         service = random.choice(sorted(self._clients))
         request = self._kinds[service].Request()
@@ -128,8 +129,8 @@ class Calls:
         """Ask for the state."""
         return self._clients['get_state'].call_async(GetState.Request())
 
-    def by_the_machine(self) -> Any:
-        """Ask it to go by the machine's clock again."""
+    def use_system_time(self) -> Any:
+        """Ask the node to use the system clock again."""
         value = ParameterValue(type=1, bool_value=False)
         request = SetParameters.Request(parameters=[Parameter(name='use_sim_time', value=value)])
         return self._clients['set_parameters'].call_async(request)
@@ -147,10 +148,10 @@ class Calls:
 
 
 GOOD, BAD = 0.5, 2.0
-"""The only angle of messages that are good, and that of all others, in [rad]."""
+"""The angle of all valid messages, and of invalid ones, in [rad]."""
 
 LARGEST = 60_000
-"""Joints of the largest messages: 2.8 MB."""
+"""Number of joints of the largest messages, of 2.8 MB."""
 
 _CRANK = 'crank_joint'
 _PATIENCE = 20.0
@@ -176,9 +177,9 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
     Parameters
     ----------
     seconds
-        Total duration of floods and storms, in [s].
+        Total duration, in [s].
     seed
-        Of all that is drawn.
+        Seed of the random generator.
 
     Returns
     -------
@@ -192,7 +193,7 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
         folder = Path(name)
         linkage = shipped('linkages/four_bar.yaml')
         (folder / 'attacked.yaml').write_text(_SCENE.format(linkage=linkage))
-        # Below 102, so that the ports stay below those which the kernel hands out.
+        # Below 102, so that the ports stay below the kernel's ephemeral ones.
         graph = Graph(2 + os.getpid() % 100, folder, longest=round(seconds) + 200)
         node_arguments = (
             *('--ros-args', '-p', f'scene:={folder / "attacked.yaml"}'),
@@ -203,41 +204,41 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
                 with graph.run('campaigns.attacks.graph', (str(seconds), str(seed))) as attacker:
                     outcome = attacker.read(patience=seconds + 8 * _PATIENCE)
                 node.check()
-            # 1: the memory of the last seconds had no room for all of a flood; it says so.
+            # 1: the snapshot memory overflowed in a flood, which the node reports.
             node.check_end(1)
         except MeasurementError as error:
             return {}, [str(error)]
         log = (folder / 'linkage_node.log').read_text(errors='replace')
-    findings = outcome['findings'] + _judged(log, outcome['tried'])
+    findings = outcome['findings'] + _faults_in(log, outcome['tried'])
     return outcome['tried'], findings
 
 
-def _judged(log: str, tried: dict[str, int]) -> list[str]:
-    """Return the faults in a node's output."""
+def _faults_in(log: str, tried: dict[str, int]) -> list[str]:
+    """Return the faults in the node's log."""
     closings = [
-        {key: int(value or 0) for key, value in found.groupdict().items()}
-        for found in _CLOSING.finditer(log)
+        {key: int(value or 0) for key, value in match.groupdict().items()}
+        for match in _CLOSING.finditer(log)
     ]
     findings = [
-        f'counts do not close: {counts}'
+        f'counts do not add up: {counts}'
         for counts in closings
         if counts['received']
         != sum(counts[of] for of in ('used', 'superseded', 'rejected', 'ignored'))
     ]
     if not closings:
-        return ['the node has not said what became of the messages']
-    # Only the first that were sent may have found nobody who would count them.
+        return ['the node has not logged its counts of messages']
+    # Only the first messages may have been sent before the subscription existed.
     sent = tried['messages of the floods']
-    untold = sent - closings[0]['received'] - closings[0]['lost']
-    if not 0 <= untold <= tried['first messages']:
-        findings.append(f'{untold} of {sent} messages are unaccounted for: {closings[0]}')
-    tried |= {f'of these {what}': number for what, number in closings[0].items()}
+    missing = sent - closings[0]['received'] - closings[0]['lost']
+    if not 0 <= missing <= tried['first messages']:
+        findings.append(f'{missing} of {sent} messages are not accounted for: {closings[0]}')
+    tried |= {f'of these {name}': number for name, number in closings[0].items()}
     findings += [line for line in log.splitlines() if 'Traceback' in line or 'has stopped' in line]
     return findings
 
 
 def crank(angle: float, *, joints: int = 1, rate: float = 0.0) -> bytes:
-    """Return a message of the crank and so many joints in all, stamped now, serialized."""
+    """Return a serialized message of the crank with a number of joints, stamped now."""
     names = [_CRANK, *(f'joint_with_a_long_name_{number}' for number in range(1, joints))]
     return JointStateWriter(names).write(time.time_ns(), [angle] * joints, [rate] * joints)
 
@@ -251,8 +252,8 @@ def malformed(random: Random) -> bytes:
         return message[: random.randrange(len(message) - 8)]
     if kind == 1:
         return random.randbytes(int(2.8e6 ** random.random()))
-    if kind == 2:  # a count that promises more than there is
-        at = 20  # behind a frame_id that is empty
+    if kind == 2:  # a count larger than the sequence
+        at = 20  # behind an empty frame_id
         return (
             message[:at]
             + random.randrange(joints + 1, 2**32).to_bytes(4, 'little')
@@ -274,23 +275,18 @@ def malformed(random: Random) -> bytes:
 
 class Attacker:
     """
-    The node that attacks.
+    The attacking node.
 
     Parameters
     ----------
     seconds
         Duration, in [s].
     seed
-        Of all that is drawn.
+        Seed of the random generator.
 
     """
 
     def __init__(self, seconds: float, seed: int) -> None:
-        from campaigns.attacks.graph import Calls  # local import: as above
-        import rclpy  # local import: who judges needs no ROS
-        from rclpy.node import Node  # local import: as above
-        from sensor_msgs.msg import JointState  # local import: as above
-
         rclpy.init()
         self._spin = lambda wait: rclpy.spin_once(self.node, timeout_sec=wait)
         self.node = Node('attacker')
@@ -301,26 +297,26 @@ class Attacker:
         self._publisher = self.node.create_publisher(JointState, 'crank_states', 100)
         self._calls = Calls(self.node, '/linkage_node', self._random)
         self._heard = 0
-        linkage = read_linkage(read_yaml(str(shipped('linkages/four_bar.yaml')))[0])
-        self._reader = JointStateReader(tuple(linkage.joints))
-        self._pose = Closure(linkage).position(GOOD).joints
+        closure = load(shipped('linkages/four_bar.yaml'))
+        self._reader = JointStateReader(closure.joint_names)
+        self._pose = closure.position(GOOD).joints
         self.node.create_subscription(JointState, 'joint_states', self._hear, 100, raw=True)
 
     def run(self) -> None:
-        """Attack, and see that the node is well afterwards."""
+        """Attack, and check that the node still works."""
         self._wait(lambda: self._publisher.get_subscription_count() > 0, 'no node to attack')
-        self._see_it_tick()
+        self._check_ticks()
         self.tried['first messages'] = self.tried['messages']
         self._flood(0.3 * self._seconds, lambda: crank(GOOD))
-        self._flood(0.3 * self._seconds, self._of_any_kind)
-        self._see_it_tick()
+        self._flood(0.3 * self._seconds, self._valid_or_not)
+        self._check_ticks()
         self.tried['messages of the floods'] = self.tried['messages']
         if not self.findings:
-            self._bring_to_work()  # and have it say what became of them
+            self._reactivate()  # the node logs its counts
             self._storm(0.4 * self._seconds)
             self._spin_empty()
-            self._bring_to_work()
-            self._see_it_tick()
+            self._reactivate()
+            self._check_ticks()
 
     def _hear(self, message: bytes) -> None:
         self._heard += 1
@@ -328,7 +324,7 @@ class Attacker:
         angles = getattr(state, 'angles', ())
         off = [a - b for a, b in zip(angles, self._pose, strict=False)]
         if len(angles) != len(self._pose) or any(not abs(each) < 1e-9 for each in off):
-            self.findings.append(f'a joint state of no crank that was sent: {state}'[:200])
+            self.findings.append(f'a joint state that belongs to no crank message: {state}'[:200])
 
     def _send(self, message: bytes) -> None:
         self._publisher.publish(message)
@@ -343,8 +339,8 @@ class Attacker:
                 return
             self._spin(0.01)
 
-    def _see_it_tick(self) -> None:
-        """Send good samples, slowly, until joint states come of ticks that begin now."""
+    def _check_ticks(self) -> None:
+        """Send valid samples slowly until new joint states arrive."""
         time.sleep(0.2)
         self._spin_empty()
         heard = self._heard
@@ -365,14 +361,14 @@ class Attacker:
                 self._send(message)
             self._spin(0.0)
 
-    def _of_any_kind(self) -> bytes:
+    def _valid_or_not(self) -> bytes:
         if self._random.random() < 0.3:
             joints = int(LARGEST ** self._random.random())
             return crank(GOOD, joints=joints)
         return malformed(self._random)
 
     def _storm(self, seconds: float) -> None:
-        """Ask for whatever there is to ask for, in any order, 50 calls at once."""
+        """Call all services in random order, 50 at once."""
         waiting: list[Any] = []
         end = time.monotonic() + seconds
         while time.monotonic() < end:
@@ -380,14 +376,14 @@ class Attacker:
                 name, future = self._calls.any()
                 self.tried[name] += 1
                 waiting.append(future)
-            else:  # some are never answered: rclpy raises for parameters of no type
+            else:  # some get no response: rclpy raises for parameters without a type
                 waiting.pop(0)
             self._send(crank(GOOD))
             self._spin(0.001)
             waiting = [future for future in waiting if not future.done()]
 
-    def _bring_to_work(self) -> None:
-        """Deactivate it, where it is active, and activate it again, from whatever state."""
+    def _reactivate(self) -> None:
+        """Deactivate the node if it is active, and activate it again, from any state."""
         calls = self._calls
 
         def ask(future: Any, finding: str) -> Any:
@@ -396,15 +392,15 @@ class Attacker:
 
         for number in (4, 2, 1, 3):  # deactivate, clean up, configure, activate
             if number == 1:
-                ask(calls.by_the_machine(), 'no answer to a parameter')
+                ask(calls.use_system_time(), 'no answer to a parameter')
             ask(calls.transition(number), f'no answer to transition {number}')
         state = ask(calls.state(), 'no answer to get_state')
         if state is None or state.current_state.label != 'active':
-            self.findings.append(f'cannot be brought to work again: {state}')
+            self.findings.append(f'cannot be activated again: {state}')
 
 
 def main() -> int:
-    """Attack, and tell how it went."""
+    """Attack, and print the outcome."""
     attacker = Attacker(float(sys.argv[1]), int(sys.argv[2]))
     attacker.run()
     print(json.dumps({'findings': attacker.findings[:20], 'tried': attacker.tried}), flush=True)

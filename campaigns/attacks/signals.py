@@ -13,10 +13,11 @@
 # limitations under the License.
 
 """
-Signals at random instants of every command that starts no node: each ends it, or comes too late.
+Send signals at random instants to every command that starts no node.
 
-Once its handlers are installed, a command ends within seconds, with exit code 1 and one line, and
-leaves no file but its result. Before that Python is starting, and no program can react.
+Once its handlers are installed, a command has to end within seconds, with exit code 1 and one
+line, and to leave no file but its result. Before that Python is starting, and no program can
+react. A signal may also come after the command has ended.
 """
 
 from __future__ import annotations
@@ -36,10 +37,10 @@ from linkage_ros.resources import shipped
 
 _SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 _LATEST = 1.5
-"""The last instant at which a signal comes, in [s] from when the handlers are there."""
+"""Latest instant of a signal, in [s] after the handlers are installed."""
 
 _PATIENCE = 30.0
-"""When a process counts as one that does not end, in [s]: others want the processor too."""
+"""Time limit for the end of a process, in [s]; other processes use the processor too."""
 
 _COMMANDS = {
     'check': ['jansen_leg.yaml'],
@@ -57,12 +58,12 @@ _COMMANDS = {
 
 
 def attack(count: int, seed: int) -> tuple[dict[str, int], list[str]]:
-    """Send signals; return the counts of each kind of end, and the violations, one line each."""
+    """Send signals; return the number of each kind of end, and the violations, one line each."""
     tried: Counter[str] = Counter()
     findings = []
     for number in range(count):
-        how, finding = _try(random.Random(f'{seed} {number}'))
-        tried[how] += 1
+        end, finding = _try(random.Random(f'{seed} {number}'))
+        tried[end] += 1
         if finding:
             findings.append(f'signal {seed} {number}: {finding}')
     return dict(sorted(tried.items())), findings
@@ -71,7 +72,7 @@ def attack(count: int, seed: int) -> tuple[dict[str, int], list[str]]:
 def _try(rng: random.Random) -> tuple[str, str]:
     command, sent = rng.choice(sorted(_COMMANDS)), rng.choice(_SIGNALS)
     instant, again = rng.uniform(0.0, _LATEST), rng.random() < 0.3
-    asked = [word for word in _COMMANDS[command] if word.startswith(('x.', 'page'))]
+    results = [word for word in _COMMANDS[command] if word.startswith(('x.', 'page'))]
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / 'jansen_leg.yaml').write_bytes(
             shipped('linkages/jansen_leg.yaml').read_bytes()
@@ -90,22 +91,25 @@ def _try(rng: random.Random) -> tuple[str, str]:
             for _ in range(1 + again):
                 process.send_signal(sent)
             begun = time.monotonic()
-            _, said = process.communicate(timeout=_PATIENCE)
+            _, errors = process.communicate(timeout=_PATIENCE)
             took = time.monotonic() - begun
         except subprocess.TimeoutExpired:
             return f'{command}: no end', f'{command}, {sent.name} after {instant:.3f} s: no end'
         finally:
             process.kill()
             process.communicate()
-        left = {file.name for file in Path(folder).iterdir()} - {'jansen_leg.yaml', *asked}
+        left = {file.name for file in Path(folder).iterdir()} - {'jansen_leg.yaml', *results}
     where = f'{command}, {sent.name} after {instant:.3f} s'
     code = process.returncode
     if left:
         return f'{command}: {code}', f'{where}: left {", ".join(sorted(left))}'
     if code == 0:
         return f'{command}: had ended', ''
-    if (code, said.splitlines()[-1:]) != (1, [f'linkage {command}: stopped']) or 'Trace' in said:
-        return f'{command}: {code}', f'{where}: {code}: {said[:300]!r}'
+    if (code, errors.splitlines()[-1:]) != (
+        1,
+        [f'linkage {command}: stopped'],
+    ) or 'Trace' in errors:
+        return f'{command}: {code}', f'{where}: {code}: {errors[:300]!r}'
     return f'{command}: stopped within {5.0 if took < 5.0 else _PATIENCE:g} s', ''
 
 

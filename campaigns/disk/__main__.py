@@ -16,12 +16,12 @@
 """
 ``python -m campaigns.disk``: recordings on a disk that fails, fills or stalls.
 
-What was counted as recorded has to be there, what is not has to be said, and no tick may wait.
+Messages counted as recorded have to be in the bag, losses have to be reported, and no tick may
+wait for the disk.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import datetime
@@ -31,92 +31,93 @@ from pathlib import Path
 import sys
 import time
 
-from bench.report import machine_table, say, show, Table, write_page
-from campaigns.campaign import percentile_texts, progress_lines
+from bench.report import machine_table, say, Table
+from campaigns.campaign import (
+    exit_code,
+    Page,
+    parser_of,
+    percentile_texts,
+    progress_lines,
+    publish,
+)
 from campaigns.disk import failing, filling, stalling
 from campaigns.disk.failing import Tried
 from campaigns.disk.filling import DISKS, Filled, FLOOR, NotPermittedError
 from campaigns.disk.injection import FAULTS, why_not
-from campaigns.disk.judge import AT_RECOVERY, EARLY, LEFT, MESSAGES, REFUSED, SETTINGS, WHOLE
+from campaigns.disk.judge import AT_RECOVERY, COMPLETE, EARLY, LEFT, MESSAGES, REFUSED, SETTINGS
 from campaigns.disk.stalling import Stalled
 
-INTRO = f"""\
+PAGE = Page(
+    Path('docs/recordings/disk.md'),
+    'Recordings on a disk that fails',
+    f"""
 Made by `make disk`.
 
 **A call that fails.** A recording of {MESSAGES} messages, with flushes, splits, a ring, renewed
-metadata and a close, in {len(SETTINGS)} settings. Each system call that it makes about its bag, be
-it by our code, by Python's files or by the C library, fails once, and in another recording from
-then on for ever, in each way that it can. The calls are intercepted in the kernel
-(`seccomp_unotify(2)`) and answered by another process; a short write writes the first half for
-real. *EIO, pages lost*: fsync fails, and what was written since the last one that succeeded turns
-into zeros, as a kernel may leave it. For ever means all calls that the error can befall.
+metadata and a close, is made with {len(SETTINGS)} settings. Each system call on its bag, whether
+made by our code, by Python's files or by the C library, fails once, and in another recording
+permanently, in each possible way. The calls are intercepted in the kernel (`seccomp_unotify(2)`)
+and answered by another process. A short write really writes the first half. *EIO, pages lost*:
+fsync fails, and the data written since the last successful fsync turns into zeros, as a kernel may
+leave it. Permanently means that all later calls that can have this error fail too.
 
-Judged each time: no exception but RecordingError comes out, and the recorder comes to its end;
-what it says is one line with folder, reason and remedy; received = recorded + dropped + let go,
-topic by topic; what is counted as recorded is in the bag byte for byte and in order, by our
-reader, and by rosbags where the bag has its end; `linkage recover` loses nothing that was counted;
-`metadata.yaml` is whole and names what is there; nothing is left lying about. A fault that does
-the messages no harm, as a half write or a renewal of the metadata that fails once, must not end
-the recording.
+The requirements: no exception other than RecordingError; the recorder ends; its error is one line
+with folder, reason and remedy; for each topic, received = recorded + dropped + let go; messages
+counted as recorded are in the bag byte for byte and in order, by our reader, and by rosbags if the
+bag is complete; `linkage recover` loses no counted message; `metadata.yaml` is valid and names
+existing files; no other file is left behind. A fault that does not harm the messages, such as a
+half write or one failed renewal of the metadata, must not end the recording.
 
-**A disk that fills.** tmpfs, and ext4 on a loop device, filled by the recording and by another
-process; of *reserved* blocks only root may take, and the recording is not root's there. Besides
-the above, with a floor of {FLOOR:,} bytes there must never be less free by the recording's doing.
+**A disk that fills.** tmpfs, and ext4 on a loop device, are filled by the recording and by another
+process. *reserved* blocks are for root only, and there another user records. In addition to the
+requirements above, with a floor of {FLOOR:,} bytes the recording must never leave less free space.
 These are single recordings: a node begins another file when there is space again.
 
 **A disk that stalls.** A node ticks at 1 kHz and records to an ext4 that is frozen in the kernel
-(FIFREEZE), so that every write and fsync waits. Lateness is that of the ticks in the bag, against
-the most punctual one of the second about them. The disk that stalls *for ever* is thawed when the
-node's first thread has ended: no process can leave the kernel before its disk answers.
-"""
+(FIFREEZE), so that every write and fsync waits. Lateness is that of the ticks in the bag, relative
+to the most punctual tick of the same second. A disk that stalls *permanently* is thawed when the
+first thread of the node has ended: no process can leave the kernel before its disk responds.
+""",
+)
 
-_VERDICTS = (WHOLE, EARLY, AT_RECOVERY, REFUSED, LEFT)
+_VERDICTS = (COMPLETE, EARLY, AT_RECOVERY, REFUSED, LEFT)
 
 
 def failing_tables(tried: Sequence[Tried]) -> list[Table]:
-    """Return what became of recordings with failing calls: by setting, by call, by fault."""
+    """Return the outcomes of recordings with failing calls: by setting, by call, by fault."""
     by_setting = _verdicts('Calls that fail, by setting', 'setting')
     for setting in SETTINGS:
         group = [one for one in tried if one.setting == setting]
         if group:
-            # As many as without a fault: a write in halves makes more of them.
+            # The number of calls without a fault: a write in halves makes more.
             calls = 1 + max(one.injection.number for one in group if one.injection)
             _add(by_setting, f'{setting} ({calls} calls)', group)
     _add(by_setting, 'all', tried)
     by_call = _verdicts('Calls that fail, by call', 'call')
-    struck = [(one, one.struck) for one in tried]
-    for name in sorted({(s.what, s.name) for _, s in struck if s}):
-        group = [one for one, s in struck if s and (s.what, s.name) == name]
-        _add(by_call, f'{name[1]}, {name[0]}', group)
+    failed = [(one, one.failed_call) for one in tried]
+    for target, name in sorted({(call.target, call.name) for _, call in failed if call}):
+        group = [one for one, call in failed if call and call[:2] == (name, target)]
+        _add(by_call, f'{name}, {target}', group)
     by_fault = _verdicts('Calls that fail, by fault', 'fault')
     for fault in FAULTS:
         for lasting in (False, True):
             group = [
                 one
                 for one in tried
-                if one.injection and one.injection[1:] == (fault, lasting) and one.struck
+                if one.injection and one.injection[1:] == (fault, lasting) and one.failed_call
             ]
             if group:
-                _add(by_fault, f'{fault}, {"for ever" if lasting else "once"}', group)
+                _add(by_fault, f'{fault}, {"permanently" if lasting else "once"}', group)
     return [by_setting, by_call, by_fault]
 
 
 def filling_table(filled: Sequence[Filled]) -> Table:
-    """Return what became of recordings on disks that filled."""
+    """Return the outcomes of recordings on disks that fill."""
     table = Table(
         'Disks that fill',
-        (
-            'disk, storage',
-            'filled by',
-            'verdict',
-            'received',
-            'recorded',
-            'let go',
-            'least free, kB',
-            'free at the end, kB',
-            'faults',
-        ),
-    )
+        ('disk, storage', 'filled by', 'verdict', 'received', 'recorded',
+         'removed by the ring', 'least free, kB', 'free at the end, kB', 'faults'),
+    )  # fmt: skip
     for one in filled:
         outcome = one.outcome
         table.rows.append(
@@ -137,50 +138,39 @@ def stalling_tables(runs: Sequence[Stalled]) -> list[Table]:
     """Return the outcome for the ticks and for the messages."""
     ticks = Table(
         'Disks that stall: ticks',
-        (
-            'stall',
-            'ticks in the bag',
-            'missing',
-            'of these dropped',
-            'lateness, µs: p50',
-            'p99',
-            'most',
-            'during the stall: ticks',
-            'p50',
-            'p99',
-            'most',
-        ),
-    )
-    account = Table(
+        ('stall', 'ticks in the bag', 'missing', 'of these dropped', 'lateness, µs: p50',
+         'p99', 'most', 'during the stall: ticks', 'p50', 'p99', 'most'),
+    )  # fmt: skip
+    messages = Table(
         'Disks that stall: messages',
-        ('stall', 'received', 'recorded', 'dropped', 'node ended after, s', 'says', 'faults'),
+        ('stall', 'received', 'recorded', 'dropped', 'node ended after, s', 'last line', 'faults'),
     )
     for run in runs:
-        dropped = run.account.get('dropped', {}).get('/joint_states', 0)
+        dropped = run.counts.get('dropped', {}).get('/joint_states', 0)
         ticks.rows.append(
             (
                 run.plan.name,
                 f'{run.ticks:,}',
                 f'{run.gaps:,}',
-                f'{dropped:,}' if run.account else '',
+                f'{dropped:,}' if run.counts else '',
                 *percentile_texts([t / 1e3 for t in run.lateness], 0),
                 f'{run.during:,}',
                 *percentile_texts([t / 1e3 for t in run.lateness_during], 0),
             )
         )
-        account.rows.append(
+        messages.rows.append(
             (
                 run.plan.name,
                 *(
-                    f'{run.total(word):,}' if run.account else ''
-                    for word in ('received', 'recorded', 'dropped')
+                    f'{run.total(kind):,}' if run.counts else ''
+                    for kind in ('received', 'recorded', 'dropped')
                 ),
                 f'{run.ended:.1f}' if run.ended and isfinite(run.ended) else '',
-                run.said.partition(', /linkage_node')[0],
+                run.last_line.partition(', /linkage_node')[0],
                 '; '.join(run.faults) or 'none',
             )
         )
-    return [ticks, account]
+    return [ticks, messages]
 
 
 def _verdicts(title: str, head: str) -> Table:
@@ -195,53 +185,37 @@ def _add(table: Table, name: str, group: Iterable[Tried]) -> None:
     table.rows.append([name, *(f'{number:,}' for number in numbers)])
 
 
-PAGE = Path('docs/recordings/disk.md')
 PARTS = ('failing', 'filling', 'stalling')
 
 
 def main() -> int:
-    """Let disks fail, and judge; 1 where a verdict is a fault."""
-    parser = argparse.ArgumentParser('python -m campaigns.disk', description=__doc__)
+    """Let disks fail, and judge; return 1 if there are faults."""
+    parser = parser_of('disk', __doc__, page=PAGE, seed=False)
     parser.add_argument('--only', nargs='+', choices=PARTS, default=PARTS, help='only these')
-    parser.add_argument('--every', type=int, default=1, help='only every so manyth failing call')
+    parser.add_argument('--every', type=int, default=1, help='only every n-th failing call')
     parser.add_argument('--messages', type=int, default=100_000, help='to a disk that fills')
-    parser.add_argument('--jobs', type=int, default=2, help='processes')
-    parser.add_argument('--write', action='store_true', help=f'keep the outcome in {PAGE}')
-    given = parser.parse_args()
+    options = parser.parse_args()
     started, begin = time.monotonic(), datetime.now().astimezone()
     tables: list[Table] = []
     faults: list[str] = []
     skipped: list[tuple[str, str]] = []
-    doing = {
-        'failing': lambda: _fail(given.every, given.jobs, faults),
-        'filling': lambda: _fill(given.messages, faults),
+    parts = {
+        'failing': lambda: _fail(options.every, options.jobs, faults),
+        'filling': lambda: _fill(options.messages, faults),
         'stalling': lambda: _stall(faults),
     }
-    try:
-        for part in PARTS:
-            if part in given.only:
-                try:
-                    tables += doing[part]()
-                except NotPermittedError as error:
-                    skipped.append((f'left out: {part}', str(error)))
-    except KeyboardInterrupt:
-        say('stopped')
-        return 130
-    tables.append(
-        machine_table(
-            begin,
-            ('mcap', metadata.version('mcap')),
-            ('rosbags', metadata.version('rosbags')),
-            ('took', f'{time.monotonic() - started:.0f} s, {given.jobs} processes'),
-            *skipped,
-        )
-    )
-    for table in tables:
-        show(table)
+    for part in PARTS:
+        if part in options.only:
+            try:
+                tables += parts[part]()
+            except NotPermittedError as error:
+                skipped.append((f'left out: {part}', str(error)))
+    versions = [(package, metadata.version(package)) for package in ('mcap', 'rosbags')]
+    took = f'{time.monotonic() - started:.0f} s, {options.jobs} processes'
+    tables.append(machine_table(begin, *versions, ('took', took), *skipped))
+    publish(tables, PAGE if options.write else None)
     for fault in faults:
         say(fault)
-    if given.write:
-        write_page(PAGE, 'Recordings on a disk that fails', INTRO, tables)
     return int(bool(faults))
 
 
@@ -279,4 +253,4 @@ def _stall(faults: list[str]) -> list[Table]:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(exit_code(main))

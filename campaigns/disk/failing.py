@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Every system call of a recording fails, once or from then on, in every way."""
+"""Let every system call of a recording fail, once or permanently, in every way."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from campaigns.campaign import results_of
-from campaigns.disk.injection import can_befall, FAULTS, Injection, run, Seen
+from campaigns.disk.injection import can_befall, FAULTS, Injection, run, SeenCall
 from campaigns.disk.judge import (
     Expectation,
     expected_messages,
@@ -39,7 +39,7 @@ _PART = 20
 
 
 class Part(NamedTuple):
-    """Recordings of one setting that a process makes one after the other."""
+    """Recordings of one setting that one process makes in turn."""
 
     setting: str
     injections: tuple[Injection | None, ...]
@@ -56,20 +56,20 @@ class Tried(NamedTuple):
     injection
         The injected fault; None for none.
     calls
-        All calls that it made.
+        All system calls of the recording.
     outcome
-        What became of it.
+        The outcome.
 
     """
 
     setting: str
     injection: Injection | None
-    calls: list[Seen]
+    calls: list[SeenCall]
     outcome: Outcome
 
     @property
-    def struck(self) -> Seen | None:
-        """Return the first call that failed; None where it did not come to it."""
+    def failed_call(self) -> SeenCall | None:
+        """Return the first call that failed; None if the recording did not reach it."""
         plan = self.injection
         return self.calls[plan.number] if plan and plan.number < len(self.calls) else None
 
@@ -89,17 +89,17 @@ def attempt(part: Part) -> list[Tried]:
     return tried
 
 
-def injections(calls: Sequence[Seen]) -> Iterator[Injection]:
-    """Yield all there are, for calls as a dry run has shown them."""
+def injections(calls: Sequence[SeenCall]) -> Iterator[Injection]:
+    """Yield all possible injections for the calls of a recording without faults."""
     for number, call in enumerate(calls):
         for fault in FAULTS:
-            if can_befall(fault, call.name, call.what):
+            if can_befall(fault, call.name, call.target):
                 yield Injection(number, fault, lasting=False)
                 yield Injection(number, fault, lasting=True)
 
 
 def parts(setting: str, every: int = 1, first: int = 0) -> list[Part]:
-    """Return the work for a setting: all injections, or every so manyth from one on."""
+    """Return the work for a setting: all injections, or every n-th from one on."""
     (dry,) = attempt(Part(setting, (None,)))
     if dry.outcome.faults:
         return [Part(setting, (None,))]
@@ -117,27 +117,27 @@ def attempts(work: Sequence[Part], jobs: int) -> Iterator[list[Tried]]:
 
 
 def _expectation(tried: Tried) -> Expectation:
-    plan, struck = tried.injection, tried.struck
-    if plan is None or struck is None:
+    plan, failed = tried.injection, tried.failed_call
+    if plan is None or failed is None:
         return Expectation(expected_messages(MESSAGES), keeps_all=True)
     fault = FAULTS[plan.fault]
     return Expectation(
         expected_messages(MESSAGES),
-        keeps_all=fault.harmless or _can_be_done_without(struck, plan),
-        # What fails to be closed, named or removed lies there.
-        may_leave=plan.lasting or struck.name in ('unlink', 'rmdir'),
+        keeps_all=fault.harmless or _is_dispensable(failed, plan),
+        # A file that cannot be closed, renamed or removed stays there.
+        may_leave=plan.lasting or failed.name in ('unlink', 'rmdir'),
         loses_pages=fault.loses,
-        may_be_silent=struck.phase == 'closing' and struck.what == 'folder',
+        may_be_silent=failed.phase == 'closing' and failed.target == 'folder',
     )
 
 
-def _can_be_done_without(call: Seen, plan: Injection) -> bool:
-    """Return whether a recording has to do without a call: what it is for is not the messages."""
+def _is_dispensable(call: SeenCall, plan: Injection) -> bool:
+    """Return whether a recording has to continue without a call, which serves no message."""
     return (
         not plan.lasting
         and call.phase != 'beginning'
         and call.name != 'statfs'
-        and (call.what in ('metadata', 'folder', 'reserve') or call.name == 'unlink')
-        # The room for the index of a new file has to be there.
-        and (call.what, call.name) not in (('reserve', 'create'), ('reserve', 'fallocate'))
+        and (call.target in ('metadata', 'folder', 'reserve') or call.name == 'unlink')
+        # The space reserved for the index of a new file is required.
+        and (call.target, call.name) not in (('reserve', 'create'), ('reserve', 'fallocate'))
     )

@@ -49,7 +49,7 @@ _NOBODY = 65534
 
 
 class NotPermittedError(Exception):
-    """This disk cannot be had here; the text says why."""
+    """This disk cannot be mounted here; the text is the reason."""
 
 
 class Disk(NamedTuple):
@@ -63,9 +63,9 @@ class Disk(NamedTuple):
     kind
         'tmpfs' or 'ext4'; the latter is an image on a loop device.
     size
-        In [MiB].
+        Its size in [MiB].
     reserved
-        How much of it only root may fill [percent]; then the recording is not root's.
+        The share that only root may fill [percent]; if not 0, another user records.
 
     """
 
@@ -76,7 +76,7 @@ class Disk(NamedTuple):
 
     @property
     def user(self) -> int:
-        """Return as whom to record."""
+        """Return the user id of the recording."""
         return _NOBODY if self.reserved else os.geteuid()
 
 
@@ -95,14 +95,14 @@ def mounted(disk: Disk, work: Path) -> Iterator[Path]:
     Parameters
     ----------
     disk
-        Which.
+        The disk.
     work
-        Where its image and its folder go.
+        Folder of its image and its mount point.
 
     Raises
     ------
     NotPermittedError
-        It cannot be made or mounted here.
+        The disk cannot be made or mounted here.
 
     """
     if os.geteuid():
@@ -128,7 +128,7 @@ def mounted(disk: Disk, work: Path) -> Iterator[Path]:
 
 
 def free_on(folder: Path) -> int:
-    """Return what may still be written to a disk by who is not root [bytes]."""
+    """Return the free space of a disk for users other than root [bytes]."""
     disk = os.statvfs(folder)
     return disk.f_bavail * disk.f_frsize
 
@@ -139,8 +139,8 @@ def _do(*command: str) -> None:
     except FileNotFoundError:
         raise NotPermittedError(f'there is no {command[0]}') from None
     if done.returncode:
-        said = (done.stderr.strip().splitlines() or ['it failed'])[0]
-        raise NotPermittedError(f'{command[0]}: {said}')
+        reason = (done.stderr.strip().splitlines() or ['it failed'])[0]
+        raise NotPermittedError(f'{command[0]}: {reason}')
 
 
 FLOOR = 1_500_000
@@ -160,14 +160,14 @@ STORAGES: Mapping[str, Storage] = {
 
 class Filler(NamedTuple):
     """
-    Who else writes to the disk.
+    Another process that writes to the disk.
 
     Attributes
     ----------
     speed
-        How fast [bytes/s].
+        Its rate [bytes/s].
     hungry
-        Whether it takes at once whatever becomes free, to the end.
+        Whether it continues to take all space that becomes free.
 
     """
 
@@ -178,24 +178,24 @@ class Filler(NamedTuple):
 FILLERS: Mapping[str, Filler | None] = {
     'the recording alone': None,
     'another process too': Filler(2e6, hungry=False),
-    'another that takes whatever is freed': Filler(2e6, hungry=True),
+    'another process, which takes all free space': Filler(2e6, hungry=True),
 }
 
 
 class Filled(NamedTuple):
     """
-    A recording, and its outcome.
+    A recording and its outcome.
 
     Attributes
     ----------
     disk, storage, filler
         Their names.
     outcome
-        What became of it.
+        The outcome.
     least_free, free
-        The least that was free while it was made, and what was at its end [bytes].
+        The least free space during the recording, and the free space at its end [bytes].
     failure
-        Its output; '' if none.
+        Its error message; '' if none.
 
     """
 
@@ -219,7 +219,7 @@ def fill(disk: Disk, storage: str, filler: str, count: int) -> Filled:
     storage, filler
         Names of one of `STORAGES` and one of `FILLERS`.
     count
-        Messages that are offered at most.
+        Maximum number of messages.
 
     Raises
     ------
@@ -232,30 +232,30 @@ def fill(disk: Disk, storage: str, filler: str, count: int) -> Filled:
         TemporaryDirectory(prefix='linkage_ros_full_') as name,
         mounted(disk, Path(name)) as folder,
     ):
-        # The recording's user has to come through.
+        # The recording's user needs access.
         Path(name).chmod(0o755)
         other = _Other(folder, FILLERS[filler])
         done = _in_child(lambda: offer_all(folder / 'bag', how, count), disk.user, other.start)
         other.stop()
         free = free_on(folder)
-        outcome = Outcome(faults=['came to no end'])
+        outcome = Outcome(faults=['did not end'])
         if done is not None:
-            # For what is recovered from the bag, beside it.
+            # Make space for the recovered bag.
             other.make_room()
             expectation = Expectation(expected_messages(done.offered))
             outcome = judge(done, folder / 'bag', expectation, Path(name) / 'recovered')
             if how.keep_files and filler == 'the recording alone' and done.failure:
-                outcome.faults.append('a ring that fits came to an end')
+                outcome.faults.append('a ring that fits on the disk ended')
         if how.min_free_bytes and FILLERS[filler] is None and other.least < how.min_free_bytes:
             below = how.min_free_bytes - other.least
             outcome.faults.append(f'{below:,} bytes below the floor')
-        said = (done.refused or done.failure or '') if done else ''
-        said = said.replace(f'{folder}/bag: ', '')
-        return Filled(disk.name, storage, filler, outcome, other.least, free, said)
+        failure = (done.refused or done.failure or '') if done else ''
+        failure = failure.replace(f'{folder}/bag: ', '')
+        return Filled(disk.name, storage, filler, outcome, other.least, free, failure)
 
 
 def cases(disks: Sequence[Disk]) -> Iterator[tuple[Disk, str, str]]:
-    """Yield all there are."""
+    """Yield all combinations of disk, storage and filler."""
     for disk in disks:
         for filler in FILLERS:
             for storage in STORAGES:
@@ -263,7 +263,7 @@ def cases(disks: Sequence[Disk]) -> Iterator[tuple[Disk, str, str]]:
 
 
 class _Other:
-    """Another process to the recording: looks how much is free, and writes where it is to."""
+    """Watches the free space, and writes to the disk if it has a filler."""
 
     def __init__(self, folder: Path, filler: Filler | None) -> None:
         self._folder = folder
@@ -304,7 +304,7 @@ class _Other:
 def _in_child(
     do: Callable[[], Recorded], user: int, started: Callable[[], None]
 ) -> Recorded | None:
-    """Record in a process of its own, as a user; None where that came to no end."""
+    """Record in a process of its own, as a user; return None if it does not end."""
     reads, writes = os.pipe()
     process = os.fork()
     if not process:
@@ -318,7 +318,7 @@ def _in_child(
         finally:
             os._exit(0)
     os.close(writes)
-    # Threads only now: a fork would copy half of them.
+    # Start threads only after the fork.
     started()
     answer, until = b'', monotonic() + _PATIENCE
     try:

@@ -14,11 +14,11 @@
 
 
 """
-Run a recording in a process of its own, and answer its system calls as a failing disk would.
+Run a recording in a process of its own, and answer its system calls like a failing disk.
 
-System calls wait until another process answers them: Linux' ``seccomp_unotify(2)``. So a call
-fails in the kernel, as with a failing disk, whoever makes it: the interpreter, its buffered files
-or the C library. No compiler, tracer or privilege is needed.
+By Linux' ``seccomp_unotify(2)`` system calls wait until another process answers them. So a call
+fails in the kernel, as with a failing disk, whether the interpreter, its buffered files or the C
+library makes it. No compiler, tracer or privilege is needed.
 """
 
 from __future__ import annotations
@@ -55,15 +55,15 @@ class Fault(NamedTuple):
     Attributes
     ----------
     calls
-        The calls that it can befall.
+        The calls that can have this fault.
     error
-        Its error number; 0 if there is none.
+        Its error number; 0 for none.
     short
-        Whether it writes less than it was given.
+        Whether only a part of the data is written.
     loses
-        Whether what was written since the last fsync that succeeded is gone with it.
+        Whether the data written since the last successful fsync is lost.
     harmless
-        Whether a recording has to go on to its end as if nothing had been.
+        Whether a recording has to continue and to be complete.
 
     """
 
@@ -104,9 +104,9 @@ class Signature(NamedTuple):
     Attributes
     ----------
     name
-        What it does, the same for all its variants.
+        Its name, the same for all its variants.
     path
-        Which argument is a path; None where the first is a descriptor.
+        Number of the argument that is a path; None if the first argument is a descriptor.
 
     """
 
@@ -115,13 +115,11 @@ class Signature(NamedTuple):
 
 
 _X86: Mapping[int, Signature] = {
-    1: Signature('write'),
+    **dict.fromkeys((1, 20), Signature('write')),
     2: Signature('open', 0),
     3: Signature('close'),
     18: Signature('pwrite'),
-    20: Signature('write'),
-    74: Signature('fsync'),
-    75: Signature('fsync'),
+    **dict.fromkeys((74, 75), Signature('fsync')),
     77: Signature('ftruncate'),
     82: Signature('rename', 0),
     83: Signature('mkdir', 0),
@@ -132,14 +130,13 @@ _X86: Mapping[int, Signature] = {
     257: Signature('open', 1),
     258: Signature('mkdir', 1),
     263: Signature('unlink', 1),
-    264: Signature('rename', 1),
+    **dict.fromkeys((264, 316), Signature('rename', 1)),
     285: Signature('fallocate'),
-    316: Signature('rename', 1),
 }
 _ARM: Mapping[int, Signature] = {
     34: Signature('mkdir', 1),
     35: Signature('unlink', 1),
-    38: Signature('rename', 1),
+    **dict.fromkeys((38, 276), Signature('rename', 1)),
     43: Signature('statfs', 0),
     44: Signature('statfs'),
     46: Signature('ftruncate'),
@@ -148,9 +145,7 @@ _ARM: Mapping[int, Signature] = {
     57: Signature('close'),
     64: Signature('write'),
     68: Signature('pwrite'),
-    82: Signature('fsync'),
-    83: Signature('fsync'),
-    276: Signature('rename', 1),
+    **dict.fromkeys((82, 83), Signature('fsync')),
 }
 # System calls of each machine, and the number of seccomp itself.
 _MACHINES = {'x86_64': (_X86, 317), 'aarch64': (_ARM, 277)}
@@ -160,20 +155,20 @@ _libc = ctypes.CDLL(None, use_errno=True)
 
 class Call(NamedTuple):
     """
-    A system call that waits.
+    A waiting system call.
 
     Attributes
     ----------
     identifier
-        The kernel's name for it.
+        The kernel's identifier of the call.
     thread
-        Who makes it.
+        The calling thread.
     name
-        What it does.
+        Name of its `Signature`.
     path
-        The file concerned; '' if none.
+        The path of its file; '' for none.
     arguments
-        As they stand in the registers.
+        Values of the registers.
 
     """
 
@@ -185,7 +180,7 @@ class Call(NamedTuple):
 
 
 def why_not() -> str:
-    """Return why calls cannot be answered on this machine; '' if they can."""
+    """Return the reason why calls cannot be answered on this machine; '' if they can."""
     if platform.system() != 'Linux' or platform.machine() not in _MACHINES:
         return f'no table of system calls for {platform.system()} on {platform.machine()}'
     if tuple(map(int, platform.release().split('.')[:2])) < (5, 6):
@@ -195,7 +190,7 @@ def why_not() -> str:
 
 def listen() -> int:
     """
-    Let this thread's calls wait, and those of threads that it starts; for good.
+    Make the calls of this thread, and of threads that it starts, wait from now on.
 
     Returns
     -------
@@ -224,14 +219,14 @@ def listen() -> int:
 
 class Listener:
     """
-    The other end: receives calls and answers them.
+    Receives the calls of another process and answers them.
 
     Parameters
     ----------
     descriptor
-        What `listen` returned, in this process.
+        The descriptor that `listen` returned, in this process.
     process
-        Whose calls they are.
+        Process id of the calling process.
 
     """
 
@@ -241,7 +236,7 @@ class Listener:
         self._calls = _MACHINES[platform.machine()][0]
 
     def receive(self) -> Call:
-        """Return the next call; OSError where its thread has ended meanwhile."""
+        """Return the next call; raise OSError if its thread has ended."""
         buffer = bytearray(_REQUEST.size)
         fcntl.ioctl(self.descriptor, _RECEIVE, buffer)
         identifier, thread, _, number, _, _, *arguments = _REQUEST.unpack(buffer)
@@ -253,16 +248,16 @@ class Listener:
         )
         return Call(identifier, thread, signature.name, path, tuple(arguments))
 
-    def let(self, call: Call) -> None:
-        """Let the kernel do it."""
+    def allow(self, call: Call) -> None:
+        """Let the kernel execute a call."""
         self._answer(call, 0, 0, _CONTINUE)
 
     def refuse(self, call: Call, error: int) -> None:
-        """Answer with an error number; nothing has been done."""
+        """Answer a call with an error number, without executing it."""
         self._answer(call, 0, -error, 0)
 
-    def give(self, call: Call, value: int) -> None:
-        """Answer with what it is to return."""
+    def answer(self, call: Call, value: int) -> None:
+        """Answer a call with a return value, without executing it."""
         self._answer(call, value, 0, 0)
 
     def data(self, call: Call) -> bytes:
@@ -272,14 +267,14 @@ class Listener:
             return memory.read(call.arguments[2])
 
     def file_of(self, call: Call) -> int:
-        """Return a descriptor of the very file that a call is about, with its position."""
+        """Return a descriptor of the file of a call, which shares its position."""
         file: int = _libc.syscall(_PIDFD_GETFD, self._process, call.arguments[0] & 0xFFFFFFFF, 0)
         if file < 0:
             raise _error()
         return file
 
     def close(self) -> None:
-        """Let go; calls that wait fail."""
+        """Close the listener; waiting calls fail."""
         os.close(self.descriptor)
         os.close(self._process)
 
@@ -301,7 +296,7 @@ def _text(thread: int, address: int) -> bytes:
         memory.seek(address)
         text = b''
         while b'\0' not in text:
-            # To the end of the page: the next one may not be there.
+            # Read to the end of the page: the next one may not exist.
             text += memory.read(_PAGE - (address + len(text)) % _PAGE)
     return text.split(b'\0', 1)[0]
 
@@ -312,43 +307,43 @@ def _error() -> OSError:
 
 
 _PATIENCE = 8.0
-"""How long a recording may take [s]."""
+"""Time limit of a recording [s]."""
 
 Do = Callable[[Callable[[str], None]], Recorded]
 
 
-class Seen(NamedTuple):
+class SeenCall(NamedTuple):
     """
-    A call about the bag.
+    A system call on the bag.
 
     Attributes
     ----------
     name
-        What it does.
-    what
-        With what.
+        Its name.
+    target
+        The part of the bag: file, metadata, folder, reserve or parent folder.
     phase
-        While what was done.
+        The phase of the recording.
 
     """
 
     name: str
-    what: str
+    target: str
     phase: str
 
 
 class Injection(NamedTuple):
     """
-    Which calls fail, and how.
+    The calls that fail, and their fault.
 
     Attributes
     ----------
     number
-        The first of them, from 0 on.
+        Number of the first failing call, from 0.
     fault
         Name of one of `FAULTS`.
     lasting
-        Whether all fail from then on which it can befall.
+        Whether all later calls that can have this fault fail too.
 
     """
 
@@ -357,23 +352,25 @@ class Injection(NamedTuple):
     lasting: bool
 
 
-def run(do: Do, folder: Path, injection: Injection | None) -> tuple[Recorded | None, list[Seen]]:
+def run(
+    do: Do, folder: Path, injection: Injection | None
+) -> tuple[Recorded | None, list[SeenCall]]:
     """
     Run a recording and let calls fail.
 
     Parameters
     ----------
     do
-        Records; it is given what to tell the phase.
+        Records; its argument is the function to call with each phase.
     folder
-        The bag's; calls about others are let pass.
+        The folder of the bag; calls on other files are allowed.
     injection
         The fault to inject; None for none.
 
     Returns
     -------
     tuple
-        Its outcome, None if it did not end; and all its calls.
+        The result of the recording, None if it did not end, and all its calls on the bag.
 
     """
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -388,7 +385,7 @@ def run(do: Do, folder: Path, injection: Injection | None) -> tuple[Recorded | N
         try:
             return _Supervisor(listener, ours, folder, injection).supervise()
         finally:
-            # First, since a call that waits does not hear it; killed where it has not ended.
+            # Kill first: a waiting call fails when the listener is closed.
             with suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
             listener.close()
@@ -398,19 +395,19 @@ def run(do: Do, folder: Path, injection: Injection | None) -> tuple[Recorded | N
 
 
 def _child(do: Do, theirs: socket.socket) -> None:
-    """Record, say how it went, and end without a word to what was inherited."""
+    """Record, send the result, and end without running inherited handlers."""
     try:
         listener = listen()
         socket.send_fds(theirs, [b'L'], [listener])
-        done = do(partial(_tell, theirs))
+        done = do(partial(_enter_phase, theirs))
         theirs.sendall(b'D' + pickle.dumps(done))
         theirs.shutdown(socket.SHUT_WR)
     finally:
         os._exit(0)
 
 
-def _tell(theirs: socket.socket, phase: str) -> None:
-    """Tell the phase, and wait until it is known: no call of it may be seen before."""
+def _enter_phase(theirs: socket.socket, phase: str) -> None:
+    """Send the phase, and wait for the receipt: none of its calls may be seen before."""
     theirs.sendall(b'P' + phase.encode())
     theirs.recv(1)
 
@@ -426,11 +423,11 @@ class _Supervisor:
         self._folder = str(folder)
         self._injection = injection
         self._phase = 'beginning'
-        self._seen: list[Seen] = []
+        self._seen: list[SeenCall] = []
         # Size of each file at its last successful fsync.
         self._safe: dict[str, int] = {}
 
-    def supervise(self) -> tuple[Recorded | None, list[Seen]]:
+    def supervise(self) -> tuple[Recorded | None, list[SeenCall]]:
         poll = select.poll()
         poll.register(self._listener.descriptor, select.POLLIN)
         poll.register(self._ours, select.POLLIN)
@@ -455,33 +452,33 @@ class _Supervisor:
         return done, self._seen
 
     def _answer(self, call: Call) -> None:
-        what = self._what(call)
-        if not what:
-            self._listener.let(call)
+        target = self._target(call)
+        if not target:
+            self._listener.allow(call)
             return
         number = len(self._seen)
-        self._seen.append(Seen(_kind(call), what, self._phase))
-        fault = self._fault(number, _kind(call), what)
+        self._seen.append(SeenCall(_kind(call), target, self._phase))
+        fault = self._fault(number, _kind(call), target)
         if fault is None:
-            if call.name == 'fsync' and what == 'file':
+            if call.name == 'fsync' and target == 'file':
                 self._safe[call.path] = Path(call.path).stat().st_size
-            self._listener.let(call)
+            self._listener.allow(call)
         elif fault.error:
             if fault.loses:
                 self._lose(call)
             self._listener.refuse(call, fault.error)
         else:
-            self._listener.give(call, self._write_half(call) if fault.short else 0)
+            self._listener.answer(call, self._write_half(call) if fault.short else 0)
 
-    def _fault(self, number: int, name: str, what: str) -> Fault | None:
+    def _fault(self, number: int, name: str, target: str) -> Fault | None:
         plan = self._injection
         if plan is None or number < plan.number or (number > plan.number and not plan.lasting):
             return None
         fault = FAULTS[plan.fault]
-        return fault if can_befall(plan.fault, name, what) else None
+        return fault if can_befall(plan.fault, name, target) else None
 
     def _lose(self, call: Call) -> None:
-        """Let go of what was written since the last fsync, as the kernel may after a failure."""
+        """Lose the data written since the last fsync, as the kernel may after a failure."""
         file = self._listener.file_of(call)
         try:
             safe, end = self._safe.get(call.path, 0), os.fstat(file).st_size
@@ -501,8 +498,8 @@ class _Supervisor:
         finally:
             os.close(file)
 
-    def _what(self, call: Call) -> str:
-        """Return what of the bag a call is about; '' where it is about nothing of it."""
+    def _target(self, call: Call) -> str:
+        """Return the part of the bag that a call works on; '' for none."""
         path = call.path.removesuffix(' (deleted)')
         if path == str(Path(self._folder).parent):
             return 'parent folder'
@@ -518,9 +515,9 @@ class _Supervisor:
         return 'file' if name.endswith('.mcap') else 'reserve'
 
 
-def can_befall(fault: str, name: str, what: str) -> bool:
-    """Return whether a fault can befall a call."""
-    return name in FAULTS[fault].calls and (what == 'file' or not FAULTS[fault].loses)
+def can_befall(fault: str, name: str, target: str) -> bool:
+    """Return whether a call can have a fault."""
+    return name in FAULTS[fault].calls and (target == 'file' or not FAULTS[fault].loses)
 
 
 def _kind(call: Call) -> str:
@@ -528,7 +525,7 @@ def _kind(call: Call) -> str:
 
 
 def _flags(call: Call) -> int:
-    # open(path, flags) and openat(folder, path, flags): what lies before the path is a descriptor.
+    # open(path, flags) or openat(folder, path, flags).
     return call.arguments[2] if call.arguments[0] & 0xFFFFFFFF == 0xFFFFFF9C else call.arguments[1]
 
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A short recording that uses every function of a writer, and its outcome against its input."""
+"""A short recording that uses every function of a writer, and the judgement of its outcome."""
 
 from __future__ import annotations
 
@@ -26,10 +26,9 @@ from time import monotonic_ns, sleep
 from typing import Any
 
 from campaigns.kills.plan import ATTACHMENTS, expected, message, TOPICS
-from linkage_ros.bag.metadata import BagSummary, METADATA_FILE, ROOT_KEY
+from linkage_ros.bag.metadata import BagSummary, FAILURE, METADATA_FILE, ROOT_KEY, UNFINISHED
 from linkage_ros.bag.reader import Bag, BagMessage, read_bag
 from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.recording_stats import FAILURE, UNFINISHED
 from linkage_ros.bag.recover import recover
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
@@ -61,17 +60,17 @@ class Recorded:
     Attributes
     ----------
     refused
-        Why it could not begin; '' where it did.
+        The error that kept it from beginning; '' for none.
     escaped
-        An exception other than RecordingError; '' if none.
+        An exception other than RecordingError; '' for none.
     offered
-        Messages.
+        Number of messages offered.
     counts
         Received, recorded, dropped, let go and waiting, of each topic.
     failure
-        Why it ended early; None where it did not.
+        The error that ended it early; None for none.
     longest_offer
-        The longest that `Recorder.offer` took [ns].
+        The longest duration of `Recorder.offer` [ns].
 
     """
 
@@ -84,36 +83,24 @@ class Recorded:
 
     @property
     def recorded(self) -> int:
-        """Messages that are counted as recorded."""
+        """Number of messages that are counted as recorded."""
         return sum(counts[1] for counts in self.counts)
 
     @property
     def let_go(self) -> int:
-        """Messages that are counted as let go."""
+        """Number of messages that are counted as removed by the ring."""
         return sum(counts[3] for counts in self.counts)
 
 
-def record(folder: Path, storage: Storage, tell: Callable[[str], None]) -> Recorded:
-    """
-    Record; flushes and renewals come after messages, not after times.
-
-    Parameters
-    ----------
-    folder
-        The bag's.
-    storage
-        How it is stored.
-    tell
-        Is told when the recording has begun, and when it is closed.
-
-    """
+def record(folder: Path, storage: Storage, enter_phase: Callable[[str], None]) -> Recorded:
+    """Record; flush and renew the metadata after numbers of messages, and announce each phase."""
     done = Recorded()
     try:
-        writer = _ByCount(folder, storage, tell)
+        writer = _ByCount(folder, storage, enter_phase)
     except RecordingError as error:
         done.refused = str(error)
         return done
-    except Exception as error:  # noqa: BLE001 (this is what is looked for)
+    except Exception as error:  # noqa: BLE001 (a fault)
         done.escaped = f'{type(error).__name__}: {error}'
         return done
     try:
@@ -131,19 +118,7 @@ def record(folder: Path, storage: Storage, tell: Callable[[str], None]) -> Recor
 
 
 def offer_all(folder: Path, storage: Storage, count: int) -> Recorded:
-    """
-    Record until the recorder gives up, or so many messages were offered.
-
-    Parameters
-    ----------
-    folder
-        The bag's.
-    storage
-        How it is stored.
-    count
-        Messages that are offered at most.
-
-    """
+    """Record until the recorder fails, or ``count`` messages are offered."""
     done = Recorded()
     try:
         writer = BagWriter(folder, TOPICS, ATTACHMENTS, storage)
@@ -156,7 +131,7 @@ def offer_all(folder: Path, storage: Storage, count: int) -> Recorded:
             for number in range(done.offered, done.offered + _BURST):
                 recorder.offer(*message(number, time_of(number)))
             done.offered += _BURST
-            # As fast as the recorder's thread can follow.
+            # Wait until the recorder's thread has caught up.
             while not recorder.failure and _waiting(recorder) > _MOST_WAITING:
                 sleep(0.001)
         _end(done, recorder)
@@ -172,48 +147,48 @@ def _waiting(recorder: Recorder) -> int:
 def _end(done: Recorded, recorder: Recorder) -> None:
     summary = recorder.stop(timeout=10.0)
     done.counts = [
-        (c.received, c.recorded, c.dropped, c.let_go, c.waiting) for c in summary.topics
+        (c.received, c.recorded, c.dropped, c.discarded, c.waiting) for c in summary.topics
     ]
     done.failure = summary.failure
 
 
 def time_of(number: int) -> int:
-    """Return when a message is offered [ns]."""
+    """Return the time at which a message is offered [ns]."""
     return _START + number * _PERIOD
 
 
 def expected_messages(count: int) -> list[BagMessage]:
-    """Return the first messages, as a bag has to give them."""
+    """Return the first messages, as they have to be in the bag."""
     return [expected(number, time_of(number)) for number in range(count)]
 
 
 class _ByCount(BagWriter):
-    """Flushes and renews its metadata after so many messages, so that every run is the same."""
+    """Flushes and renews its metadata after numbers of messages, so that all runs are equal."""
 
-    def __init__(self, folder: Path, storage: Storage, tell: Callable[[str], None]) -> None:
-        self._tell = tell
+    def __init__(self, folder: Path, storage: Storage, enter_phase: Callable[[str], None]) -> None:
+        self._enter_phase = enter_phase
         self._written = 0
         super().__init__(folder, TOPICS, ATTACHMENTS, storage)
-        tell('recording')
+        enter_phase('recording')
 
     def write(self, topic: int, log_time: int, publish_time: int, data: bytes) -> bool:
         if self._written and self._written % _FLUSH_EVERY == 0:
             self._due = 0.0
             self.flush()
-        taken = super().write(topic, log_time, publish_time, data)
+        accepted = super().write(topic, log_time, publish_time, data)
         self._written += 1
-        return taken
+        return accepted
 
     def close(self, custom: Mapping[str, str] | None = None) -> BagSummary:
-        self._tell('closing')
+        self._enter_phase('closing')
         return super().close(custom)
 
 
-REFUSED = 'refused at the beginning, and said so'
-LEFT = 'refused, said so, what was begun could not be removed'
-WHOLE = 'went on to the end, whole'
-EARLY = 'ended early and said so; a bag'
-AT_RECOVERY = 'ended early and said so; all that was counted, by recover'
+REFUSED = 'refused at the beginning'
+LEFT = 'refused, but files could not be removed'
+COMPLETE = 'complete'
+EARLY = 'ended early, bag readable'
+AT_RECOVERY = 'ended early, complete after recovery'
 
 
 @dataclass(slots=True)
@@ -224,11 +199,11 @@ class Outcome:
     Attributes
     ----------
     verdict
-        In words; '' where there is no more than faults.
+        One of the verdicts above; '' if there are only faults.
     faults
         The violations.
     offered, recorded, let_go
-        Messages.
+        Numbers of messages.
 
     """
 
@@ -246,15 +221,15 @@ class Expectation:
     Parameters
     ----------
     messages
-        What it was offered, in order.
+        The offered messages, in order.
     keeps_all
-        Whether the recording may lose nothing.
+        Whether the recording must not lose a message.
     may_leave
-        Whether what is not wanted any more may lie there still: it could not be removed.
+        Whether unwanted files may remain, because they could not be removed.
     loses_pages
-        Whether what was not flushed may be gone from the files; then recover only is asked.
+        Whether data that was not flushed may be lost from the files; then only recovery is judged.
     may_be_silent
-        Whether the metadata may say nothing of a failure: they had been written before it.
+        Whether the metadata may lack the failure, because they were written before it.
 
     """
 
@@ -284,48 +259,34 @@ class Expectation:
 
 
 def judge(
-    done: Recorded | None, folder: Path, expectation: Expectation, beside: Path | None = None
+    done: Recorded | None, folder: Path, expectation: Expectation, recovered: Path | None = None
 ) -> Outcome:
-    """
-    Judge a recording.
-
-    Parameters
-    ----------
-    done
-        Its outcome; None if it did not end.
-    folder
-        The bag's.
-    expectation
-        What is expected.
-    beside
-        Where to recover to, to be removed again.
-
-    """
-    beside = beside or folder.with_name(f'{folder.name}_recovered')
+    """Judge a recording, None if it did not end; the recovered bag is removed afterwards."""
+    recovered = recovered or folder.with_name(f'{folder.name}_recovered')
     if done is None:
-        return Outcome(faults=['came to no end'])
+        return Outcome(faults=['did not end'])
     outcome = Outcome(offered=done.offered, recorded=done.recorded, let_go=done.let_go)
     if done.escaped:
         outcome.faults.append(f'escaped: {done.escaped}')
         return outcome
-    said = done.refused or done.failure
-    if said and not _is_line(said, folder):
-        outcome.faults.append(f'said badly: {said}')
-    if said and expectation.keeps_all:
-        outcome.faults.append(f'ended by what is harmless: {said}')
+    error = done.refused or done.failure
+    if error and not _is_line(error, folder):
+        outcome.faults.append(f'bad error message: {error}')
+    if error and expectation.keeps_all:
+        outcome.faults.append(f'ended by a harmless fault: {error}')
     if done.refused:
         outcome.verdict = LEFT if folder.exists() else REFUSED
         if folder.exists() and not expectation.may_leave:
-            outcome.faults.append('refused, and something left behind')
+            outcome.faults.append('refused, but files left behind')
         return outcome
-    outcome.faults += _account(done)
+    outcome.faults += _counts(done)
     outcome.faults += _metadata(folder)
     if done.failure is None:
-        outcome.verdict = WHOLE
-        outcome.faults += _whole(done, folder, expectation)
+        outcome.verdict = COMPLETE
+        outcome.faults += _complete(done, folder, expectation)
     else:
         outcome.verdict = EARLY
-        _ended_early(outcome, done, folder, expectation, beside)
+        _ended_early(outcome, done, folder, expectation, recovered)
     if not expectation.may_leave:
         outcome.faults += [
             f'left behind: {path.name}'
@@ -335,51 +296,51 @@ def judge(
     return outcome
 
 
-def _is_line(said: str, folder: Path) -> bool:
-    """Return whether it has place, reason and remedy, on one line."""
-    where, _, rest = said.partition(': ')
+def _is_line(error: str, folder: Path) -> bool:
+    """Return whether an error has place, reason and remedy on one line."""
+    where, _, rest = error.partition(': ')
     reason, _, remedy = rest.partition('; ')
     return (
         where == str(folder)
         and bool(reason and remedy)
-        and said.isprintable()
-        and ('please report' not in said)
+        and error.isprintable()
+        and ('please report' not in error)
     )
 
 
-def _account(done: Recorded) -> list[str]:
-    """Return in what the counts do not add up, topic by topic."""
+def _counts(done: Recorded) -> list[str]:
+    """Return the faults of the counts, topic by topic."""
     faults = []
     for number, (received, recorded, dropped, let_go, waiting) in enumerate(done.counts):
         offered = len(range(number, done.offered, len(TOPICS)))
         if received != offered:
             faults.append(f'{offered} offered, {received} received')
         if received != recorded + dropped + let_go or waiting or min(recorded, dropped) < 0:
-            faults.append(f'the account is open: {done.counts[number]}')
+            faults.append(f'the counts do not add up: {done.counts[number]}')
     return faults
 
 
-def _whole(done: Recorded, folder: Path, expectation: Expectation) -> list[str]:
-    """Return what a recording lacks that says nothing of a failure."""
-    lacks = []
+def _complete(done: Recorded, folder: Path, expectation: Expectation) -> list[str]:
+    """Return the faults of a recording that reports no failure."""
+    faults = []
     try:
         bag = read_bag(folder)
         run = expectation.run_of(list(bag.messages()))
     except BagError as error:
-        return [f'says nothing, and cannot be read: {error}']
+        return [f'reports no failure, but cannot be read: {error}']
     if run is None:
         return ['a false message']
     if (run.start, run.stop) != (done.let_go, done.offered) or len(run) != done.recorded:
-        lacks.append(f'says nothing, and holds {run} of {done.offered}')
+        faults.append(f'reports no failure, but holds {run} of {done.offered}')
     if UNFINISHED in bag.custom or FAILURE in bag.custom:
-        lacks.append('says nothing, but its metadata do')
-    return lacks + _rosbags(bag, folder)
+        faults.append('reports no failure, but its metadata do')
+    return faults + _rosbags(bag, folder)
 
 
 def _ended_early(
-    outcome: Outcome, done: Recorded, folder: Path, expectation: Expectation, beside: Path
+    outcome: Outcome, done: Recorded, folder: Path, expectation: Expectation, target: Path
 ) -> None:
-    """Judge what is left of a recording that says why it ended."""
+    """Judge the bag of a recording that reports a failure."""
     counted = range(done.let_go, done.let_go + done.recorded)
     run: range | None = range(0)
     try:
@@ -398,23 +359,23 @@ def _ended_early(
             outcome.faults.append('another failure in the metadata')
         silent = FAILURE not in bag.custom and UNFINISHED not in bag.custom
         if silent and not expectation.may_be_silent:
-            outcome.faults.append('its metadata say nothing of a failure')
+            outcome.faults.append('its metadata report no failure')
         if not bag.truncated and not expectation.loses_pages:
             outcome.faults += _rosbags(bag, folder)
     if bag is None or not _holds(run, counted):
         outcome.verdict = AT_RECOVERY
-    outcome.faults += _recovered(counted, folder, expectation, beside)
+    outcome.faults += _recovered(counted, folder, expectation, target)
 
 
 def _recovered(counted: range, folder: Path, expectation: Expectation, target: Path) -> list[str]:
-    """Return the counted messages that recover lost."""
+    """Return the faults of the recovered bag."""
     try:
         recover(folder, target)
-        found = list(read_bag(target).messages())
+        messages = list(read_bag(target).messages())
         if expectation.may_leave:
-            # A file that made way, and could not be removed, comes behind those that are named.
-            found.sort(key=attrgetter('log_time'))
-        run = expectation.run_of(found)
+            # An old file of the ring that could not be removed comes after the named files.
+            messages.sort(key=attrgetter('log_time'))
+        run = expectation.run_of(messages)
     except BagError as error:
         return [f'recover: {error}'] if counted else []
     except Exception as error:  # noqa: BLE001
@@ -433,16 +394,16 @@ def _holds(run: range, counted: range) -> bool:
 def _metadata(folder: Path) -> list[str]:
     """Return the faults of ``metadata.yaml``."""
     try:
-        said: Any = yaml.safe_load((folder / METADATA_FILE).read_text(encoding='utf-8'))
-        named = said[ROOT_KEY]['relative_file_paths']
+        content: Any = yaml.safe_load((folder / METADATA_FILE).read_text(encoding='utf-8'))
+        named = content[ROOT_KEY]['relative_file_paths']
     except Exception as error:  # noqa: BLE001
         return [f'metadata: {type(error).__name__}']
     missing = [name for name in named if not (folder / name).is_file()]
-    return [f'metadata name what is not there: {missing}'] if missing else []
+    return [f'metadata name missing files: {missing}'] if missing else []
 
 
 def _rosbags(bag: Bag, folder: Path) -> list[str]:
-    """Return in what rosbags disagrees with our reader."""
+    """Return the faults that reading by rosbags finds."""
     ours = sorted((m.topic, m.log_time, m.data) for m in bag.messages())
     try:
         with AnyReader([folder]) as reader:

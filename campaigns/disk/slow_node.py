@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-``python -m campaigns.disk.slow_node FILE ARGUMENTS…``: the node, on a disk that stalls.
+``python -m campaigns.disk.slow_node FILE ARGUMENTS…``: the node on a disk that stalls.
 
-For where no file system can be frozen: as long as the file is there, no write and no flush of this
-process comes to an end. They stall in the interpreter, not in the kernel.
+It is used where no file system can be frozen. As long as FILE exists, no write and no flush of
+this process returns. They stall in the interpreter, not in the kernel.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _stalling(call: Callable[..., Any], file: Path) -> Callable[..., Any]:
 
 
 def main() -> int:
-    """Put the calls behind the file, and run the node."""
+    """Make the calls wait while the file exists, and run the node."""
     file = Path(sys.argv.pop(1))
     for name in _CALLS:
         setattr(os, name, _stalling(getattr(os, name), file))

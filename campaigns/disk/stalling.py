@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A node at work on a disk that stalls: the effect on its ticks and its bag."""
+"""A node that records to a disk that stalls: the effect on its ticks and its bag."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from time import monotonic, sleep, time_ns
 from typing import NamedTuple
 
 from campaigns.disk.filling import Disk, mounted
-from campaigns.endurance.memory import Account, account_of
+from campaigns.endurance.memory import Counts, counts_of
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.errors import BagError
@@ -40,10 +40,10 @@ _FREEZE, _THAW = 0xC0045877, 0xC0045878
 _DISK = Disk('ext4, 256 MiB', 'ext4', 256)
 _START = 20.0  # [s]
 _MOST_TO_END = 25.0
-"""How long a node may take to end where its disk does not answer [s]."""
+"""Time limit for a node to end while its disk does not respond [s]."""
 _SECOND = 1_000_000_000
 _GAP = 20_000_000
-"""From where on ticks are lost and not made up for [ns]."""
+"""Lateness from which on ticks are lost [ns]."""
 _SCENE = """\
 linkage: {linkage}
 rate: {rate}
@@ -63,15 +63,15 @@ class Plan(NamedTuple):
     name
         Its name in reports.
     seconds
-        How long it is.
+        Its duration [s].
     stall
-        Duration of the stall, from the middle of the run [s]; 0 for none.
+        Duration of the stall in the middle of the run [s]; 0 for none.
     queue
-        Messages that may wait.
-    comes_back
-        Whether the disk answers again before the node is ended.
+        Length of the recorder's queue.
+    recovers
+        Whether the disk responds again before the node is ended.
     rate
-        Of the ticks [Hz].
+        Rate of the ticks [Hz].
 
     """
 
@@ -79,7 +79,7 @@ class Plan(NamedTuple):
     seconds: float
     stall: float
     queue: int = 20_000
-    comes_back: bool = True
+    recovers: bool = True
     rate: int = 1000
 
 
@@ -87,40 +87,40 @@ PLANS = (
     Plan('none', 12.0, 0.0),
     Plan('2 s', 12.0, 2.0),
     Plan('4 s, a queue of 1 s', 12.0, 4.0, queue=1000),
-    Plan('for ever', 8.0, 2.0, comes_back=False),
+    Plan('permanently', 8.0, 2.0, recovers=False),
 )
 
 
 @dataclass(slots=True)
 class Stalled:
     """
-    How a run went.
+    The outcome of a run.
 
     Attributes
     ----------
     plan
-        What it was.
-    account
-        What the bag says of its messages.
+        The plan of the run.
+    counts
+        The bag's counts of messages.
     ticks, during
-        Ticks in the bag, and of these while the disk stalled.
+        Number of ticks in the bag, and of those during the stall.
     lateness, lateness_during
-        Of each tick in the bag that fell outside, and while it stalled [ns].
+        Lateness of each tick in the bag outside and during the stall [ns].
     after
-        Ticks in the bag that came when the disk was back.
+        Number of ticks in the bag after the stall.
     gaps
-        Ticks that are missing in the bag between its first and last.
+        Number of missing ticks between the first and the last tick in the bag.
     ended
         Time from the signal to the end of the node [s].
-    said
-        Its last line about the recording.
+    last_line
+        The node's last log line about the recording.
     faults
         The violations.
 
     """
 
     plan: Plan
-    account: Account = field(default_factory=dict)
+    counts: Counts = field(default_factory=dict)
     ticks: int = 0
     during: int = 0
     after: int = 0
@@ -128,12 +128,12 @@ class Stalled:
     lateness: list[int] = field(default_factory=list)
     lateness_during: list[int] = field(default_factory=list)
     ended: float = 0.0
-    said: str = ''
+    last_line: str = ''
     faults: list[str] = field(default_factory=list)
 
-    def total(self, word: str) -> int:
-        """Return how many messages the account has under a word."""
-        return sum(self.account.get(word, {}).values())
+    def total(self, kind: str) -> int:
+        """Return the number of messages of a kind, such as 'dropped'."""
+        return sum(self.counts.get(kind, {}).values())
 
 
 def run(plan: Plan, *, frozen: bool) -> Stalled:
@@ -143,10 +143,10 @@ def run(plan: Plan, *, frozen: bool) -> Stalled:
     Parameters
     ----------
     plan
-        How.
+        The plan of the run.
     frozen
-        Whether a file system of its own is frozen, which stalls it in the kernel; else the node's
-        own calls stand still.
+        Whether to freeze a file system, which stalls calls in the kernel; otherwise `slow_node`
+        stalls its own calls.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
     scene.write_text(
         _SCENE.format(linkage=_LINKAGE, rate=plan.rate, folder=folder, queue=plan.queue)
     )
-    # Below 102, so that the ports stay below those which the kernel hands out.
+    # Below 102, so that the ports stay below the kernel's ephemeral ones.
     graph = Graph(2 + os.getpid() % 100, work, longest=round(plan.seconds) + 60)
     arguments = ['--ros-args', '-p', f'scene:={scene}']
     module = 'linkage_ros.node.linkage_node'
@@ -185,29 +185,29 @@ def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
             with _stalled(folder, file, plan):
                 sleep(plan.stall)
                 end = time_ns()
-                if not plan.comes_back:
-                    done.ended, done.said = _ended(node.pid, log)
-            sleep(0.5 * (plan.seconds - plan.stall) if plan.comes_back else 0.0)
+                if not plan.recovers:
+                    done.ended, done.last_line = _ended(node.pid, log)
+            sleep(0.5 * (plan.seconds - plan.stall) if plan.recovers else 0.0)
             node.end()
-            done.said = done.said or _said(log)
-        if plan.comes_back:
-            # A run that lost messages is no success.
+            done.last_line = done.last_line or _last_line(log)
+        if plan.recovers:
+            # A run that lost messages has exit code 1.
             node.check_end(*((1,) if _drops(plan) else ()))
     except MeasurementError as error:
         done.faults.append(str(error))
         return done
-    _look(done, folder / 'bag', begin, end)
+    _judge(done, folder / 'bag', begin, end)
     return done
 
 
 def _drops(plan: Plan) -> bool:
-    """Return whether more comes in a stall than the queue takes."""
+    """Return whether a stall has more messages than the queue holds."""
     return plan.stall * plan.rate > plan.queue
 
 
 @contextmanager
 def _stalled(folder: Path, file: Path | None, plan: Plan) -> Iterator[None]:
-    """Let the disk of a folder stall, or a process that looks for a file."""
+    """Let the disk of a folder stall, or the process that checks for a file."""
     if not plan.stall:
         yield
     elif file:
@@ -229,39 +229,39 @@ def _stalled(folder: Path, file: Path | None, plan: Plan) -> Iterator[None]:
 
 
 def _ended(pid: int, log: Path) -> tuple[float, str]:
-    """End a node whose disk does not answer; return how long it took, and its last word."""
+    """End a node whose disk does not respond; return the time it took, and its last line."""
     begin = monotonic()
     os.kill(pid, signal.SIGINT)
     while monotonic() < begin + _MOST_TO_END:
-        # A thread in the kernel cannot be ended before the disk answers: the process is a zombie
-        # until then, but all that it runs has ended.
+        # A thread in the kernel cannot end before the disk responds. Until then the process is a
+        # zombie, but all its Python threads have ended.
         if _state(pid) in 'Z ':
-            return monotonic() - begin, _said(log)
+            return monotonic() - begin, _last_line(log)
         sleep(0.02)
-    return inf, _said(log)
+    return inf, _last_line(log)
 
 
 def _state(pid: int) -> str:
-    """Return the state of a process' first thread; ' ' where it is gone."""
+    """Return the state of the first thread of a process; ' ' if it has ended."""
     try:
         return Path(f'/proc/{pid}/stat').read_text().rpartition(') ')[2][0]
     except OSError:
         return ' '
 
 
-def _said(log: Path) -> str:
+def _last_line(log: Path) -> str:
     """Return the last line of a log about the recording, from its folder on."""
     lines = [line for line in log.read_text(errors='replace').splitlines() if '/bag: ' in line]
     return lines[-1].partition('/bag: ')[2] if lines else ''
 
 
-def _look(done: Stalled, folder: Path, begin: int, end: int) -> None:
-    """Look at the bag: its account, and when its ticks came; stall in [ns]."""
+def _judge(done: Stalled, folder: Path, begin: int, end: int) -> None:
+    """Judge the bag by its counts and the times of its ticks; the stall is given in [ns]."""
     plan = done.plan
     try:
-        bag = read_bag(folder, allow_truncated=not plan.comes_back)
+        bag = read_bag(folder, allow_truncated=not plan.recovers)
         times = [m.log_time for m in bag.messages() if m.topic == '/joint_states']
-        done.account = account_of(folder) if plan.comes_back else {}
+        done.counts = counts_of(folder) if plan.recovers else {}
     except BagError as error:
         done.faults.append(str(error))
         return
@@ -273,22 +273,24 @@ def _look(done: Stalled, folder: Path, begin: int, end: int) -> None:
     done.lateness = [late for late, stalls in zip(late, inside, strict=True) if not stalls]
     done.lateness_during = [late for late, stalls in zip(late, inside, strict=True) if stalls]
     done.gaps = sum(round((b - a) / period) - 1 for a, b in pairwise(times) if b - a > _GAP)
-    if not plan.comes_back:
-        if 'has not answered' not in done.said or done.ended == inf:
-            done.faults.append(f'does not say that the disk has not answered: {done.said!r}')
+    if not plan.recovers:
+        if 'has not answered' not in done.last_line or done.ended == inf:
+            done.faults.append(
+                f'does not report that the disk has not answered: {done.last_line!r}'
+            )
         return
-    if not done.account:
-        done.faults.append('the bag has no account')
-    for topic, received in done.account.get('received', {}).items():
-        recorded, dropped = (done.account[word][topic] for word in ('recorded', 'dropped'))
+    if not done.counts:
+        done.faults.append('the bag has no counts')
+    for topic, received in done.counts.get('received', {}).items():
+        recorded, dropped = (done.counts[kind][topic] for kind in ('recorded', 'dropped'))
         if received != recorded + dropped:
-            done.faults.append(f'{topic}: the account does not close')
+            done.faults.append(f'{topic}: the counts do not add up')
         if dropped and not _drops(plan):
             done.faults.append(f'{topic}: {dropped} dropped')
-    if done.account and done.account['recorded']['/joint_states'] != done.ticks:
-        done.faults.append(f'{done.ticks} ticks in the bag, others in its account')
+    if done.counts and done.counts['recorded']['/joint_states'] != done.ticks:
+        done.faults.append(f'{done.ticks} ticks in the bag, another number in its counts')
     if _drops(plan) and not done.total('dropped'):
-        done.faults.append('more than the queue takes, and nothing dropped')
+        done.faults.append('more messages than the queue holds, but none dropped')
     if not done.after:
         done.faults.append('nothing recorded after the stall')
 
@@ -297,8 +299,8 @@ def _lateness(times: Sequence[int], period: int) -> list[int]:
     """
     Return the lateness of each tick [ns].
 
-    Ticks are due a period apart; which are due when is told by the most punctual one of a second,
-    or of what lies between two gaps.
+    Ticks are due a period apart. Their due times are derived from the most punctual tick of each
+    second, or of each stretch between two gaps.
     """
     found: list[int] = []
     stretch: list[int] = []

@@ -16,8 +16,8 @@
 """
 ``python -m campaigns.endurance``: a day at 100 Hz in minutes, and ten minutes over DDS.
 
-Memory, open files and threads have to stay what they are, every message has to be accounted for,
-and what ran over DDS has to replay to the same bytes.
+Memory, open files and threads must not grow, every message has to be counted, and the run over
+DDS has to replay to the same bytes.
 """
 
 from __future__ import annotations
@@ -28,29 +28,34 @@ from datetime import datetime
 from pathlib import Path
 import sys
 
-from bench.report import machine_table, say, show, Table, write_page
+from bench.report import machine_table, say, Table
+from campaigns.campaign import exit_code, Page, parser_of, publish
 from campaigns.endurance import accelerated, over_dds
 from campaigns.endurance.accelerated import Run
 from campaigns.endurance.memory import flatness, MOST_GROWTH, Usage
 from campaigns.endurance.over_dds import DdsRun
 
-INTRO = f"""\
+PAGE = Page(
+    Path('docs/recordings/endurance.md'),
+    'Long runs',
+    f"""
 Made by `make endurance`.
 
-**Accelerated**: scenes that come with the package, at another rate, go through the node's own
-tick loop and recorder on simulated time, each in a process of its own. The bag is a ring of a
-few files; flushes come about as often as in a real run. Every so often the ticks wait for the
-recorder, so that nothing is dropped, and memory is looked at while nothing waits.
+**Accelerated**: scenes that come with the package, at another rate, run through the node's own
+tick loop and recorder on simulated time, each in a process of its own. The bag is a ring of a few
+files; there are about as many flushes as in a real run. From time to time the ticks wait for the
+recorder, so that nothing is dropped. Memory is measured while its queue is empty.
 
 **Over DDS**: the demo as a node at 1 kHz, with a crank source at 500 Hz, each a process of its
-own, in real time; memory is the node's.
+own, in real time. Memory is that of the node.
 
 Memory is `VmRSS`. The first quarter of a run is warm-up. *Slope* is the median of the slopes
-between any two later samples; a run is *flat* if that makes no more than {MOST_GROWTH:,} kB over
-these three quarters, and no file or thread is left open. *One file* shows what is not flat: the
-index of an MCAP file stays in memory until the file ends, 0.7 kB for each chunk, and each
-flush makes one. `split_bytes`, by default 1 GiB, bounds that.
-"""
+between any two later samples. A run is *flat* if the slope makes no more than {MOST_GROWTH:,} kB
+over these three quarters, and if open files and threads do not increase. *One file* is not flat:
+the index of an MCAP file stays in memory until the file ends, 0.7 kB for each chunk, and each
+flush makes a chunk. `split_bytes`, by default 1 GiB, bounds it.
+""",
+)
 
 _TICKS = (
     'Events since startup',
@@ -66,7 +71,7 @@ _TICKS = (
 
 
 def accelerated_tables(runs: Sequence[Run]) -> list[Table]:
-    """Return memory by the hour, the judgement on it, and the accounts."""
+    """Return the memory by the hour, its verdicts, and the counts of messages."""
     first = runs[0].plan
     title = f'Accelerated: {first.hours:g} h at {first.rate:g} Hz'
     memory = Table(
@@ -78,16 +83,16 @@ def accelerated_tables(runs: Sequence[Run]) -> list[Table]:
         memory.rows.append(
             [f'{number * step:.3g}', *(_at(run.samples, 3600.0 * number * step) for run in runs)]
         )
-    judged = _judged(f'{title}, judged')
+    verdicts = _verdicts(f'{title}, verdicts')
     for run in runs:
-        judged.rows.append(_judgement(run.plan.name, run.samples, exempt=not run.plan.keep_files))
-    account = _account(f'{title}, messages')
+        verdicts.rows.append(_verdict(run.plan.name, run.samples, exempt=not run.plan.keep_files))
+    messages = _messages(f'{title}, messages')
     for run in runs:
         for counts in run.summary.topics:
-            numbers = (counts.received, counts.recorded, counts.dropped, counts.let_go)
-            account.rows.append([f'{run.plan.name}: {counts.name}', *(f'{n:,}' for n in numbers)])
+            numbers = (counts.received, counts.recorded, counts.dropped, counts.discarded)
+            messages.rows.append([f'{run.plan.name}: {counts.name}', *(f'{n:,}' for n in numbers)])
     took = Table(
-        f'{title}, took',
+        f'{title}, duration',
         ('', 'h', 'ticks', 's', 'µs a tick', 'faults'),
         [
             [
@@ -102,11 +107,11 @@ def accelerated_tables(runs: Sequence[Run]) -> list[Table]:
             for ticks in [round(run.plan.hours * 3600.0 * run.plan.rate)]
         ],
     )
-    return [memory, judged, account, took]
+    return [memory, verdicts, messages, took]
 
 
 def dds_tables(run: DdsRun) -> list[Table]:
-    """Return memory by the minute, the judgement on it, the account and the ticks."""
+    """Return the memory by the minute, its verdict, the counts of messages, and the ticks."""
     title = f'Over DDS: {run.minutes:g} min'
     memory = Table(f'{title}, memory of the node', ('minute', 'kB', 'open files', 'threads'))
     for number in range(11):
@@ -116,13 +121,13 @@ def dds_tables(run: DdsRun) -> list[Table]:
             memory.rows.append(
                 (f'{sample.time / 60.0:.1f}', *(f'{value:,}' for value in sample[1:]))
             )
-    judged = _judged(f'{title}, judged')
+    verdicts = _verdicts(f'{title}, verdicts')
     if run.samples:
-        judged.rows.append(_judgement('linkage_node', run.samples))
-    account = _account(f'{title}, messages')
-    for topic, received in run.account.get('received', {}).items():
-        numbers = [run.account[word][topic] for word in ('recorded', 'dropped', 'let_go')]
-        account.rows.append([topic, f'{received:,}', *(f'{number:,}' for number in numbers)])
+        verdicts.rows.append(_verdict('linkage_node', run.samples))
+    messages = _messages(f'{title}, messages')
+    for topic, received in run.counts.get('received', {}).items():
+        numbers = [run.counts[kind][topic] for kind in ('recorded', 'dropped', 'let_go')]
+        messages.rows.append([topic, f'{received:,}', *(f'{number:,}' for number in numbers)])
     ticks = Table(f'{title}, ticks', ('', ''), [(k, run.ticks.get(k, '')) for k in _TICKS])
     replayed = run.replayed
     ticks.rows.append(
@@ -132,32 +137,32 @@ def dds_tables(run: DdsRun) -> list[Table]:
         )
     )
     ticks.rows.append(('Faults', '; '.join(run.faults) or 'none'))
-    return [memory, judged, account, ticks]
+    return [memory, verdicts, messages, ticks]
 
 
-def _judged(title: str) -> Table:
+def _verdicts(title: str) -> Table:
     return Table(
         title,
         ('', 'slope, kB/h', 'growth, kB', 'peak, kB', 'more files', 'more threads', 'verdict'),
     )
 
 
-def _judgement(name: str, samples: Sequence[Usage], *, exempt: bool = False) -> list[str]:
-    found = flatness(samples)
-    verdict = 'flat' if found.flat else 'grows'
+def _verdict(name: str, samples: Sequence[Usage], *, exempt: bool = False) -> list[str]:
+    growth = flatness(samples)
+    verdict = 'flat' if growth.flat else 'grows'
     return [
         name,
-        f'{3600.0 * found.slope:.1f}',
-        f'{found.growth:,.0f}',
-        f'{found.peak:,.0f}',
-        str(found.files),
-        str(found.threads),
+        f'{3600.0 * growth.slope:.1f}',
+        f'{growth.growth:,.0f}',
+        f'{growth.peak:,.0f}',
+        str(growth.files),
+        str(growth.threads),
         'one file: not judged' if exempt else verdict,
     ]
 
 
-def _account(title: str) -> Table:
-    return Table(title, ('', 'received', 'recorded', 'dropped', 'let go'))
+def _messages(title: str) -> Table:
+    return Table(title, ('', 'received', 'recorded', 'dropped', 'removed by the ring'))
 
 
 def _at(samples: Sequence[Usage], time: float) -> str:
@@ -171,58 +176,47 @@ def _nearest(samples: Sequence[Usage], time: float) -> Usage:
     return min(samples, key=lambda sample: abs(sample.time - time))
 
 
-PAGE = Path('docs/recordings/endurance.md')
-_ONE_FILE = 0.25  # of the time: its index grows evenly
+_ONE_FILE = 0.25  # share of the duration: its index grows evenly
 
 
 def main() -> int:
-    """Run what the command line asks for; 1 where something is at fault or grows."""
-    parser = argparse.ArgumentParser('python -m campaigns.endurance', description=__doc__)
+    """Run the campaign; return 1 if there are faults, or if a run grows."""
+    parser = parser_of('endurance', __doc__, page=PAGE, seed=False)
     parser.add_argument('--hours', type=float, default=24.0, help='of simulated time')
-    parser.add_argument('--rate', type=float, default=100.0, help='ticks a simulated second')
+    parser.add_argument('--rate', type=float, default=100.0, help='ticks per simulated second')
     parser.add_argument('--scenes', nargs='+', default=['demo', 'excavator_delay'])
-    parser.add_argument('--jobs', type=int, default=2, help='accelerated runs at once')
     parser.add_argument('--minutes', type=float, default=10.0, help='over DDS')
     only = parser.add_mutually_exclusive_group()
     only.add_argument('--accelerated', action='store_true', help='only this')
     only.add_argument('--dds', action='store_true', help='only this')
-    parser.add_argument('--write', action='store_true', help=f'keep the outcome in {PAGE}')
-    given = parser.parse_args()
+    options = parser.parse_args()
     begin = datetime.now().astimezone()
     tables: list[Table] = []
     faults: list[str] = []
-    try:
-        if not given.dds:
-            runs = accelerated.run_all(_plans(given), given.jobs)
-            tables += accelerated_tables(runs)
-            faults += [fault for run in runs for fault in run.faults]
-            ringed = [run for run in runs if run.plan.keep_files]
-            faults += [f'{r.plan.name} grows' for r in ringed if not flatness(r.samples).flat]
-        if not given.accelerated:
-            say(f'over DDS: {given.minutes:g} min')
-            run = over_dds.run(given.minutes)
-            tables += dds_tables(run)
-            faults += run.faults
-            if run.samples and not flatness(run.samples).flat:
-                faults.append('the node grows')
-    except KeyboardInterrupt:
-        say('stopped')
-        return 130
-    tables.append(machine_table(begin))
-    for table in tables:
-        show(table)
+    if not options.dds:
+        runs = accelerated.run_all(_plans(options), options.jobs)
+        tables += accelerated_tables(runs)
+        faults += [fault for run in runs for fault in run.faults]
+        rings = [run for run in runs if run.plan.keep_files]
+        faults += [f'{run.plan.name} grows' for run in rings if not flatness(run.samples).flat]
+    if not options.accelerated:
+        say(f'over DDS: {options.minutes:g} min')
+        run = over_dds.run(options.minutes)
+        tables += dds_tables(run)
+        faults += run.faults
+        if run.samples and not flatness(run.samples).flat:
+            faults.append('the node grows')
+    publish([*tables, machine_table(begin)], PAGE if options.write else None)
     for fault in faults:
         say(fault)
-    if given.write:
-        write_page(PAGE, 'Long runs', INTRO, tables)
     return int(bool(faults))
 
 
-def _plans(given: argparse.Namespace) -> list[accelerated.Plan]:
-    plans = [accelerated.Plan(scene, given.hours, given.rate) for scene in given.scenes]
-    one = plans[0]._replace(hours=_ONE_FILE * given.hours, split_seconds=0.0, keep_files=0)
+def _plans(options: argparse.Namespace) -> list[accelerated.Plan]:
+    plans = [accelerated.Plan(scene, options.hours, options.rate) for scene in options.scenes]
+    one = plans[0]._replace(hours=_ONE_FILE * options.hours, split_seconds=0.0, keep_files=0)
     return [*plans, one]
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(exit_code(main))

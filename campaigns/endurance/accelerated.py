@@ -14,10 +14,10 @@
 
 
 """
-A day of ticks without the waiting: the node's tick loop and its recorder, on simulated time.
+A day of ticks without waiting: the node's tick loop and its recorder on simulated time.
 
-Now and then the ticks wait for the recorder's queue, so that nothing is dropped: in a real run
-the disk has the time between ticks, which is left out here.
+From time to time the ticks wait for the recorder's queue, so that nothing is dropped. In a real
+run the disk has the time between ticks, which is missing here.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ from rosbags.typesys import get_typestore, Stores
 SCENES = Path(__file__).parents[2] / 'config' / 'scenes'
 _BEGIN = 1_700_000_000 * NANOSECONDS
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
-_SPEED = 0.5  # of the crank, in turns a second
-_AT_ONCE = 500  # ticks between two looks at the queue
+_SPEED = 0.5  # of the crank [turns/s]
+_BURST = 500  # ticks between two checks of the queue
 _FLUSH_PERIOD = 0.004
-"""[s]. At a few hundred times the pace of time it is about the second of a real run."""
+"""In [s]. At some hundred times real time it corresponds to one second of a real run."""
 
 
 class Plan(NamedTuple):
@@ -68,9 +68,9 @@ class Plan(NamedTuple):
     hours
         Duration, in simulated time.
     rate
-        Ticks a second, instead of the scene's own.
+        Ticks per second, instead of the rate of the scene.
     split_seconds, keep_files
-        How the bag is stored.
+        Storage options of the bag.
 
     """
 
@@ -89,20 +89,20 @@ class Plan(NamedTuple):
 @dataclass(slots=True)
 class Run:
     """
-    How a run went.
+    The outcome of a run.
 
     Attributes
     ----------
     plan
-        What was run.
+        The plan of the run.
     samples
-        What the process held, from the beginning to the end.
+        The usage of the process from the beginning to the end.
     summary
-        The outcome for the messages.
+        The recorder's summary.
     published
-        Joint states that the tick loop has counted.
+        Number of joint states by the tick loop's count.
     seconds
-        Its duration.
+        Its duration [s].
     faults
         The violations.
 
@@ -117,13 +117,13 @@ class Run:
 
 
 def run_all(plans: Sequence[Plan], jobs: int) -> list[Run]:
-    """Run, some at once, each in a process of its own: what one leaves free hides growth."""
+    """Run plans in parallel, each in a new process: memory freed by another run hides growth."""
     with multiprocessing.get_context('spawn').Pool(jobs, maxtasksperchild=1) as pool:
         return list(pool.imap(run, plans))
 
 
 def run(plan: Plan) -> Run:
-    """Run, and compare the bag with the counts."""
+    """Run a plan, and compare the bag with the counts."""
     say(f'{plan.name}: {plan.hours:g} h at {plan.rate:g} Hz')
     with TemporaryDirectory(prefix='linkage_ros_endurance_') as name:
         return _run(plan, Path(name))
@@ -148,7 +148,7 @@ def _run(plan: Plan, folder: Path) -> Run:
     loop.recorder = recorder = Recorder(writer, flush_period=_FLUSH_PERIOD)
     crank = JointStateWriter(scene.members[0].inputs).write
     period, ticks = round(NANOSECONDS / plan.rate), round(plan.hours * 3600.0 * plan.rate)
-    between = max(ticks // 144, 1)  # of 24 h ten minutes
+    between = max(ticks // 144, 1)  # ten minutes of 24 h
     progress = progress_lines(ticks, f'ticks of {plan.name}')
     begin = time.monotonic()
     samples = [usage(0.0)]
@@ -159,8 +159,8 @@ def _run(plan: Plan, folder: Path) -> Run:
             message = crank(now - 100_000, (angle,), (rate,))
             pending.append((message, {'source_timestamp': now - 90_000}))
         loop.tick_at(now)
-        if tick % _AT_ONCE == 0:
-            _wait_for(recorder, 4 * _AT_ONCE)
+        if tick % _BURST == 0:
+            _wait_for(recorder, 4 * _BURST)
         if tick % between == 0:
             _wait_for(recorder, 0)
             samples.append(usage(tick / plan.rate))
@@ -171,18 +171,18 @@ def _run(plan: Plan, folder: Path) -> Run:
     done.faults += shortcomings(summary.folder)
     received = {counts.name: counts.received for counts in summary.topics}
     if received['/joint_states'] != loop.counts.published or not loop.counts.published:
-        done.faults.append('not every joint state went to the recorder')
+        done.faults.append('the recorder did not receive every joint state')
     if from_topic and not received['/crank_states'] == loop.counts.used == ticks:
-        done.faults.append('not every sample was taken')
-    if summary.failure or any(c.received != c.recorded + c.let_go for c in summary.topics):
+        done.faults.append('not every sample was used')
+    if summary.failure or any(c.received != c.recorded + c.discarded for c in summary.topics):
         done.faults.append(f'dropped: {summary.failure or summary.topics}')
     if len(list(summary.folder.glob('*.mcap'))) != (plan.keep_files if plan.split_seconds else 1):
-        done.faults.append('not as many files as are to be kept')
+        done.faults.append('wrong number of files')
     return done
 
 
 def _wait_for(recorder: Recorder, most: int) -> None:
-    """Wait until no more messages wait than these."""
+    """Wait until the recorder's queue has at most so many messages."""
     while recorder.failure is None and sum(c.waiting for c in recorder.inspect()) > most:
         time.sleep(0.001)
 
@@ -192,13 +192,13 @@ def _take(pending: list[tuple[bytes, dict[str, Any]]]) -> tuple[bytes, dict[str,
 
 
 def _crank_at(seconds: float) -> tuple[float, float]:
-    """Return angle and rate of a crank whose speed swings about its mean."""
+    """Return angle and rate of a crank whose speed oscillates about its mean."""
     turns = tau * _SPEED * seconds
     return turns + 0.3 * sin(turns), tau * _SPEED * (1.0 + 0.3 * cos(turns))
 
 
 def _scene(plan: Plan, folder: Path) -> Scene:
-    """Return the scene with another rate; its linkage is where it was."""
+    """Return the scene with another rate."""
     text = (SCENES / f'{plan.scene}.yaml').read_text()
     text = re.sub(r'^rate: [\d.]+', f'rate: {plan.rate:g}', text, flags=re.MULTILINE)
     file = folder / f'{plan.scene}.yaml'

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Memory, open files and threads of a process, whether they stay flat, and counts of a bag."""
+"""Memory, open files and threads of a process, their growth, and the counts of a bag."""
 
 from __future__ import annotations
 
@@ -26,48 +26,48 @@ import re
 from statistics import median
 from typing import NamedTuple
 
+from linkage_ros.bag.metadata import STATS_RECORD
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recording_stats import STATS_RECORD
 from linkage_ros.errors import BagError
 from mcap.reader import make_reader
 
-Account = dict[str, dict[str, int]]
+Counts = dict[str, dict[str, int]]
 
 
-def account_of(folder: Path) -> Account:
-    """Return what the bag's last file says of each topic: received, recorded, dropped, let go."""
+def counts_of(folder: Path) -> Counts:
+    """Return the counts in the bag's last file: received, recorded, dropped, let go; by topic."""
     with read_bag(folder).files[-1].open('rb') as stream:
-        said = {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
-    return {word: json.loads(text) for word, text in said.get(STATS_RECORD, {}).items()}
+        metadata = {each.name: each.metadata for each in make_reader(stream).iter_metadata()}
+    return {kind: json.loads(text) for kind, text in metadata.get(STATS_RECORD, {}).items()}
 
 
 def shortcomings(folder: Path) -> list[str]:
     """Return the inconsistencies and missing parts of a bag."""
     try:
         bag = read_bag(folder)
-        counts = Counter(message.topic for message in bag.messages())
-        account = account_of(folder)
+        messages = Counter(message.topic for message in bag.messages())
+        counts = counts_of(folder)
     except BagError as error:
         return [str(error)]
-    if not account:
-        return ['the bag has no account']
-    found = []
-    for topic, received in account['received'].items():
-        kept = account['recorded'][topic]
-        if kept != counts[topic]:
-            found.append(f'{topic}: {kept} recorded by the account, {counts[topic]} in the bag')
-        if received != kept + account['dropped'][topic] + account['let_go'][topic]:
-            found.append(f'{topic}: the account does not close')
-        if account['dropped'][topic]:
-            found.append(f'{topic}: {account["dropped"][topic]} dropped')
-    return found
+    if not counts:
+        return ['the bag has no counts']
+    faults = []
+    for topic, received in counts['received'].items():
+        recorded = counts['recorded'][topic]
+        if recorded != messages[topic]:
+            faults.append(f'{topic}: {recorded} counted, {messages[topic]} in the bag')
+        if received != recorded + counts['dropped'][topic] + counts['let_go'][topic]:
+            faults.append(f'{topic}: the counts do not add up')
+        if counts['dropped'][topic]:
+            faults.append(f'{topic}: {counts["dropped"][topic]} dropped')
+    return faults
 
 
 WARM_UP = 0.25
-"""The part of a run that is not judged: buffers, caches and pools fill."""
+"""The share of a run that is not judged: buffers, caches and pools fill."""
 
 MOST_GROWTH = 1024
-"""How much more a run may hold in the end than after its warm-up [kB]."""
+"""Maximum growth of the memory after the warm-up [kB]."""
 
 
 class Usage(NamedTuple):
@@ -77,11 +77,11 @@ class Usage(NamedTuple):
     Attributes
     ----------
     time
-        Since the beginning [s].
+        Time since the beginning [s].
     resident
-        Memory that is in use: ``VmRSS`` [kB].
+        Resident memory: ``VmRSS`` [kB].
     files, threads
-        How many are open, and run.
+        Number of open files and of threads.
 
     """
 
@@ -92,7 +92,7 @@ class Usage(NamedTuple):
 
 
 def usage(time: float, pid: int | str = 'self') -> Usage:
-    """Return what a process holds now, which is this time since the beginning [s]."""
+    """Return the present usage of a process, at a time since the beginning [s]."""
     status = Path(f'/proc/{pid}/status').read_text()
     numbers = dict(re.findall(r'^(\w+):\s+(\d+)', status, re.MULTILINE))
     files = sum(1 for _ in Path(f'/proc/{pid}/fd').iterdir())
@@ -101,21 +101,20 @@ def usage(time: float, pid: int | str = 'self') -> Usage:
 
 class Flatness(NamedTuple):
     """
-    How what was held after the warm-up grew.
+    The growth of the usage after the warm-up.
 
     Attributes
     ----------
     slope
-        Of the memory: the median of the slopes between any two samples (Theil 1950, Sen 1968),
-        which no single peak moves [kB/s].
+        Slope of the memory [kB/s]: the median of the slopes between any two samples (Theil 1950,
+        Sen 1968), which is robust against single peaks.
     growth
-        That slope times the time [kB].
+        The slope times the duration [kB].
     peak
-        The most, less what was held by the middle of the time just after the warm-up [kB].
+        The greatest memory minus the median of the quarter after the warm-up [kB].
     files, threads
-        How many more there were at the end than then; of each, the lower quartile, since one
-        file more is open for moments whenever metadata is written (for long ones where the disk
-        is slow), and one fewer whenever a bag goes on in another file.
+        The increase from that quarter to the last one, of the lower quartiles. One file more is
+        open while metadata is written, and one fewer when a bag continues in another file.
 
     """
 
@@ -127,12 +126,12 @@ class Flatness(NamedTuple):
 
     @property
     def flat(self) -> bool:
-        """Say whether it holds no more than it did."""
+        """Return whether memory, files and threads do not grow."""
         return self.growth <= MOST_GROWTH and self.files <= 0 and self.threads <= 0
 
 
 def flatness(samples: Sequence[Usage]) -> Flatness:
-    """Judge samples, in the order of time, of which at least eight are after the warm-up."""
+    """Judge samples in the order of time, of which at least eight are after the warm-up."""
     end = samples[-1].time
     judged = [each for each in samples if each.time >= WARM_UP * end]
     first = [each for each in judged if each.time <= 2.0 * WARM_UP * end]

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Minutes over DDS: a node and a crank source in two processes; the node's memory and counts."""
+"""Minutes over DDS: a node and a crank source as processes; the node's memory and counts."""
 
 from __future__ import annotations
 
@@ -29,36 +29,36 @@ from typing import Any
 
 from campaigns.campaign import progress_lines
 from campaigns.endurance.accelerated import SCENES
-from campaigns.endurance.memory import Account, account_of, shortcomings, Usage, usage
+from campaigns.endurance.memory import Counts, counts_of, shortcomings, Usage, usage
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.processes import Graph, MeasurementError
 from rosbags.typesys import get_typestore, Stores
 
 _CRANK_RATE = 500
 _START = 30.0
-"""How long the node may take to begin to record [s]."""
+"""Time limit for the beginning of the recording [s]."""
 
-_LOOKS = 600
-"""Looks at the node's memory, at most one a second."""
+_SAMPLES = 600
+"""Number of samples of the node's memory, at most one per second."""
 
 
 @dataclass(slots=True)
 class DdsRun:
     """
-    How a run went.
+    The outcome of a run.
 
     Attributes
     ----------
     minutes
-        How long it was.
+        Its duration [min].
     samples
-        What the node's process held.
+        The usage of the node's process.
     ticks
-        Their counts in the last diagnostics.
-    account
-        What the bag says of its messages.
+        Counts of ticks in the last diagnostics.
+    counts
+        The bag's counts of messages.
     replayed
-        The account of ``linkage replay``.
+        The result of ``linkage replay --json``.
     faults
         The violations.
 
@@ -67,7 +67,7 @@ class DdsRun:
     minutes: float
     samples: list[Usage] = field(default_factory=list)
     ticks: dict[str, str] = field(default_factory=dict)
-    account: Account = field(default_factory=dict)
+    counts: Counts = field(default_factory=dict)
     replayed: dict[str, Any] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
 
@@ -81,7 +81,7 @@ def run(minutes: float) -> DdsRun:
     with TemporaryDirectory(prefix='linkage_ros_endurance_') as name:
         folder = Path(name)
         scene = _scene(folder, max(min(60.0, 6.0 * minutes), 1.0))
-        # Below 102, so that the ports stay below those which the kernel hands out.
+        # Below 102, so that the ports stay below the kernel's ephemeral ones.
         graph = Graph(2 + os.getpid() % 100, folder, longest=round(60.0 * minutes) + 120)
         done = DdsRun(minutes)
         try:
@@ -90,7 +90,7 @@ def run(minutes: float) -> DdsRun:
             done.faults.append(str(error))
             return done
         done.faults += shortcomings(folder / 'bag')
-        done.account = account_of(folder / 'bag')
+        done.counts = counts_of(folder / 'bag')
         done.ticks = _ticks(folder / 'bag')
         done.replayed = _replayed(folder / 'bag')
         if done.replayed.get('verdict') != 'identical':
@@ -99,7 +99,7 @@ def run(minutes: float) -> DdsRun:
 
 
 def _record(graph: Graph, scene: Path, bag: Path, done: DdsRun) -> None:
-    """Run node and source, and look at the node; both are ended, the node with its bag closed."""
+    """Run node and source, sample the node's usage, and end both."""
     node_arguments = ['--ros-args', '-p', f'scene:={scene}']
     with graph.run('linkage_ros.node.linkage_node', node_arguments) as node:
         until = time.monotonic() + _START
@@ -110,7 +110,7 @@ def _record(graph: Graph, scene: Path, bag: Path, done: DdsRun) -> None:
         with graph.run('linkage_ros.node.crank_source', source_arguments) as source:
             begin = time.monotonic()
             seconds = 60.0 * done.minutes
-            step = max(seconds / _LOOKS, min(1.0, seconds / 40))
+            step = max(seconds / _SAMPLES, min(1.0, seconds / 40))
             progress = progress_lines(seconds, 's over DDS')
             while (now := time.monotonic() - begin) < seconds:
                 node.check()
@@ -123,7 +123,7 @@ def _record(graph: Graph, scene: Path, bag: Path, done: DdsRun) -> None:
 
 
 def _scene(folder: Path, split_seconds: float) -> Path:
-    """Write the demo with a bag that is split."""
+    """Write the demo scene with a bag that is split."""
     text = (SCENES / 'demo.yaml').read_text()
     text = text.replace('../linkages', str(SCENES.parent / 'linkages'))
     record = f'record: {{directory: {folder}, name: bag, split_seconds: {split_seconds:g}}}'
@@ -134,7 +134,7 @@ def _scene(folder: Path, split_seconds: float) -> Path:
 
 
 def _ticks(bag: Path) -> dict[str, str]:
-    """Return the last diagnostics in a bag on the ticks and the crank."""
+    """Return the last diagnostics in a bag about the ticks and the crank."""
     store = get_typestore(Stores.ROS2_JAZZY)
     last = b''
     for message in read_bag(bag).messages():
@@ -152,11 +152,11 @@ def _ticks(bag: Path) -> dict[str, str]:
 
 
 def _replayed(bag: Path) -> dict[str, Any]:
-    """Return what ``linkage replay`` says of a bag."""
+    """Return the result of ``linkage replay --json`` for a bag."""
     command = [sys.executable, '-m', 'linkage_ros.cli.main', 'replay', str(bag), '--json']
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     try:
-        said: dict[str, Any] = json.loads(answer.stdout)
+        result: dict[str, Any] = json.loads(answer.stdout)
     except ValueError:
         return {'verdict': f'missing: {answer.stderr.strip()}'}
-    return said
+    return result

@@ -16,51 +16,61 @@
 """
 ``python -m campaigns.kills``: recordings at 1 kHz, killed at random instants by SIGKILL.
 
-What is left has to be readable, the beginning of what was offered without a false message, and
-short of it by the flush period and one tick at most.
+The bag has to be readable and to begin with the offered messages, without a false one. At most the
+messages of the last flush period and one tick may be lost.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Sequence
 from datetime import datetime
 from importlib import metadata
 from pathlib import Path
 import sys
-import time
 
-from bench.report import machine_table, say, show, Table, write_page
-from campaigns.campaign import percentile_texts, progress_lines
+from bench.report import say, Table
+from campaigns.campaign import (
+    exit_code,
+    machine_of,
+    Page,
+    parser_of,
+    percentile_texts,
+    progress_lines,
+    publish,
+)
 from campaigns.kills.plan import FLUSH_PERIODS, Phase, plans
 from campaigns.kills.run import (
     FAULT,
-    GONE_FILE,
     KillError,
     NEXT_FILE,
     NO_FILE,
     NO_FOLDER,
+    OLD_FILE,
     Outcome,
     run,
 )
 
-INTRO = """\
-Made by `make kills`: recordings at 1 kHz, a crank's and joint states, each by a process of its
-own, killed by SIGKILL at random instants from before the folder is made to after the close, and
-some more aimed at what takes milliseconds only. Compression, splits, rings and flush periods are
-drawn for each. Every message is made of its number and the time at which it was offered, so that
-what a bag holds is compared byte by byte with what was offered: it has to be all of it from the
-first message on, or in a ring from the first that was kept, up to some last one, and never
-less than what a flush had brought to the disk. What is recovered of it is read by rosbags too.
+PAGE = Page(
+    Path('docs/recordings/kills.md'),
+    'Recordings that are killed',
+    """
+Made by `make kills`. Recordings of crank samples and joint states at 1 kHz, each in its own
+process, are killed by SIGKILL at random instants from before the folder is made to after the
+close. More kills are aimed at phases that last only milliseconds. Compression, splits, rings and
+flush periods are drawn at random. The bytes of every message contain its number and its time, so
+the bag is compared byte by byte with the offered messages. It has to hold all messages from the
+first one, or from the first one that the ring kept, up to some last one, and at least all messages
+that a flush had brought to the disk. The recovered bag is read by rosbags too.
 
-- *by SIGKILL*: age at the kill of the oldest message that is missing. What the system was given
+- *by SIGKILL*: age at the kill of the oldest lost message. Data that was given to the system
   survives the process. The bound is the flush period and one tick.
-- *taken as it was*: with the longest tick of that time for the one tick, since a machine may hold
-  a process up, and with the time of flushes and splits in it: a message that comes while the disk
-  is waited for is given to the system after that.
-- *by a power cut*: age of the oldest message that no flush had brought to the disk by then.
-"""
+- *above it, with delays*: losses above the sum of the flush period, the longest tick and the time
+  of flushes and splits. A busy machine may hold a process up, and a message that arrives while the
+  recorder waits for the disk is given to the system afterwards.
+- *by a power cut*: age of the oldest message that no flush had brought to the disk.
+""",
+)
 
 _PHASES = {
     Phase.STARTING: 'before the folder',
@@ -71,64 +81,64 @@ _PHASES = {
     Phase.CLOSING: 'in the close',
     Phase.CLOSED: 'after the close',
 }
-_NO_WHOLE_FILE = 'folder, no whole file'
+_NO_COMPLETE_FILE = 'folder, no complete file'
 
 
 def tables(outcomes: Sequence[Outcome]) -> list[Table]:
-    """Return the tables of what came of the kills."""
+    """Return the tables of the outcomes."""
     return [_phases(outcomes), _verdicts(outcomes), _losses(outcomes)]
 
 
 def is_beyond(outcome: Outcome) -> bool:
-    """Say whether more was lost than the bound allows, tick and disk taken as they were."""
+    """Return whether the loss is above the bound with the longest tick and the disk's time."""
     return outcome.excess > 0
 
 
 def _phase(outcome: Outcome) -> str:
-    said = outcome.verdicts['bag']
-    if said == NO_FOLDER:
+    verdict = outcome.verdicts['bag']
+    if verdict == NO_FOLDER:
         return _PHASES[Phase.STARTING]
-    return _NO_WHOLE_FILE if said == NO_FILE else _PHASES[outcome.phase]
+    return _NO_COMPLETE_FILE if verdict == NO_FILE else _PHASES[outcome.phase]
 
 
 def _phases(outcomes: Sequence[Outcome]) -> Table:
     table = Table(
-        'Kills, by what the recording was doing',
+        'Kills by phase of the recording',
         (
             '',
             'kills',
             'messages offered',
             'found',
-            'let go',
+            'removed by the ring',
             'lost',
             'metadata.yaml.tmp left',
             NEXT_FILE,
-            GONE_FILE,
+            OLD_FILE,
         ),
     )
     names = list(_PHASES.values())
-    names.insert(1, _NO_WHOLE_FILE)
+    names.insert(1, _NO_COMPLETE_FILE)
     groups = [(name, [o for o in outcomes if _phase(o) == name]) for name in names]
-    for name, group in [*groups, ('all', list(outcomes))]:
-        offered, found, gone = (
-            sum(getattr(outcome, what) for outcome in group)
-            for what in ('offered', 'found', 'let_go')
+    for phase, group in [*groups, ('all', list(outcomes))]:
+        offered, found, removed = (
+            sum(getattr(outcome, name) for outcome in group)
+            for name in ('offered', 'found', 'let_go')
         )
         left = Counter(each for outcome in group for each in outcome.leftovers)
-        counts = [len(group), offered, found, gone, offered - found - gone]
-        counts += [left['metadata.yaml.tmp'], left[NEXT_FILE], left[GONE_FILE]]
-        table.rows.append([name, *(f'{count:,}' for count in counts)])
+        counts = [len(group), offered, found, removed, offered - found - removed]
+        counts += [left['metadata.yaml.tmp'], left[NEXT_FILE], left[OLD_FILE]]
+        table.rows.append([phase, *(f'{count:,}' for count in counts)])
     return table
 
 
 def _verdicts(outcomes: Sequence[Outcome]) -> Table:
     counts = Counter(
-        (what, said[:80]) for outcome in outcomes for what, said in outcome.verdicts.items()
+        (of, text[:80]) for outcome in outcomes for of, text in outcome.verdicts.items()
     )
     table = Table('Verdicts', ('', 'kills'))
     order = {'bag': 0, 'metadata': 1, 'recovered': 2}
-    for what, said in sorted(counts, key=lambda k: (not k[1].startswith(FAULT), order[k[0]], k)):
-        table.rows.append((f'{what}: {said}', f'{counts[what, said]:,}'))
+    for of, text in sorted(counts, key=lambda k: (not k[1].startswith(FAULT), order[k[0]], k)):
+        table.rows.append((f'{of}: {text}', f'{counts[of, text]:,}'))
     faults = sum(bool(outcome.faults) for outcome in outcomes)
     table.rows.append(('kills with a fault', f'{faults:,}'))
     return table
@@ -136,21 +146,10 @@ def _verdicts(outcomes: Sequence[Outcome]) -> Table:
 
 def _losses(outcomes: Sequence[Outcome]) -> Table:
     table = Table(
-        'What was lost, in ms, of recordings that were not closed',
-        (
-            'flush period',
-            'kills',
-            'by SIGKILL: p50',
-            'p99',
-            'most',
-            'bound',
-            'above it',
-            'above it, taken as it was',
-            'by a power cut: p50',
-            'p99',
-            'most',
-        ),
-    )
+        'Losses of recordings that were not closed, in ms',
+        ('flush period', 'kills', 'by SIGKILL: p50', 'p99', 'most', 'bound', 'above it',
+         'above it, with delays', 'by a power cut: p50', 'p99', 'most'),
+    )  # fmt: skip
     lossy = [o for o in outcomes if Phase.MAKING < o.phase < Phase.CLOSED and o.offered]
     for period in FLUSH_PERIODS:
         group = [o for o in lossy if o.plan.storage.flush_period == period]
@@ -170,32 +169,24 @@ def _losses(outcomes: Sequence[Outcome]) -> Table:
     return table
 
 
-PAGE = Path('docs/recordings/kills.md')
-
-
 def main() -> int:
-    """Kill and judge; 1 where a verdict is a fault, or more was lost than may be."""
-    parser = argparse.ArgumentParser('python -m campaigns.kills', description=__doc__)
+    """Kill and judge; return 1 if a verdict is a fault, or a loss is above the bound."""
+    parser = parser_of('kills', __doc__, page=PAGE, jobs=4)
     parser.add_argument('--kills', type=int, default=1000, help='at any instant')
-    parser.add_argument('--aimed', type=int, default=400, help='at what takes milliseconds only')
+    parser.add_argument('--aimed', type=int, default=400, help='aimed at short phases')
     parser.add_argument(
         '--seconds', type=float, nargs=2, default=(0.2, 3.0), help='shortest and longest run'
     )
-    parser.add_argument('--jobs', type=int, default=4, help='recordings at once')
-    parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--write', action='store_true', help=f'keep the outcome in {PAGE}')
-    given = parser.parse_args()
-    started, begin = time.monotonic(), datetime.now().astimezone()
-    work = plans(given.seed, given.kills, given.aimed, (given.seconds[0], given.seconds[1]))
+    options = parser.parse_args()
+    begin = datetime.now().astimezone()
+    shortest, longest = options.seconds
+    work = plans(options.seed, options.kills, options.aimed, (shortest, longest))
     outcomes = []
     progress = progress_lines(len(work), 'kills')
     try:
-        for outcome in run(work, given.jobs):
+        for outcome in run(work, options.jobs):
             outcomes.append(outcome)
             progress(1)
-    except KeyboardInterrupt:
-        say('stopped')
-        return 130
     except KillError as error:
         print(f'kills: {error}', file=sys.stderr)
         return 1
@@ -204,23 +195,12 @@ def main() -> int:
         for fault in outcome.faults:
             say(f'{fault}: {outcome.plan}')
         if is_beyond(outcome):
-            say(f'lost for {outcome.excess / 1e6:.1f} ms more than may be: {outcome.plan}')
-    seconds = time.monotonic() - started
-    machine = machine_table(
-        begin,
-        ('mcap', metadata.version('mcap')),
-        ('rosbags', metadata.version('rosbags')),
-        ('seed', str(given.seed)),
-        ('kills', f'{given.kills:,} at any instant, {given.aimed:,} aimed'),
-        ('took', f'{seconds:.0f} s, {given.jobs} at once'),
-    )
-    found = [*tables(outcomes), machine]
-    for table in found:
-        show(table)
-    if given.write:
-        write_page(PAGE, 'Recordings that are killed', INTRO, found)
+            say(f'loss {outcome.excess / 1e6:.1f} ms above the bound: {outcome.plan}')
+    versions = [(package, metadata.version(package)) for package in ('mcap', 'rosbags')]
+    machine = machine_of(begin, options, 'kills', len(work), *versions)
+    publish([*tables(outcomes), machine], PAGE if options.write else None)
     return int(any(outcome.faults or is_beyond(outcome) for outcome in outcomes))
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(exit_code(main))

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""``python -m campaigns.kills.child``: the recording that is killed."""
+"""``python -m campaigns.kills.child``: the process whose recording is killed."""
 
 from __future__ import annotations
 
@@ -36,31 +36,31 @@ _SWITCH_INTERVAL = 1e-4  # as the node has it [s]
 
 class _MarkedWriter(BagWriter):
     """
-    Notes what it does; ``bell`` is a pipe that gets a byte at the beginning of each phase.
+    Marks its progress; ``signal_pipe`` gets a byte at the beginning of each phase.
 
-    A message is counted as safe when the flush has returned before which it was written.
+    A message counts as safe when a flush after it has returned.
     """
 
-    def __init__(self, marks: Marks, bell: int, folder: Path, storage: Storage) -> None:
-        self._marks, self._bell = marks, bell
+    def __init__(self, marks: Marks, signal_pipe: int, folder: Path, storage: Storage) -> None:
+        self._marks, self._signal_pipe = marks, signal_pipe
         self._written = 0
         self._enter(Phase.MAKING)
         super().__init__(folder, TOPICS, ATTACHMENTS, storage)
         self._enter(Phase.RECORDING)
 
     def write(self, topic: int, log_time: int, publish_time: int, data: bytes) -> bool:
-        taken = super().write(topic, log_time, publish_time, data)
+        accepted = super().write(topic, log_time, publish_time, data)
         self._written += 1
-        return taken
+        return accepted
 
     def flush(self) -> None:
-        self._ring(Phase.FLUSHING)
+        self._signal(Phase.FLUSHING)
         with self._marks.pause(Phase.FLUSHING):
             super().flush()
             self._marks.safe = self._written
 
     def close(self, custom: Mapping[str, str] | None = None) -> BagSummary:
-        self._ring(Phase.CLOSING)
+        self._signal(Phase.CLOSING)
         with self._marks.pause(Phase.CLOSING):
             summary = super().close(custom)
             self._marks.safe = self._written
@@ -68,34 +68,34 @@ class _MarkedWriter(BagWriter):
         return summary
 
     def _split(self) -> None:
-        self._ring(Phase.SPLITTING)
+        self._signal(Phase.SPLITTING)
         with self._marks.pause(Phase.SPLITTING):
             super()._split()
             self._marks.safe = self._written
 
     def _enter(self, phase: Phase) -> None:
-        self._ring(phase)
+        self._signal(phase)
         self._marks.enter(phase)
 
-    def _ring(self, phase: Phase) -> None:
-        os.write(self._bell, bytes([phase]))
+    def _signal(self, phase: Phase) -> None:
+        os.write(self._signal_pipe, bytes([phase]))
 
 
 def main() -> int:
     """Record, close, and wait to be killed."""
     parser = argparse.ArgumentParser('python -m campaigns.kills.child', description=__doc__)
-    parser.add_argument('folder', type=Path, help='of the bag')
-    parser.add_argument('marks', type=Path, help='the file for the marks')
-    parser.add_argument('bell', type=int, help='descriptor of the pipe')
+    parser.add_argument('folder', type=Path, help='folder of the bag')
+    parser.add_argument('marks', type=Path, help='file of the marks')
+    parser.add_argument('signal_pipe', type=int, help='file descriptor')
     parser.add_argument('ticks', type=int)
     parser.add_argument('storage', type=json.loads)
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     sys.setswitchinterval(_SWITCH_INTERVAL)
-    marks, storage = Marks(given.marks), Storage(**given.storage)
-    writer = _MarkedWriter(marks, given.bell, given.folder, storage)
+    marks, storage = Marks(arguments.marks), Storage(**arguments.storage)
+    writer = _MarkedWriter(marks, arguments.signal_pipe, arguments.folder, storage)
     recorder = Recorder(writer, flush_period=storage.flush_period)
     begin = monotonic_ns()
-    for tick in range(given.ticks):
+    for tick in range(arguments.ticks):
         wait = begin + tick * PERIOD_NS - monotonic_ns()
         if wait > 0:
             sleep(wait * 1e-9)
@@ -108,7 +108,7 @@ def main() -> int:
     if summary.failure or any(counts.dropped for counts in summary.topics):
         print(summary.failure, file=sys.stderr)
         return 1
-    # Killed here too, or when nobody is left to do it.
+    # Wait for the kill, or end if it does not come.
     sleep(60.0)
     return 1
 

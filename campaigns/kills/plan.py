@@ -14,10 +14,10 @@
 
 
 """
-The plan of a recording and of its kill, and the marks that show the killer its progress.
+The plan of a recording and of its kill, and the marks by which the recording shows its progress.
 
-Marks lie in the memory of a file that both processes have mapped. A value stored there is visible
-at once and survives the kill; a pipe would lose data not yet written to it. Each number is eight
+Marks are in a file that both processes have mapped into memory. A value stored there is visible at
+once and survives the kill; a pipe would lose data not yet written to it. Each number is eight
 aligned bytes, stored by one instruction.
 """
 
@@ -38,7 +38,7 @@ from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.messages.joint_state import JointStateWriter
 
 PERIOD_NS = 1_000_000
-"""Of the ticks: 1 kHz."""
+"""Period of the ticks: 1 kHz."""
 
 FLUSH_PERIODS = (0.05, 0.1, 0.25, 0.5, 1.0)  # [s]
 
@@ -87,17 +87,17 @@ class Plan(NamedTuple):
     Attributes
     ----------
     number
-        Which.
+        Its number.
     storage
-        How the bag is stored.
+        The storage options of the bag.
     ticks
-        How many are recorded before the bag is closed.
+        Number of ticks before the bag is closed.
     aim
-        The phase whose beginning the delay counts from; MAKING, the first, for any instant.
+        The phase from whose beginning the delay counts; MAKING, the first, for any instant.
     time
-        Which occurrence of the phase, counted from 1.
+        The occurrence of the phase, counted from 1.
     delay
-        From there to the kill [s].
+        Time from there to the kill [s].
 
     """
 
@@ -110,7 +110,7 @@ class Plan(NamedTuple):
 
 
 AIMS: Mapping[Phase, float] = {
-    # The longest delay from the beginning of a phase [s]: on a fast disk twice what it takes.
+    # The longest delay from the beginning of a phase [s], twice its duration on a fast disk.
     Phase.MAKING: 0.008,
     Phase.FLUSHING: 0.002,
     Phase.SPLITTING: 0.010,
@@ -119,19 +119,7 @@ AIMS: Mapping[Phase, float] = {
 
 
 def plans(seed: int, kills: int, aimed: int, seconds: tuple[float, float]) -> list[Plan]:
-    """
-    Return kills at random instants of runs of random settings, then some aimed at what is short.
-
-    Parameters
-    ----------
-    seed
-        Of all that is random.
-    kills, aimed
-        How many of each.
-    seconds
-        Shortest and longest run.
-
-    """
+    """Return kills at random instants, then kills aimed at short phases; runs last ``seconds``."""
     return [
         _plan(Random(f'{seed} {number}'), number, aimed=number >= kills, seconds=seconds)
         for number in range(kills + aimed)
@@ -166,14 +154,14 @@ _WRITE = (
 
 def message(number: int, time: int) -> tuple[int, int, int, bytes]:
     """
-    Return the message of a number as it is offered: a crank's and joint states in turn.
+    Return a numbered message for the recorder; messages of the crank and joint states alternate.
 
     Parameters
     ----------
     number
-        From 0 on; two for each tick.
+        From 0; two for each tick.
     time
-        When it is offered, in [ns]; it and the number are in its bytes.
+        Time at which it is offered, in [ns]; its bytes contain number and time.
 
     """
     topic = number % len(TOPICS)
@@ -182,7 +170,7 @@ def message(number: int, time: int) -> tuple[int, int, int, bytes]:
 
 
 def expected(number: int, time: int) -> BagMessage:
-    """Return the message of a number as the bag has to give it."""
+    """Return a numbered message as it has to be in the bag."""
     topic, log_time, publish_time, data = message(number, time)
     return BagMessage(TOPICS[topic].name, log_time, publish_time, data)
 
@@ -206,7 +194,7 @@ class Marks:
     Attributes
     ----------
     times
-        When each tick began, in [ns] of the steady clock; 0 for one that has not.
+        Begin of each tick, in [ns] of the steady clock; 0 before.
 
     """
 
@@ -218,7 +206,7 @@ class Marks:
 
     @classmethod
     def make(cls, file: Path, ticks: int) -> Marks:
-        """Make the file for so many ticks, and return its marks."""
+        """Make the file for a number of ticks, and return its marks."""
         file.write_bytes(bytes(8 * (_FIRST_TICK + ticks)))
         return cls(file)
 
@@ -234,7 +222,7 @@ class Marks:
 
     @property
     def offered(self) -> int:
-        """Return how many messages the recorder was given, or was being given."""
+        """Return the number of messages offered to the recorder, with the current one."""
         return self._numbers[_OFFERED]
 
     @offered.setter
@@ -243,7 +231,7 @@ class Marks:
 
     @property
     def safe(self) -> int:
-        """Return how many messages a flush, split or close had brought to the disk."""
+        """Return the number of messages that a flush, split or close has brought to the disk."""
         return self._numbers[_SAFE]
 
     @safe.setter
@@ -252,18 +240,18 @@ class Marks:
 
     @property
     def ticks(self) -> int:
-        """Return how many ticks have begun."""
+        """Return the number of ticks begun."""
         return self._numbers[_TICKS]
 
     def begin_tick(self) -> int:
-        """Note that a tick begins; return when, in [ns]."""
+        """Mark the begin of a tick; return its time in [ns]."""
         number, now = self._numbers[_TICKS], monotonic_ns()
         self.times[number] = now
         self._numbers[_TICKS] = number + 1
         return now
 
     def enter(self, phase: Phase) -> int:
-        """Note what is being done from now on; return when that is, in [ns]."""
+        """Mark the begin of a phase; return its time in [ns]."""
         now = monotonic_ns()
         # One number, so that a kill cannot come between phase and time.
         self._numbers[_STATE] = now * _PHASES + phase
@@ -271,7 +259,7 @@ class Marks:
 
     @contextmanager
     def pause(self, phase: Phase) -> Iterator[None]:
-        """Note for how long the disk is worked for, and nothing is taken."""
+        """Mark a phase in which the recorder waits for the disk and takes no messages."""
         begin = self.enter(phase)
         try:
             yield
@@ -283,7 +271,7 @@ class Marks:
             self._numbers[_PAUSES] = number + 1
 
     def paused(self, begin: int, end: int) -> int:
-        """Return for how long of a time, all in [ns], the disk was worked for."""
+        """Return the time, in [ns], that the recorder waited for the disk within an interval."""
         count = min(self._numbers[_PAUSES], _MOST_PAUSES)
         pauses = [
             (self._numbers[at], self._numbers[at + 1])
@@ -292,4 +280,4 @@ class Marks:
         since, phase = divmod(self._numbers[_STATE], _PHASES)
         if phase in (Phase.FLUSHING, Phase.SPLITTING, Phase.CLOSING):
             pauses.append((since, end))
-        return sum(max(0, min(end, till) - max(begin, since)) for since, till in pauses)
+        return sum(max(0, min(end, until) - max(begin, since)) for since, until in pauses)

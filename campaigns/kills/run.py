@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Kill recordings, and compare the remaining bag with the messages offered."""
+"""Kill recordings, and compare each bag with the messages that were offered."""
 
 from __future__ import annotations
 
@@ -33,9 +33,8 @@ from typing import Any
 
 from campaigns.campaign import results_of
 from campaigns.kills.plan import expected, Marks, PERIOD_NS, Phase, Plan, TOPICS
-from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
+from linkage_ros.bag.metadata import DISCARDED, METADATA_FILE, ROOT_KEY, UNFINISHED
 from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.bag.recording_stats import LET_GO, UNFINISHED
 from linkage_ros.bag.recover import recover
 from linkage_ros.errors import BagError
 from rosbags.highlevel import AnyReader
@@ -45,9 +44,9 @@ FAULT = 'FAULT: '
 """Prefix of a verdict that is a violation."""
 
 NO_FOLDER = 'no folder yet'
-NO_FILE = 'nothing whole yet, and says so'
-NEXT_FILE = 'the next file there, not yet named'
-GONE_FILE = 'a file that made way there, no longer named'
+NO_FILE = 'no complete file yet, reported'
+NEXT_FILE = 'next file not yet in the metadata'
+OLD_FILE = 'old file no longer in the metadata'
 
 
 @dataclass(slots=True)
@@ -58,23 +57,23 @@ class Outcome:
     Attributes
     ----------
     plan
-        The kind of kill.
+        The plan of the kill.
     phase
-        The phase that it was in.
+        The phase in which it was killed.
     offered, found, let_go
-        Messages: that the recorder was given, that are in the bag, and that were in files which
-        made way for newer ones.
+        Numbers of messages: offered to the recorder, in the bag, and in files that the ring
+        removed.
     loss
-        Age at the kill of the oldest message that was lost [ns]; 0 for none.
+        Age at the kill of the oldest lost message [ns]; 0 for none.
     power_loss
-        Age of the oldest that no returned flush had brought to the disk: what a power cut at this
-        instant may have cost [ns].
+        Age of the oldest message that no flush had brought to the disk: the greatest loss by a
+        power cut at this instant [ns].
     paused
-        For how long of `loss` the disk was worked for: flushes, splits, the close [ns].
+        Time within `loss` in which the recorder waited for the disk: flushes, splits, close [ns].
     tick
-        The longest tick in that time [ns].
+        The longest tick within `loss` [ns].
     verdicts
-        Of the bag as it lies there, of its metadata, and of what was recovered of it.
+        The verdicts on the bag, on its metadata, and on the recovered bag.
     leftovers
         Other files in the folder.
 
@@ -94,39 +93,23 @@ class Outcome:
 
     @property
     def strict_excess(self) -> int:
-        """Return by how much the loss is more than the flush period and one tick [ns]."""
+        """Return the excess of the loss over the flush period and one tick [ns]."""
         return self.loss - round(self.plan.storage.flush_period * 1e9) - PERIOD_NS
 
     @property
     def excess(self) -> int:
-        """Return the same, with the tick and the disk taken as they were [ns]."""
+        """Return the excess over the flush period, the longest tick and the disk's time [ns]."""
         period = round(self.plan.storage.flush_period * 1e9)
         return self.loss - period - self.tick - self.paused
 
     @property
     def faults(self) -> list[str]:
-        """Return the verdicts that must not be."""
-        return [
-            f'{what}: {said}' for what, said in self.verdicts.items() if said.startswith(FAULT)
-        ]
+        """Return the verdicts that are violations."""
+        return [f'{of}: {text}' for of, text in self.verdicts.items() if text.startswith(FAULT)]
 
 
 def judge(plan: Plan, folder: Path, marks: Marks, killed: int) -> Outcome:
-    """
-    Judge the bag after a kill.
-
-    Parameters
-    ----------
-    plan
-        The kind of kill.
-    folder
-        The bag's.
-    marks
-        Progress of the process by then.
-    killed
-        When, in [ns] of the steady clock.
-
-    """
+    """Judge the bag after a kill at a time in [ns] of the steady clock."""
     outcome = Outcome(plan, marks.phase, offered=marks.offered)
     begun = marks.phase > Phase.MAKING
     if not folder.exists():
@@ -136,14 +119,14 @@ def judge(plan: Plan, folder: Path, marks: Marks, killed: int) -> Outcome:
     if messages is not None:
         _measure(outcome, marks, killed)
     elif begun and not outcome.faults:
-        outcome.verdicts['bag'] = f'{FAULT}nothing whole, although it had begun'
+        outcome.verdicts['bag'] = f'{FAULT}no complete file, although recording had begun'
     outcome.verdicts['metadata'] = _metadata(outcome, folder)
     outcome.verdicts['recovered'] = _recovered(outcome, folder, messages, marks)
     return outcome
 
 
 def _read(outcome: Outcome, folder: Path, marks: Marks) -> list[BagMessage] | None:
-    """Read the bag as it lies there; return its messages, or nothing where none are whole."""
+    """Read the bag; return its messages, or None without a complete file."""
     try:
         bag = read_bag(folder, allow_truncated=True)
         messages = list(bag.messages())
@@ -154,29 +137,29 @@ def _read(outcome: Outcome, folder: Path, marks: Marks) -> list[BagMessage] | No
         outcome.verdicts['bag'] = f'{FAULT}{type(error).__name__}: {error}'
         return None
     outcome.found = len(messages)
-    counts = json.loads(bag.custom.get(LET_GO, '{}'))
+    counts = json.loads(bag.custom.get(DISCARDED, '{}'))
     outcome.let_go = sum(counts.values())
     end = outcome.let_go + len(messages)
     if not _is_run(messages, outcome.let_go, marks):
         verdict = f'{FAULT}a false message'
     elif end < marks.safe:
-        verdict = f'{FAULT}{marks.safe - end} messages lost that had been flushed'
+        verdict = f'{FAULT}{marks.safe - end} flushed messages lost'
     elif marks.phase is Phase.CLOSED and (bag.truncated or UNFINISHED in bag.custom):
         verdict = f'{FAULT}closed, but not finished'
     elif bag.truncated:
-        verdict = 'the beginning, and says that it has no end'
+        verdict = 'a beginning, truncation reported'
     elif UNFINISHED in bag.custom:
-        verdict = 'whole files, and says that it is not finished'
+        verdict = 'complete files, marked as unfinished'
     else:
         verdict = 'finished'
         if end < marks.offered:
-            verdict = f'{FAULT}finished, but not all'
+            verdict = f'{FAULT}finished, but incomplete'
     outcome.verdicts['bag'] = verdict
     return messages
 
 
 def _is_run(messages: Sequence[BagMessage], first: int, marks: Marks) -> bool:
-    """Return whether these are the offered messages, byte for byte, consecutive without a gap."""
+    """Return whether these are consecutive offered messages, byte for byte."""
     return first + len(messages) <= marks.offered and all(
         message == expected(number, marks.times[number // len(TOPICS)])
         for number, message in enumerate(messages, first)
@@ -184,8 +167,8 @@ def _is_run(messages: Sequence[BagMessage], first: int, marks: Marks) -> bool:
 
 
 def _measure(outcome: Outcome, marks: Marks, killed: int) -> None:
-    """Say how much was lost, and how much a power cut could have cost."""
-    # A tick may have begun between the look at the clock and the kill.
+    """Measure the loss by the kill, and the greatest loss by a power cut."""
+    # A tick may have begun between reading the clock and the kill.
     killed = max(killed, marks.times[marks.ticks - 1] if marks.ticks else 0)
 
     def age(number: int) -> int:
@@ -202,7 +185,7 @@ def _measure(outcome: Outcome, marks: Marks, killed: int) -> None:
 
 
 def _metadata(outcome: Outcome, folder: Path) -> str:
-    """Judge ``metadata.yaml``: whole, and no name or count in it without a file or message."""
+    """Judge ``metadata.yaml``: valid, and every name and count in it has its file and messages."""
     files = {file.name for file in folder.glob('*.mcap')}
     others = {file.name for file in folder.iterdir()} - files
     outcome.leftovers += sorted(others - {METADATA_FILE})
@@ -210,39 +193,39 @@ def _metadata(outcome: Outcome, folder: Path) -> str:
         begun = outcome.phase > Phase.MAKING
         return f'{FAULT}none' if begun else 'none yet'
     try:
-        said: dict[str, Any] = yaml.safe_load((folder / METADATA_FILE).read_text())[ROOT_KEY]
-        named = said['relative_file_paths']
-        count = said['message_count']
-        parts = [(part['path'], part['message_count']) for part in said['files']]
+        content: dict[str, Any] = yaml.safe_load((folder / METADATA_FILE).read_text())[ROOT_KEY]
+        named = content['relative_file_paths']
+        count = content['message_count']
+        parts = [(part['path'], part['message_count']) for part in content['files']]
     except Exception as error:  # noqa: BLE001
         return f'{FAULT}{type(error).__name__}'
     if not files.issuperset(named) or [path for path, _ in parts] != named:
-        return f'{FAULT}names a file that is not there'
+        return f'{FAULT}names a missing file'
     if count > outcome.found or count != sum(number for _, number in parts):
-        return f'{FAULT}counts {count}, of which {outcome.found} are there'
+        return f'{FAULT}counts {count} messages, {outcome.found} exist'
     newest = max(map(_number, named))
     outcome.leftovers += [
-        NEXT_FILE if _number(name) > newest else GONE_FILE
+        NEXT_FILE if _number(name) > newest else OLD_FILE
         for name in sorted(files.difference(named))
     ]
-    return 'whole, names what is there'
+    return 'valid, names existing files'
 
 
 def _number(name: str) -> int:
-    """Return which of a bag's files has this name."""
+    """Return the number in the name of a bag's file."""
     return int(Path(name).stem.rpartition('_')[2])
 
 
 def _recovered(
     outcome: Outcome, folder: Path, messages: list[BagMessage] | None, marks: Marks
 ) -> str:
-    """Recover the bag, and read that by rosbags and by ourselves."""
+    """Recover the bag, and read the result by rosbags and by our reader."""
     target = folder.with_name(f'{folder.name}_recovered')
     try:
         recover(folder, target)
     except BagError:
-        nothing = not messages and not marks.safe
-        return 'nothing to save, and says so' if nothing else f'{FAULT}nothing saved'
+        empty = not messages and not marks.safe
+        return 'nothing to recover, reported' if empty else f'{FAULT}nothing recovered'
     except Exception as error:  # noqa: BLE001
         return f'{FAULT}{type(error).__name__}: {error}'
     try:
@@ -258,12 +241,12 @@ def _recovered(
         return f'{FAULT}rosbags reads other messages'
     if ours == (messages or []):
         return 'the same messages'
-    # A file that made way was still there, or the next one was not yet named.
+    # The ring had not yet removed an old file, or the next file was not yet in the metadata.
     first = _first(ours, marks)
     end = first + len(ours)
     holds_all = first <= outcome.let_go and end >= outcome.let_go + outcome.found
     if holds_all and _is_run(ours, first, marks):
-        return 'the same and older ones, from a file that made way'
+        return 'the same and older messages, from an old file of the ring'
     return f'{FAULT}other messages'
 
 
@@ -278,15 +261,15 @@ def _first(messages: Sequence[BagMessage], marks: Marks) -> int:
 
 
 _PATIENCE = 30.0
-"""How long a process may take to come to what is waited for [s]."""
+"""Time limit for a process to reach the awaited phase [s]."""
 
 
 class KillError(Exception):
-    """A recording ended without having been killed."""
+    """A recording ended before its kill."""
 
 
 def run(plans: list[Plan], jobs: int) -> Iterator[Outcome]:
-    """Carry plans out, several at once; yield what came of each."""
+    """Carry out plans, several at once; yield the outcomes."""
     yield from results_of(kill, plans, jobs)
 
 
@@ -303,40 +286,40 @@ def kill(plan: Plan) -> Outcome:
 
 
 def _kill(plan: Plan, folder: Path, marks: Path, log: Path) -> int:
-    """Return when the process was killed, in [ns] of the steady clock."""
-    hears, bell = os.pipe()
-    arguments = [folder, marks, bell, plan.ticks, json.dumps(asdict(plan.storage))]
+    """Kill a recording; return the time of the kill in [ns] of the steady clock."""
+    signals, signal_pipe = os.pipe()
+    arguments = [folder, marks, signal_pipe, plan.ticks, json.dumps(asdict(plan.storage))]
     command = [sys.executable, '-m', 'campaigns.kills.child', *map(str, arguments)]
     with log.open('wb') as errors:
         process = subprocess.Popen(
-            command, cwd=Path(__file__).parents[2], pass_fds=[bell], stderr=errors
+            command, cwd=Path(__file__).parents[2], pass_fds=[signal_pipe], stderr=errors
         )
-    os.close(bell)
+    os.close(signal_pipe)
     try:
-        if not _wait_for(plan, hears):
+        if not _wait_for(plan, signals):
             raise KillError(f'ended by itself: {log.read_text(errors="replace").strip()}')
         sleep(plan.delay)
         killed = monotonic_ns()
         process.kill()
     finally:
-        # This very process, whatever went wrong; its end is waited for before anything is judged.
+        # Whatever failed, the process has to end before the bag is judged.
         process.kill()
         process.wait()
-        os.close(hears)
+        os.close(signals)
     return killed
 
 
-def _wait_for(plan: Plan, hears: int) -> bool:
-    """Wait for the phase, or for the close where it does not come; False if the process ended."""
+def _wait_for(plan: Plan, signals: int) -> bool:
+    """Wait for the phase, or else for the close; return False if the process ended."""
     until = monotonic() + _PATIENCE + plan.ticks * 1e-3
     missing = plan.time
     while (left := until - monotonic()) > 0:
-        if not select.select([hears], [], [], left)[0]:
+        if not select.select([signals], [], [], left)[0]:
             break
-        heard = os.read(hears, 1)
-        if not heard:
+        phase = os.read(signals, 1)
+        if not phase:
             return False
-        missing -= heard[0] == plan.aim
-        if not missing or heard[0] == Phase.CLOSED:
+        missing -= phase[0] == plan.aim
+        if not missing or phase[0] == Phase.CLOSED:
             return True
     return False

@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 Real = np.longdouble
-"""64 bits of mantissa on x86-64, 113 on aarch64; where it is a double, the campaign is blunt."""
+"""Mantissa of 64 bits on x86-64, 113 on aarch64; if only 53, the campaign finds less."""
 
 Array = npt.NDArray[Any]
 
@@ -39,14 +39,14 @@ TURN = 2 * np.arctan2(Real(0), Real(-1))
 UNIT_ROUNDOFF = 2.0**-53
 _REFINEMENTS = 3
 _SMALL = 2.0**-6
-"""Of the linkage: terms that are smaller count as this, since others that they go with are not."""
+"""Least size of a term, relative to the linkage: its other terms are larger."""
 
 _STEP = 2.0**-40
 _SAMPLES = 5
 
 
 class _Spot(NamedTuple):
-    """A point of a link: the number of the link (−1: the ground) and the place in its frame."""
+    """A point of a link: the number of the link (−1: the ground), and x and y in its frame."""
 
     link: int
     x: Array
@@ -54,7 +54,7 @@ class _Spot(NamedTuple):
 
 
 class _Moved(NamedTuple):
-    """A point in the frame of the ground, and the arm that it stands on."""
+    """A point in the frame of the ground, and the vector to it from the origin of its link."""
 
     place: tuple[Array, Array]
     arm: tuple[Array, Array]
@@ -68,9 +68,9 @@ class Motion(NamedTuple):
     Attributes
     ----------
     unknowns
-        (n, N): angle [rad] and place [m] of each moving link in turn.
+        (n, N): angle [rad] and position [m] of each moving link in turn.
     rates, accelerations
-        (n, N), their derivatives by time.
+        (n, N), their time derivatives.
     joints
         Three arrays (joints, N): values of the published joints and their derivatives.
 
@@ -91,8 +91,8 @@ class Equations:
     linkage
         The linkage.
     vary
-        Where its numbers are to be varied: a function of the shape (,) of a number that returns
-        what it is multiplied by, one for each column of the states.
+        To vary its numbers: a function without arguments that returns the factors of one number,
+        one for each column of the states.
 
     """
 
@@ -129,7 +129,7 @@ class Equations:
         return x / length, y / length
 
     def unknowns(self, poses: dict[str, tuple[Array, Array, Array]]) -> Array:
-        """Return the unknowns of links by name, each with its angle and place."""
+        """Return the unknowns, from the angle and position of each link."""
         return np.array([part for link in self.links for part in poses[link]], Real)
 
     def residuals(self, unknowns: Array, inputs: Array) -> tuple[Array, Array, Array]:
@@ -187,7 +187,7 @@ class Equations:
         return residuals, jacobian, terms
 
     def _each(self) -> Any:
-        """Yield the equations by kind; a pin stands for two."""
+        """Yield the equations by kind; a pin has two equations."""
         carriers: dict[str, list[str]] = {}
         for link, points in self.linkage.links.items():
             for point in points:
@@ -245,14 +245,14 @@ class Equations:
     def _on_line(
         self, unknowns: Array, turned: tuple[Array, Array], name: str, kind: str
     ) -> tuple[Array, Array, Array]:
-        """Return how far a slider's point lies beside its line, or along it; the gradient too."""
+        """Return the distance of a slider's point from its line, or along it, and the gradient."""
         point, through, along, (ux, uy) = self._slider(name)
         tip = self._moved(unknowns, turned, point)
         foot = self._moved(unknowns, turned, through)
         if along >= 0:
             cosine, sine = turned[0][along], turned[1][along]
             ux, uy = cosine * ux - sine * uy, sine * ux + cosine * uy
-        if kind == 'on line':  # the normal takes the place of the direction
+        if kind == 'on line':  # take the normal instead of the direction
             ux, uy = -uy, ux
         dx, dy = tip.place[0] - foot.place[0], tip.place[1] - foot.place[1]
         value = ux * dx + uy * dy
@@ -274,7 +274,7 @@ class Equations:
         return value, size, gradient
 
     def _turn(self, unknowns: Array, jacobian: Array, parts: Any) -> tuple[Array, Array]:
-        """Return the angle of one link less that of another and a constant."""
+        """Return the angle of one link minus that of another and a constant."""
         one, other, angle = parts[:3]
         value = -angle * np.ones(unknowns.shape[1], Real)
         size = np.abs(angle) + np.pi * np.ones(unknowns.shape[1], Real)
@@ -285,7 +285,7 @@ class Equations:
         return value, size
 
     def bend(self, unknowns: Array, rates: Array) -> Array:
-        """Return the second derivatives (n, N) of the equations by time at accelerations of 0."""
+        """Return the second time derivatives (n, N) of the equations for accelerations of 0."""
         turned = self._turned(unknowns)
         rows: list[Array] = []
         for kind, parts in self._each():
@@ -357,16 +357,16 @@ class Equations:
         self, unknowns: Array, inputs: Array, shift: Array | None = None, steps: int = 8
     ) -> tuple[Array, Array]:
         """
-        Return the solutions next to some states, by Newton's method, and which are solutions.
+        Correct states by Newton's method; return the solutions, and which have converged.
 
         Parameters
         ----------
         unknowns, inputs
             (n, N) and (inputs, N).
         shift
-            Residuals to reach, (n, N); 0 if not given.
+            Wanted residuals, (n, N); 0 if not given.
         steps
-            Corrections at most.
+            Maximum number of corrections.
 
         """
         found = np.array(unknowns, Real)
@@ -391,9 +391,9 @@ class Equations:
         noise: Array | float = 0.0,
     ) -> Motion:
         """
-        Return solutions with their rates and accelerations, from those of the inputs.
+        Return the rates and accelerations of solutions, from those of the inputs.
 
-        ``noise``, (n, N), is what part of its terms each equation is to be off by.
+        ``noise``, (n, N), is the error of each equation relative to the size of its terms.
         """
         _, jacobian, _ = self.residuals(unknowns, inputs)
         drive = np.zeros_like(unknowns)
@@ -412,11 +412,12 @@ def condition_numbers(
     linkage: Linkage, motion: Motion, inputs: Array, rates: Array, accelerations: Array, seed: int
 ) -> tuple[Array, Array, Array]:
     """
-    Return the change of the joints relative to the rounding of all data, (joints, N) each.
+    Return the condition numbers of the joints and their derivatives, (joints, N) each.
 
     All numbers of the linkage, the inputs and the terms of every equation are varied by the same
-    part with random signs, some times over; the greatest change counts, and the value itself. That
-    the terms of the equations vary, stands for what one dyad hands to the next.
+    relative amount with random signs, several times. The result is the greatest relative change
+    plus the value itself. Varying the terms of the equations stands for the rounding of results
+    that one dyad passes to the next.
     """
     random = np.random.default_rng(seed)
     count = inputs.shape[1]
@@ -440,7 +441,7 @@ def condition_numbers(
 
 
 def _terms(jacobian: Array, values: Array) -> Array:
-    """Return the sums of the moduli of what the rows of a product are made of, (n, N)."""
+    """Return the sums of the absolute terms of a matrix product, (n, N)."""
     return (np.abs(jacobian) @ np.abs(values.T)[:, :, None])[:, :, 0].T
 
 
@@ -460,7 +461,7 @@ def _pull(moved: _Moved, rates: Array) -> tuple[Any, Any]:
 
 
 def solve(jacobian: Array, right: Array) -> Array:
-    """Solve (N, n, n) systems for (n, N) right sides, refined; infinite where singular."""
+    """Solve (N, n, n) systems for (n, N) right sides, with refinement; infinite if singular."""
     scale = np.maximum(np.abs(jacobian).max(2), 1e-300)
     scaled = jacobian / scale[:, :, None]
     matrix = scaled.astype(float)

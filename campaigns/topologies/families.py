@@ -17,9 +17,9 @@
 The families: every dyad on every kind of link, chains, inputs of all kinds, and class III.
 
 Some families have exact change points: with every dyad, in both orientations, on a crank and in
-chains. All their lengths are whole multiples of 1/64, so that their sums and differences are exact
-and the dyad lies flat to the last bit. Frames are those of textbooks; the ground's may be
-elsewhere.
+chains. All their lengths are multiples of 1/64, so that sums and differences are exact and the
+links of the dyad are exactly in line. Frames are those of textbooks; the ground may have another
+origin.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ from typing import NamedTuple
 
 from campaigns.accuracy.dyads import RPR, RRP, RRR
 from campaigns.accuracy.mechanism import Spot
+from campaigns.accuracy.random_families import DYADS
 from campaigns.topologies.constraints import Real
 from campaigns.topologies.geometry import DrivenLink, Geometry, Group, Passing
-from campaigns.topologies.topology import KINDS, Topology, TopologyBuilder
+from campaigns.topologies.topology import Topology, TopologyBuilder
 from linkage_ros.kinematics.linkage import (
     GROUND,
     Input,
@@ -83,12 +84,12 @@ class _Parts:
         self.assembly: dict[str, Side] = {}
         self.sides: dict[str, int | Passing] = {}
         self.chained = place == IN_A_CHAIN
-        # The input may be said as the angle of the ground to the crank.
+        # The input may be the angle of the ground relative to the crank.
         self.child = place != REVERSED
         self.input = 'motor' if self.chained else 'crank'
         pivot = 'O'
         if self.chained:
-            # A crank-rocker before it, whose rocker stands in the crank's place.
+            # The crank is the rocker of a crank-rocker.
             pivot = 'M'
             self._base()
         ends = (GROUND, self.input) if self.child else (self.input, GROUND)
@@ -121,7 +122,7 @@ class _Parts:
 
     def on_ground(self, distance: float, name: str) -> complex:
         """Add a point of the ground at an exact distance from O; return its direction."""
-        # Straight against the input's 0 it would be a tie which turn of two comes first.
+        # Not at π from the input's 0: there the count of turns would be ambiguous.
         direction = self.rng.choice((1 + 0j, 1j, -1j))
         step = distance * direction
         self.links[GROUND][name] = (self.origin[0] + step.real, self.origin[1] + step.imag)
@@ -131,9 +132,9 @@ class _Parts:
         self, side: int, line: complex, at: tuple[bool, bool], zero: float | None = None
     ) -> int | Passing:
         """
-        Return a side that changes at crank directions 0 and π from a line, or stays.
+        Return a side that changes at crank directions 0 or π from a line, or a constant side.
 
-        The line's direction is ``zero``, if given: that of ``line`` but for turns.
+        ``zero`` is the direction of ``line`` with its turns, if it has any.
         """
         if self.chained and at != (True, True):
             return side
@@ -142,7 +143,7 @@ class _Parts:
         return Passing(side, 'crank', (GROUND, line), at, turns)
 
     def topology(self, line: complex, at: tuple[bool, bool]) -> Topology | None:
-        """Return the built linkage; ``at`` says whether it lies flat at 0 and at π from it."""
+        """Return the built linkage; ``at``: whether its dyad is in line at 0 and at π."""
         moving = [link for link in self.links if link != GROUND]
         joints: dict[str, RevoluteJoint | SlideJoint] = {
             f'a_{link}': RevoluteJoint(GROUND, link) for link in moving
@@ -168,7 +169,7 @@ def _started(
     rng: random.Random,
     chained_line: tuple[complex, tuple[bool, bool]] | None,
 ) -> Topology | None:
-    """Return a topology that starts where it is farthest from its limits, if it closes."""
+    """Return a topology that starts far from its limits; None if it does not close."""
     geometry = Geometry(topology.linkage, topology.groups or (), topology.sides)
     inputs = np.array([[rng.uniform(-pi, pi) for _ in range(400)]], Real)
     places = geometry.place(inputs)
@@ -177,7 +178,7 @@ def _started(
     if spare[best] < _LEAST_SPARE:
         return None
     if chained_line is not None:
-        # The rocker has to come by where the dyad lies flat.
+        # The rocker has to reach the pose in which the dyad is in line.
         line, at = chained_line
         phi = np.angle(places.units['crank'] * np.conj(line))[spare > -_NEARLY_FLAT]
         away = [np.abs(np.sin(0.5 * (phi - angle))).min() for angle in (0.0, pi)]
@@ -261,16 +262,15 @@ def _rrp(
     def make(rng: random.Random) -> Topology | None:
         parts = _Parts(rng, place)
         a = _length(rng)
-        # The pivot lies by e left of the line's direction: the rod lies flat where b = |e ± a|.
+        # The pivot lies by e left of the line; the rod is perpendicular where b = |e ± a|.
         e = 0.0 if below and above else rng.choice((1, -1)) * _other(rng, a)
         b = a
         if not (below and above):
-            # y of the pin goes from e − a to e + a; the rod is across at y = b and y = −b.
+            # y of the pin goes from e − a to e + a; the rod is perpendicular at y = b and y = −b.
             b = a + e if below else a - e
             while b <= 0.0 or b == a:
                 e = rng.choice((1, -1)) * _other(rng, a)
                 b = a + e if below else a - e
-        # The crank is at 0 from this line where its pin lies at the line's far side: ψ = −π/2.
         side = rng.choice((1, -1))
         if pin_on_crank:
             parts.links['crank']['A'] = (a, 0.0)
@@ -320,22 +320,22 @@ def _until_it_closes(
 
 
 def _families() -> dict[str, tuple[str, Callable[[random.Random], Topology]]]:
-    found: dict[str, tuple[str, Callable[[random.Random], Topology]]] = {}
+    families: dict[str, tuple[str, Callable[[random.Random], Topology]]] = {}
     for place, where in PLACES.items():
         for name, fold, stretch in (
             ('fold', True, False),
             ('stretch', False, True),
             ('fold and stretch', True, True),
         ):
-            found[f'RRR {name}{place}'] = (
-                f'an RRR dyad {where} that lies flat exactly: {name}',
+            families[f'RRR {name}{place}'] = (
+                f'an RRR dyad {where} that is exactly in line: {name}',
                 _until_it_closes(_rrr(fold, stretch, place)),
             )
         for name, bent in (('bent', True), ('straight', False)):
             for crank in (True, False):
                 carrier = 'the crank' if crank else 'the ground'
-                found[f'RPR {name}, rail on {carrier}{place}'] = (
-                    f'an RPR dyad {where}, its rail {name} and pinned to {carrier}, flat exactly',
+                families[f'RPR {name}, rail on {carrier}{place}'] = (
+                    f'an RPR dyad {where} exactly in line, its rail {name} on {carrier}',
                     _until_it_closes(_rpr(bent, crank, place)),
                 )
         for name, below, above in (
@@ -345,21 +345,21 @@ def _families() -> dict[str, tuple[str, Callable[[random.Random], Topology]]]:
         ):
             for crank in (True, False):
                 carrier = 'the crank' if crank else 'the ground'
-                found[f'RRP {name}, pin on {carrier}{place}'] = (
-                    f'an RRP dyad {where}, its pin on {carrier}, the rod just as long: {name}',
+                families[f'RRP {name}, pin on {carrier}{place}'] = (
+                    f'an RRP dyad {where}, pin on {carrier}, rod exactly perpendicular: {name}',
                     _until_it_closes(_rrp(below, above, crank, place)),
                 )
-    return found
+    return families
 
 
 CHANGE_POINTS = _families()
-"""For each family what it is, and how one linkage is made."""
+"""For each family its description, and the function that makes a linkage."""
 
 
 class Family(NamedTuple):
-    """How a linkage is made, and what is tried with it."""
+    """The description of a family, and the function that makes a linkage."""
 
-    why: str
+    description: str
     make: Callable[[random.Random], Topology]
 
 
@@ -373,7 +373,7 @@ ENDS = (
     ('moving', 'moving'),
     ('input', 'second input'),
 )
-"""The links that carry the ends of a dyad; of a rail, the first one carries its pin."""
+"""The links that carry the ends of a dyad; the first one carries the pin of a rail."""
 
 
 def _input(build: TopologyBuilder, on: str = GROUND) -> str:
@@ -387,9 +387,9 @@ def _on_links(kind: str, ends: tuple[str, str]) -> Callable[[random.Random], Top
         if 'second input' in ends:
             links['second input'] = [_input(build, rng.choice((GROUND, *links['input'])))]
         if 'moving' in ends:
-            links['moving'] = build.dyad(rng.choice(KINDS), links['input'][0], GROUND)
+            links['moving'] = build.dyad(rng.choice(DYADS), links['input'][0], GROUND)
             if ends.count('moving') > 1 and rng.random() < 0.5:
-                links['moving'] += build.dyad(rng.choice(KINDS), links['input'][0], GROUND)
+                links['moving'] += build.dyad(rng.choice(DYADS), links['input'][0], GROUND)
         one = rng.choice(links[ends[0]])
         other = rng.choice([link for link in links[ends[1]] if link != one] or [GROUND])
         build.dyad(kind, one, other)
@@ -408,7 +408,7 @@ def _chain(count: int, inputs: int = 1) -> Callable[[random.Random], Topology]:
         for _ in range(count):
             one = rng.choice(latest)
             other = rng.choice([link for link in known if link != one])
-            kind = rng.choice(KINDS)
+            kind = rng.choice(DYADS)
             if rng.random() < 0.5:
                 one, other = other, one
             latest = build.dyad(kind, one, other)
@@ -425,14 +425,14 @@ def _between(inputs: int, chain: int) -> Callable[[random.Random], Topology]:
         between = 1 if inputs == 1 else rng.choice((1, 2))
         known += [_input(build) for _ in range(inputs - between)]
         if len(known) < 2:
-            # A link that the other bodies hold: both ends stand on the ground.
+            # Both ends of the arms are on the ground.
             known += build.driven_dyad(GROUND, GROUND, between)
         else:
             known += build.driven_dyad(known[-1], GROUND, between)
         for _ in range(chain):
             one = rng.choice(known[1:])
             other = rng.choice([link for link in known if link != one])
-            known += build.dyad(rng.choice(KINDS), one, other)
+            known += build.dyad(rng.choice(DYADS), one, other)
         return build.topology()
 
     return make
@@ -448,7 +448,7 @@ def _class_3(
         known += [add(build, GROUND) for _ in range(inputs)]
         latest = known[1:]
         for _ in range(chain):
-            latest = build.dyad(rng.choice(KINDS), known[1], GROUND)
+            latest = build.dyad(rng.choice(DYADS), known[1], GROUND)
             known += latest
         legs = [rng.choice(('RR', 'PR', 'RP')) for _ in range(3)] if sliders else ['RR'] * 3
         if sliders and legs.count('RR') == 0:
@@ -468,7 +468,7 @@ FAMILIES: dict[str, Family] = {
             else f'a pin on a line of the {one} link and on one of the {other} link',
             _on_links(kind, (one, other)),
         )
-        for kind in KINDS
+        for kind in DYADS
         for one, other in ENDS
     },
     **{
@@ -489,5 +489,5 @@ FAMILIES: dict[str, Family] = {
     'class III two inputs': Family(
         'a platform on two inputs and the ground', _class_3(True, 0, 2)
     ),
-    **{name: Family(why, make) for name, (why, make) in CHANGE_POINTS.items()},
+    **{name: Family(*family) for name, family in CHANGE_POINTS.items()},
 }

@@ -16,10 +16,10 @@
 """
 A linkage by plain geometry: intersections of circles and lines, one dyad after the other.
 
-It gives the states that close, the distance by which others fail, and the positions of the links
-in the assembly that the conventions name; `constraints` corrects these to the solution. The
-generator of the linkage gives its dyads and their order, so that nothing is inherited from the
-package. Many states are computed at once, in numpy's longest floats.
+It gives the states that close, the closure error of the others, and the pose in the assembly of
+the file; `constraints` corrects the pose to the solution. The dyads and their order come from the
+generator of the linkage, not from the package. Many states are computed at once, in numpy's
+longest floats.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Complex = np.clongdouble
 
 @dataclass(frozen=True, slots=True)
 class DrivenLink:
-    """A link that an input places, against a link that is placed."""
+    """A link that an input places relative to a placed link."""
 
     link: str
     on: str
@@ -49,16 +49,16 @@ class DrivenLink:
 @dataclass(frozen=True, slots=True)
 class DrivenRRR:
     """
-    Two bodies pinned together; inputs between the links of a body give it its shape.
+    Two arms pinned together; an arm may consist of two links with an input between them.
 
     Attributes
     ----------
     arms
-        Of each body its links, from the outer pin on, with the input between two of them.
+        The links of each arm, from the outer pin on.
     ends
         The outer pins, on the links that carry them.
     pin
-        What the last links share.
+        The pin that the last links share.
 
     """
 
@@ -71,7 +71,7 @@ Group = DrivenLink | DrivenRRR | RRR | RRP | RPR | PRP | RPP
 
 
 class Margin(NamedTuple):
-    """Margin of a dyad in [m], negative if it does not close, and the size of its terms."""
+    """Margin of a dyad in [m], negative if it is open, and the size of its terms."""
 
     spare: Array
     grain: Array
@@ -80,19 +80,19 @@ class Margin(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Passing:
     """
-    A side that changes where the linkage goes on through its change points.
+    A side of assembly that changes where the linkage passes a change point.
 
     Attributes
     ----------
     side
         +1 or −1, for a crank direction between 0 and π from the line.
     crank, line
-        Links whose x axes lie along the crank, from the pivot they share, and along the line.
+        Link whose x axis lies along the crank; link and direction of the line.
     at
-        Crank directions at which it changes: 0, π or both.
+        Whether it changes at a crank direction of 0, and at π.
     turns
-        The crank's direction less this times the only input and less a constant is 0: a sign and
-        the constant. None where the crank is no input, and only its direction is known.
+        Sign s and constant c of the crank's direction s·input + c, which counts turns; None if
+        the crank is not the input and only its direction is known.
 
     """
 
@@ -119,17 +119,16 @@ class Passing:
 @dataclass
 class Places:
     """
-    Where links are.
+    Poses of links.
 
     Attributes
     ----------
     units, origins
-        For each link the direction of its x axis and the place of its origin.
+        For each link the direction of its x axis and the position of its origin.
     margins
-        Of each dyad that has limits.
+        Margin of each dyad that has limits.
     crossings
-        Of each dyad of two lines the sine of the angle between them: where it passes 0, they are
-        parallel.
+        For each dyad of two lines the sine of the angle between them; they are parallel at 0.
 
     """
 
@@ -148,10 +147,10 @@ class Geometry:
     linkage
         The linkage.
     groups
-        Its inputs and dyads in the order in which they become known.
+        Its inputs and dyads in the order of solution.
     sides
-        +1 or −1 for the pin or slider that closes a dyad with two assemblies: left of the line
-        between the outer pins in the order of ``ends`` or a→d, or ahead.
+        +1 or −1 for the pin or slider that closes a dyad with two assemblies. +1: left of the line
+        between the outer pins, in the order of ``ends`` or a→d, or ahead.
 
     """
 
@@ -163,7 +162,7 @@ class Geometry:
         self._sides = sides
 
     def place(self, inputs: Array) -> Places:
-        """Return where the links are at inputs (inputs, N); far from real where a dyad misses."""
+        """Return the poses at inputs (inputs, N); without meaning where a dyad is open."""
         count = inputs.shape[1]
         places = Places()
         places.units[GROUND] = np.ones(count, Complex)
@@ -198,7 +197,7 @@ class Geometry:
         places.origins[group.link] = places.origins[group.on] + places.units[group.on] * origin
 
     def _carried(self, on: str, link: str, index: int) -> tuple[Array, Array]:
-        """Return direction and origin of a link in the frame of another that an input is to."""
+        """Return direction and origin of a driven link in the frame of the other link."""
         given, value = self.linkage.inputs[index], self.inputs[index]
         if given.slider:
             slider = self.linkage.sliders[given.slider]
@@ -207,7 +206,7 @@ class Geometry:
             along = start + value * line
             if slider.block == link:
                 return turn, along - turn * self.point(link, slider.point)
-            # The line is on the new link, the block on the known one.
+            # The line is on the new link, the block is the known one.
             back = turn.conj()
             return back, self.point(on, slider.point) - back * along
         (pin,) = set(self.linkage.links[on]) & set(self.linkage.links[link])
@@ -215,7 +214,7 @@ class Geometry:
         return unit, self.point(on, pin) - unit * self.point(link, pin)
 
     def _line(self, name: str, pin: str = '') -> tuple[Any, Any]:
-        """Return a slider's line where a pin of its block travels, in the frame of ``along``."""
+        """Return the line on which a pin of a slider's block moves, in the frame of ``along``."""
         slider = self.linkage.sliders[name]
         x, y = (Real(part) for part in slider.direction)
         line = (x + Complex(1j) * y) / np.sqrt(x * x + y * y)
@@ -273,7 +272,7 @@ class Geometry:
     def _triangle(
         self, places: Places, ends: tuple[Array, Array], arms: tuple[Any, Any], side: Any
     ) -> tuple[Array, Array]:
-        """Return the vectors from two ends to where arms of given lengths meet, on a side."""
+        """Return the vectors from two ends to the point where two arms meet, on a side."""
         diagonal = ends[1] - ends[0]
         s, b, c = np.abs(diagonal), np.abs(arms[0]), np.abs(arms[1])
         spare = np.minimum(b + c - s, s - np.abs(b - c))
@@ -338,7 +337,7 @@ class Geometry:
         unit = places.units[outer.along] * line
         slot, direction = self._line(dyad.inner, dyad.a.point)
         pin = self.at(places, dyad.a)
-        # Pin = guide + slot's start seen from the guide's point + along the slot.
+        # Pin = guide point + vector to the start of the slot + slide along the slot.
         beside = yoke * (slot - self.point(inner.along, outer.point))
         between = pin - beside - foot
         where = foot + unit * _crossing(between, unit, yoke * direction)
@@ -350,7 +349,7 @@ UNIT = 2.0**-53
 
 
 def _crossing(between: Array, one: Array, other: Array) -> Array:
-    """Return how far along the first of two lines it meets the second."""
+    """Return the distance along the first line to its intersection with the second."""
     return (between.conj() * other).imag / (one.conj() * other).imag
 
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""One linkage, solved by the package, against the equations and the geometry."""
+"""Compare the package's solution of one linkage with the equations and the geometry."""
 
 from __future__ import annotations
 
@@ -43,25 +43,25 @@ import numpy as np
 QUANTITIES = ('position', 'velocity', 'acceleration')
 
 STATES = 16
-"""At which each linkage is solved."""
+"""Number of states at which each linkage is solved."""
 
 _AT_LIMIT = 1e-12
-"""Of a dyad's lengths: a dyad with less to spare may be told to be closed, toggled or open."""
+"""Relative to a dyad's lengths. With a smaller margin any status is accepted."""
 
 _ILL = 1e9
-"""From this condition on, nothing is compared: 1e-7 of a position would be rounding."""
+"""Condition number above which nothing is compared: rounding causes an error of 1e-7."""
 
 LIMIT = 16.0
-"""In u·κ, beyond which an error is a finding: κ is drawn five times, and may come out small."""
+"""In u·κ. A greater error is a finding; κ is an estimate from five draws, and may be too small."""
 
 _GROSS = 1e6
-"""In u·κ: a position that is off by more is another one."""
+"""In u·κ. A position with a greater error belongs to another pose."""
 
 _BESIDE = 1e-4
-"""In [rad], of a change point, where it is looked at from both sides."""
+"""Distance of the states on both sides of a change point, in [rad]."""
 
 _STILL = 2.0**-10
-"""Of the greatest κ of a state: that of a joint counts as this much at least."""
+"""Least κ of a joint, relative to the greatest κ of the state."""
 
 CLOSED, OPEN, AT_LIMIT, UNKNOWN = 'closed', 'open', 'at limit', 'unknown'
 
@@ -74,9 +74,9 @@ class Findings:
     Attributes
     ----------
     counts
-        Of states by what they are, and of findings by name.
+        Number of states by state, and of findings by name.
     notes
-        (finding, what exactly), the first of each name.
+        (finding, description), the first of each name.
     errors
         For each quantity the errors in u·κ.
 
@@ -94,7 +94,7 @@ class Findings:
 
 
 class Truth:
-    """Solution of the equations for some states: which close, and the linkage's motion there."""
+    """Solution of the equations for some states: which of them close, and the poses there."""
 
     def __init__(self, topology: Topology, inputs: Array, walks: Walks | None = None) -> None:
         self.equations = Equations(topology.linkage)
@@ -123,7 +123,7 @@ def _pose(places: Places, link: str) -> tuple[Array, Array, Array]:
 
 
 def _decide(places: Places, count: int) -> tuple[Array, Array]:
-    """Return what states are by the first dyad that misses, and by how much it does, in [m]."""
+    """Return the states by the first dyad that does not close, and its closure error, in [m]."""
     state = np.full(count, CLOSED, object)
     missed = np.full(count, np.nan)
     for margin in places.margins:
@@ -145,29 +145,17 @@ def judge_states(
     findings: Findings,
     walks: Walks | None,
 ) -> None:
-    """
-    Compare positions, rates, accelerations and statuses.
-
-    Parameters
-    ----------
-    topology, closure
-        The linkage.
-    rng
-        Draws the states.
-    findings
-        Where what is found goes.
-    walks
-        The linkage followed, where it has a single input and links that no dyad covers.
-
-    """
+    """Compare positions, rates, accelerations and statuses at random states."""
     count = len(topology.start)
     inputs = np.array([_values(topology, rng, i) for i in range(count)], Real)
     rates = np.array([[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in range(count)], Real)
-    pulls = np.array([[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in range(count)], Real)
+    accelerations = np.array(
+        [[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in range(count)], Real
+    )
     truth = Truth(topology, inputs, walks)
-    answers = _scalar_answers(closure, inputs, rates, pulls, findings)
-    _compare_arrays(closure, inputs, rates, pulls, answers, truth, findings)
-    _compare(topology, closure, truth, answers, (rates, pulls), findings)
+    answers = _scalar_answers(closure, inputs, rates, accelerations, findings)
+    _compare_arrays(closure, inputs, rates, accelerations, answers, truth, findings)
+    _compare(topology, closure, truth, answers, (rates, accelerations), findings)
     for at in topology.change_points:
         _judge_change_point(topology, closure, at, findings)
 
@@ -178,32 +166,32 @@ def closure_of(topology: Topology, findings: Findings) -> Closure | None:
         return Closure(topology.linkage)
     except DefinitionError as error:
         findings.find('refused', str(error))
-    except Exception as error:  # noqa: BLE001 - it is counted
+    except Exception as error:  # noqa: BLE001 - any exception is counted
         findings.find('traceback: Closure', repr(error))
     return None
 
 
 def _values(topology: Topology, rng: random.Random, number: int) -> list[float]:
-    """Return values of an input: where the linkage was made, near it, and anywhere."""
+    """Return values of an input: that of the pose it was made in, near it, and anywhere."""
     start, step = topology.start[number], topology.step[number]
     turning = not topology.linkage.inputs[number].slider
     values = [start]
     while len(values) < STATES // 2 + 1:
         values.append(start + rng.gauss(0.0, step))
     while len(values) < STATES:
-        # Class III is followed for a turn about its pose; a dyad's angle may be any.
+        # Class III is followed for one turn about its pose; dyads have no such limit.
         far = tau / 2 if topology.groups is None else tau
         values.append(start + rng.uniform(-far, far) if turning else start * rng.uniform(-2, 3))
     return values
 
 
 def _scalar_answers(
-    closure: Closure, inputs: Array, rates: Array, pulls: Array, findings: Findings
+    closure: Closure, inputs: Array, rates: Array, accelerations: Array, findings: Findings
 ) -> list[tuple[Any, tuple[tuple[float, ...], ...]] | None]:
-    """Return position and joints with their derivatives, for each state that was answered."""
+    """Return the position and joints with their derivatives; None for an exception."""
     answers: list[tuple[Any, tuple[tuple[float, ...], ...]] | None] = []
     for k in range(inputs.shape[1]):
-        x, v, a = ([float(value) for value in row[:, k]] for row in (inputs, rates, pulls))
+        x, v, a = ([float(value) for value in row[:, k]] for row in (inputs, rates, accelerations))
         call = 'position'
         try:
             position = closure.position(*x)
@@ -214,7 +202,7 @@ def _scalar_answers(
                 call = 'acceleration'
                 acceleration = closure.acceleration(position, velocity, *a)
                 joints = (position.joints, velocity.joints, acceleration.joints)
-        except Exception as error:  # noqa: BLE001 - it is counted
+        except Exception as error:  # noqa: BLE001 - any exception is counted
             findings.find(f'traceback: {call}', f'at {x}: {error!r}')
             answers.append(None)
             continue
@@ -226,19 +214,19 @@ def _compare_arrays(
     closure: Closure,
     inputs: Array,
     rates: Array,
-    pulls: Array,
+    accelerations: Array,
     answers: list[Any],
     truth: Truth,
     findings: Findings,
 ) -> None:
-    """Compare what is solved over arrays with what is solved one by one."""
+    """Compare the solution of arrays with that of single states."""
     from linkage_ros.kinematics.batch import CODES  # local import: with numpy only
 
-    motion = {'rates': rates.astype(float), 'accelerations': pulls.astype(float)}
+    motion = {'rates': rates.astype(float), 'accelerations': accelerations.astype(float)}
     try:
         for derivatives in (0, 1, 2):
             batch = closure.solve(*inputs.astype(float), **motion, derivatives=derivatives)
-    except Exception as error:  # noqa: BLE001 - it is counted
+    except Exception as error:  # noqa: BLE001 - any exception is counted
         findings.find('traceback: solve', f'derivatives={derivatives}: {error!r}')
         return
     for k, answer in enumerate(answers):
@@ -253,7 +241,7 @@ def _compare_arrays(
             if not one:
                 continue
             off = np.abs(many[:, k] - np.array(one))
-            # The difference is rounding, for a state far from a toggle.
+            # Far from a toggle the two differ by rounding only.
             if not (off <= 1e-6 * (1.0 + np.abs(one).max())).all():
                 findings.find(f'arrays: {name}', f'at {inputs[:, k].tolist()}: {off.max():.2g}')
 
@@ -286,10 +274,10 @@ def _compare(
         closed.append(k)
     if not closed:
         return
-    rates, pulls = (values[:, closed] for values in motion_of_inputs)
+    rates, accelerations = (values[:, closed] for values in motion_of_inputs)
     inputs = truth.inputs[:, closed]
-    motion = truth.equations.motion(truth.unknowns[:, closed], inputs, rates, pulls)
-    kappa = condition_numbers(topology.linkage, motion, inputs, rates, pulls, 1)
+    motion = truth.equations.motion(truth.unknowns[:, closed], inputs, rates, accelerations)
+    kappa = condition_numbers(topology.linkage, motion, inputs, rates, accelerations, 1)
     for column, k in enumerate(closed):
         at = f'at {[float(v) for v in inputs[:, column]]}'
         position, joints = answers[k]
@@ -308,7 +296,7 @@ def _compare(
                 off[turns] -= TURN * np.round(off[turns] / TURN)
                 condition = condition + np.where(turns, np.pi + np.abs(values), 0.0)
             off = np.abs(off)
-            # What does not move is told from terms that do.
+            # A joint that does not move is computed from terms that do.
             condition = np.maximum(condition, max(_STILL * condition.max(), 1e-300))
             errors.append(
                 float(np.nan_to_num(off / (UNIT_ROUNDOFF * condition), nan=np.inf).max())
@@ -333,12 +321,12 @@ def _other_pose(
     at: str,
     findings: Findings,
 ) -> None:
-    """Tell whether a pose that is not the one that it should be closes at all."""
+    """Find out whether a wrong pose closes at all."""
     residual = closure.residual(position)
     if residual < 1e-9 * closure.scale * max(1.0, truth.equations.size / closure.scale):
         findings.find('wrong assembly', f'{at}: {dict(topology.linkage.assembly) or "class III"}')
     else:
-        findings.find('not closed', f'{at}: said to be closed, off by {residual:.2g} m')
+        findings.find('not closed', f'{at}: reported as closed, off by {residual:.2g} m')
 
 
 def _compare_points(
@@ -349,7 +337,7 @@ def _compare_points(
     at: str,
     findings: Findings,
 ) -> None:
-    """Compare the places of all points."""
+    """Compare the positions of all points."""
     angles = motion.unknowns[0::3, 0]
     places = closure.points(position)
     worst = 0.0
@@ -371,14 +359,14 @@ def _compare_points(
 def _judge_change_point(
     topology: Topology, closure: Closure, value: float, findings: Findings
 ) -> None:
-    """Compare a change point that is passed with what lies closely on both sides of it."""
+    """Compare a passed change point with the states close to it on both sides."""
     steps = _BESIDE * np.array([-1, 1, -2, 2], Real)
     beside = value + steps[None, :]
-    one, nought = np.ones_like(beside), np.zeros_like(beside)
+    one, zero = np.ones_like(beside), np.zeros_like(beside)
     truth = Truth(topology, beside)
     if (truth.state != CLOSED).any():
         return
-    motion = truth.equations.motion(truth.unknowns, beside, one, nought)
+    motion = truth.equations.motion(truth.unknowns, beside, one, zero)
     jumps = np.array(closure.turning)[:, None]
     places = motion.joints[0] - motion.joints[0][:, :1]
     places -= np.where(jumps, TURN * np.round(places / TURN), 0.0)
@@ -386,25 +374,25 @@ def _judge_change_point(
     for values in (motion.joints[0][:, :1] + places, motion.joints[1]):
         near, far = values[:, :2].mean(1), values[:, 2:].mean(1)
         wanted.append(near)
-        # The mean of both sides is off by a third of what it changes by at twice the distance.
+        # The error of the mean is a third of its change from the double distance.
         doubt.append(np.abs(far - near))
     try:
         position = closure.position(value)
         if position.status is Status.INDETERMINATE:
-            # A straight rod whose pins meet, exactly or within their rounding.
-            findings.counts['pins that meet'] += 1
+            # The pins of a straight rod coincide, exactly or to rounding.
+            findings.counts['coincident pins'] += 1
             return
         joints = [position.joints]
         if position.status.has_rates:
             joints.append(closure.velocity(position, 1.0).joints)
-    except Exception as error:  # noqa: BLE001 - it is counted
+    except Exception as error:  # noqa: BLE001 - any exception is counted
         findings.find('traceback: change point', f'at {value}: {error!r}')
         return
     if not position.status.has_pose or (value == 0.0 and not position.status.has_rates):
         findings.find('change point: status', f'at {value}: {position.status.name}')
-    for name, found, true, off_by in zip(QUANTITIES, joints, wanted, doubt, strict=False):
-        off = np.array(found, Real) - true if found else np.zeros(1, Real)
-        if found and name == 'position':
+    for name, values, true, off_by in zip(QUANTITIES, joints, wanted, doubt, strict=False):
+        off = np.array(values, Real) - true if values else np.zeros(1, Real)
+        if values and name == 'position':
             off -= np.where(jumps[:, 0], TURN * np.round(off / TURN), 0.0)
         if not (np.abs(off) < 1e-5 * (1.0 + np.abs(true).max()) + off_by).all():
             findings.find(f'change point: {name}', f'at {value}: off by {np.abs(off).max():.2g}')

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The ranges of a single input and its singular values, against a fine walk."""
+"""Compare the ranges and singular values of a single input with a fine sampling of it."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ from linkage_ros.kinematics.status import Status
 import numpy as np
 
 SAMPLES = 2400
-"""Of the walk, over a turn from end to end, or as far as a slide may reach; the pose is one."""
+"""Number of samples over a turn, or over the reach of a slide; the pose is one of them."""
 
 _FLAT = 1e-13
-"""Of a dyad's lengths: what it has to spare at a change point, but for rounding."""
+"""Margin of a dyad at a change point, which is 0 but for rounding, relative to its lengths."""
 
 _NEARLY_FLAT = 0.03
 _SAME = 1e-6
-"""What places of the input may differ by, in [rad] or of what a slide may reach."""
+"""Tolerance of input values, in [rad] or relative to the reach of a slide."""
 
 
 class Travel(NamedTuple):
     """
-    Where an input closes the loops.
+    The values of an input at which the loops close.
 
     Attributes
     ----------
     parts
         Intervals of the input, in [rad] or [m].
     ends
-        Those of their ends at which the linkage is at a limit.
+        Ends of these intervals that are limits of the linkage.
     changes
-        Values between at which a dyad lies flat.
+        Values within them at which the links of a dyad are in line.
     parallels
         Values at which the two lines of a dyad are parallel.
 
@@ -68,7 +68,7 @@ class Travel(NamedTuple):
 def judge_ranges(
     topology: Topology, closure: Closure, findings: Findings, walks: Walks | None
 ) -> None:
-    """Compare what the package says of a single input with a walk along it."""
+    """Compare the package's ranges and singular values of a single input with its samples."""
     turning = not topology.linkage.inputs[0].slider
     try:
         ranges = closure.input_ranges
@@ -96,15 +96,15 @@ def judge_ranges(
     for value in values:
         inside = any(low - same <= value <= high + same for low, high in travel.parts)
         well_inside = any(low + same <= value <= high - same for low, high in travel.parts)
-        said = any(
+        in_range = any(
             interval.whole or interval.lowest - same <= value + turn <= interval.highest + same
             for interval in ranges
             for turn in ((-2 * tau, -tau, 0.0, tau, 2 * tau) if turning else (0.0,))
         )
-        if well_inside and not said:
+        if well_inside and not in_range:
             findings.find('range: a part is missing', f'{value:.9g} closes, not in {ranges}')
             break
-        if said and not inside:
+        if in_range and not inside:
             findings.find('range: too wide', f'{value:.9g} is open, but in {ranges}')
             break
     _judge_singular(topology, travel, singular, same, findings)
@@ -116,7 +116,7 @@ def judge_ranges(
 
 
 def _zero_length(topology: Topology) -> float | None:
-    """Return the slide at which the two pins of a cylinder meet, None where there is none."""
+    """Return the slide at which the two pins of a cylinder coincide; None if there is none."""
     linkage = topology.linkage
     slider = linkage.sliders.get(linkage.inputs[0].slider)
     if slider is None or GROUND in (slider.along, slider.block):
@@ -138,7 +138,7 @@ def _zero_length(topology: Topology) -> float | None:
 
 
 def _on_a_side(travel: Travel, zero: float, side: float) -> Travel:
-    """Return what of a cylinder's way lies on one side of the slide at which its pins meet."""
+    """Return the travel of a cylinder on one side of the slide at which its pins coincide."""
     low, high = (zero, inf) if side > 0.0 else (-inf, zero)
     parts = [(max(one, low), min(other, high)) for one, other in travel.parts]
     return Travel(
@@ -154,12 +154,12 @@ def _judge_singular(
     same: float,
     findings: Findings,
 ) -> None:
-    """Compare the values that are listed with those that there are, by their kind."""
+    """Compare the listed singular values with the true ones, by their kind."""
     turning = not topology.linkage.inputs[0].slider
     passed = any(isinstance(side, Passing) for side in topology.sides.values())
     at_changes = {Status.CHANGE_POINT if passed else Status.TOGGLE}
     if isinstance((topology.groups or ())[-1], RPR):
-        at_changes.add(Status.INDETERMINATE)  # A straight rod whose pins meet.
+        at_changes.add(Status.INDETERMINATE)  # The pins of a straight rod coincide.
     unmatched = list(singular)
     for kind, places, statuses in (
         ('toggle', travel.ends, {Status.TOGGLE}),
@@ -169,18 +169,18 @@ def _judge_singular(
         for place in places:
             near = [one for one in singular if _apart(place, one.value, turning) <= same]
             unmatched = [one for one in unmatched if one not in near]
-            said = [one.value for one in singular]
+            listed = [one.value for one in singular]
             if not near:
-                findings.find(f'singular: {kind} not listed', f'{place:.9g}, not in {said}')
+                findings.find(f'singular: {kind} not listed', f'{place:.9g}, not in {listed}')
             elif not any(one.status in statuses for one in near):
                 note = f'{place:.9g} is a {near[0].status.value}'
-                findings.find(f'singular: {kind} called other', note)
+                findings.find(f'singular: {kind} has another status', note)
     if unmatched:
-        findings.find('singular: listed, is none', f'{unmatched[0].value:.9g}')
+        findings.find('singular: listed, but regular', f'{unmatched[0].value:.9g}')
 
 
 def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: Findings) -> None:
-    """Compare the range about the pose with how far the linkage can be followed from there."""
+    """Compare the range about the pose with the part over which the linkage can be followed."""
     turning = not topology.linkage.inputs[0].slider
     start = topology.start[0]
     down, up = walks
@@ -203,14 +203,14 @@ def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: 
             )
         return
     for walk, sign, end in ((down, -1, interval.lowest), (up, 1, interval.highest)):
-        true, said = start + sign * walk.end, end - turn
+        true, listed_end = start + sign * walk.end, end - turn
         same = _SAME * max(1.0, abs(true))
-        short = sign * (true - said)
-        # A slide is looked at only as far as some length.
+        short = sign * (true - listed_end)
+        # A slide is followed for a limited length only.
         if short > same and interval.limited[sign > 0]:
-            findings.find('range: a part is missing', f'to {true:.9g}, said {said:.9g}')
+            findings.find('range: a part is missing', f'to {true:.9g}, listed to {listed_end:.9g}')
         elif short < -same and not walk.complete:
-            findings.find('range: too wide', f'to {true:.9g}, said {said:.9g}')
+            findings.find('range: too wide', f'to {true:.9g}, listed to {listed_end:.9g}')
         listed = [one.value for one in closure.singular_inputs]
         if (
             not walk.complete
@@ -249,22 +249,22 @@ def _travel(geometry: Geometry, start: float, far: float, turning: bool) -> Trav
             low = edge
     if low is not None:
         parts.append((low, inf))
-    # Lines may be parallel between an end and the sample next to it.
+    # Lines may be parallel between an end and the next sample.
     fine = np.sort(np.concatenate([values, inner]))
     there = geometry.place(fine[None, :].astype(Real))
     open_ones = (_spare(there.margins, len(fine)) < -_FLAT).any(0)
     parallels = _parallel(geometry, there.crossings, fine, ~open_ones)
-    # Next to parallel lines a dyad is far away, and small against that.
+    # Near parallel lines a dyad is far away, and its lengths are small relative to that.
     changes = _flat(geometry, samples, spare, [*ends, *parallels], turning)
     return Travel(parts, ends, changes, parallels)
 
 
 def _turning_points(geometry: Geometry, values: Array, spare: Array) -> Array:
-    """Return where a dyad has least or most to spare between samples: a border on either side."""
+    """Return where the margin of a dyad changes sign twice between two samples."""
     found = []
     for k, row in enumerate([*spare, spare.min(0)]):
         before, here, after = row[:-2], row[1:-1], row[2:]
-        # Where nothing can miss, or a dyad before it does, all samples are alike.
+        # If a dyad always closes, or an earlier dyad is open, all its samples are equal.
         valley = (here > 0.0) & (here <= np.minimum(before, after)) & (here < before)
         summit = (here < 0.0) & (here >= np.maximum(before, after)) & (here > before)
         for sign, at in ((1.0, valley), (-1.0, summit)):
@@ -278,14 +278,14 @@ def _turning_points(geometry: Geometry, values: Array, spare: Array) -> Array:
                 places = np.take_along_axis(near, nearest, 1)[:, 0]
                 least = np.take_along_axis(one, nearest, 1)[:, 0]
                 width /= 15.0
-            # What only comes to zero touches it, as next to parallel lines, where a dyad is small
-            # against how far away it is.
+            # A margin that only touches zero is no range, as near parallel lines, where the
+            # lengths of a dyad are small relative to its distance.
             found.append(places[least < -_FLAT])
     return np.concatenate(found)
 
 
 def _spare_at(geometry: Geometry, values: Array) -> Array:
-    """Return what each dyad has to spare at values of the input, of its lengths, (dyads, N)."""
+    """Return the margin of each dyad at input values, relative to its lengths, (dyads, N)."""
     return _spare(geometry.place(values[None, :].astype(Real)).margins, len(values))
 
 
@@ -304,13 +304,13 @@ def _flat(
     borders: list[float],
     turning: bool,
 ) -> list[float]:
-    """Return where a dyad has nothing to spare and goes on."""
+    """Return where the margin of a dyad is zero within a range."""
     found: list[float] = []
     closes = (spare >= -_FLAT).all(0)
     for k, row in enumerate(spare):
-        # Where a slide is looked at no farther, it may be stretched, and need not go on.
+        # At an end of the samples of a slide a zero margin may be an end of the range.
         for i in range(0 if turning else 1, len(row) - (0 if turning else 1)):
-            # A turn begins where it ends: at one value twice.
+            # The first and the last sample of a turn are the same state.
             last = len(row) - 1
             before = row[i - 1 if i or not turning else last - 1]
             after = row[i + 1 if i < last else 1 if turning else last]

@@ -17,10 +17,10 @@
 The work of the campaign, in parts that any number of processes share.
 
 Each linkage has a random generator of its own, seeded by the campaign's seed, its family and its
-number: the result does not depend on how the work was shared, and any linkage can be made again.
+number. So the result does not depend on how the work is shared, and any linkage can be made again.
 
-The commands of ``linkage`` are tried on the file of any linkage: they do their work, or print one
-line with the reason why not.
+The commands of ``linkage`` are run on the files of the linkages. Each command has to do its work,
+or to print one line with the reason.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ import tempfile
 import traceback
 from typing import NamedTuple
 
-from campaigns.campaign import results_of
+from campaigns.campaign import Part, parts_of, tallies_of
 from campaigns.in_process import in_process
 from campaigns.topologies.families import FAMILIES
 from campaigns.topologies.judge import closure_of, Findings, judge_states
@@ -44,28 +44,14 @@ from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.kinematics.linkage import Linkage
 
 FILES = ('draw', 'urdf', 'mjcf')
-"""Commands that write a file; beside these there are `check`, and `accuracy`, which is slow."""
+"""Commands that write a file; `check` and `accuracy` are tried separately."""
 
 _SECONDS = 600
-"""A command that takes longer has not ended; on a free machine the slowest takes some 15 s."""
+"""Time limit of a command, in [s]; on a free machine the slowest takes some 15 s."""
 
 
 def judge_command(command: str, linkage: Linkage, findings: Findings, closes: bool = True) -> None:
-    """
-    Run a command on a linkage.
-
-    Parameters
-    ----------
-    command
-        `check`, `accuracy`, or one of `FILES`.
-    linkage
-        The linkage.
-    findings
-        Where what is found goes.
-    closes
-        Whether it is a linkage that closes somewhere: the command has no reason to refuse it.
-
-    """
+    """Run a command on a linkage; if it closes, the command has no reason to refuse it."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / 'linkage.yaml'
         file.write_text(linkage_text(linkage), encoding='utf-8')
@@ -76,21 +62,20 @@ def judge_command(command: str, linkage: Linkage, findings: Findings, closes: bo
             arguments += ['-o', str(Path(folder) / 'page')]
         if output:
             arguments += ['-o', str(Path(folder) / f'out.{output}')]
-        code, said, _ = in_process(arguments, _SECONDS)
-    said = said.replace(folder, '')
+        code, errors, _ = in_process(arguments, _SECONDS)
+    lines = errors.replace(folder, '').strip().splitlines()
     if code == 0:
         findings.counts[f'{command}: done'] += 1
-    elif code == 2 and len(said.strip().splitlines()) == 1:
+    elif code == 2 and len(lines) == 1:
         findings.counts[f'{command}: refused'] += 1
         if closes:
-            findings.find(f'{command} refuses', said.strip())
+            findings.find(f'{command} refuses', lines[0])
     else:
-        last = said.strip().splitlines()[-1:] or ['']
-        findings.find(f'{command}: {code}', last[0])
+        findings.find(f'{command}: {code}', lines[-1] if lines else '')
 
 
-def spoilt(linkage: Linkage, rng: random.Random) -> Linkage:
-    """Return a linkage with one or two numbers changed, as a typing error would, or worse."""
+def altered(linkage: Linkage, rng: random.Random) -> Linkage:
+    """Return a linkage with one or two numbers replaced, as by a typing error, or worse."""
     for _ in range(rng.choice((1, 1, 2))):
         link = rng.choice(list(linkage.links))
         point = rng.choice(list(linkage.links[link]))
@@ -115,29 +100,19 @@ def spoilt(linkage: Linkage, rng: random.Random) -> Linkage:
 _PART = 5
 _KEPT = 3
 
-KINEMATICS, CHECK, CHECK_SPOILT, FILE, ACCURACY = (
+KINEMATICS, CHECK, CHECK_ALTERED, FILE, ACCURACY = TESTS = (
     'kinematics',
     'check',
-    'check spoilt',
+    'check altered',
     'files',
     'accuracy',
 )
 
 
-class Part(NamedTuple):
-    """Some linkages of a family, and the tests to run on them."""
-
-    seed: int
-    family: str
-    first: int
-    size: int
-    what: str = KINEMATICS
-
-
 class Note(NamedTuple):
-    """A finding with the linkage that it was made with."""
+    """A finding and its linkage."""
 
-    what: str
+    finding: str
     linkage: int
     text: str
 
@@ -164,7 +139,7 @@ class Tally:
             self._note_errors(name, errors, (max(errors), linkage))
 
     def merge(self, other: Tally) -> None:
-        """Add what another part has found."""
+        """Add the findings of another part."""
         self.counts += other.counts
         self.found_with += other.found_with
         for name, notes in other.notes.items():
@@ -181,27 +156,27 @@ class Tally:
 
 
 def make(seed: int, family: str, index: int) -> tuple[Topology, random.Random]:
-    """Return a linkage of a family, and what draws its states."""
+    """Return a linkage of a family, and the random generator of its states."""
     rng = random.Random(f'{seed}/{family}/{index}')
     return FAMILIES[family].make(rng), rng
 
 
-def made_for(what: str, seed: int, family: str, index: int) -> Linkage:
-    """Return the linkage that a command is tried with."""
+def made_for(test: str, seed: int, family: str, index: int) -> Linkage:
+    """Return the linkage for a test of commands."""
     topology, rng = make(seed, family, index)
-    return spoilt(topology.linkage, rng) if what == CHECK_SPOILT else topology.linkage
+    return altered(topology.linkage, rng) if test == CHECK_ALTERED else topology.linkage
 
 
-def examine(seed: int, family: str, index: int, what: str = KINEMATICS) -> Findings:
-    """Try one thing with one linkage."""
+def examine(seed: int, family: str, index: int, test: str = KINEMATICS) -> Findings:
+    """Run one test on one linkage."""
     findings = Findings()
-    if what == KINEMATICS:
+    if test == KINEMATICS:
         _kinematics(seed, family, index, findings)
         return findings
-    linkage = made_for(what, seed, family, index)
-    commands = {CHECK: ('check',), CHECK_SPOILT: ('check',), FILE: FILES, ACCURACY: ('accuracy',)}
-    for command in commands[what]:
-        judge_command(command, linkage, findings, closes=what != CHECK_SPOILT)
+    linkage = made_for(test, seed, family, index)
+    commands = {CHECK: ('check',), CHECK_ALTERED: ('check',), FILE: FILES, ACCURACY: ('accuracy',)}
+    for command in commands[test]:
+        judge_command(command, linkage, findings, closes=test != CHECK_ALTERED)
     return findings
 
 
@@ -226,43 +201,41 @@ def parts(
     Parameters
     ----------
     seed
-        The campaign's.
+        The campaign's seed.
     wanted
-        How many linkages to try what with: of each family the kinematics, of all families together
-        everything else.
+        Number of linkages for each test: of each family for the kinematics, of all families
+        together for the other tests.
     families
-        Their names.
+        Names of the families.
     slow
-        By how much fewer linkages of class III are tried: each is followed step by step.
+        Factor by which fewer linkages of class III are tried, which are followed step by step.
 
     """
     weights = {family: 1 if family.startswith('class III') else slow for family in families}
     work = []
-    for what, count in wanted.items():
+    for test, count in wanted.items():
         done, passed = 0, 0
+        shares = {}
         for family, weight in weights.items():
             passed += weight
-            share = -(-count * weight // slow)
-            if what != KINEMATICS:
-                # So that all shares come to the whole.
-                share = count * passed // sum(weights.values()) - done
-            done += share
-            work += [
-                Part(seed, family, first, min(_PART, share - first), what)
-                for first in range(0, share, _PART)
-            ]
+            shares[family] = -(-count * weight // slow)
+            if test != KINEMATICS:
+                # The shares have to add up to the count.
+                shares[family] = count * passed // sum(weights.values()) - done
+            done += shares[family]
+        work += parts_of(seed, shares, _PART, test)
     return work
 
 
 def do(part: Part) -> tuple[Part, Tally]:
     """Do one part."""
     tally = Tally()
-    for index in range(part.first, part.first + part.size):
+    for index in part.numbers:
         try:
-            findings = examine(part.seed, part.family, index, part.what)
+            findings = examine(part.seed, part.family, index, part.test)
         except Exception as error:
             raise RuntimeError(
-                f'{part.what} of {part.family} {index}: {traceback.format_exc()}'
+                f'{part.test} of {part.family} {index}: {traceback.format_exc()}'
             ) from error
         tally.add(index, findings)
     return part, tally
@@ -271,23 +244,8 @@ def do(part: Part) -> tuple[Part, Tally]:
 def run(
     work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, dict[str, Tally]]:
-    """
-    Run all parts and return the findings, by test and by family.
-
-    Parameters
-    ----------
-    work
-        The parts.
-    jobs
-        Number of processes; 1 runs in this one.
-    progress
-        Called with the number of linkages of each part that is done.
-
-    """
+    """Run all parts as `tallies_of` does; return the tallies by test and by family."""
     tallies: dict[str, dict[str, Tally]] = {}
-    for part in work:
-        tallies.setdefault(part.what, {}).setdefault(part.family, Tally())
-    for part, tally in results_of(do, work, jobs):
-        tallies[part.what][part.family].merge(tally)
-        progress(part.size)
+    for (test, family), tally in tallies_of(do, work, jobs, Tally, progress).items():
+        tallies.setdefault(test, {})[family] = tally
     return tallies

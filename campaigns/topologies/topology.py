@@ -14,16 +14,15 @@
 
 
 """
-Linkages of any topology, made from a pose, and followed from it by their equations alone.
+Linkages of any topology, made from a pose, and followed from it by their equations.
 
-Links and dyads are those of the accuracy campaign's builder. Here inputs turn or slide, stand on
-the ground, on each other or between moving links, and links may have no dyad at all. Every linkage
-closes at the inputs of its pose.
+Links and dyads are those of the accuracy campaign's builder. In addition, inputs turn or slide,
+act on the ground, on each other or between moving links, and there are Assur groups of class III.
+Every linkage closes at the inputs of its pose.
 
-A step along the motion predicts by rates and accelerations and corrects by Newton's method. It is
-accepted if the correction is small compared with the step, and, unless the linkage has exact
-change points, if the determinant keeps its sign; else it is halved. When it gets too small, the
-linkage is at its limit.
+A step along the motion is predicted by rates and accelerations and corrected by Newton's method.
+It is accepted if the correction is small compared with the step and the determinant keeps its
+sign; otherwise it is halved. If a step becomes too small, the linkage is at its limit.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from typing import Any, NamedTuple
 
 from campaigns.accuracy.dyads import PRP, RPP, RPR, RRP, RRR
 from campaigns.accuracy.mechanism import Dyad, polar, Spot, Turn
-from campaigns.accuracy.random_families import add_prp, add_rpp, add_rpr, add_rrp, add_rrr, Builder
+from campaigns.accuracy.random_families import add_random, Builder
 from campaigns.topologies.constraints import Array, Equations, Real
 from campaigns.topologies.geometry import DrivenLink, DrivenRRR, Group, Passing
 from linkage_ros.kinematics.linkage import (
@@ -52,31 +51,28 @@ from linkage_ros.kinematics.linkage import (
 )
 import numpy as np
 
-KINDS = ('RRR', 'RRP', 'RPR', 'PRP', 'RPP')
-
 
 @dataclass(frozen=True, slots=True)
 class Topology:
     """
-    A linkage with what its maker knows of it.
+    A linkage, and the knowledge of its generator about it.
 
     Attributes
     ----------
     linkage
         The linkage, in the package's terms.
     groups
-        Inputs and dyads in the order in which they become known; None where links are left that
-        no dyad covers.
+        Inputs and dyads in the order of solution; None with an Assur group that is no dyad.
     sides
-        For what closes a dyad +1 (left, ahead) or −1, or how that changes.
+        For the pin or slider that closes a dyad +1 (left, ahead) or −1, or a side that changes.
     start
         Inputs at which it closes by construction, in [rad] or [m].
     pose
-        Angle and place of each moving link there.
+        Angle and position of each moving link there.
     step
-        What an input moves by that a person would call a little: 0.3 rad, or of a length.
+        A small change of each input: 0.3 rad, or 0.3 of a length.
     change_points
-        Inputs within a turn at which exactly a change point lies that the linkage passes.
+        Inputs within a turn at which the linkage passes an exact change point.
 
     """
 
@@ -91,14 +87,14 @@ class Topology:
 
 class TopologyBuilder(Builder):
     """
-    A linkage in the making.
+    Builds a linkage of any topology.
 
     Parameters
     ----------
     rng
-        Source of everything random.
+        Random generator of all numbers.
     plain
-        Whether the frames are plain; either if not said.
+        Whether the frames are plain; None draws it.
 
     """
 
@@ -115,15 +111,15 @@ class TopologyBuilder(Builder):
         self.put(GROUND, 'O', 0j)
 
     def is_first(self) -> bool:
-        """Return whether lines may lie along axes: they might be parallel for ever."""
+        """Return False: with lines along axes two lines might be parallel at every input."""
         return False
 
     def parent(self) -> str:
-        """Return a link that a published angle may be counted from; all are published anyway."""
+        """Return the parent link for a published angle; `topology` publishes all angles anyway."""
         return GROUND
 
     def add(self, dyad: Dyad, *joints: Turn | str) -> None:
-        """Add a dyad with the side that the conventions name."""
+        """Add a dyad with its assembly as the conventions name it."""
         super().add(dyad, *joints)
         group: Any = dyad
         if isinstance(group, RRR):
@@ -135,7 +131,7 @@ class TopologyBuilder(Builder):
         self._known(group)
 
     def slide(self, line: complex, along: str, through: str, point: str, block: str | None) -> str:
-        """Add a slider whose line has a direction in the pose; its block may stand anyhow."""
+        """Add a slider by its direction in the pose; its block may have any angle to the line."""
         name = super().slide(line, along, through, point, block)
         if block is not None and self.axis(block) != self.axis(along):
             turn = phase(self.axis(block) * self.axis(along).conjugate())
@@ -143,7 +139,7 @@ class TopologyBuilder(Builder):
         return name
 
     def _name_side(self, ends: tuple[Spot, Spot], links: tuple[str, str], pin: str) -> None:
-        """Name the side of A→D on which a pin lies; A is known later, or stands first."""
+        """Set the side of A→D on which a pin lies; A is solved later than D, or comes first."""
         ranks = [self._rank[end.link] for end in ends]
         order = list(self._links)
         if ranks[0] == ranks[1]:
@@ -157,7 +153,7 @@ class TopologyBuilder(Builder):
         self._assembly[pin] = 'left' if (side > 0) != swapped else 'right'
 
     def _known(self, group: Group) -> None:
-        """Take the links of a group as known, in the order in which `linkage check` lists them."""
+        """Mark the links of a group as known, in the order of `linkage check`."""
         self._groups.append(group)
         bodies: list[tuple[str, ...]] = []
         if isinstance(group, RRR):
@@ -176,7 +172,7 @@ class TopologyBuilder(Builder):
         elif isinstance(group, RPP):
             inner = self._sliders[group.inner]
             bodies = [(inner.block,)] if inner.block else []
-        # Of an RRP or RPR dyad the link with the pin, or with the rail, was made first.
+        # For RRP and RPR, the link with the pin, or the rail, was made first.
         for body in [*bodies, tuple(self._links)]:
             for link in body:
                 self._rank.setdefault(link, len(self._rank))
@@ -198,7 +194,7 @@ class TopologyBuilder(Builder):
         start = self.where(self.spot(on)) + polar(self.length(), self.direction())
         name = self.name('C')
         if self.rng.random() < 0.3:
-            # The line is on the new link: it slides through a block that is part of the known one.
+            # The line is on the new link, which slides through a block on the known one.
             through = self.name('Q')
             line = polar(1.0, self.direction())
             link = self.link('rod', {through: start - line * self.length()}, axis=self.axis(on))
@@ -224,7 +220,7 @@ class TopologyBuilder(Builder):
     def _drive_slide(
         self, line: complex, along: str, through: str, point: str, block: str
     ) -> None:
-        # A block against a line that looks the other way is a slide below 0.
+        # With the opposite direction of the line the slide is negative.
         line *= self.rng.choice((1, -1))
         name = self.slide(line, along, through, point, block)
         self.inputs.append(Input(self.name('in'), slider=name))
@@ -234,19 +230,11 @@ class TopologyBuilder(Builder):
         self._joints[name] = name
 
     def dyad(self, kind: str, known: str, other: str) -> list[str]:
-        """Add a random dyad between two links, the first one for the pin, or the rail's pin."""
-        if kind == 'PRP':
-            return add_prp(self, known, other)
-        pin = self.spot(known)
-        if kind == 'RRP':
-            return add_rrp(self, pin, other)
-        if kind == 'RPP':
-            return add_rpp(self, pin, other)
-        end = self.spot(other)
-        return (add_rrr if kind == 'RRR' else add_rpr)(self, pin, end)
+        """Add a random dyad between two links; the first one carries the pin of a rail."""
+        return add_random(self, kind, known, other, first=False)
 
     def driven_dyad(self, known: str, other: str, count: int = 1) -> list[str]:
-        """Add two bodies pinned together, with inputs between the links of one or of both."""
+        """Add two arms pinned together, with inputs between the links of one or of both."""
         ends = self.spot(known), self.spot(other)
         places = [self.where(end) for end in ends]
         where = places[0] + polar(self.length(), self.direction())
@@ -282,10 +270,10 @@ class TopologyBuilder(Builder):
 
     def platform(self, knowns: list[str], legs: list[str]) -> list[str]:
         """
-        Add a link on three legs, each to a known link: three links or more that no dyad covers.
+        Add a link on three legs, each on a known link: an Assur group of class III or above.
 
-        A leg is a link with two pins ('RR'), a slot in which a pin of the platform runs ('PR'), or
-        a link with a pin on which the platform slides as a block ('RP').
+        A leg is a link with two pins ('RR'), a slot in which a pin of the platform slides ('PR'),
+        or a pinned link on which the platform slides as a block ('RP').
         """
         centre = self.where(self.spot(knowns[0])) + polar(self.length(), self.direction())
         corners = [centre + polar(self.length(), self.direction()) for _ in legs]
@@ -329,7 +317,7 @@ class TopologyBuilder(Builder):
         iterated = None in self._groups
         points = {name: (z.real, z.imag) for name, z in self._pose_points.items()}
         pose = Pose(tuple(self._start), points)
-        told = iterated or len(self.inputs) > 1 or self.rng.random() < 0.5
+        with_pose = iterated or len(self.inputs) > 1 or self.rng.random() < 0.5
         return Topology(
             Linkage(
                 {link: dict(points) for link, points in self._links.items()},
@@ -347,7 +335,7 @@ class TopologyBuilder(Builder):
                     )
                     for name, slide in self._sliders.items()
                 },
-                pose=pose if told else None,
+                pose=pose if with_pose else None,
             ),
             None if iterated else tuple(self._groups),
             dict(self._sides),
@@ -369,7 +357,7 @@ _KNOTS = 180
 
 _SMALLEST = 2.0**-26
 _CLOSE = 0.05
-"""What a correction may be, of what the step moves by, and at most of the linkage's size."""
+"""Greatest correction, relative to the step and to the linkage's size."""
 
 
 class Walk(NamedTuple):
@@ -379,13 +367,13 @@ class Walk(NamedTuple):
     Attributes
     ----------
     values
-        How far along the path each knot lies.
+        Distance along the path of each knot.
     unknowns
         (n, knots).
     end
-        How far it came; the last knot where it came to the end of the path.
+        Distance along the path that was reached.
     complete
-        Whether it did.
+        Whether this is the end of the path.
 
     """
 
@@ -415,7 +403,7 @@ def walk(
     begin, direction
         (inputs, 1); the inputs at a distance s are begin + s·direction.
     length, spacing
-        How far to go, and the longest step.
+        Distance to follow, and the longest step.
 
     """
     values, knots = [0.0], [start[:, 0]]
@@ -449,14 +437,14 @@ def walk(
 
 
 def start_of(topology: Topology, equations: Equations) -> tuple[Array, Array]:
-    """Return the pose that a linkage was made in, corrected, and its inputs."""
+    """Return the corrected pose in which a linkage was made, and its inputs."""
     begin = np.array([[value] for value in topology.start], Real)
     rough = np.array([[part] for link in equations.links for part in topology.pose[link]], Real)
     return equations.correct(rough, begin)[0], begin
 
 
 Walks = tuple[Walk, Walk]
-"""A linkage with a single input followed down and up from where it was made."""
+"""A linkage with a single input, followed down and up from the pose it was made in."""
 
 
 def follow(
@@ -465,9 +453,8 @@ def follow(
     """
     Return poses (n, N) at inputs, and whether the linkage can be followed there.
 
-    From the pose that it was made in it goes straight to the inputs. One with a single input that
-    turns may go the other way round, where that direction is reached so: what holds there is not
-    judged ('unknown').
+    The path is straight from the pose in which the linkage was made to the inputs. If it fails, a
+    single turning input may still be reached the other way round; such a state is 'unknown'.
     """
     start, begin = start_of(topology, equations)
     count = inputs.shape[1]
@@ -479,9 +466,9 @@ def follow(
             part = both[value > 0]
             if abs(value) <= part.end:
                 nearest = int(np.argmin(np.abs(np.array(part.values) - abs(value))))
-                found = _to(equations, part, nearest, begin, inputs[:, [k]], value)
-                if found is not None:
-                    unknowns[:, [k]], state[k] = found, 'closed'
+                pose = _to(equations, part, nearest, begin, inputs[:, [k]], value)
+                if pose is not None:
+                    unknowns[:, [k]], state[k] = pose, 'closed'
                 continue
             turning = not topology.linkage.inputs[0].slider
             around = tau - abs(value)
@@ -502,7 +489,7 @@ def follow(
 
 
 def both_ways(topology: Topology, turns: float = 1.25) -> Walks:
-    """Return a linkage with a single input followed down and up from where it was made."""
+    """Follow a linkage with a single input down and up from the pose it was made in."""
     equations = Equations(topology.linkage)
     start, begin = start_of(topology, equations)
     length, spacing = turns * tau, tau / _KNOTS
@@ -519,7 +506,7 @@ def both_ways(topology: Topology, turns: float = 1.25) -> Walks:
 def _to(
     equations: Equations, part: Walk, nearest: int, begin: Array, inputs: Array, value: float
 ) -> Array | None:
-    """Return the pose at inputs from that at a knot."""
+    """Follow a linkage from a knot to inputs; return the pose, None if it fails."""
     sign = 1.0 if value > 0 else -1.0
     knot = part.values[nearest]
     start = part.unknowns[nearest][:, None]

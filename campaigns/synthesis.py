@@ -14,30 +14,48 @@
 
 
 """
-The round trips: pairs of a known linkage, as doubles, and the error of the synthesised one.
+``python -m campaigns.synthesis``: four-bars designed back from their own pairs of angles.
 
-The rocker angles and condition numbers of the known linkage are computed in balls of more than
-fifty digits. Each linkage has a generator of its own, seeded by the campaign's seed, its family
-and its number: the result does not depend on how the work was shared, and any linkage can be made
-again.
+Three crank angles of a random linkage and its rocker angles there go into Freudenstein's equation;
+the lengths that it gives are compared with the lengths of the linkage. The rocker angles and
+condition numbers are computed in balls of more than fifty digits. Errors are given in units of
+the error that rounding the angles may cause.
+
+Each linkage has a random generator of its own, seeded by the campaign's seed, its family and its
+number. So the result does not depend on how the work is shared, and any linkage can be made again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import datetime
+from importlib import metadata
 from math import acos, cos, hypot, pi, sin
 from random import Random
+import sys
+import time
 from typing import Any, NamedTuple
 
-from campaigns.campaign import results_of
+from bench.report import say, show, Table
+from campaigns.campaign import (
+    exit_code,
+    machine_of,
+    parse_families,
+    parser_of,
+    Part,
+    parts_of,
+    progress_lines,
+    publish,
+    tallies_of,
+)
 from flint import arb, ctx
-from linkage_ros.synthesis.pairs.freudenstein import three_pairs, TRUSTED
+from linkage_ros.synthesis.pairs.freudenstein import links, three_pairs, TRUSTED
 import numpy as np
 from numpy.typing import NDArray
 
 PRECISION = 384
-"""In bits: what a cluster of 1e-9 rad takes away twice still leaves more than fifty digits."""
+"""In bits. A cluster of 1e-9 rad costs digits twice; more than fifty are left."""
 
 
 class Truth(NamedTuple):
@@ -47,7 +65,7 @@ class Truth(NamedTuple):
     Attributes
     ----------
     rocker
-        Its three angles, as doubles nearest to the true ones, in [rad].
+        Its three angles, rounded to doubles, in [rad].
     sensitivity
         Σ|x ∂L/∂x| + ``abs(L)`` of crank, coupler and rocker over the six angles.
 
@@ -59,7 +77,7 @@ class Truth(NamedTuple):
 
 def truth(lengths: Sequence[float], crank: Sequence[float], sides: Sequence[int]) -> Truth | None:
     """
-    Return where the rocker stands, and what its angles tell of the lengths; None if it does not.
+    Return the rocker angles and the sensitivity of the lengths; None where the loop is open.
 
     Parameters
     ----------
@@ -68,7 +86,7 @@ def truth(lengths: Sequence[float], crank: Sequence[float], sides: Sequence[int]
     crank
         Three crank angles, in [rad].
     sides
-        For each the assembly: 1 where the pin B lies to the left of A→O4, −1 to the right.
+        The assembly at each: 1 if the pin B lies left of A→O4, −1 if right.
 
     """
     ctx.prec = PRECISION
@@ -89,14 +107,14 @@ def truth(lengths: Sequence[float], crank: Sequence[float], sides: Sequence[int]
 def _rocker_direction(
     a: Any, b: Any, c: Any, cosine: Any, sine: Any, side: int
 ) -> tuple[Any, Any] | None:
-    """Return cos φ and sin φ from the triangle of A, B and O4; None where it does not close."""
+    """Return cos φ and sin φ from the triangle of A, B and O4; None where it is open."""
     x, y = 1 - a * cosine, -a * sine
     square = x * x + y * y
     along = (c * c - b * b + square) / 2
     height = c * c * square - along * along
     if not height > 0:
         return None
-    # From O4, along is laid off towards A.
+    # The foot of B lies at ``along`` from O4 towards A.
     across = side * height.sqrt()
     return (-along * x - across * y) / (square * c), (across * x - along * y) / (square * c)
 
@@ -142,13 +160,13 @@ def _sensitivity(
 
 
 Lengths = tuple[float, float, float]
-"""Of crank, coupler and rocker on a ground of 1; the first and the last signed."""
+"""Crank, coupler and rocker for a ground of 1; crank and rocker have a sign."""
 
 Angles = tuple[float, ...]
 
 
 class Case(NamedTuple):
-    """A linkage, three crank angles, on which side of A→O4 the pin B lies, and the truth."""
+    """A linkage, three crank angles, the side of A→O4 on which B lies at each, and the truth."""
 
     lengths: Lengths
     crank: Angles
@@ -158,22 +176,22 @@ class Case(NamedTuple):
 
 class Family(NamedTuple):
     """
-    The random quantities, and their purpose.
+    Random linkages with a common difficulty.
 
     Attributes
     ----------
-    why
-        Why it is hard.
+    description
+        The difficulty.
     lengths
         Draws the links.
     angles
-        Draws three crank angles; they need not close the linkage.
+        Draws three crank angles; the linkage may be open there.
     mixed
-        Whether each angle has an assembly of its own.
+        Whether each angle has its own assembly.
 
     """
 
-    why: str
+    description: str
     lengths: Callable[[Random], Lengths]
     angles: Callable[[Random, Lengths], Angles]
     mixed: bool = False
@@ -244,7 +262,7 @@ def _parallel(rng: Random) -> Lengths:
 
 
 def _reach(lengths: Lengths) -> tuple[float, float] | None:
-    """Return between which sizes of the crank angle it closes."""
+    """Return the smallest and the largest |crank angle| at which the linkage closes."""
     a, b, c = lengths
     ends = [(1 + a * a - reach * reach) / (2 * a) for reach in (b + c, b - c)]
     if min(ends) > 1 or max(ends) < -1:
@@ -253,7 +271,7 @@ def _reach(lengths: Lengths) -> tuple[float, float] | None:
 
 
 def _anywhere(rng: Random, lengths: Lengths) -> Angles:
-    """Evenly where the linkage closes."""
+    """Draw uniformly from the range of the crank."""
     low, high = _reach(lengths) or (0.0, pi)
     return tuple(_sign(rng) * rng.uniform(low, high) for _ in range(3))
 
@@ -272,7 +290,7 @@ def _pair(rng: Random, lengths: Lengths) -> Angles:
 
 
 def _about(*places: float) -> Callable[[Random, Lengths], Angles]:
-    """Return what draws each angle near one of some places, at a distance of its own."""
+    """Return a function that draws each angle near one of some places."""
 
     def angles(rng: Random, lengths: Lengths) -> Angles:
         del lengths
@@ -282,7 +300,7 @@ def _about(*places: float) -> Callable[[Random, Lengths], Angles]:
 
 
 def _at_limits(rng: Random, lengths: Lengths) -> Angles:
-    """Near where coupler and rocker lie in line, which not all linkages come to."""
+    """Draw angles near toggles of coupler and rocker, if the linkage has toggles."""
     limits = [end for end in _reach(lengths) or () if 0 < end < pi]
     found = list(_anywhere(rng, lengths))
     for i in range(3 if limits else 0):
@@ -319,17 +337,8 @@ _PART = 500
 _ROUNDOFF = 2.0**-53
 
 
-class Part(NamedTuple):
-    """Some linkages of a family."""
-
-    seed: int
-    family: str
-    first: int
-    size: int
-
-
 class Worst(NamedTuple):
-    """An error in units of roundoff times sensitivity, and where it was met."""
+    """An error, in units of roundoff times sensitivity, and the number of its linkage."""
 
     error: float
     linkage: int
@@ -346,20 +355,21 @@ class Tally:
     Attributes
     ----------
     cases
-        Linkages.
+        Number of linkages.
     flagged
-        Those of whose lengths no digit was trusted.
+        Number of linkages for which the result trusts no digit of some length.
     digits
-        The sum of the digits trusted, of the least trusted length of each that was not flagged.
+        Sum over the other linkages of the number of trusted digits of the least trusted length.
     worst
-        The greatest error of those not flagged, by the sensitivity that the result came with;
-        lengths apart whose second derivatives count for more.
+        Greatest error of the linkages that are not flagged, relative to the sensitivity that the
+        result gives; lengths dominated by second derivatives are left out.
     worst_true
-        The same by that of the true linkage, worked out from the loop in balls.
+        The same, relative to the sensitivity of the true linkage, computed in balls.
     worst_lost
-        The greatest error of all that are not flagged, in what the result said may be lost.
+        Greatest error of the linkages that are not flagged, relative to the loss that the result
+        gives.
     kappa
-        How the first of these sensitivities was to the second, at least and at most.
+        Smallest and largest ratio of the two sensitivities.
 
     """
 
@@ -388,60 +398,42 @@ def make(seed: int, family: str, index: int) -> Case:
 
 
 def judge(cases: list[Case], first: int) -> Tally:
-    """Synthesise linkages from their pairs, all at once, and compare."""
-    found = three_pairs([case.crank for case in cases], [case.truth.rocker for case in cases])
-    off = np.abs(found.lengths - [case.lengths for case in cases])
+    """Synthesise all linkages from their pairs at once, and compare."""
+    result = three_pairs([case.crank for case in cases], [case.truth.rocker for case in cases])
+    off = np.abs(result.lengths - [case.lengths for case in cases])
     kappa = np.array([case.truth.sensitivity for case in cases])
-    told = np.flatnonzero((found.digits > 0.0).all(1))
-    tally = Tally(len(cases), len(cases) - len(told))
-    if len(told):
-        off, kappa, said = off[told], kappa[told], found.sensitivity[told]
-        lost, numbers = found.lost[told] * np.abs(found.lengths[told]), first + told
-        linear = lost < 2.0 * TRUSTED * _ROUNDOFF * said
-        tally.digits = float(found.digits[told].min(1).sum())
-        tally.worst = _worst(np.where(linear, off / said, 0.0) / _ROUNDOFF, numbers)
+    trusted = np.flatnonzero((result.digits > 0.0).all(1))
+    tally = Tally(len(cases), len(cases) - len(trusted))
+    if len(trusted):
+        off, kappa = off[trusted], kappa[trusted]
+        sensitivity = result.sensitivity[trusted]
+        lost = result.lost[trusted] * np.abs(result.lengths[trusted])
+        numbers = first + trusted
+        linear = lost < 2.0 * TRUSTED * _ROUNDOFF * sensitivity
+        tally.digits = float(result.digits[trusted].min(1).sum())
+        tally.worst = _worst(np.where(linear, off / sensitivity, 0.0) / _ROUNDOFF, numbers)
         tally.worst_true = _worst(np.where(linear, off / kappa, 0.0) / _ROUNDOFF, numbers)
         tally.worst_lost = _worst(off / lost, numbers)
-        tally.kappa = float((said / kappa).min()), float((said / kappa).max())
+        tally.kappa = float((sensitivity / kappa).min()), float((sensitivity / kappa).max())
     return tally
 
 
 def parts(cases: int, seed: int, families: list[str]) -> list[Part]:
-    """Return the work for so many linkages of each family."""
-    return [
-        Part(seed, family, first, min(_PART, cases - first))
-        for family in families
-        for first in range(0, cases, _PART)
-    ]
+    """Return the work for a number of linkages of each family."""
+    return parts_of(seed, dict.fromkeys(families, cases), _PART)
 
 
 def do(part: Part) -> tuple[Part, Tally]:
     """Do one part."""
-    numbers = range(part.first, part.first + part.size)
-    return part, judge([make(part.seed, part.family, i) for i in numbers], part.first)
+    return part, judge([make(part.seed, part.family, i) for i in part.numbers], part.first)
 
 
 def run(
     work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, Tally]:
-    """
-    Run all parts and return the findings by family.
-
-    Parameters
-    ----------
-    work
-        The parts.
-    jobs
-        Number of processes; 1 runs in this one.
-    progress
-        Called with the number of linkages of each part that is done.
-
-    """
-    tallies: dict[str, Tally] = {part.family: Tally() for part in work}
-    for part, tally in results_of(do, work, jobs):
-        tallies[part.family].merge(tally)
-        progress(part.size)
-    return tallies
+    """Run all parts as `tallies_of` does, and return the tally of each family."""
+    tallies = tallies_of(do, work, jobs, Tally, progress)
+    return {family: tally for (_, family), tally in tallies.items()}
 
 
 def _worst(errors: NDArray[np.float64], numbers: NDArray[np.intp]) -> Worst:
@@ -449,3 +441,84 @@ def _worst(errors: NDArray[np.float64], numbers: NDArray[np.intp]) -> Worst:
     each = np.nan_to_num(errors, nan=np.inf).max(1)
     place = int(each.argmax())
     return Worst(float(each[place]), int(numbers[place]))
+
+
+def main() -> int:
+    """Run the campaign; return 1 if an error is above its limit."""
+    parser = parser_of('synthesis', __doc__)
+    parser.add_argument('--cases', type=int, default=100_000, help='linkages of each family')
+    arguments = parse_families(parser, FAMILIES)
+    if arguments.show:
+        _show_case(arguments.seed, arguments.show[0], int(arguments.show[1]))
+        return 0
+    begin = datetime.now().astimezone()
+    work = parts(arguments.cases, arguments.seed, arguments.only or [*FAMILIES])
+    progress = progress_lines(sum(part.size for part in work), 'linkages')
+    tallies = run(work, arguments.jobs, progress)
+    cases = sum(tally.cases for tally in tallies.values())
+    version = 'python-flint', metadata.version('python-flint')
+    machine = machine_of(begin, arguments, 'cases', cases, version)
+    families = [(name, family.description) for name, family in FAMILIES.items()]
+    tables = [_errors(tallies), Table('Families', ('family', 'description'), families), _speed()]
+    publish([*tables, machine], None)
+    return int(any(t.worst.error > TRUSTED or t.worst_lost.error > 1.0 for t in tallies.values()))
+
+
+def _errors(tallies: dict[str, Tally]) -> Table:
+    table = Table(
+        'Errors of lengths, in 2⁻⁵³·sensitivity',
+        ('family', 'linkages', 'flagged', 'mean digits', 'worst', 'linkage',
+         'by true sensitivity', 'ratio', 'relative to loss'),
+    )  # fmt: skip
+    for family, tally in tallies.items():
+        trusted = tally.cases - tally.flagged
+        table.rows.append(
+            [
+                family,
+                f'{tally.cases:,}',
+                f'{tally.flagged:,}',
+                f'{tally.digits / trusted:.1f}' if trusted else '',
+                f'{tally.worst.error:.3g}',
+                str(tally.worst.linkage),
+                f'{tally.worst_true.error:.3g}',
+                f'{tally.kappa[0]:.2f}–{tally.kappa[1]:.2f}',
+                f'{tally.worst_lost.error:.2f}',
+            ]
+        )
+    return table
+
+
+def _speed() -> Table:
+    """Measure three-pair designs per second on one core, as a search makes them."""
+    angles = np.random.default_rng(1).uniform(-np.pi, np.pi, (2, 262_144, 3))
+    table = Table('Designs from three pairs, on one core', ('', 'million/s'))
+    for name, solve in (('lengths', links), ('with condition and sensitivity', three_pairs)):
+        best = np.inf
+        for _ in range(3):
+            start = time.perf_counter()
+            solve(*angles)
+            best = min(best, time.perf_counter() - start)
+        table.rows.append([name, f'{angles.shape[1] / best / 1e6:.2f}'])
+    return table
+
+
+def _show_case(seed: int, family: str, index: int) -> None:
+    case = make(seed, family, index)
+    result = three_pairs(case.crank, case.truth.rocker)
+    table = Table(f'{family} {index}', ('', 'crank', 'coupler', 'rocker'))
+    for name, numbers in (
+        ('true length', case.lengths),
+        ('synthesised', result.lengths),
+        ('sensitivity', result.sensitivity),
+        ('true sensitivity', case.truth.sensitivity),
+        ('digits', result.digits),
+    ):
+        table.rows.append([name, *(f'{float(number):.17g}' for number in numbers)])
+    show(table)
+    say(f'crank {case.crank}')
+    say(f'rocker {case.truth.rocker}')
+    say(f'assemblies {case.sides}; condition {result.condition:.3g}, doubt {result.doubt}')
+
+
+if __name__ == '__main__':
+    sys.exit(exit_code(main))

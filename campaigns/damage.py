@@ -14,10 +14,10 @@
 
 
 """
-Bags are damaged, read and recovered; a verdict compares the outcome with the original.
+``python -m campaigns.damage``: bags truncated at every byte, and with every bit flipped.
 
-The bags are a node's own, and others in the style of other writers. The damages are shared among
-processes.
+A damaged bag is read and recovered, and the result is compared with the original: messages are the
+recorded ones in their order, topics and attachments are unchanged, and every loss is reported.
 """
 
 from __future__ import annotations
@@ -25,13 +25,24 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 import os
 from pathlib import Path
 from random import Random
+import sys
 import tempfile
 from typing import NamedTuple
 
-from campaigns.campaign import results_of
+from bench.report import say, Table
+from campaigns.campaign import (
+    exit_code,
+    machine_of,
+    Page,
+    parser_of,
+    progress_lines,
+    publish,
+    results_of,
+)
 from linkage_ros.bag.mcap_records import Message, Source
 from linkage_ros.bag.reader import BagMessage, read_bag, topic_of
 from linkage_ros.bag.salvage import Salvage
@@ -43,7 +54,8 @@ from mcap.records import Attachment
 from mcap.writer import CompressionType, Writer
 
 START = 1_700_000_000_000_000_000
-KILLED = 'own, killed'
+OURS = 'linkage_ros'
+KILLED = 'linkage_ros, killed'
 TYPE = 'sensor_msgs/msg/JointState'
 DEFINITION = 'std_msgs/Header header\nstring[] name\nfloat64[] position\n' + '# text\n' * 100
 ATTACHMENTS = {
@@ -55,7 +67,7 @@ ATTACHMENTS = {
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A bag's folder, its one file as it is undamaged, and what it holds."""
+    """An undamaged bag: its folder, its single file, and the content of both."""
 
     folder: Path
     file: Path
@@ -66,7 +78,7 @@ class Subject:
 
 
 def make(kind: str, folder: Path, seed: int, size: int) -> Subject:
-    """Make a bag of this kind with a file of about so many bytes."""
+    """Make a bag of a kind, whose file has about ``size`` bytes."""
     random = Random(f'{seed} {kind}')
     count = max(size // 240, 20)
     messages = []
@@ -82,11 +94,13 @@ def make(kind: str, folder: Path, seed: int, size: int) -> Subject:
     named = folder if (folder / 'metadata.yaml').exists() else file
     bag = read_bag(named, allow_truncated=kind == KILLED)
     expected = [BagMessage(topics[topic].name, *rest) for topic, *rest in messages]
-    assert list(bag.messages()) == expected, 'undamaged, it is not what was written'
+    assert list(bag.messages()) == expected, 'the undamaged bag differs from what was written'
     return Subject(folder, file, file.read_bytes(), expected, bag.topics, bag.attachments)
 
 
-def _own(folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, int, int, bytes]]):
+def _by_linkage_ros(
+    folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, int, int, bytes]]
+):
     writer = BagWriter(folder, topics, ATTACHMENTS)
     for number, message in enumerate(messages):
         writer.write(*message)
@@ -97,8 +111,8 @@ def _own(folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, int,
 
 
 def _killed(folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, int, int, bytes]]):
-    """Write one that ends behind its last chunk, where a kill after a flush leaves it."""
-    file = _own(folder, topics, messages)
+    """Write a bag that ends after its last chunk, as a kill after a flush leaves it."""
+    file = _by_linkage_ros(folder, topics, messages)
     with file.open('rb') as stream:
         last = make_reader(stream).get_summary().chunk_indexes[-1]
     os.truncate(file, last.chunk_start_offset + last.chunk_length + last.message_index_length)
@@ -106,7 +120,7 @@ def _killed(folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, i
 
 
 def _by_mcap(**options: object) -> Callable[..., Path]:
-    """Return what writes a file by mcap's writer with these options, and no metadata.yaml."""
+    """Return a function that writes a bag by mcap's writer, without metadata.yaml."""
 
     def write(folder: Path, topics: tuple[Topic, ...], messages) -> Path:
         folder.mkdir(parents=True)
@@ -127,7 +141,7 @@ def _by_mcap(**options: object) -> Callable[..., Path]:
 
 
 KINDS: dict[str, Callable[..., Path]] = {
-    'own': _own,
+    OURS: _by_linkage_ros,
     KILLED: _killed,
     'lz4': _by_mcap(compression=CompressionType.LZ4),
     'zstd': _by_mcap(compression=CompressionType.ZSTD),
@@ -147,9 +161,11 @@ KINDS: dict[str, Callable[..., Path]] = {
 FAULT = 'FAULT: '
 """Prefix of a verdict that is a violation."""
 
+_REPORTED, _SILENT = 'damage reported', 'nothing reported'
+
 
 def judge_reading(subject: Subject, *, allow_truncated: bool) -> str:
-    """Read the bag's file as it lies there now; return a verdict."""
+    """Read the damaged file and return a verdict."""
     given: list[BagMessage] = []
     try:
         bag = read_bag(subject.file, allow_truncated=allow_truncated)
@@ -157,15 +173,15 @@ def judge_reading(subject: Subject, *, allow_truncated: bool) -> str:
         return 'refused'
     except Exception as error:  # noqa: BLE001
         return f'{FAULT}{type(error).__name__}'
-    end = 'says nothing'
+    end = _SILENT
     try:
         given.extend(bag.messages())
     except BagError:
-        end = 'says so'
+        end = _REPORTED
     except Exception as error:  # noqa: BLE001
         return f'{FAULT}{type(error).__name__}'
     if bag.truncated:
-        end = 'says so'
+        end = _REPORTED
     if not _is_subset(bag.topics, subject.topics):
         return f'{FAULT}a false topic'
     if not bag.attachments.items() <= subject.attachments.items():
@@ -175,7 +191,7 @@ def judge_reading(subject: Subject, *, allow_truncated: bool) -> str:
 
 
 def judge_salvage(subject: Subject) -> str:
-    """Look for what is whole in the bag's file as it lies there now; return a verdict."""
+    """Recover undamaged records from the damaged file and return a verdict."""
     given: list[BagMessage] = []
     attachments: dict[str, bytes] = {}
     channels = {}
@@ -200,7 +216,7 @@ def judge_salvage(subject: Subject) -> str:
         return f'{FAULT}a false topic'
     if not attachments.items() <= subject.attachments.items():
         return f'{FAULT}a false attachment'
-    end = 'says so' if salvage.losses else 'says nothing'
+    end = _REPORTED if salvage.losses else _SILENT
     complete = len(attachments) == len(subject.attachments)
     return _verdict(given, subject.messages, end, complete=complete)
 
@@ -214,13 +230,13 @@ def _verdict(
         amount = 'a part' if given else 'none'
     else:
         return f'{FAULT}a false message'
-    if amount != 'all' and end == 'says nothing':
-        return f'{FAULT}{amount}, and says nothing'
+    if amount != 'all' and end == _SILENT:
+        return f'{FAULT}{amount}, {_SILENT}'
     return f'{amount}, {end}'
 
 
 def _is_part(given: Sequence[BagMessage], true: Sequence[BagMessage]) -> bool:
-    """Say whether these are some of those, in their order."""
+    """Return whether the given messages are some of the true ones, in their order."""
     if given == true[: len(given)]:
         return True
     rest = iter(true)
@@ -232,7 +248,7 @@ def _is_subset(some: Iterable[object], those: Sequence[object]) -> bool:
 
 
 _PART = 4000
-"""Damages that a process takes at a time."""
+"""Number of damages that a process tries at a time."""
 
 JUDGES: dict[str, Callable[[Subject], str]] = {
     'read': lambda subject: judge_reading(subject, allow_truncated=False),
@@ -248,11 +264,11 @@ class Part(NamedTuple):
     Attributes
     ----------
     kind, seed, size
-        Which bag, as `make` takes it.
+        The bag, as arguments of `make`.
     damage
-        'cut' to so many bytes, or 'flip' of the bit of this number.
+        'cut': the file is truncated to so many bytes; 'flip': one bit is inverted.
     places
-        The bytes or bits.
+        The sizes, or the numbers of the bits.
 
     """
 
@@ -265,7 +281,7 @@ class Part(NamedTuple):
 
 @dataclass
 class Tally:
-    """How often each judge came to each verdict, and the first damages that led to a fault."""
+    """Number of verdicts by kind, damage and judge, and the first damages that are faults."""
 
     verdicts: Counter[tuple[str, str, str, str]] = field(default_factory=Counter)
     faults: list[tuple[str, str, int, str, str]] = field(default_factory=list)
@@ -276,7 +292,7 @@ class Tally:
 
 
 def parts(kinds: list[str], seed: int, size: int, sample: int | None) -> list[Part]:
-    """Return all damages to the bags of these kinds, or of each damage so many at random."""
+    """Return all damages to bags of some kinds; with ``sample`` so many of each at random."""
     work = []
     for kind in kinds:
         with tempfile.TemporaryDirectory() as folder:
@@ -297,7 +313,7 @@ def parts(kinds: list[str], seed: int, size: int, sample: int | None) -> list[Pa
 
 
 def run(work: list[Part], jobs: int) -> Iterator[tuple[Part, Tally]]:
-    """Damage and judge; yield each part as it is done."""
+    """Damage and judge; yield each part when it is done."""
     yield from results_of(_with_part, work, jobs)
 
 
@@ -306,7 +322,7 @@ def _with_part(part: Part) -> tuple[Part, Tally]:
 
 
 def run_part(part: Part) -> Tally:
-    """Make the bag, damage its file at each place, judge, and make it whole again."""
+    """Make the bag; at each place damage its file, judge, and undo the damage."""
     tally = Tally()
     with tempfile.TemporaryDirectory() as folder:
         subject = make(part.kind, Path(folder) / 'run', part.seed, part.size)
@@ -331,3 +347,65 @@ def run_part(part: Part) -> Tally:
                     file.seek(place)
                     file.write(content[place:])
     return tally
+
+
+PAGE = Page(
+    Path('docs/recordings/damage.md'),
+    'Damaged bags',
+    """
+Made by `make damage`. A bag of about 100 kB that linkage_ros recorded is truncated at every byte,
+and every bit of it is flipped, each time starting from the undamaged bag. A bag that was killed,
+and bags by other writers with and without compression, are damaged at random places. Each damaged
+bag is read as a complete bag, read as a bag that may be truncated, and recovered. The result has
+to be the recorded messages in their order, with unchanged topics and attachments; every loss has
+to be reported.
+
+A row is a verdict: how much was read, and whether damage was reported. The numbers count damages.
+*all messages*: all messages, but not all attachments. A verdict that is a violation begins with
+FAULT: a false message, topic or attachment, an unreported loss, or a Python exception.
+""",
+)
+
+
+def main() -> int:
+    """Damage and judge; return 1 if a verdict is a fault."""
+    parser = parser_of('damage', __doc__, page=PAGE)
+    parser.add_argument('--size', type=int, default=100_000, help='of the file, about [bytes]')
+    parser.add_argument('--sample', type=int, help='cuts and flips at random, instead of all')
+    parser.add_argument(
+        '--others', type=int, default=20_000, help='cuts and flips of each bag by other writers'
+    )
+    arguments = parser.parse_args()
+    begin = datetime.now().astimezone()
+    work = parts([OURS], arguments.seed, arguments.size, arguments.sample)
+    if arguments.others:
+        others = [kind for kind in KINDS if kind != OURS]
+        work += parts(others, arguments.seed, arguments.size, arguments.others)
+    tally = Tally()
+    total = sum(len(part.places) for part in work)
+    progress = progress_lines(total, 'damages')
+    for part, judged in run(work, arguments.jobs):
+        tally.add(judged)
+        progress(len(part.places))
+    tables = [_table(tally, kind, damage) for kind in KINDS for damage in ('cut', 'flip')]
+    tables = [table for table in tables if table.rows]
+    for kind, damage, place, name, verdict in tally.faults:
+        say(f'{name}, {kind}, {damage} {place}: {verdict}')
+    tables.append(machine_of(begin, arguments, 'damages', total))
+    publish(tables, PAGE if arguments.write else None)
+    return int(bool(tally.faults))
+
+
+def _table(tally: Tally, kind: str, damage: str) -> Table:
+    counts: dict[str, Counter[str]] = {}
+    for (of_kind, of_damage, judge, verdict), count in tally.verdicts.items():
+        if (of_kind, of_damage) == (kind, damage):
+            counts.setdefault(verdict, Counter())[judge] += count
+    table = Table(f'{kind}: {damage}', ('verdict', *JUDGES))
+    for verdict in sorted(counts, key=lambda v: (not v.startswith(FAULT), v)):
+        table.rows.append([verdict, *(f'{counts[verdict][judge]:,}' for judge in JUDGES)])
+    return table
+
+
+if __name__ == '__main__':
+    sys.exit(exit_code(main))
