@@ -31,7 +31,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from linkage_ros import __version__
 
-from docs.website.reference import put_in
+from docs.website.reference import insert_parts
 from docs.website.tutorial import PercentParser
 
 project = 'linkage_ros'
@@ -60,7 +60,7 @@ autodoc_typehints = 'signature'
 add_module_names = False
 maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
-# In docstrings a name in backticks is one of the code.
+# In docstrings a name in backticks is a name of the code.
 default_role = 'py:obj'
 napoleon_google_docstring = False
 napoleon_use_ivar = True
@@ -70,26 +70,28 @@ html_theme = 'furo'
 html_title = f'linkage_ros {__version__}'
 html_copy_source = False
 html_show_sphinx = False
-html_static_path = ['website/static']
+html_static_path = ['website/static', '../linkage_ros/accuracy/page/field.js']
 html_css_files = ['site.css']
+# The field of accuracy.md, the same as on the pages of `linkage accuracy`.
+html_js_files = [('field.js', {'defer': 'defer'})]
 
 
 def setup(app: Any) -> dict[str, Any]:
-    """Connect what this site adds to Sphinx."""
+    """Connect the extensions of this site to Sphinx."""
     app.add_source_suffix('.py', 'percent')
     app.add_source_parser(PercentParser)
-    app.connect('source-read', lambda _app, docname, source: put_in(docname, source))
+    app.connect('source-read', lambda _app, docname, source: insert_parts(docname, source))
     app.connect('missing-reference', _unlinked)
     app.connect('autodoc-process-signature', _readable)
     return {'parallel_read_safe': True, 'parallel_write_safe': True}
 
 
-def _readable(*told: Any) -> tuple[str | None, str | None]:
-    """Return a signature that Sphinx can read: a dataclass's factory is no Python."""
-    *_, signature, returns = told
+def _readable(*arguments: Any) -> tuple[str | None, str | None]:
+    """Return a signature that Sphinx can parse: the factory of a dataclass is no Python."""
+    *_, signature, returns = arguments
     return signature and signature.replace('<factory>', '...'), returns
 
 
-def _unlinked(_app: Any, _env: Any, node: Any, shown: Any) -> Any:
-    """Let names of the code that have no page of their own stand as they are."""
-    return shown if node.get('refdomain') == 'py' else None
+def _unlinked(_app: Any, _env: Any, node: Any, content: Any) -> Any:
+    """Return a name of the code without a page of its own as plain text."""
+    return content if node.get('refdomain') == 'py' else None

@@ -14,10 +14,10 @@
 
 
 """
-Measure what accuracy costs on scenes that come with the package, for docs/accuracy.md.
+Measure the cost of accuracy for scenes that come with the package, for docs/accuracy.md.
 
-Some two and a half minutes a scene. Run it in the checkout's own folder, as `make accuracy_page`
-does: ``python -m docs.make_accuracy``, with names of scenes or without.
+A scene takes about two and a half minutes. Run it in the folder of the checkout, as `make
+accuracy_page` does: ``python -m docs.make_accuracy [SCENE …]``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import argparse
 from pathlib import Path
 import sys
 
-from linkage_ros.accuracy.measure import measure_accuracy, PARTS
+from linkage_ros.accuracy import measure_accuracy, PARTS
 from linkage_ros.accuracy.page.files import write_markdown
 from linkage_ros.scene.load import load_scene
 
@@ -35,26 +35,28 @@ PAGE = DOCS / 'accuracy.md'
 SCENES = DOCS.parent / 'config' / 'scenes'
 
 SHOWN = ('demo', 'torque_crank', 'jansen_leg')
-"""A four-bar whose crank is measured, and one that a torque moves."""
+"""Scenes with a measured crank, with a torque drive, and with several loops."""
 
 
 def main() -> int:
     """Measure and write."""
     parser = argparse.ArgumentParser('python -m docs.make_accuracy', description=__doc__)
     parser.add_argument('scenes', nargs='*', default=SHOWN, help='names of shipped scenes')
-    parser.add_argument('--quick', action='store_true', help='to see the page, not for figures')
+    parser.add_argument('--quick', action='store_true', help='faster, to see the page only')
     arguments = parser.parse_args()
     results = []
     for name in arguments.scenes:
         scene = load_scene(SCENES / f'{name}.yaml')
-        told: set[str] = set()
+        printed: set[str] = set()
 
-        def tell(part: str, share: float, name: str = name, told: set[str] = told) -> None:
-            if part not in told:
-                told.add(part)
+        def progress(
+            part: str, share: float, name: str = name, printed: set[str] = printed
+        ) -> None:
+            if part not in printed:
+                printed.add(part)
                 sys.stderr.write(f'{name}: {part}\n')
 
-        results.append(measure_accuracy(scene, PARTS, arguments.quick, DOCS.parent, tell))
+        results.append(measure_accuracy(scene, PARTS, arguments.quick, DOCS.parent, progress))
     write_markdown(results, PAGE)
     return 0
 

@@ -16,7 +16,7 @@
 """
 Measure the cost of every effect on this machine, and write it into docs/cost.md.
 
-Run it in the checkout's own folder, as `make cost` does: ``python -m docs.make_cost``.
+Run it in the folder of the checkout, as `make cost` does: ``python -m docs.make_cost``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from linkage_ros.cli.cost import all_effects
+from linkage_ros.cli.cost import all_effects, table_of_all
 from linkage_ros.cli.terminal import Table
 from linkage_ros.measuring import describe_machine
 from linkage_ros.pages.markdown import filled, table_lines
@@ -33,20 +33,20 @@ PAGE = Path(__file__).resolve().parent / 'cost.md'
 
 _TICKS = 50_000
 _LEFT_OUT = ('governor', 'kernel', 'rclpy', 'middleware')
-"""What the machine has and no tick here sees."""
+"""Properties of the machine that do not concern these ticks."""
 
 
 def main() -> int:
     """Measure and write."""
-    table = all_effects(_TICKS)
-    assert table is not None, 'nobody stops it'
-    text = measured(table, describe_machine())
+    costs = all_effects(_TICKS)
+    assert costs is not None, 'nothing interrupts the measurement'
+    text = measured(table_of_all(costs, _TICKS), describe_machine())
     PAGE.write_text(filled(PAGE.read_text('utf-8'), 'measured', text), 'utf-8')
     return 0
 
 
 def measured(table: Table, machine: Sequence[tuple[str, str]]) -> str:
-    """Return what is measured as Markdown: the machine, and the table."""
+    """Return the measurement as Markdown: the machine and the table."""
     on = ', '.join(f'{name} {value}' for name, value in machine if name not in _LEFT_OUT)
     heads = [column.lstrip('>') for column in table.columns]
     lines = table_lines(heads, table.rows, [column.startswith('>') for column in table.columns])

@@ -14,10 +14,10 @@
 
 
 """
-Make the pictures, lists and tables of docs/effects.md.
+Make the pictures, lists and tables of docs/effects.md and the pages in docs/effects.
 
-Its text is written by hand. The text between two marks comes from the declarations in the code,
-and every picture from runs of the scene beside it. Run it in the checkout's own folder, as `make
+Their text is written by hand. The text between two marks comes from the declarations in the code,
+and every picture from runs of the scene beside it. Run it in the folder of the checkout, as `make
 effects` does: ``python -m docs.make_effects``.
 """
 
@@ -42,13 +42,19 @@ import yaml
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'effects.md'
 PICTURES = DOCS / 'effects'
+PAGES = [
+    PAGE,
+    *(PICTURES / f'{name}.md' for kind in ('drive', 'effect') for name in REGISTRIES[kind]),
+    PICTURES / 'faults.md',
+]
 REFUSED = DOCS / 'refused.yaml'
 LINKAGES = DOCS.parent / 'config' / 'linkages'
 
 LARGEST = 80_000
-"""Bytes of a picture, at most."""
+LARGEST_SMALL = 30_000
+"""Maximum sizes of a picture and of a small one, in bytes."""
 
-_STANDS = {
+_WORKS_ON = {
     'alter': 'the linkage, once, when the scene is built',
     'drive_stage': 'the crank, before the loops are closed',
     'stage': 'the mechanism, once its loops are closed',
@@ -59,7 +65,7 @@ _STANDS = {
     'message': 'the messages of the crank',
     'mechanism': 'the loop, once it is closed',
 }
-"""What a module works on that has this function, or whose parameters have this."""
+"""The object of a module that has this function, or whose parameters have this attribute."""
 
 
 class Section(NamedTuple):
@@ -71,7 +77,7 @@ class Section(NamedTuple):
     name
         The heading.
     text
-        The heading's line, and all up to the next one.
+        The heading and the text up to the next heading.
 
     """
 
@@ -80,26 +86,34 @@ class Section(NamedTuple):
 
     @property
     def scene(self) -> str:
-        """The scene that it shows; '' for none."""
-        found = re.search(r'^```yaml\n(.*?)^```$', self.text, re.MULTILINE | re.DOTALL)
-        return found.group(1) if found else ''
+        """The scene of the section; '' for none."""
+        match = re.search(r'^```yaml\n(.*?)^```$', self.text, re.MULTILINE | re.DOTALL)
+        return match.group(1) if match else ''
 
 
 def main() -> int:
-    """Write page and pictures; return 1 where a picture is too large."""
-    page = filled(PAGE.read_text('utf-8'))
-    PAGE.write_text(page, 'utf-8')
-    PICTURES.mkdir(exist_ok=True)
-    for old in PICTURES.iterdir():
+    """Write pages and pictures; return 1 if a picture is too large."""
+    for page in PAGES:
+        page.write_text(filled(page.read_text('utf-8')), 'utf-8')
+    small = PICTURES / 'thumbnails'
+    for old in (*PICTURES.glob('*.png'), *small.glob('*.png')):
         old.unlink()
-    large = [drawn for drawn in _draw(page) if drawn.stat().st_size > LARGEST]
-    for drawn in large:
-        sys.stderr.write(f'{drawn}: more than {LARGEST} bytes\n')
+    small.mkdir(exist_ok=True)
+    drawn = _draw(text_of_pages())
+    large = [(file, most) for file, most in drawn if file.stat().st_size > most]
+    for file, most in large:
+        sys.stderr.write(f'{file}: more than {most} bytes\n')
     return 1 if large else 0
 
 
-def _draw(page: str) -> Iterator[Path]:
-    # The page can be checked where matplotlib is missing.
+def text_of_pages() -> str:
+    """Return the text of all pages, one after the other."""
+    return ''.join(page.read_text('utf-8') for page in PAGES)
+
+
+def _draw(page: str) -> Iterator[tuple[Path, int]]:
+    """Yield the drawn pictures, each with its maximum size."""
+    # Tests check the page without matplotlib.
     from .pictures import drives, faults, markers, mechanism, paper, sensors
 
     modules = (drives, mechanism, sensors, markers, faults)
@@ -110,32 +124,33 @@ def _draw(page: str) -> Iterator[Path]:
             file = PICTURES / f'{name}.png'
             figure = draw[name](yaml.safe_load(section.scene))
             paper.save(figure, section.scene, file)
-            yield file
+            yield file, LARGEST
+            yield paper.save_small(file, PICTURES / 'thumbnails' / file.name), LARGEST_SMALL
 
 
 def sections(page: str) -> list[Section]:
-    """Return the parts of a page, in their order."""
-    found = []
+    """Return the sections of a page, in their order."""
+    parts = []
     fenced = False
     lines: list[str] = []
     for line in page.splitlines(keepends=True):
         if line.startswith('```'):
             fenced = not fenced
         if not fenced and re.match(r'#+ ', line):
-            found.append(lines)
+            parts.append(lines)
             lines = []
         lines.append(line)
-    found.append(lines)
-    return [Section(lines[0].lstrip('#').strip(), ''.join(lines)) for lines in found if lines]
+    parts.append(lines)
+    return [Section(lines[0].lstrip('#').strip(), ''.join(lines)) for lines in parts if lines]
 
 
 def filled(page: str) -> str:
-    """Return a page with what is made anew between all its marks."""
+    """Return a page with new text between all its marks."""
     kinds = {name: kind for kind, names in REGISTRIES.items() for name in names}
     parts = []
     for section in sections(page):
         text = section.text
-        for mark, made in (('order', order), ('refused', refused)):
+        for mark, made in _MADE.items():
             if markdown.marks(mark)[0] in text:
                 text = markdown.filled(text, mark, made())
         if section.name in kinds:
@@ -146,43 +161,48 @@ def filled(page: str) -> str:
     return ''.join(parts)
 
 
+def thumbnails(kind: str) -> str:
+    """Return the drives or effects as a list of pictures that lead to their pages."""
+    return '\n'.join(
+        f'- [![](effects/thumbnails/{name}.png) {name}](effects/{name}.md)'
+        for name in REGISTRIES[kind]
+    )
+
+
 def order() -> str:
     """Return the effects in their order, each with its summary."""
     return '\n'.join(
-        f'{number}. [{name}](#{name}): {_summary("effect", name)}'
+        f'{number}. [{name}](effects/{name}.md): {_summary("effect", name)}'
         for number, name in enumerate(EFFECTS, 1)
     )
 
 
 def place(kind: str, name: str) -> str:
-    """Return what a drive, an effect or a fault is, and its place."""
+    """Return the summary of a drive, an effect or a fault, and its place in the order."""
     module = import_module(REGISTRIES[kind][name])
-    said = [f'*{_summary(kind, name)}*', '']
+    lines = [f'*{_summary(kind, name)}*', '']
+    owners = module, module.PARAMETERS
     works_on = next(
-        (
-            w
-            for has, w in _STANDS.items()
-            if hasattr(module, has) or hasattr(module.PARAMETERS, has)
-        ),
+        (text for key, text in _WORKS_ON.items() if any(hasattr(owner, key) for owner in owners)),
         '',
     )
     if kind == 'drive':
         topic = getattr(module, 'TOPIC', '')
         listens = f'Listens to `{topic}`, sensor_msgs/msg/JointState.' if topic else ''
-        said.append(listens or 'Listens to no topic.')
+        lines.append(listens or 'Listens to no topic.')
     elif kind == 'fault':
-        said.append(f'Works on {works_on}.')
+        lines.append(f'Works on {works_on}.')
     else:
-        said.append(f'{_neighbours(name)}. Works on {works_on}.')
+        lines.append(f'{_neighbours(name)}. Works on {works_on}.')
         if name in NEEDS:
-            said.append(f'Needs {_listed(NEEDS[name])}, computed but not published for it.')
+            lines.append(f'Needs {_listed(NEEDS[name])}, computed but not published for it.')
         if name in PUBLISHED_WITH:
-            said[-1] = f'Needs {_listed(PUBLISHED_WITH[name])}, published with it.'
+            lines[-1] = f'Needs {_listed(PUBLISHED_WITH[name])}, published with it.'
         if hasattr(module, 'TOPIC'):
-            said.append(f'Publishes `{module.TOPIC}`, {module.MESSAGE}.')
+            lines.append(f'Publishes `{module.TOPIC}`, {module.MESSAGE}.')
     source = Path(str(module.__file__)).relative_to(DOCS.parent).as_posix()
-    said.append(f'In [{source}](../{source}).')
-    return '\n'.join(said)
+    lines.append(f'In [{source}](../../{source}).')
+    return '\n'.join(lines)
 
 
 def _neighbours(name: str) -> str:
@@ -211,13 +231,22 @@ def parameters(kind: str, name: str) -> str:
 
 
 def refused() -> str:
-    """Return the scenes that are refused, each with its error."""
+    """Return the table of refused scenes with their errors."""
     scenes = yaml.safe_load(REFUSED.read_text('utf-8'))
-    rows = [(each['what'], f'`{_said(**each)}`') for each in scenes]
+    rows = [(each['what'], f'`{_error_of(**each)}`') for each in scenes]
     return '\n'.join(markdown.table_lines(('scene', 'error'), rows))
 
 
-def _said(what: str, linkage: str, scene: str) -> str:
+_MADE = {
+    'drives': lambda: thumbnails('drive'),
+    'effects': lambda: thumbnails('effect'),
+    'order': order,
+    'refused': refused,
+}
+"""The parts of the first page that are made, by their marks."""
+
+
+def _error_of(what: str, linkage: str, scene: str) -> str:
     files = {
         'scene.yaml': f'linkage: {linkage}.yaml\n{scene}'.encode(),
         'linkage.yaml': (LINKAGES / f'{linkage}.yaml').read_bytes(),

@@ -14,21 +14,35 @@
 
 
 """
-Make docs/gallery.md and its pictures from the linkage files that come with the package.
+Make docs/gallery.md, a page and a picture of each linkage that comes with the package.
 
-The text on a linkage is the comment at the head of its file, with the results of `linkage check`.
+Beside each picture there is a small one for an overview, and one linkage is animated for the
+first page. The text on a linkage is the comment at the head of its file, and the results of
+`linkage check`.
 Run it from anywhere: ``python docs/make_gallery.py``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import compress
 from pathlib import Path
+import shutil
 import sys
 
 from linkage_ros.cli.arguments import angle_text, fixed
 from linkage_ros.cli.check import describe_group
-from linkage_ros.drawing.figure import picture, view
+from linkage_ros.drawing.animation import animate, range_motion
+from linkage_ros.drawing.figure import (
+    all_places,
+    paint_background,
+    picture,
+    symbol_size,
+    View,
+    view,
+)
+from linkage_ros.drawing.painting import corners, outline, paint, save, set_plane, settings
+from linkage_ros.drawing.shapes import shapes
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import (
@@ -38,64 +52,120 @@ from linkage_ros.kinematics.sweep_analysis import (
     usual_inputs,
 )
 from linkage_ros.kinematics.topology import Driven
+from matplotlib.figure import Figure
 from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
 LINKAGES = DOCS.parent / 'config' / 'linkages'
 LARGEST = 150_000
-"""Bytes of a picture, at most."""
+LARGEST_SMALL = 30_000
+LARGEST_MOVING = {'svg': 200_000, 'gif': 300_000}
+"""Maximum sizes of a picture, a small one and a moving one, in bytes."""
 
 _COLOURS = 96
+_HERO = 'jansen_leg'
+_HERO_JOINTS = ('parallel_rod_joint', 'lower_rocker_joint', 'leg_joint')
 
 _INTRODUCTION = """\
 # Gallery
 
-The linkages in [config/linkages](../config/linkages), drawn by `linkage draw` and measured by
-`linkage check`. This page is made from these files by `make gallery`; do not edit it. Driven links
-are orange, poses all over the range light grey, paths of traced points dashed.
+The linkages that come with the package, in [config/linkages](../config/linkages). Their names
+stand for them in all commands, as in `linkage check jansen_leg`; `linkage gallery NAME -o FILE`
+copies one. `make gallery` makes this page and theirs from the files; do not edit them.
+"""
+
+_CONTENTS = """\
+
+```{toctree}
+:hidden:
+:glob:
+
+gallery/*
+```
 """
 
 
 def main() -> int:
-    """Write the page and the pictures; return 1 where a picture is too large."""
+    """Write the pages and the pictures; return 1 if a picture is too large."""
     folder = DOCS / 'gallery'
-    folder.mkdir(exist_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / 'thumbnails').mkdir(parents=True)
     files = sorted(LINKAGES.glob('*.yaml'))
-    for old in folder.iterdir():
-        old.unlink()
-    page = [_INTRODUCTION]
-    large = []
+    sizes = {}
     for file in files:
         closure = load(file)
-        drawn = _draw(closure, file.stem, folder)
-        if drawn.stat().st_size > LARGEST:
-            large.append(drawn)
-        page += [*chapter(closure, file, drawn), '']
-    (DOCS / 'gallery.md').write_text('\n'.join(page).rstrip() + '\n', encoding='utf-8')
-    for drawn in large:
-        sys.stderr.write(f'{drawn}: more than {LARGEST} bytes\n')
+        shown = view(closure, usual_inputs(closure))
+        drawn = folder / f'{file.stem}.png'
+        picture(shown, file.stem, drawn, names=True)
+        small = folder / 'thumbnails' / drawn.name
+        thumbnail(shown, small)
+        sizes |= {_with_few_colours(drawn): LARGEST, _with_few_colours(small): LARGEST_SMALL}
+        page = '\n'.join(chapter(closure, file, drawn))
+        drawn.with_suffix('.md').write_text(f'{page}\n', encoding='utf-8')
+    first = [_INTRODUCTION, *overview(files), _CONTENTS]
+    (DOCS / 'gallery.md').write_text('\n'.join(first), encoding='utf-8')
+    for kind, most in LARGEST_MOVING.items():
+        sizes[hero(DOCS / f'hero.{kind}')] = most
+    large = [(file, most) for file, most in sizes.items() if file.stat().st_size > most]
+    for file, most in large:
+        sys.stderr.write(f'{file}: more than {most} bytes\n')
     return 1 if large else 0
 
 
-def _draw(closure: Closure, name: str, folder: Path) -> Path:
-    """Draw a linkage, in as many colours as are told apart: as SVG it would be larger."""
-    file = folder / f'{name}.png'
-    picture(view(closure, usual_inputs(closure)), name, file, names=True)
+def thumbnail(shown: View, file: Path) -> None:
+    """Draw a linkage alone, small."""
+    size = symbol_size(shown)
+    drawn = shapes(shown.closure, shown.position, size, shown.sweep.travels)
+    low, high = corners([*all_places(shown), *(p for shape in drawn for p in outline(shape))])
+    margin = complex(2.0, 2.0) * size
+    with settings():
+        figure = Figure(figsize=(4.0, 3.0), dpi=100)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        set_plane(axes, low - margin, high + margin)
+        axes.set_axis_off()
+        paint_background(axes, shown)
+        paint(axes, drawn)
+        save(figure, file)
+
+
+def hero(file: Path) -> Path:
+    """Animate a linkage beside three of its joints, readable where it is 400 pixels wide."""
+    closure = load(_HERO)
+    motion = range_motion(view(closure, usual_inputs(closure)), _HERO, 4.0)
+    shown = [joint.name in _HERO_JOINTS for joint in motion.joints]
+    joints = list(compress(motion.joints, shown))
+    animate(motion._replace(joints=joints, values=motion.values[:, shown]), file, compact=True)
+    return file
+
+
+def _with_few_colours(file: Path) -> Path:
+    """Store a picture with few colours, which is smaller than SVG."""
     with Image.open(file) as drawn:
         drawn.convert('RGB').quantize(_COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
     return file
 
 
+def overview(files: Sequence[Path]) -> Iterator[str]:
+    """Yield the linkages as a list of pictures that lead to their pages."""
+    for name in (file.stem for file in files):
+        yield f'- [![](gallery/thumbnails/{name}.png) {name}](gallery/{name}.md)'
+
+
 def chapter(closure: Closure, file: Path, drawn: Path) -> Iterator[str]:
-    """Yield the lines on a linkage."""
+    """Yield the lines of the page on a linkage."""
     name = file.stem
-    yield f'## {name}'
+    yield f'# {name}'
     yield ''
-    yield f'![{name}]({drawn.relative_to(DOCS).as_posix()})'
+    yield f'![{name}, its range and its joints]({drawn.name})'
+    yield ''
+    yield (
+        '*Driven links are orange, poses over the whole range light grey, paths of traced '
+        'points dashed.*'
+    )
     yield ''
     yield _head(file)
     yield ''
-    yield f'- [{file.name}](../config/linkages/{file.name})'
+    yield f'- [{file.name}](../../config/linkages/{file.name})'
     yield f'- Solved: {_sequence(closure)}'
     yield f'- Range: {_range(closure)}'
     extreme = _worst(closure)
@@ -115,52 +185,52 @@ def _head(file: Path) -> str:
 
 
 def _sequence(closure: Closure) -> str:
-    said = []
+    steps = []
     for number, group in enumerate(closure.structure.groups):
         kind, links, how, assembly = describe_group(closure, number)
         if isinstance(group, Driven):
-            said.append(f'input {closure.linkage.inputs[group.index].joint}')
+            steps.append(f'input {closure.linkage.inputs[group.index].joint}')
         else:
             beside = assembly if how == 'closed form' else how
-            said.append(f'{kind} {links} ({beside})')
-    return '; '.join(said)
+            steps.append(f'{kind} {links} ({beside})')
+    return '; '.join(steps)
 
 
 def _range(closure: Closure) -> str:
     if len(closure.linkage.inputs) > 1:
-        return 'it depends on every input'
-    way = InputSweep(closure)
-    said = []
-    for interval in way.ranges:
+        return 'depends on every input'
+    sweep = InputSweep(closure)
+    intervals = []
+    for interval in sweep.ranges:
         if interval.whole:
             return 'the input turns fully'
         low, high = interval.lowest, interval.highest
-        said.append(
+        intervals.append(
             f'{angle_text(low, 2)} to {angle_text(high, 2)}'
-            if way.turning
+            if sweep.turning
             else f'{fixed(low, 4)} to {fixed(high, 4)} m'
         )
-    return ' or '.join(said)
+    return ' or '.join(intervals)
 
 
 def _worst(closure: Closure) -> str:
     """Return the smallest transmission angle of all dyads, or the worst conditioning."""
     if len(closure.linkage.inputs) > 1:
         return ''
-    way = InputSweep(closure)
-    angles = transmission_angles(way)
+    sweep = InputSweep(closure)
+    angles = transmission_angles(sweep)
     if angles:
-        group, found = min(angles.items(), key=lambda item: item[1].lowest.value)
-        said = f'Least transmission angle: {angle_text(found.lowest.value, 1)}'
+        group, extremes = min(angles.items(), key=lambda item: item[1].lowest.value)
+        text = f'Least transmission angle: {angle_text(extremes.lowest.value, 1)}'
     else:
-        group, found = min(conditionings(way).items(), key=lambda item: item[1].lowest.value)
-        said = f'Worst conditioning: {found.lowest.value:.3f}'
+        group, extremes = min(conditionings(sweep).items(), key=lambda item: item[1].lowest.value)
+        text = f'Worst conditioning: {extremes.lowest.value:.3f}'
     links = describe_group(closure, group)[1]
-    at = found.lowest.at
+    at = extremes.lowest.at
     if not at:
-        return f'{said}, everywhere'
-    places = [angle_text(value, 1) if way.turning else f'{fixed(value, 4)} m' for value in at]
-    return f'{said} ({links}) at {", ".join(places)}'
+        return f'{text}, everywhere'
+    places = [angle_text(value, 1) if sweep.turning else f'{fixed(value, 4)} m' for value in at]
+    return f'{text} ({links}) at {", ".join(places)}'
 
 
 if __name__ == '__main__':

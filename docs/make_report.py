@@ -17,7 +17,7 @@
 Make docs/report.png: a report page as a browser shows it.
 
 The run is the fault drill, as ``linkage demo`` runs it; the page is `linkage report`'s. Run it in
-the checkout's own folder, as `make report` does: ``python -m docs.make_report``.
+the folder of the checkout, as `make report` does: ``python -m docs.make_report``.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from test.browser.opened import opened
 
 FILE = Path(__file__).resolve().parent / 'report.png'
 LARGEST = 150_000
-"""Bytes of the picture, at most."""
+"""Maximum size of the picture, in bytes."""
 
 SCENE = 'fault_drill'
 _SECONDS = 9
@@ -46,7 +46,7 @@ _COLOURS = 96
 
 
 def main() -> int:
-    """Draw the picture; return 1 where it is too large."""
+    """Draw the picture; return 1 if it is too large."""
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder, 'run.html')
         _linkage('demo', SCENE, '--seconds', str(_SECONDS), '--plain', '--runs', folder)

@@ -16,7 +16,7 @@
 """
 Make docs/synthesis.md and its pictures: the cost of accuracy in design work.
 
-Every number of the page is computed here. Run it in the checkout's own folder, as
+Every number of the page is computed here. Run it in the folder of the checkout, as
 `make synthesis` does: ``python -m docs.make_synthesis``.
 """
 
@@ -36,14 +36,14 @@ PAGE = DOCS / 'synthesis.md'
 PICTURES = DOCS / 'synthesis'
 
 LARGEST = 180_000
-"""Bytes of a picture, at most."""
+"""Maximum size of a picture, in bytes."""
 
 DECIMALS = range(3, 17)
-"""Of the example's picture."""
+"""Decimals in the picture of the example."""
 
 
 def main() -> int:
-    """Write page and pictures; return 1 where a picture is too large."""
+    """Write page and pictures; return 1 if a picture is too large."""
     from linkage_ros.drawing.design import draw_design
 
     from .pictures.digits import digits_picture
@@ -52,29 +52,29 @@ def main() -> int:
     for old in PICTURES.iterdir():
         old.unlink()
     with mp.workdps(PRECISION):
-        found = rounding.study()
+        study = rounding.study()
         task = rounding.example()
         rows = {n: task.by_cosines(n) for n in DECIMALS}
         digits_picture(
             {n: ([float(x) for x in row.off], float(row.missed)) for n, row in rows.items()},
-            {n: rounding.spread(each) for n, each in found.cosines.items()},
+            {n: rounding.spread(each) for n, each in study.cosines.items()},
             (rounding.PRINTED_DECIMALS, float(rounding.printed().off[COUPLER])),
             PICTURES / 'digits.svg',
         )
         draw_design(rounding.designed()[0], rounding.PAIRS, PICTURES / 'example.svg')
-        PAGE.write_text('\n'.join(page(found)).rstrip() + '\n', encoding='utf-8')
+        PAGE.write_text('\n'.join(page(study)).rstrip() + '\n', encoding='utf-8')
     large = [file for file in PICTURES.iterdir() if file.stat().st_size > LARGEST]
     for file in large:
         sys.stderr.write(f'{file}: more than {LARGEST} bytes\n')
     return 1 if large else 0
 
 
-def page(found: rounding.Study) -> Iterator[str]:
+def page(study: rounding.Study) -> Iterator[str]:
     """Yield the lines of the page."""
     yield from rounding.introduction()
     yield from rounding.by_hand()
     yield from rounding.decimals()
-    yield from rounding.at_random(found)
+    yield from rounding.at_random(study)
     yield from rounding.on_the_bench()
     yield from kinds.chapter(PICTURES)
 

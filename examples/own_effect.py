@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Use an effect of one's own, ``mine/dead_zone.py``, in a scene."""
+"""Use your own effect, ``mine/dead_zone.py``, in a scene."""
 
 from pathlib import Path
 

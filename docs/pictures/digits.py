@@ -29,11 +29,11 @@ _LINKS = ('crank', 'coupler', 'rocker')
 def digits_picture(
     example: Mapping[int, tuple[Sequence[float], float]],
     random: Mapping[int, tuple[float, float, float]],
-    said: tuple[int, float],
+    printed: tuple[int, float],
     file: Path,
 ) -> None:
     """
-    Draw what decimals of the cosines cost.
+    Draw the errors that rounding the cosines causes.
 
     Parameters
     ----------
@@ -41,11 +41,11 @@ def digits_picture(
         By decimals: relative errors of crank, coupler and rocker, and the rocker's greatest error
         in degrees.
     random
-        By decimals: median, 95th percentile and greatest error of random designs' couplers.
-    said
-        Decimals of the text, and the error of the coupler that it prints.
+        By decimals: median, 95th percentile and greatest error of the couplers of random designs.
+    printed
+        Decimals of the textbook, and the error of its coupler.
     file
-        Where to store it.
+        The file to write.
 
     """
     context = settings()
@@ -68,13 +68,14 @@ def digits_picture(
                 sorted(example), errors, color=colour, marker=marker, markersize=4.0,
                 linewidth=1.2, label=f'the example, {link}',
             )  # fmt: skip
-        left.plot([said[0]], [said[1]], 'x', color=INK, markersize=7.0, markeredgewidth=1.6)
+        left.plot([printed[0]], [printed[1]], 'x', color=INK, markersize=7.0, markeredgewidth=1.6)
         left.annotate(
-            'the coupler in print', said, (12.0, 14.0), textcoords='offset points', fontsize=7.5,
+            'the coupler in print', printed, (12.0, 14.0), textcoords='offset points',
+            fontsize=7.5,
             arrowprops={'arrowstyle': '-', 'linewidth': 0.6, 'color': INK}, color=INK,
         )  # fmt: skip
         left.set_ylabel('relative error of a length')
-        # Where there is none the line is broken.
+        # Without a linkage the line is broken.
         met = {n: each if each < 360.0 else nan for n, (_, each) in sorted(example.items())}
         right.plot(list(met), list(met.values()), color=INK, marker='o', markersize=4.0,
                    linewidth=1.2, label='the example, rocker at the pairs')  # fmt: skip

@@ -27,11 +27,11 @@ from .paper import BLUE, empty_sheet, GREEN, legend, sheet, SKY, VERMILLION
 from .runs import changed, Run, run, Sample, Scene
 
 _RESTS = 0.5
-"""How long a picture goes on when the drive has come to its end, in [s]."""
+"""Time shown after the end of the drive, in [s]."""
 
 
 def topic(scene: Scene) -> Figure:
-    """Draw the crank between and after samples that come ten times a second."""
+    """Draw the crank between and after samples at 10 Hz."""
     samples = _swinging(0.1, 11)
     figure, axes = sheet(2, 1, sharex=True)
     held = run(changed(scene, ('drive.topic.carry_forward', False)), 1.5, samples)
@@ -47,7 +47,7 @@ def topic(scene: Scene) -> Figure:
 
 
 def constant_rate(scene: Scene) -> Figure:
-    """Draw a crank that turns."""
+    """Draw a crank that turns at a constant rate."""
     figure, axes = sheet(2, 1, sharex=True)
     _over_time(axes, run(scene, 2.0), color=BLUE)
     for each in axes:
@@ -56,34 +56,34 @@ def constant_rate(scene: Scene) -> Figure:
 
 
 def sine(scene: Scene) -> Figure:
-    """Draw a crank that swings."""
+    """Draw a crank that oscillates."""
     return _one(scene, 2.0)
 
 
 def chirp(scene: Scene) -> Figure:
-    """Draw a crank that swings faster and faster."""
+    """Draw a crank that oscillates with increasing frequency."""
     return _one(scene, scene['drive']['chirp']['seconds'] + _RESTS)
 
 
 def profile(scene: Scene) -> Figure:
-    """Draw the three ways from row to row of a table."""
+    """Draw the three interpolations of a table."""
     figure, axes = sheet(2, 1, sharex=True)
     table = scene['drive']['profile']['table']
     seconds = table[-1][0] + _RESTS
-    for way, style in (
+    for interpolation, style in (
         ('linear', {'color': GREEN, 'linestyle': '--'}),
         ('cubic', {'color': BLUE}),
         ('minimum_jerk', {'color': VERMILLION, 'linestyle': '-.'}),
     ):
-        moving = run(changed(scene, ('drive.profile.interpolation', way)), seconds)
-        _over_time(axes, moving, label=way, **style)
+        moving = run(changed(scene, ('drive.profile.interpolation', interpolation)), seconds)
+        _over_time(axes, moving, label=interpolation, **style)
     axes[0].plot(*zip(*table, strict=True), 'o', color='black', markersize=4, label='table')
     legend(axes[0])
     return figure
 
 
 def bag(scene: Scene) -> Figure:
-    """Draw the crank from a bag that has come to its end and begins again."""
+    """Draw the crank from a bag that is played twice."""
     samples = _swinging(0.05, 20)
     figure, axes = sheet(2, 1, sharex=True)
     _over_time(axes, run(scene, 2.0, samples), color=BLUE, label='crank')
@@ -95,7 +95,7 @@ def bag(scene: Scene) -> Figure:
 
 
 def torque(scene: Scene) -> Figure:
-    """Draw a four-bar that swings by its weight, and what integration makes of its energy."""
+    """Draw a four-bar that swings under its weight, and the energy error of the integration."""
     figure = empty_sheet()
     axes = figure.subplot_mosaic([['angle', 'energy'], ['rate', 'energy']])
     right = axes['energy']
@@ -115,14 +115,14 @@ def torque(scene: Scene) -> Figure:
         right.plot(swinging.times, drift, label=method, **style)
     right.set_yscale('log')
     right.set_ylim(1e-14, 10.0)
-    right.set_ylabel('largest error of the energy so far,\nas a share of what gravity gives')
+    right.set_ylabel('largest error of the energy so far,\nrelative to the span of the potential')
     right.set_xlabel('time [s]')
     right.legend(loc='lower right', handlelength=2.2)
     return figure
 
 
 def _span_of_potential(scene: Scene) -> float:
-    """Return how far the potential energy of a linkage spans, in [J]."""
+    """Return the span of the potential energy of a linkage, in [J]."""
     creeping = {**scene, 'drive': {'constant_rate': {'rate': tau}}, 'effects': {'effort': {}}}
     moving = run(creeping, 1.0)
     potential = moving.pipeline.lines[0].context.mechanics.potential
@@ -153,7 +153,7 @@ def _dots(axes: Any, samples: list[Sample], label: str) -> None:
 
 
 def _swinging(interval: float, count: int) -> list[Sample]:
-    """Return samples of a crank that swings once a second by a radian, and how fast it does."""
+    """Return samples of a crank that oscillates at 1 Hz with an amplitude of 1 rad."""
     times = [number * interval for number in range(count)]
     return [(time, sin(tau * time), tau * cos(tau * time)) for time in times]
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The picture of the faults: one timeline with all of them."""
+"""The picture of the faults: two joints around each of them."""
 
 from __future__ import annotations
 
@@ -21,40 +21,42 @@ from math import cos, pi, sin
 
 from linkage_ros.faults.fault import FAULTS
 from matplotlib.figure import Figure
+import numpy as np
 
-from .paper import BLUE, IDEAL, legend, ORANGE, sheet, SKY
+from .paper import BLUE, IDEAL, ORANGE, sheet, SKY
 from .runs import changed, run, Scene
+
+_BESIDE = 0.5
+"""Time shown before and after a fault, in [s]."""
 
 
 def faults(scene: Scene) -> Figure:
-    """Draw two joints and the clock while one fault comes after the other."""
-    figure, (upper, lower) = sheet(2, 1, sharex=True, height_ratios=(2.6, 1.0))
-    last = max(at + fault['seconds'] for fault in scene['faults'].values() for at in fault['at'])
-    seconds = last + 0.5
+    """Draw two joints around each fault, one panel each."""
+    figure, panels = sheet(2, 3, sharey=True)
+    figure.set_size_inches(8.0, 4.8)
+    spans = [
+        (at, at + fault['seconds'], next(key for key in fault if key in FAULTS))
+        for fault in scene['faults'].values()
+        for at in fault['at']
+    ]
+    seconds = max(end for _, end, _ in spans) + _BESIDE
     times = [number * 0.005 for number in range(round(seconds / 0.005))]
     samples = [(time, sin(pi * time), pi * cos(pi * time)) for time in times]
     ideal = run(changed(scene, ('faults', None)), seconds, samples)
-    harmed = run(scene, seconds, samples)
-    for joint, colour in (('rocker_joint', BLUE), ('coupler_joint', ORANGE)):
-        upper.plot(ideal.times, ideal.position(joint), **IDEAL)
-        upper.plot(ideal.times, harmed.position(joint), color=colour, label=joint)
-    upper.plot([], [], label='without faults', **IDEAL)
-    upper.set_ylabel('joint [rad]')
-    lower.plot(ideal.times, 1e3 * (harmed.stamps() - ideal.times), color='black')
-    lower.set_ylabel('stamp − time\n[ms]')
-    lower.set_xlabel('time [s]')
-    lower.margins(y=0.2)
-    upper.set_ylim(-1.8, 2.6)
-    for fault in scene['faults'].values():
-        kind = next(key for key in fault if key in FAULTS)
-        for at in fault['at']:
-            end = at + fault['seconds']
-            for axes in (upper, lower):
-                axes.axvspan(at, end, color=SKY, alpha=0.3, linewidth=0.0)
-            upper.text(
-                0.5 * (at + end), 0.03, kind, ha='center', transform=upper.get_xaxis_transform()
-            )
-    legend(upper)
+    faulty = run(scene, seconds, samples)
+    ahead = faulty.stamps() - ideal.times
+    for axes, (at, end, kind) in zip(panels.flat, spans, strict=True):
+        for joint, colour in (('rocker_joint', BLUE), ('coupler_joint', ORANGE)):
+            axes.plot(ideal.times, faulty.position(joint), color=colour, label=joint)
+            axes.plot(ideal.times, ideal.position(joint), **IDEAL)
+        axes.axvspan(at, end, color=SKY, alpha=0.3, linewidth=0.0)
+        axes.set_xlim(at - _BESIDE, end + _BESIDE)
+        most = 1e3 * np.nanmax(ahead[(ideal.times >= at) & (ideal.times <= end)], initial=0.0)
+        axes.set_title(f'{kind}: stamps {most:.0f} ms ahead' if most > 0.5 else kind)
+    axes.plot([], [], label='without faults', **IDEAL)
+    figure.legend(*axes.get_legend_handles_labels(), loc='outside upper left', ncols=3)
+    figure.supxlabel('time [s]', fontsize='medium')
+    figure.supylabel('joint [rad]', fontsize='medium')
     return figure
 
 

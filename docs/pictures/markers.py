@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The content of ~/markers, drawn from the messages alone, as RViz draws it."""
+"""The content of ~/markers, drawn from the messages alone, as in RViz."""
 
 from __future__ import annotations
 
@@ -34,30 +34,31 @@ _ARROW, _LINE_STRIP, _LINE_LIST, _SPHERE_LIST, _TEXT, _TRIANGLES = 0, 4, 5, 7, 9
 _DELETE = 2
 
 Display = dict[tuple[str, int], Any]
-"""What is to be seen: each marker by its namespace and id."""
+"""The displayed markers, by namespace and id."""
 
 _MOMENTS = ((0.0, 'far from a toggle'), (1.17, 'near one'), (1.5, 'beyond it: open'))
 _INCH = 72.0
 
 
 def markers(scene: Scene) -> Figure:
-    """Draw what a display shows at three moments of a run."""
+    """Draw the display at three times of a run."""
     figure = empty_sheet()
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.9, 1.0))
+    figure.set_size_inches(8.0, 5.0)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.2, 1.0))
     axes = [figure.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1])]
     lines: list[tuple[Any, float]] = []
-    for place, (moment, said) in zip(axes, _MOMENTS, strict=True):
+    for place, (moment, label) in zip(axes, _MOMENTS, strict=True):
         shown: Display = {}
         for message in extra_messages(scene, MESSAGE, moment):
             receive(shown, message)
         lines += show(place, shown)
-        place.set_xlim(-0.75, 1.65)
+        place.set_xlim(-0.85, 1.65)
         place.set_ylim(-0.75, 0.85)
-        place.set_title(f'{moment:g} s, {said}')
+        place.set_title(f'{moment:g} s, {label}')
         place.set_ylabel('y [m]')
     axes[0].set_xlabel('x [m]')
     axes[2].set_xlabel('x [m]')
-    figure.draw_without_rendering()  # from here on a metre has its length on the paper
+    figure.draw_without_rendering()  # fixes the scale of the axes
     for line, width in lines:
         (low, _), (high, _) = line.axes.transData.transform(((0.0, 0.0), (1.0, 0.0)))
         line.set_linewidth(width * (high - low) * _INCH / figure.dpi)
@@ -65,7 +66,7 @@ def markers(scene: Scene) -> Figure:
 
 
 def receive(shown: Display, message: bytes) -> None:
-    """Do with the markers of a message, in CDR, what it says."""
+    """Add, replace or delete the markers of a message in CDR."""
     for marker in _STORE.deserialize_cdr(message, MESSAGE).markers:
         key = marker.ns, marker.id
         if marker.action == _DELETE:
@@ -75,7 +76,7 @@ def receive(shown: Display, message: bytes) -> None:
 
 
 def show(axes: Any, shown: Display) -> list[tuple[Any, float]]:
-    """Draw what is to be seen, from above; return its lines, each with its width in [m]."""
+    """Draw the markers from above; return the lines, each with its width in [m]."""
     drawn: list[tuple[Any, float]] = []
     axes.set_aspect('equal')
     axes.grid(False)
@@ -97,12 +98,12 @@ def show(axes: Any, shown: Display) -> list[tuple[Any, float]]:
             arrow = FancyArrowPatch(*places, shrinkA=0.0, shrinkB=0.0, **look, **style)
             axes.add_patch(arrow)
         elif marker.type == _TEXT:
-            axes.text(*places[0], marker.text, ha='center', va='center', fontsize=6, **style)
+            axes.text(*places[0], marker.text, ha='center', va='center', fontsize=7, **style)
     return drawn
 
 
 def _placed(marker: Any) -> tuple[Values, float]:
-    """Return the points of a marker in the plane of its frame, and how high they are."""
+    """Return the points of a marker in the plane of its frame, and their greatest height."""
     position, turn = marker.pose.position, marker.pose.orientation
     angle = 2.0 * np.arctan2(turn.z, turn.w)
     points = np.array([(p.x, p.y, p.z) for p in marker.points] or [(0.0, 0.0, 0.0)])
@@ -117,4 +118,4 @@ def _colour(marker: Any) -> tuple[float, ...]:
 
 
 PICTURES = {'markers': markers}
-"""What draws each section's picture."""
+"""The function that draws the picture of each section."""

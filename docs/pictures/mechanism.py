@@ -30,7 +30,7 @@ _ROCKER, _PISTON = 'rocker_joint', 'piston_slide'
 
 
 def tolerance(scene: Scene) -> Figure:
-    """Draw how far five mechanisms of one drawing are off."""
+    """Draw the errors of five mechanisms made from one drawing."""
     figure, axes = sheet()
     ideal = _turn(changed(scene, ('effects', {})))
     colours, lines = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE), ('-', '--', '-.', ':', '-')
@@ -46,7 +46,7 @@ def tolerance(scene: Scene) -> Figure:
 
 
 def backlash(scene: Scene) -> Figure:
-    """Draw the crank beside the motor, and over it."""
+    """Draw the angles of crank and motor over time, and over each other."""
     figure, (left, right) = sheet(1, 2, width_ratios=(1.6, 1.0))
     motor = run(changed(scene, ('effects', {})), 2.0)
     crank = run(scene, 2.0)
@@ -64,7 +64,7 @@ def backlash(scene: Scene) -> Figure:
 
 
 def velocity(scene: Scene) -> Figure:
-    """Draw a rate over the differences of the positions."""
+    """Draw a rate, and the difference quotients of the positions."""
     figure, (upper, lower) = sheet(2, 1, sharex=True)
     moving = _turn(scene)
     times, positions = moving.times, moving.position(_ROCKER)
@@ -79,14 +79,14 @@ def velocity(scene: Scene) -> Figure:
 
 
 def acceleration(scene: Scene) -> Figure:
-    """Draw an acceleration over the differences of the rates."""
+    """Draw an acceleration, and the difference quotients of the rates."""
     figure, (upper, lower) = sheet(2, 1, sharex=True)
     moving = _turn(scene)
     times, rates = moving.times, moving.rate(_ROCKER)
     upper.plot(times, rates, color=BLUE)
     upper.set_ylabel('rocker [rad/s]')
-    found = moving.acceleration(_ROCKER)
-    lower.plot(times, found, color=VERMILLION, label='published acceleration')
+    accelerations = moving.acceleration(_ROCKER)
+    lower.plot(times, accelerations, color=VERMILLION, label='published acceleration')
     _slopes(lower, times, rates, 'slope of the rates')
     lower.set_ylabel('rocker [rad/s²]')
     lower.set_xlabel('time [s]')
@@ -95,7 +95,7 @@ def acceleration(scene: Scene) -> Figure:
 
 
 def friction(scene: Scene) -> Figure:
-    """Draw the drive's torque with and without it."""
+    """Draw the drive's torque with and without friction."""
     figure, axes = sheet()
     without = _turn(changed(scene, ('effects.friction', None)))
     rubbing = _turn(scene)
@@ -108,7 +108,7 @@ def friction(scene: Scene) -> Figure:
 
 
 def effort(scene: Scene) -> Figure:
-    """Draw the drive's torque at speed, and creeping."""
+    """Draw the drive's torque at the scene's rate, and at a very low one."""
     figure, axes = sheet()
     fast = scene['drive']['constant_rate']['rate']
     for rate, style in (
@@ -124,7 +124,7 @@ def effort(scene: Scene) -> Figure:
 
 
 def pin_forces(scene: Scene) -> Figure:
-    """Draw how large the forces are, and where one of them points."""
+    """Draw the magnitudes of pin forces, and the direction of one of them."""
     figure, (left, right) = sheet(1, 2, width_ratios=(1.6, 1.0))
     moving = _turn(scene)
     crank = moving.crank()[0]
@@ -153,12 +153,12 @@ def pin_forces(scene: Scene) -> Figure:
 
 
 def compliance(scene: Scene) -> Figure:
-    """Draw what the rod carries, and how far the piston is off."""
+    """Draw the tension of the rod, and the displacement of the piston."""
     figure, (upper, lower) = sheet(2, 1, sharex=True)
     rigid, yielding = _turn(changed(scene, ('effects', {}))), _turn(scene)
     crank = rigid.crank()[0]
     shift = 1e6 * (yielding.position(_PISTON) - rigid.position(_PISTON))
-    # Of the rod: what crank and piston exert on it.
+    # The forces of crank and piston on the rod.
     along = crank + rigid.position('rod_joint')
     pull = -yielding.force('B') - yielding.force('A')
     upper.plot(crank, 0.5 * (pull[0] * np.cos(along) + pull[1] * np.sin(along)), color=VERMILLION)
@@ -172,7 +172,7 @@ def compliance(scene: Scene) -> Figure:
 
 
 def clearance(scene: Scene) -> Figure:
-    """Draw where a pin leans, and how far the rocker is off."""
+    """Draw the displacement of a pin in its hole, and the error of the rocker."""
     figure, (left, right) = sheet(1, 2, width_ratios=(1.0, 1.6))
     tight, loose = _turn(changed(scene, ('effects', {'pin_forces': {}}))), _turn(scene)
     crank = tight.crank()[0]
@@ -195,14 +195,14 @@ def clearance(scene: Scene) -> Figure:
 
 
 def _turn(scene: Scene) -> Run:
-    """Let a crank of constant rate turn once, in 720 ticks."""
+    """Run one turn of a crank of constant rate, in 720 ticks."""
     rate = scene['drive']['constant_rate']['rate']
     seconds = tau / rate
     return run(changed(scene, ('rate', 720.0 / seconds)), seconds)
 
 
 def _slopes(axes: Any, times: Values, values: Values, label: str) -> None:
-    """Draw the central differences of values, at some of the times."""
+    """Draw the central difference quotients of values at some times."""
     slopes = (values[2:] - values[:-2]) / (times[2:] - times[:-2])
     style = {'color': 'black', 'markersize': 4, 'markerfacecolor': 'none'}
     axes.plot(times[1:-1:24], slopes[::24], 'o', label=label, **style)

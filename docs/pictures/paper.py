@@ -49,17 +49,18 @@ mpl.rcParams.update(
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = (
     '#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9',
 )  # fmt: skip
-"""Okabe and Ito's, which colour-blind readers can tell."""
+"""The palette of Okabe and Ito, which colour-blind readers can distinguish."""
 
 IDEAL: dict[str, Any] = {'color': 'black', 'linewidth': 1.0, 'linestyle': (0, (4, 2))}
-"""The line of what would be without the effect."""
+"""The line style of the ideal result, without the effect."""
 
 SCENE = 'Scene'
-"""Under this name a picture holds the scene that it shows."""
+"""The key of the PNG text that holds the scene of a picture."""
 
 _SIZE = (8.0, 3.5)
 _DPI = 120
 _COLOURS = 256
+_FEW_COLOURS = 64
 
 
 def sheet(rows: int = 1, columns: int = 1, **layout: Any) -> tuple[Figure, Any]:
@@ -74,7 +75,7 @@ def empty_sheet() -> Figure:
 
 
 def save(figure: Figure, scene: str, file: Path) -> None:
-    """Store a picture as PNG, in as many colours as are told apart, with its scene."""
+    """Store a picture as PNG with few colours, and with its scene."""
     figure.align_ylabels()
     drawn = BytesIO()
     figure.savefig(drawn, format='png')
@@ -85,13 +86,21 @@ def save(figure: Figure, scene: str, file: Path) -> None:
         few.save(file, optimize=True, pnginfo=about)
 
 
+def save_small(file: Path, small: Path) -> Path:
+    """Store a saved picture again, half as wide, for an overview."""
+    with Image.open(file) as image:
+        half = image.convert('RGB').resize((image.width // 2, image.height // 2))
+        half.quantize(_FEW_COLOURS, dither=Image.Dither.NONE).save(small, optimize=True)
+    return small
+
+
 def over_a_turn(axes: Any, label: str = 'crank angle [rad]') -> None:
-    """Let the horizontal axis be one turn of the crank."""
+    """Set the horizontal axis to one turn of the crank."""
     axes.set_xlim(0.0, 2.0 * np.pi)
     axes.set_xticks([0.5 * n * np.pi for n in range(5)], ['0', 'π/2', 'π', '3π/2', '2π'])
     axes.set_xlabel(label)
 
 
 def legend(axes: Any, columns: int = 4) -> None:
-    """Say what the lines are, above the axes, where no line is."""
+    """Add the legend above the axes."""
     axes.legend(loc='lower left', bbox_to_anchor=(0.0, 1.02), ncols=columns, handlelength=2.2)

@@ -35,10 +35,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Scene = dict[str, Any]
-"""A scene file, as YAML has it."""
+"""The content of a scene file."""
 
 Sample = tuple[float, float, float]
-"""Time since the first tick, in [s], and the crank then: its angle and rate."""
+"""Time since the first tick, in [s], and angle and rate of the crank."""
 
 Values = NDArray[np.float64]
 
@@ -46,23 +46,23 @@ START = 1_700_000_000_000_000_000
 """Time of the first tick, in [ns]."""
 
 CRANK = 'crank_joint'
-"""The input of the linkages here."""
+"""The input of the linkages in the pictures."""
 
 _LINKAGES = Path(__file__).resolve().parents[2] / 'config' / 'linkages'
 
 
 class Run(NamedTuple):
     """
-    What came of a scene.
+    A run of a scene.
 
     Attributes
     ----------
     pipeline
         The pipeline, after its last tick.
     times
-        Of the ticks, in [s] since the first.
+        Times of the ticks, in [s] since the first.
     looks
-        What the linkage came to at each.
+        The linkage at each tick.
 
     """
 
@@ -71,7 +71,7 @@ class Run(NamedTuple):
     looks: list[LinkageTick]
 
     def position(self, joint: str) -> Values:
-        """Return what is published of a joint, in [rad] or [m]; nan where nothing is."""
+        """Return the published positions of a joint, in [rad] or [m]; nan without a message."""
         return self._read(joint, lambda reading: reading.joints)
 
     def rate(self, joint: str) -> Values:
@@ -87,14 +87,14 @@ class Run(NamedTuple):
         return self._read(joint, lambda reading: reading.efforts)
 
     def stamps(self) -> Values:
-        """Return the stamps of what is published, in [s] since the first tick."""
+        """Return the stamps of the published messages, in [s] since the first tick."""
         return np.array(
             [nan if look.reading is None else (look.reading.stamp - START) * 1e-9
              for look in self.looks]
         )  # fmt: skip
 
     def crank(self) -> Values:
-        """Return what the drive says: a row each of angles, rates and accelerations."""
+        """Return the crank by the drive: rows of angles, rates and accelerations."""
         return np.array(
             [
                 (nan, nan, nan) if crank is None else
@@ -104,7 +104,7 @@ class Run(NamedTuple):
         ).T  # fmt: skip
 
     def force(self, pin: str) -> Values:
-        """Return the force in a pin, in [N]: its x in a row, and its y."""
+        """Return the force in a pin, in [N]: a row of x and a row of y."""
         names = self.pipeline.lines[0].context.reactions.names
         place = names.index(pin)
         motions = [look.motion for look in self.looks]
@@ -128,19 +128,7 @@ class Run(NamedTuple):
 
 
 def run(scene: Scene, seconds: float, samples: Sequence[Sample] = ()) -> Run:
-    """
-    Let a scene run for some seconds.
-
-    Parameters
-    ----------
-    scene
-        The scene, with files as a scene in config/scenes names them.
-    seconds
-        How long.
-    samples
-        Of the crank: what comes on the topic, or is in the bag, that it is driven from.
-
-    """
+    """Run a scene for some seconds; the samples are on the topic, or in the bag, of its drive."""
     with TemporaryDirectory() as folder:
         pipeline, reset = _built(Path(folder), scene, samples)
         listens = bool(pipeline.topic)
@@ -163,7 +151,7 @@ def run(scene: Scene, seconds: float, samples: Sequence[Sample] = ()) -> Run:
 
 
 def extra_messages(scene: Scene, message_type: str, seconds: float) -> list[bytes]:
-    """Return the messages of an extra's type in some seconds of a scene that drives itself."""
+    """Return the messages of an extra topic in a run of a scene without a topic drive."""
     with TemporaryDirectory() as folder:
         pipeline, _ = _built(Path(folder), scene, ())
     place = next(n for n, extra in enumerate(pipeline.extras) if extra.message == message_type)
@@ -178,7 +166,7 @@ def ticks(scene: Scene, seconds: float) -> list[int]:
 
 
 def messages(samples: Sequence[Sample]) -> list[tuple[int, bytes]]:
-    """Return crank messages, each with the time at which it comes, in [ns]."""
+    """Return crank messages, each with its time of arrival, in [ns]."""
     write = JointStateWriter([CRANK]).write
     times = [START + round(time * 1e9) for time, _, _ in samples]
     return [
@@ -188,7 +176,7 @@ def messages(samples: Sequence[Sample]) -> list[tuple[int, bytes]]:
 
 
 def changed(scene: Scene, *changes: tuple[str, Any]) -> Scene:
-    """Return a scene with other values at some places, each a dotted key; None takes one out."""
+    """Return a scene with other values for dotted keys; None removes a key."""
     scene = deepcopy(scene)
     for key, value in changes:
         *outer, last = key.split('.')
@@ -205,7 +193,7 @@ def changed(scene: Scene, *changes: tuple[str, Any]) -> Scene:
 def _built(
     folder: Path, scene: Scene, samples: Sequence[Sample]
 ) -> tuple[Pipeline, Callable[[Pipeline], Pipeline]]:
-    """Build the pipeline of a scene; return it, and what builds it again."""
+    """Build the pipeline of a scene; return it, and a function that builds it again."""
     file = folder / 'config' / 'scenes' / 'scene.yaml'
     file.parent.mkdir(parents=True)
     (folder / 'config' / 'linkages').symlink_to(_LINKAGES)

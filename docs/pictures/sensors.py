@@ -29,7 +29,7 @@ _ROCKER = 'rocker_joint'
 
 
 def jitter(scene: Scene) -> Figure:
-    """Draw how far each reading is off, and how far it may be."""
+    """Draw the errors of readings, and their bound."""
     figure, axes = sheet()
     ideal, read = _pair(scene, 1.0)
     most = scene['effects']['jitter']['seconds'] * 1e3
@@ -47,7 +47,7 @@ def jitter(scene: Scene) -> Figure:
 
 
 def bias(scene: Scene) -> Figure:
-    """Draw what is read beside what is."""
+    """Draw the reading and the joint."""
     figure, axes = sheet()
     ideal, read = _pair(scene, 2.0)
     axes.plot(ideal.times, ideal.position(_ROCKER), label='the joint', **IDEAL)
@@ -59,7 +59,7 @@ def bias(scene: Scene) -> Figure:
 
 
 def noise(scene: Scene) -> Figure:
-    """Draw the noise alone, and how far its walk goes."""
+    """Draw the noise alone, and the standard deviation of its random walk."""
     figure, axes = sheet()
     ideal, read = _pair(scene, 20.0)
     walk = 1e3 * scene['effects']['noise']['joints'][_ROCKER]['walk'] * np.sqrt(read.times)
@@ -82,17 +82,19 @@ def noise(scene: Scene) -> Figure:
 
 
 def encoder(scene: Scene) -> Figure:
-    """Draw the steps of some counts, and the rates made of them."""
+    """Draw the steps of some counts, and the rates computed from them."""
     figure, (left, right) = sheet(1, 2)
     ideal, read = _pair(scene, 0.5)
     first, last = 250, 271
     times = 1e3 * read.times
-    for axes, what in ((left, Run.position), (right, Run.rate)):
+    for axes, values in ((left, Run.position), (right, Run.rate)):
         axes.plot(
-            times[first:last], what(read, _ROCKER)[first:last],
+            times[first:last], values(read, _ROCKER)[first:last],
             color=BLUE, drawstyle='steps-post', marker='.', label='as read',
         )  # fmt: skip
-        axes.plot(times[first:last], what(ideal, _ROCKER)[first:last], label='the joint', **IDEAL)
+        axes.plot(
+            times[first:last], values(ideal, _ROCKER)[first:last], label='the joint', **IDEAL
+        )
         axes.set_xlabel('time [ms]')
         legend(axes)
     left.set_ylabel('rocker [rad]')
@@ -101,7 +103,7 @@ def encoder(scene: Scene) -> Figure:
 
 
 def rate_limit(scene: Scene) -> Figure:
-    """Draw the steps of what is held."""
+    """Draw the held readings."""
     figure, axes = sheet()
     ideal, read = _pair(scene, 1.0)
     axes.plot(ideal.times, ideal.position(_ROCKER), label='the joint', **IDEAL)
@@ -115,7 +117,7 @@ def rate_limit(scene: Scene) -> Figure:
 
 
 def dropout(scene: Scene) -> Figure:
-    """Draw what arrives, and where nothing does."""
+    """Draw the readings that arrive, and the gaps."""
     figure, axes = sheet()
     ideal, read = _pair(scene, 1.0)
     axes.plot(ideal.times, ideal.position(_ROCKER), label='the joint', **IDEAL)
@@ -136,7 +138,7 @@ def dropout(scene: Scene) -> Figure:
 
 
 def delay(scene: Scene) -> Figure:
-    """Draw what arrives behind what is."""
+    """Draw the delayed readings and the joint."""
     figure, axes = sheet()
     ideal, read = _pair(scene, 3.0)
     axes.plot(ideal.times, ideal.position(_ROCKER), label='the joint', **IDEAL)
@@ -159,7 +161,7 @@ def delay(scene: Scene) -> Figure:
 
 
 def _pair(scene: Scene, seconds: float) -> tuple[Run, Run]:
-    """Return the runs of a scene with ideal sensors, and with its own."""
+    """Return the runs of a scene with ideal sensors, and with its own sensors."""
     ideal = changed(scene, ('effects', {'velocity': {}}))
     return run(ideal, seconds), run(scene, seconds)
 

@@ -51,12 +51,12 @@ class Rounded(NamedTuple):
     Attributes
     ----------
     lengths
-        Of crank, coupler and rocker, for a ground of 1; none where the coupler is imaginary.
+        Lengths of crank, coupler and rocker for a ground of 1; None if the coupler is imaginary.
     off
-        Their relative errors; infinite where there is no such linkage.
+        Their relative errors; infinite without a linkage.
     missed
         The greatest error of the rocker's angle at the pairs, each in the better assembly, in
-        degrees; infinite where the linkage closes at one of them in neither.
+        degrees; infinite if the linkage is open at a pair.
     reached
         Whether it closes at each of the pairs.
 
@@ -69,7 +69,7 @@ class Rounded(NamedTuple):
 
 
 def round_to(value: mpf, decimals: int) -> mpf:
-    """Round to so many decimals, as one does on paper."""
+    """Round to a number of decimals, as on paper."""
     unit = mpf(10) ** decimals
     return mp.nint(value * unit) / unit
 
@@ -103,7 +103,7 @@ def square_of_coupler(k: Sequence[mpf]) -> mpf:
 
 
 def links(k: Sequence[mpf]) -> tuple[mpf, mpf, mpf] | None:
-    """Return crank, coupler and rocker, or none where a link does not exist."""
+    """Return crank, coupler and rocker; None if a link does not exist."""
     if not (k[0] and k[1] and mp.isfinite(k[0])):
         return None
     square = square_of_coupler(k)
@@ -114,7 +114,7 @@ def errors(lengths: Sequence[mpf], crank: Sequence[mpf], rocker: Sequence[mpf]) 
     """
     Return the error of the rocker's angle at each pair, in the better assembly, in degrees.
 
-    Infinite where the linkage closes there in neither.
+    The error is infinite if the linkage is open there.
     """
     a, b, c = lengths
     found = []
@@ -148,7 +148,7 @@ class Task:
         self.lengths = links(self.k)
 
     def judged(self, lengths: tuple[mpf, mpf, mpf] | None) -> Rounded:
-        """Return what lengths that are not these come to."""
+        """Return the errors of other lengths."""
         if lengths is None or self.lengths is None:
             return Rounded(None, (mp.inf,) * 3, mp.inf, (False,) * 3)
         off = tuple(abs(x / y - 1) for x, y in zip(lengths, self.lengths, strict=True))
@@ -156,20 +156,20 @@ class Task:
         return Rounded(lengths, off, max(met), tuple(map(mp.isfinite, met)))
 
     def by_cosines(self, decimals: int) -> Rounded:
-        """Return the design from cosines of so many decimals."""
+        """Return the design from cosines with a number of decimals."""
         return self.judged(links(solve(equations(self.crank, self.rocker, decimals))))
 
     def by_coefficients(self, decimals: int) -> Rounded:
-        """Return the design from k1, k2 and k3 of so many decimals, which are right before."""
+        """Return the design from exact k1, k2 and k3, rounded to a number of decimals."""
         return self.judged(links([round_to(k, decimals) for k in self.k]))
 
     def by_angles(self, decimals: int) -> Rounded:
-        """Return the design from angles that are rounded to so many decimals of a degree."""
-        turned = [[round_to(x, decimals) for x in each] for each in (self.crank, self.rocker)]
-        return self.judged(links(solve(equations(*turned, None))))
+        """Return the design from angles rounded to a number of decimals of a degree."""
+        rounded = [[round_to(x, decimals) for x in each] for each in (self.crank, self.rocker)]
+        return self.judged(links(solve(equations(*rounded, None))))
 
     def by_worst_angles(self, decimals: int) -> Rounded:
-        """Return the worst of all designs whose angles are off by half a unit in that decimal."""
+        """Return the worst design with angle errors of half a unit in the last decimal."""
         half = mpf(10) ** -decimals / 2
         found = []
         for signs in product((-half, half), repeat=6):
@@ -183,11 +183,11 @@ class Task:
 
 def random_tasks(count: int) -> Iterator[Task]:
     """
-    Yield three-point designs drawn by random, as somebody might ask for them.
+    Yield random three-point designs.
 
-    Crank and rocker begin anywhere and turn by `SPAN` degrees either way, the middle pair being at
-    a part `MIDDLE` of each. What needs a link of more than `LARGEST_RATIO` grounds, or of less
-    than one part in as many, is drawn anew.
+    Crank and rocker start at any angle and turn by `SPAN` degrees in either direction; the middle
+    pair lies at a share `MIDDLE` of each turn. A design with a link longer than `LARGEST_RATIO`
+    grounds, or shorter than a ground divided by that, is drawn again.
     """
     generator = np.random.default_rng(SEED)
     while count:
@@ -214,10 +214,10 @@ def by_package(tasks: Sequence[Task]) -> tuple[NDArray[np.float64], NDArray[np.f
     found = three_pairs(crank, rocker)
     worst = []
     for theta, phi, lengths in zip(crank, rocker, found.lengths, strict=True):
-        # Of the very doubles that it was given: what rounding to radians did is not its fault.
-        given = [[mp.degrees(mpf(float(x))) for x in angles] for angles in (theta, phi)]
-        exact = links(solve(equations(*given, None)))
-        assert exact is not None, 'the doubles stand for a linkage too'
+        # The reference uses the same doubles: rounding to radians is no error of the package.
+        angles_ = [[mp.degrees(mpf(float(x))) for x in angles] for angles in (theta, phi)]
+        exact = links(solve(equations(*angles_, None)))
+        assert exact is not None, 'the doubles give a linkage too'
         off = (abs(mpf(float(x)) / y - 1) for x, y in zip(lengths, exact, strict=True))
         worst.append(float(max(off)))
     return found.condition, np.array(worst)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The chapter of docs/synthesis.md on kinds of tasks: results of `linkage synthesize` for each."""
+"""The chapter of docs/synthesis.md on kinds of tasks, with results of `linkage synthesize`."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ class Kind(NamedTuple):
     Attributes
     ----------
     name, picture
-        Its heading, and its picture's name.
-    words
-        What is asked for.
+        Its heading, and the name of its picture.
+    description
+        The task.
     command
-        What is typed behind `linkage synthesize`.
+        The arguments of `linkage synthesize`.
 
     """
 
     name: str
     picture: str
-    words: str
+    description: str
     command: str
 
 
@@ -62,28 +62,28 @@ KINDS = (
     Kind(
         'Three pairs',
         'three_pairs',
-        'Crank and rocker stand at three pairs of angles. There is one four-bar for it, or none.',
+        'Crank and rocker pass three pairs of angles. There is one four-bar for them, or none.',
         '--pair 50 100 --pair 80 110 --pair 110 125 --ground 0.1',
     ),
     Kind(
         'A function',
         'function',
-        'The rocker shows the logarithm of what the crank is set to. It is right at three points, '
-        'spaced as Chebyshev has it so that the error between them stays small.',
+        'The rocker shows the logarithm of the value to which the crank is set. It is exact at '
+        'three points in Chebyshev spacing, which keeps the error between them small.',
         _LOGARITHM,
     ),
     Kind(
         'Five pairs, zeros free',
         'five_pairs',
-        'The same function. Where only turns matter, and not from where they are counted, the '
-        'zeros of crank and rocker are two unknowns more, and the function is met at five points.',
+        'The same function. If only differences of angles matter, the zeros of crank and rocker '
+        'are two more unknowns, and the function is exact at five points.',
         f'{_LOGARITHM} --points 5 --free-zeros',
     ),
     Kind(
         'A path',
         'path',
-        'A point of the coupler goes through seven places, in their order, on a closed curve, '
-        'with a crank that turns one way.',
+        'A point of the coupler passes seven positions in their order, on a closed curve, with a '
+        'crank that turns in one direction.',
         '--closed --usable --candidates 200000 --point 0.100 0.100 --point 0.130 0.120 '
         '--point 0.170 0.125 --point 0.200 0.110 --point 0.190 0.090 --point 0.150 0.080 '
         '--point 0.115 0.085',
@@ -91,7 +91,7 @@ KINDS = (
     Kind(
         'Three poses',
         'poses',
-        'The coupler goes through three poses, place and angle, from two pivots that are given.',
+        'The coupler passes three poses (position and angle), with two given fixed pivots.',
         '--pose 0.00 0.10 50 --pose 0.02 0.13 35 --pose 0.10 0.12 15 '
         '--fixed-pivot 0.00 0.00 --fixed-pivot 0.10 0.00',
     ),
@@ -102,7 +102,7 @@ def answer_to(kind: Kind) -> Answer:
     """Return the first solution that the command line shows."""
     parser = argparse.ArgumentParser()
     add_arguments(parser)
-    found, _ = solutions(parser.parse_args(split(kind.command)), _untold)
+    found, _ = solutions(parser.parse_args(split(kind.command)), _ignore_progress)
     return found[0]
 
 
@@ -113,8 +113,8 @@ def chapter(folder: Path) -> Iterator[str]:
     yield from prose("""
         ## Four-bars by kind of task
 
-        What can be asked for, each with the first answer of `linkage synthesize`, drawn by its
-        `--draw`. What was wanted is blue.
+        Each kind of task with the first answer of `linkage synthesize`, drawn by its `--draw`. The
+        wanted positions are blue.
     """)
     for kind in KINDS:
         answer = answer_to(kind)
@@ -127,7 +127,7 @@ def section(kind: Kind, answer: Answer) -> Iterator[str]:
     """Yield the lines on a kind of task."""
     yield f'### {kind.name}'
     yield ''
-    yield from prose(kind.words)
+    yield from prose(kind.description)
     yield '```sh'
     yield from _command(kind)
     yield '```'
@@ -139,21 +139,21 @@ def section(kind: Kind, answer: Answer) -> Iterator[str]:
 
 
 def _facts(answer: Answer) -> Iterator[str]:
-    design, found = answer.design, answer.assessment
+    design, assessment = answer.design, answer.assessment
     lengths = zip(_LINKS, design.four_bar.lengths, strict=True)
-    said = ', '.join(f'{link} {length:.4g} m' for link, length in lengths)
-    yield f'{said[0].upper()}{said[1:]}; {found.kind.name}'
+    text = ', '.join(f'{link} {length:.4g} m' for link, length in lengths)
+    yield f'{text[0].upper()}{text[1:]}; {assessment.kind.name}'
     if answer.curve is not None:
         worst = max(abs(error) for error in answer.curve[1])
         yield f'Rocker off by {degrees(worst):.2g}° at most, over the whole range'
     elif any(wanted.place is not None for wanted in design.wanted):
-        off = [met.distance for met in found.met]
+        off = [met.distance for met in assessment.met]
         size = max(design.four_bar.lengths)
         rms = hypot(*off) / len(off) ** 0.5
         exact = max(off) < _ROUNDING * size
-        yield 'Places met exactly' if exact else f'Places missed by {1e3 * rms:.2g} mm rms'
-    yield f'Transmission angle {degrees(found.transmission):.1f}° at least, on the way'
-    for defect in found.defects:
+        yield 'Positions exact' if exact else f'Position error {1e3 * rms:.2g} mm rms'
+    yield f'Transmission angle {degrees(assessment.transmission):.1f}° at least, on the way'
+    for defect in assessment.defects:
         yield f'**{defect.name}**: {defect.text}'
 
 
@@ -169,5 +169,5 @@ def _command(kind: Kind) -> Iterator[str]:
     yield line
 
 
-def _untold(_done: int, _of: int) -> None:
-    """Say nothing of the search."""
+def _ignore_progress(_done: int, _of: int) -> None:
+    """Ignore the progress of the search."""

@@ -31,7 +31,7 @@ def prose(words: str) -> Iterator[str]:
 
 
 def table(*columns: str) -> Iterator[str]:
-    """Yield the head of a table; columns with a > are set right."""
+    """Yield the head of a table; columns with a > are aligned to the right."""
     yield row(*(column.lstrip('>') for column in columns))
     yield row(*('---:' if column.startswith('>') else '---' for column in columns))
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The chapters of docs/synthesis.md on rounding: a textbook's example, and designs at random."""
+"""The chapters of docs/synthesis.md on rounding: a textbook example, and random designs."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ from .digits import (
 from .markdown import power, prose, row, table
 
 COUNT = 3000
-"""Random designs."""
+"""Number of random designs."""
 
 COSINES = (3, 4, 5, 6, 8, 10, 12, 14, 16)
 ANGLES = (0, 1, 2, 3, 4, 6)
@@ -58,7 +58,7 @@ LINKS = ('crank a', 'coupler b', 'rocker c')
 PRINTED = ('5.598', '0.176', '4.88')
 PRINTED_K = ('0.1786', '-0.2048', '1.0272')
 PRINTED_DECIMALS = 4
-"""What the text prints."""
+"""The numbers printed in the textbook."""
 
 PAIRS = ', '.join(f'{t}° → {p}°' for t, p in zip(CRANK, ROCKER, strict=True))
 
@@ -67,7 +67,7 @@ _NONE = 'does not close'
 
 class Study(NamedTuple):
     """
-    What rounding makes of random designs.
+    The effect of rounding on random designs.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Study(NamedTuple):
     condition
         The condition number of each.
     span
-        Of each the smaller of its two spans, in degrees.
+        The smaller of the two spans of each design, in degrees.
     package
         The largest relative error of the package's lengths.
 
@@ -91,23 +91,23 @@ class Study(NamedTuple):
 
 @cache
 def example() -> Task:
-    """Return the design of the text."""
+    """Return the exact design of the textbook example."""
     return Task(CRANK, ROCKER)
 
 
 def printed() -> Rounded:
-    """Return what the printed lengths come to."""
+    """Return the errors of the printed lengths."""
     a, b, c = map(mpf, PRINTED)
     return example().judged((a, b, c))
 
 
 def designed() -> tuple[Design, ThreePairs]:
-    """Return the design as the package makes it."""
+    """Return the design by the package."""
     return exact([radians(x) for x in CRANK], [radians(x) for x in ROCKER], 1.0)
 
 
 def study() -> Study:
-    """Round the random designs in every way."""
+    """Round the random designs in all ways."""
     tasks = list(random_tasks(COUNT))
     condition, errors = by_package(tasks)
     span = [
@@ -125,20 +125,24 @@ def study() -> Study:
 def spread(found: Sequence[Rounded]) -> tuple[float, float, float]:
     """Return median, 95th percentile and greatest of the couplers' relative errors."""
     off = np.array([float(each.off[COUPLER]) for each in found])
-    # Of what cannot be made the error is infinite: no percentile lies between it and another.
+    # The error of an impossible linkage is infinite, so percentiles are not interpolated.
     median, most = (float(np.quantile(off, part, method='higher')) for part in (0.5, 0.95))
     return median, most, float(off.max())
 
 
 def introduction() -> Iterator[str]:
-    """Yield what the page is about, and its example."""
+    """Yield the introduction and its example."""
     task = example()
     yield from prose(f"""
         # What accuracy costs in design work
 
         This page is made by `make synthesis`, which works out every number in it; do not edit it.
 
-        A textbook wants a four-bar whose crank and rocker stand at three pairs of angles,
+        The example is a bad design, which shows rounding at its worst. For a sound one begin with
+        [Design by synthesis](how_to/design.md), or with
+        [the four-bars below](#four-bars-by-kind-of-task).
+
+        A textbook designs a four-bar whose crank and rocker pass three pairs of angles,
         {PAIRS}, on a ground of length 1. Freudenstein's equation,
     """)
     yield from (
@@ -150,8 +154,8 @@ def introduction() -> Iterator[str]:
     )
     yield from prose(f"""
         is linear in k1, k2 and k3, so three pairs give three equations. The text takes its
-        cosines with {PRINTED_DECIMALS} decimals, works by hand, and prints a linkage. Beside it
-        the one that it should have printed:
+        cosines with {PRINTED_DECIMALS} decimals, calculates by hand, and prints a linkage. The
+        table compares it with the exact one:
     """)
     yield from table('', '>in print', '>exact', '>in print off by')
     for name, text, value in zip(('k1', 'k2', 'k3'), PRINTED_K, task.k, strict=True):
@@ -160,23 +164,23 @@ def introduction() -> Iterator[str]:
         yield row(name, text, _digits(value), _percent(off))
     yield ''
     yield from prose(f"""
-        The exact column has {PRECISION} digits behind it; `linkage synthesize {_command()}` gives
-        as many of them as a double holds.
+        The exact column is computed with {PRECISION} digits; `linkage synthesize {_command()}`
+        gives as many of them as a double holds.
     """)
 
 
 def by_hand() -> Iterator[str]:
-    """Yield why the coupler is off."""
+    """Yield the reason for the error of the coupler."""
     task = example()
     a, _, c = task.lengths
     square = square_of_coupler(task.k)
     parts = a**2 + c**2 + 1
     half = mpf(10) ** -PRINTED_DECIMALS / 2
     change = 2 * a * c * half
-    own_k = links(list(map(mpf, PRINTED_K)))
-    assert own_k is not None, 'its coupler is real'
+    from_printed_k = links(list(map(mpf, PRINTED_K)))
+    assert from_printed_k is not None, 'its coupler is real'
     long, _, short = map(mpf, PRINTED)
-    own_links = mp.sqrt(square_of_coupler((1 / long, -1 / short, mpf(PRINTED_K[2]))))
+    from_printed_links = mp.sqrt(square_of_coupler((1 / long, -1 / short, mpf(PRINTED_K[2]))))
     condition = float(three_pairs(*map(np.radians, (CRANK, ROCKER))).condition)
     yield from prose(f"""
         ## Why the coupler suffers
@@ -186,11 +190,11 @@ def by_hand() -> Iterator[str]:
         {_short(parts - square, 4)} leaves {_short(square, 3)}. Half a unit in decimal
         {PRINTED_DECIMALS} of k3 moves b² by {_short(change, 2)}, which is
         {_percent(change / square)} of it. So {PRINTED_DECIMALS} decimals do not fix b: the text's
-        own k1, k2 and k3 give {_short(own_k[COUPLER], 3)}, its own a, c and k3 give
-        {_short(own_links, 3)}, and it prints {PRINTED[COUPLER]}.
+        own k1, k2 and k3 give {_short(from_printed_k[COUPLER], 3)}, its own a, c and k3 give
+        {_short(from_printed_links, 3)}, and it prints {PRINTED[COUPLER]}.
 
-        The system of equations does its part too. Its condition number is {condition:.0f}: about
-        {log10(condition):.1f} digits are lost in it before the coupler loses its own.
+        The system of equations loses digits too. Its condition number is {condition:.0f}: about
+        {log10(condition):.1f} digits are lost in it before the coupler is computed.
     """)
 
 
@@ -200,11 +204,11 @@ def decimals() -> Iterator[str]:
     yield from prose(f"""
         ## Decimals against error
 
-        Now one thing is rounded, and all else is done with {PRECISION} digits. *Cosines*: all
-        nine are rounded to so many decimals, as in the text. *k*: the cosines are right, and k1,
-        k2 and k3 are rounded before the lengths are taken from them. What counts on the bench is
-        the error of the rocker: the linkage is made with these lengths and analysed again, and
-        this is its rocker's greatest error at the three crank angles.
+        Now one step is rounded, and all others are done with {PRECISION} digits. *Cosines*: all
+        nine are rounded to a number of decimals, as in the text. *k*: the cosines are exact, and
+        k1, k2 and k3 are rounded before the lengths are computed from them. In practice the error
+        of the rocker matters: the linkage with these lengths is analysed again, and the column
+        gives the greatest error of its rocker at the three crank angles.
     """)
     yield (
         '![Decimals of the cosines against the relative errors of the lengths, and against the '
@@ -221,7 +225,7 @@ def decimals() -> Iterator[str]:
             n, *map(_error, cosines.off), _angle(cosines.missed),
             _error(coefficients.off[COUPLER]), _angle(coefficients.missed),
         )  # fmt: skip
-    four, own = task.by_cosines(PRINTED_DECIMALS), printed()
+    four, by_print = task.by_cosines(PRINTED_DECIMALS), printed()
     assert four.lengths is not None, 'it is a linkage'
     a, b, c = (_short(x, 5) for x in four.lengths)
     assert not four.reached[0], 'the text below says so'
@@ -230,13 +234,13 @@ def decimals() -> Iterator[str]:
         Cosines of {PRINTED_DECIMALS} decimals, and no other rounding, make a linkage of a =
         {a}, b = {b} and c = {c}, which cannot be assembled with its crank at {CRANK[0]}°: this
         lies next to the end of its range, as will be seen. The linkage in print misses the pairs
-        by {_angle(own.missed)} at most, although its coupler is
-        {float(own.off[COUPLER] / four.off[COUPLER]):.1f} times as far off: it happens to close
+        by {_angle(by_print.missed)} at most, although the error of its coupler is
+        {float(by_print.off[COUPLER] / four.off[COUPLER]):.1f} times as large: it happens to close
         there.
 
-        The angles themselves are known to so many decimals of a degree, from a drawing, a dial or
-        an encoder. Where each of the six is off by half a unit of the last one, up or down, this
-        is the worst that can come of it:
+        The angles themselves are known to a number of decimals of a degree, from a drawing, a dial
+        or an encoder. If each of the six has an error of half a unit of the last decimal, up or
+        down, these are the greatest errors of the result:
     """)
     yield from table(
         '>decimals of a degree', '>a off by', '>b off by', '>c off by', '>rocker off by'
@@ -246,40 +250,42 @@ def decimals() -> Iterator[str]:
         yield row(n, *map(_error, worst.off), _angle(worst.missed))
     yield ''
     yield from prose("""
-        This part no arithmetic can make good. It also says how exactly the links need to be made:
-        not better than the angles are known.
+        No arithmetic can reduce these errors. They also show how exactly the links need to be
+        made: no better than the angles are known.
     """)
 
 
-def at_random(found: Study) -> Iterator[str]:
+def at_random(study: Study) -> Iterator[str]:
     """Yield the tables of the random designs."""
-    condition = found.condition
+    condition = study.condition
     yield from prose(f"""
         ## {COUNT:,} other designs
 
-        Is the example a bad one? {COUNT:,} designs were drawn at random (NumPy's default
-        generator, seed {SEED}): crank and rocker begin anywhere and turn by {SPAN[0]:g} to
-        {SPAN[1]:g}°, either way, and the middle pair lies at {MIDDLE[0]:g} to {MIDDLE[1]:g} of
-        each turn; all is evenly distributed. Pairs that need a link of more than
-        {LARGEST_RATIO:g} grounds, or of less than a {LARGEST_RATIO:g}th of one, were drawn again.
-        This is the relative error of the coupler, and how many linkages do not close at a pair:
+        Is the example an exception? {COUNT:,} designs were drawn at random (NumPy's default
+        generator, seed {SEED}): crank and rocker start at any angle and turn by {SPAN[0]:g} to
+        {SPAN[1]:g}° in either direction, and the middle pair lies at {MIDDLE[0]:g} to
+        {MIDDLE[1]:g} of each turn; all distributions are uniform. Pairs that need a link of more
+        than {LARGEST_RATIO:g} grounds, or of less than a {LARGEST_RATIO:g}th of one, were drawn
+        again. The tables give the relative error of the coupler, and the share of linkages that do
+        not close at a pair:
     """)
     yield from table(
         '>cosines rounded to', '>median', '>95th percentile', '>greatest', '>do not close'
     )
-    for n, each in found.cosines.items():
+    for n, each in study.cosines.items():
         yield row(f'{n} decimals', *map(_error, map(mpf, spread(each))), _share(each))
     yield ''
     yield from table(
         '>angles rounded to', '>median', '>95th percentile', '>greatest', '>do not close'
     )
-    for n, each in found.angles.items():
+    for n, each in study.angles.items():
         name = 'whole degrees' if n == 0 else f'{n} decimal{"s" if n > 1 else ""} of a degree'
         yield row(name, *map(_error, map(mpf, spread(each))), _share(each))
     yield ''
     yield from prose(f"""
-        Each decimal more takes a digit off the error, whatever the design. How many are lost
-        beforehand lies in the task, and the condition number tells: its median is
+        Each additional decimal reduces the error by one digit, for every design. The number of
+        digits lost beforehand depends on the task, and follows from the condition number: its
+        median is
         {np.median(condition):.3g}, its 95th percentile {np.quantile(condition, 0.95):.3g}, the
         greatest {condition.max():.2g}. It grows as the pairs come nearer to each other:
     """)
@@ -287,28 +293,28 @@ def at_random(found: Study) -> Iterator[str]:
         '>smaller of the two turns', '>designs', '>condition, median', '>95th percentile'
     )
     for low, high in pairwise(SPANS):
-        part = condition[(found.span >= low) & (found.span < high)]
+        part = condition[(study.span >= low) & (study.span < high)]
         yield row(
             f'{low} to {high}°', len(part), f'{np.median(part):.3g}',
             f'{np.quantile(part, 0.95):.3g}',
         )  # fmt: skip
-    bound = 10.0 ** ceil(log10(found.package))
+    bound = 10.0 ** ceil(log10(study.package))
     yield ''
     yield from prose(f"""
-        The package takes differences of cosines as products of sines, and determinants with the
-        error of their products. What it makes of these {COUNT:,} tasks in double precision is
-        within {power(bound)} of the lengths, relative: the rounding of the answer and no more.
-        `linkage synthesize` says of each design how many digits can be trusted.
+        The package computes differences of cosines as products of sines, and determinants with
+        the errors of their products. For these {COUNT:,} tasks its lengths in double precision
+        have relative errors below {power(bound)}: the rounding of the answer and no more.
+        `linkage synthesize` gives for each design the number of digits that can be trusted.
     """)
 
 
 def on_the_bench() -> Iterator[str]:
-    """Yield that the exact solution is none."""
+    """Yield the chapter on the defect of the exact solution."""
     design, _ = designed()
     found = assess(design)
     sides = {side: [t for t, met in zip(CRANK, found.met, strict=True) if met.side == side]
              for side in ('left', 'right')}  # fmt: skip
-    said = ', '.join(
+    assemblies = ', '.join(
         f'{" and ".join(f"{t}°" for t in cranks)} on the {side} one'
         for side, cranks in sides.items() if cranks
     )  # fmt: skip
@@ -316,9 +322,9 @@ def on_the_bench() -> Iterator[str]:
     yield from prose(f"""
         ## And it does not run
 
-        So the lengths are right to the last digit, and the linkage is still of no use. A four-bar
-        has two assemblies, and a crank does not lead from one to the other. All three pairs are
-        met, but not by the same one: {said}. `linkage synthesize` names the defect:
+        So the lengths are correct to the last digit, and the linkage is still useless. A four-bar
+        has two assemblies, and its crank cannot move it from one to the other. All three pairs are
+        met, but not by the same one: {assemblies}. `linkage synthesize` names the defect:
     """)
     yield from (f'> **{defect.name}**: {defect.text}' for defect in found.defects)
     yield ''
@@ -331,9 +337,9 @@ def on_the_bench() -> Iterator[str]:
         The first pair lies right beside an end of the crank's range, where a wrong digit opens
         the loop. The longest link is {found.link_ratio:.0f} times the shortest, and the
         transmission angle at the pairs is as small as {np.degrees(found.transmission):.1f}°. This
-        linkage exists on paper only. It takes accuracy to find that out, and accuracy does not
-        help against it. What does help is to leave something open, such as the zeros of crank and
-        rocker (`--free-zeros`), and to say what is needed (`--usable`, `--min-transmission`).
+        linkage exists on paper only. Accuracy is needed to find this out, but it does not cure it.
+        The cure is to leave something free, such as the zeros of crank and rocker
+        (`--free-zeros`), and to state the requirements (`--usable`, `--min-transmission`).
     """)
 
 

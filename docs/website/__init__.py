@@ -13,4 +13,4 @@
 # limitations under the License.
 
 
-"""Pages of the site that are made from the code: the reference, and the executed tutorial."""
+"""Pages of the site that are made from code: the reference, and the executed tutorial."""

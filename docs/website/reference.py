@@ -16,9 +16,9 @@
 """
 Reference pages, made from the code while the site is built.
 
-A page requests a part by a comment on a line of its own, ``<!-- made: commands -->``. A forge
-shows none of it; `linkage scene --list`, `linkage COMMAND --help` and config/schema have the same
-content. Links into the checkout, which work on a forge, become downloads.
+A page requests a part by a comment on a line of its own, ``<!-- made: commands -->``. A forge does
+not show these parts; `linkage scene --list`, `linkage COMMAND --help` and config/schema have the
+same content. Links to files of the checkout, which work on a forge, become downloads.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ from pathlib import Path
 import re
 from typing import Any
 
-from linkage_ros.cli.main import COMMANDS, module_of
+from linkage_ros.cli.main import COMMANDS, EXIT_CODES, module_of, parser_of
 from linkage_ros.cli.scene import REGISTRIES, table_of
 from linkage_ros.pages.markdown import table_lines
 from linkage_ros.scene.schema import linkage_schema, scene_schema
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table, its cells as they are."""
+    """Return a table; the cells are Markdown."""
     return '\n'.join(table_lines(heads, rows)) + '\n'
 
 
 def plain(text: str) -> str:
-    """Return a text that Markdown leaves as it is, also in a table; but for code in backticks."""
+    """Return a text escaped for Markdown, also in a table, except for code in backticks."""
     parts = re.split(r'(`[^`]+`)', ' '.join(text.split()))
     escaped = [re.sub(r'([\\`*_\[\]<>|~{}$])', r'\\\1', part) for part in parts[::2]]
     kept = [part.replace('|', '\\|') for part in parts[1::2]]
@@ -53,35 +53,39 @@ def plain(text: str) -> str:
 
 
 def code(text: str) -> str:
-    """Return a text as code, also in a table; nothing where there is none."""
+    """Return a text as code, also in a table; '' for no text."""
     escaped = text.replace('|', '\\|')
     return f'`{escaped}`' if text else ''
 
 
+def exit_codes() -> Iterator[tuple[str, str]]:
+    """Yield the exit codes of all commands and their meanings."""
+    for number, text in EXIT_CODES.items():
+        yield str(number), plain(text)
+
+
 def commands() -> str:
-    """Return all commands: what each does, its usage and its options."""
+    """Return all commands with description, usage and options."""
     return '\n'.join(line for name in COMMANDS for line in _command(name))
 
 
 def _command(name: str) -> Iterator[str]:
-    module = import_module(module_of(name))
-    parser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
-    module.add_arguments(parser)
+    parser = parser_of(name, import_module(module_of(name)))
     yield f'## linkage {name}\n'
     yield from (f'{plain(part)}\n' for part in cleandoc(parser.description or '').split('\n\n'))
-    # Of the width that a page shows in one piece; a terminal has its own.
+    # The width of a page.
     parser.formatter_class = _narrow
     yield f'```text\n{parser.format_usage().strip()}\n```\n'
     for group in parser._action_groups:  # noqa: SLF001 (argparse has no other way)
         rows = [
-            (_typed(action), plain(_said(parser, action)))
+            (_typed(action), plain(_help(parser, action)))
             for action in group._group_actions  # noqa: SLF001
             if not isinstance(action, argparse._HelpAction)  # noqa: SLF001
         ]
         if rows:
             yield table((plain(group.title or '').capitalize(), ''), rows)
-    if parser.epilog:
-        yield f'{plain(parser.epilog)}\n'
+        elif group.description:  # the example
+            yield f'```text\n{group.description}\n```\n'
 
 
 def _narrow(prog: str) -> argparse.HelpFormatter:
@@ -89,7 +93,7 @@ def _narrow(prog: str) -> argparse.HelpFormatter:
 
 
 def _typed(action: argparse.Action) -> str:
-    """Return what one types for an argument."""
+    """Return an argument as the user types it."""
     if not action.option_strings:
         return code(str(action.metavar or action.dest))
     values = ''
@@ -103,29 +107,29 @@ def _typed(action: argparse.Action) -> str:
     return ', '.join(code(option + values) for option in action.option_strings)
 
 
-def _said(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
+def _help(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     formatter = parser._get_formatter()  # noqa: SLF001 (as above)
     return formatter._expand_help(action) if action.help else ''  # noqa: SLF001
 
 
-def parameters(what: str) -> str:
+def parameters(kind: str) -> str:
     """Return all drives, effects, faults or solvers with their parameters."""
-    return '\n'.join(part for name in REGISTRIES[what] for part in _one(what, name))
+    return '\n'.join(part for name in REGISTRIES[kind] for part in _one(kind, name))
 
 
-def _one(what: str, name: str) -> Iterator[str]:
-    found = table_of(what, name)
+def _one(kind: str, name: str) -> Iterator[str]:
+    parameters_ = table_of(kind, name)
     yield f'### {plain(name)}\n'
-    yield f'{plain(found.title.removeprefix(f"{what} {name}: "))}\n'
-    if len(found.columns) == 1:
+    yield f'{plain(parameters_.title.removeprefix(f"{kind} {name}: "))}\n'
+    if len(parameters_.columns) == 1:
         yield 'No parameters.\n'
         return
-    rows = [(code(row[0]), *map(plain, row[1:])) for row in found.rows]
-    yield table(found.columns, rows)
+    rows = [(code(row[0]), *map(plain, row[1:])) for row in parameters_.rows]
+    yield table(parameters_.columns, rows)
 
 
 _ELSEWHERE = ('drive', 'effects', 'solver')
-"""Keys whose own keys are in the reference of parameters."""
+"""Keys whose keys are in the reference of parameters."""
 
 _NAMED = 'NAME'
 _HEADS = ('key', 'takes', 'default', 'meaning')
@@ -187,7 +191,7 @@ def _resolved(schema: Mapping[str, Any], whole: Mapping[str, Any]) -> Mapping[st
 
 
 def _number(value: float) -> str:
-    """Return a number as a person writes it, and exactly."""
+    """Return a number in the shortest form that is exact."""
     short = f'{value:g}'.replace('e+', 'e').replace('e0', 'e').replace('e-0', 'e-')
     return short if float(short) == value else str(value)
 
@@ -196,7 +200,7 @@ _WORDS = {'object': 'a mapping', 'array': 'a list', 'string': 'a text', 'boolean
 
 
 def _takes(of: Mapping[str, Any]) -> str:
-    """Return which values a key takes."""
+    """Return the description of the values of a key."""
     if 'enum' in of:
         return ' or '.join(map(str, of['enum']))
     kind = of.get('type', '')
@@ -207,8 +211,7 @@ def _takes(of: Mapping[str, Any]) -> str:
             (' from', 'minimum'),
             (' to', 'maximum'),
         )
-        said = [f'{before} {_number(of[key])}' for before, key in bounds if key in of]
-        return word + ''.join(said)
+        return word + ''.join(f'{text} {_number(of[key])}' for text, key in bounds if key in of)
     if not kind and 'then' in of:
         branches = (_takes(of['then']) or 'a list', _takes(of.get('else', {})))
         return ' or '.join(dict.fromkeys(filter(None, branches)))
@@ -216,6 +219,7 @@ def _takes(of: Mapping[str, Any]) -> str:
 
 
 MADE: Mapping[str, Callable[[], str]] = {
+    'exit codes': lambda: table(('exit code', ''), exit_codes()),
     'commands': commands,
     'drives': lambda: parameters('drive'),
     'effects': lambda: parameters('effect'),
@@ -224,24 +228,24 @@ MADE: Mapping[str, Callable[[], str]] = {
     'scene keys': scene_keys,
     'linkage keys': linkage_keys,
 }
-"""What there is to put in, by its name."""
+"""The parts that a page can request, by name."""
 
 _DOCS = Path(__file__).resolve().parents[1]
 _LINK = re.compile(r'(?<!!)\[([^\]\n]+)\]\((\.\./[^)#\s]+)(?:#[^)]*)?\)')
 _MARK = re.compile(r'^<!-- made: (.+) -->$', re.MULTILINE)
 
 
-def put_in(docname: str, source: list[str]) -> None:
-    """Put into a page what it names; Sphinx wants the page changed in its list of one."""
+def insert_parts(docname: str, source: list[str]) -> None:
+    """Insert the requested parts into a page, the only item of a list that Sphinx passes."""
     names = _MARK.findall(source[0])
     unknown = sorted({*names} - {*MADE})
-    assert not unknown, f'{docname}: nothing makes {", ".join(unknown)}'
+    assert not unknown, f'{docname}: unknown parts {", ".join(unknown)}'
     text = _LINK.sub(lambda found: _local_link(found, (_DOCS / docname).parent), source[0])
     source[0] = _MARK.sub(lambda found: MADE[found[1]](), text)
 
 
 def _local_link(link: re.Match[str], folder: Path) -> str:
-    """Return a link that stays within the site: to a file of the checkout it brings the file."""
+    """Return a link within the site; a link to a file of the checkout becomes a download."""
     shown, to = link.groups()
     target = (folder / to).resolve()
     if target.is_relative_to(_DOCS):

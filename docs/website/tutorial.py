@@ -42,7 +42,7 @@ _SCRIPT = re.compile(r'<metadata>.*?</metadata>', re.DOTALL)
 
 
 class Cell(NamedTuple):
-    """A cell: text in Markdown, or code, and the line of the file on which it begins."""
+    """A cell: text in Markdown or code, and its first line in the file."""
 
     is_text: bool
     content: str
@@ -50,17 +50,17 @@ class Cell(NamedTuple):
 
 
 class PercentParser(MystParser):
-    """Reads such a file for Sphinx."""
+    """Parses a file in cells for Sphinx."""
 
     supported = ('percent',)
 
     def parse(self, inputstring: str, document: Any) -> None:
-        """Run the file, and read it as Markdown with what came of it."""
+        """Run the file, and parse it as Markdown with its results."""
         super().parse(page(inputstring, document['source']), document)
 
 
 def cells(text: str) -> Iterator[Cell]:
-    """Yield the cells of a file; what stands before the first one belongs to no cell."""
+    """Yield the cells of a file; text before the first mark belongs to no cell."""
     marks = list(_CELL.finditer(text))
     ends = [mark.start() for mark in marks[1:]] + [len(text)]
     for mark, end in zip(marks, ends, strict=True):
@@ -72,7 +72,7 @@ def cells(text: str) -> Iterator[Cell]:
 
 
 def page(text: str, name: str) -> str:
-    """Run a file, in a folder of its own, and return it as Markdown."""
+    """Run a file in a temporary folder, and return it as Markdown."""
     variables: dict[str, Any] = {'__name__': 'tutorial'}
     parts = []
     with _elsewhere():
@@ -87,7 +87,7 @@ def page(text: str, name: str) -> str:
 
 @contextmanager
 def _elsewhere() -> Iterator[None]:
-    """Work in a folder of its own, which is gone afterwards."""
+    """Work in a temporary folder."""
     before = Path.cwd()
     with TemporaryDirectory() as folder:
         os.chdir(folder)
@@ -98,9 +98,9 @@ def _elsewhere() -> Iterator[None]:
 
 
 def _results(cell: Cell, variables: dict[str, Any], name: str) -> Iterator[str]:
-    """Run a cell; yield what it printed and the value of its last line, and what it drew."""
+    """Run a cell; yield its printed output, the value of its last line, and its pictures."""
     plt.switch_backend('agg')
-    # Lines count as in the file, for tracebacks.
+    # For tracebacks, lines are numbered as in the file.
     tree = ast.parse('\n' * cell.line + cell.content, name)
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     value = None

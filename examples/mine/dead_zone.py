@@ -25,14 +25,14 @@ AFTER = 'noise'
 class DeadZoneParameters:
     """A sensor shows a new value only after the joint has moved far enough."""
 
-    width: float = number('least change that shows', unit='rad or m', above=0.0, most=1e6)
+    width: float = number('least change shown', unit='rad or m', above=0.0, most=1e6)
 
 
 PARAMETERS = DeadZoneParameters
 
 
 def sensor(parameters, context):
-    """Build the sensor; it remembers what it has shown."""
+    """Build the sensor; it remembers the values shown last."""
     shown = []
 
     def dead_zone(now, reading):
