@@ -24,52 +24,63 @@ unexport ROS_SECURITY_ENABLE ROS_SECURITY_STRATEGY ROS_SECURITY_KEYSTORE
 unexport ROS_SECURITY_ENCLAVE_OVERRIDE
 # With this one leaked, the rclpy wheels believe that their library path is set already.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
-# These send pip's or Python's eyes out of the environment made here.
+# With these, pip or Python would look outside of the environment made here.
 unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_DEPS MYPYPATH
 unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLUDE_NEWER
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema cost effects docs lint format
-.PHONY: clean damage kills endurance disk attacks accuracy_page report lock sbom compiled
+.PHONY: test_nodes test_rest clean damage kills endurance disk attacks accuracy_page report lock sbom compiled
 
 help:
-	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
+	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 sets the duration)'
 	@echo 'make test      lint, then all tests'
-	@echo 'make bench     measure'
-	@echo 'make timing    measure clients that come and go, and ticks under load, into docs/timing (35 min)'
-	@echo 'make accuracy  prove the kinematics on 11 million cases, then as topologies (35 min)'
-	@echo 'make topologies  try random linkages of every topology, into docs/accuracy (8 min)'
-	@echo 'make compiled  compare linkages in C, Python and JavaScript with the steps, by the 100,000 (8 min)'
-	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (9 min)'
-	@echo 'make synthesis compute and draw what docs/synthesis.md says'
-	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
-	@echo 'make damage    cut a bag at every byte, flip every bit of it, into docs/recordings (30 min)'
+	@echo 'make bench     measure ticks, latency and kinematics against other implementations'
+	@echo 'make timing    measure ticks with changing subscribers and under load, into docs/timing (35 min)'
+	@echo 'make accuracy  test the kinematics on 11 million cases, then run topologies (35 min)'
+	@echo 'make topologies  test random linkages of every topology, into docs/accuracy (8 min)'
+	@echo 'make compiled  compare 100,000 states in C, Python and JavaScript with the plain steps (8 min)'
+	@echo 'make accuracy_page  measure the cost of accuracy, into docs/accuracy.md (9 min)'
+	@echo 'make synthesis compute docs/synthesis.md and its pictures'
+	@echo 'make round_trips  design 1.7 million linkages back from their own pairs of angles'
+	@echo 'make damage    truncate a bag at every byte, flip every bit, into docs/recordings (30 min)'
 	@echo 'make kills     kill recordings at 1,400 instants, into docs/recordings (10 min)'
-	@echo 'make disk      let every call of a recording fail, disks fill and stall (10 min)'
-	@echo 'make attacks   send what is hostile through everything, into docs/recordings (5 min)'
+	@echo 'make disk      let system calls fail, disks fill and stall, into docs/recordings (10 min)'
+	@echo 'make attacks   send hostile input to commands and node, into docs/recordings (5 min)'
 	@echo 'make endurance run 24 h in minutes and 10 min over DDS, into docs/recordings (25 min)'
-	@echo 'make gallery   draw the linkages that come with the package'
+	@echo 'make gallery   draw the linkages that come with the package, and animate one for the first page'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
-	@echo 'make cost      measure what every effect costs, into docs/cost.md'
-	@echo 'make effects   draw what drives, effects and faults do, for docs/effects.md'
-	@echo 'make report    record a run, and picture its page for docs/report.png'
+	@echo 'make cost      measure the cost of every effect, into docs/cost.md'
+	@echo 'make effects   draw the pictures of drives, effects and faults for docs/effects.md'
+	@echo 'make report    record a run, and take a picture of its report for docs/report.png'
 	@echo 'make docs      build the documentation site into build/docs'
-	@echo 'make lock      renew the versions and hashes that .venv is installed by'
-	@echo 'make sbom      build the wheel, and its bill of materials beside it, into dist'
+	@echo 'make lock      renew the locked versions and hashes of the packages in .venv'
+	@echo 'make sbom      build the wheel and its bill of materials into dist'
 	@echo 'make lint      ruff and mypy'
-	@echo 'make format    let ruff put right what it can'
+	@echo 'make format    fix what ruff can fix'
 	@echo 'make clean     remove what make and colcon have built; recorded runs stay'
 	@echo 'PYTHON=...     the Python to build .venv with, 3.10 or newer (now: $(PYTHON))'
 
 # uv installs several times faster than pip; pip brings it, and does the rest itself where uv
 # cannot reach an index that only pip's settings name. $(1): the lock file.
-install_by = { { sed -n '/^uv==/,/[^\\]$$/p' $(1) | $(PIP_INSTALL) --require-hashes --requirement /dev/stdin \
+install_by = $(watch_size); \
+  { { sed -n '/^uv==/,/[^\\]$$/p' $(1) | $(PIP_INSTALL) --require-hashes --requirement /dev/stdin \
     && $(UV_INSTALL) --require-hashes --requirement $(1); } \
-  || $(PIP_INSTALL) --require-hashes --requirement $(1); } >$(LOG) 2>&1 || { \
+  || $(PIP_INSTALL) --require-hashes --requirement $(1); } >$(LOG) 2>&1; status=$$?; \
+  $(end_watch); \
+  [ $$status -eq 0 ] || { \
     echo "$(1): not installed: $$(grep -i error $(LOG) | tail -n 1); more in $(LOG);" \
       'offline? Behind a proxy set HTTPS_PROXY, for a mirror PIP_INDEX_URL' >&2; \
     exit 1; }
+# On a terminal: how long the installation has run, and the size of .venv. It ends with the shell of
+# the recipe, also if Ctrl-C kills that one.
+watch_size = watch=; begin=$$(date +%s); [ ! -t 2 ] || { \
+    while sleep 1 && kill -0 $$$$ 2>/dev/null; do \
+      printf '\r.venv: %d s, %d MB ' $$(($$(date +%s) - begin)) $$(du -sm .venv | cut -f1) >&2; \
+    done & watch=$$!; }
+end_watch = [ -z "$$watch" ] || { \
+    kill $$watch; wait $$watch 2>/dev/null; printf '\r\033[K' >&2; }
 say_size = echo ".venv: $$(ls -d .venv/lib/python*/site-packages/*.dist-info | wc -l) packages, $$(du -sm .venv | cut -f1) MB"
 
 $(DEMO): setup.py requirements/demo.txt
@@ -95,26 +106,35 @@ $(STAMP): $(DEMO) requirements/dev.txt
 	@$(say_size)
 	@touch $@
 
-# One simple command: make starts it without a shell between, so that Ctrl-C reaches it and make
-# waits until it has ended by itself. SECONDS counts only from the command line: a shell may
-# export its own.
+# A simple command: make starts it without a shell, so that Ctrl-C reaches it and make waits for its
+# end. SECONDS is read from the command line only, since a shell may export its own.
 demo: $(DEMO)
 	@$(BIN)/linkage demo $(if $(filter command,$(origin SECONDS)),--seconds $(SECONDS))
 
-# The tests run even when lint finds something, so that one run tells all. Each test that starts
-# nodes has a graph to itself; those that measure nodes have the processors, too. Only files that
-# have such tests are collected for them.
+# The tests run even if lint fails, so that one run shows all failures. Each test that starts nodes
+# has its own ROS domain; it mostly waits, so the other tests run beside these, at the lowest
+# priority. Tests that measure nodes run alone. Of these kinds only files with such tests are
+# collected.
 PYTEST := $(BIN)/python -m pytest --durations 25
 BY_FILE := --dist loadfile --no-loadscope-reorder
 marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)' test)
 test: $(STAMP)
 	@status=0; \
 	$(BIN)/python test/node_packages.py || status=$$?; \
-	$(MAKE) --no-print-directory lint || status=$$?; \
-	$(PYTEST) -m 'not ros' --numprocesses auto $(BY_FILE) || status=$$?; \
-	$(PYTEST) -m 'ros and not alone' --numprocesses 3 $(BY_FILE) test/node $(call marked,ros) || status=$$?; \
+	$(MAKE) --no-print-directory --keep-going --jobs 2 test_nodes lint test_rest || status=$$?; \
 	$(PYTEST) -m alone $(call marked,alone) || status=$$?; \
 	exit $$status
+
+# What it prints comes at its end, as a whole.
+test_nodes: $(STAMP)
+	@mkdir -p build; \
+	$(PYTEST) -m 'ros and not alone' --numprocesses 3 $(BY_FILE) test/node $(call marked,ros) \
+	  >build/test_nodes.log 2>&1; status=$$?; \
+	cat build/test_nodes.log; \
+	exit $$status
+
+test_rest: $(STAMP)
+	@nice -n 19 $(PYTEST) -m 'not ros' --numprocesses auto $(BY_FILE)
 
 bench: $(STAMP)
 	@$(BIN)/python -m bench
@@ -181,7 +201,9 @@ report: $(STAMP)
 	@$(BIN)/python -m docs.make_report
 
 docs: $(STAMP)
-	@$(BIN)/python -m sphinx -q -W --keep-going -d build/docs_read docs build/docs
+	@echo 'build/docs: building the site'
+	@quiet=-q; [ ! -t 1 ] || quiet=; \
+	$(BIN)/python -m sphinx $$quiet -W --keep-going -d build/docs_read docs build/docs
 	@echo 'build/docs/index.html'
 
 lock: $(STAMP)

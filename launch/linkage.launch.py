@@ -14,11 +14,11 @@
 
 
 """
-Start linkage_node, and robot_state_publisher beside it where that is asked for.
+Start linkage_node, and robot_state_publisher on request.
 
 ``ros2 launch linkage_ros linkage.launch.py scene:=/path/to/scene.yaml``
 
-Not run in CI, for want of a launch that pip can install: a test there runs it against stubs.
+CI does not run it, since pip cannot install launch: a test there runs it against stubs.
 """
 
 from pathlib import Path
@@ -28,28 +28,28 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
-from linkage_ros.cli.arguments import model_of
+from linkage_ros.cli.robot_model import model_of
 from linkage_ros.errors import LinkageError, quoted
 from linkage_ros.robot_models.urdf import urdf as write_urdf
 
 SHARE = Path(get_package_share_directory('linkage_ros'))
 
 ARGUMENTS = {
-    'scene': ('', "Scene file; '' takes the one that params_file names."),
+    'scene': ('', "Scene file; '': the scene of params_file."),
     'params_file': (str(SHARE / 'config' / 'linkage_node.yaml'), 'Parameters of linkage_node.'),
     'namespace': ('', 'Namespace of both nodes and their relative topics.'),
     'use_sim_time': (
         '',
-        "true: tick on /clock instead of the steady clock; '' takes what params_file says.",
+        "true: tick on /clock instead of the steady clock; '': the value of params_file.",
     ),
     'crank_states': (
         'crank_states',
-        'Topic that brings the crank; joint_states where joint_state_broadcaster publishes it.',
+        'Topic of the crank; joint_states if joint_state_broadcaster publishes it.',
     ),
-    'robot_description_file': ('', "URDF for robot_state_publisher; '' does not start it."),
+    'robot_description_file': ('', "URDF for robot_state_publisher; '': do not start it."),
     'robot_state_publisher': (
         'false',
-        'Start it without a file too, on the model that the scene makes; Jazzy reads no topic.',
+        'Start it without a file too, with the model of the scene; Jazzy reads no topic.',
     ),
 }
 
@@ -58,9 +58,9 @@ FLAGS = {'true': True, '1': True, 'false': False, '0': False}
 
 
 def nodes(context):
-    """Return the nodes to start; only now are the values of the arguments known."""
+    """Return the nodes to start, from the values of the arguments."""
     value = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
-    # Later parameters go before earlier ones: an empty argument must not hide what the file says.
+    # Later parameters override earlier ones: an empty argument must not override the file.
     scene = {'scene': value['scene']} if value['scene'] else {}
     clock = {'use_sim_time': flag(value, 'use_sim_time')} if value['use_sim_time'] else {}
     yield Node(
@@ -86,18 +86,18 @@ def nodes(context):
             executable='robot_state_publisher',
             name='robot_state_publisher',
             namespace=value['namespace'],
-            # The file for its clock, which has to be that of the node.
+            # The file sets its clock, which has to be that of the node.
             parameters=[value['params_file'], {**clock, 'robot_description': urdf}],
             output='screen',
         )
 
 
 def flag(value, name):
-    """Return what an argument that is true or false says."""
-    said = value[name].lower()
-    if said not in FLAGS:
+    """Return the value of an argument that is true or false."""
+    text = value[name].lower()
+    if text not in FLAGS:
         raise LinkageError(name, f'{quoted(value[name])} is not a flag', 'write true or false')
-    return FLAGS[said]
+    return FLAGS[text]
 
 
 def text_of(file):
@@ -111,15 +111,15 @@ def text_of(file):
 
 
 def tell_failure(event, context):
-    """Let launch end with 1 where the node does not end well, and leave the other nodes alone."""
+    """Make launch end with exit code 1 if the node fails, and keep the other nodes running."""
     if event.returncode:
-        # An exception that is raised would shut down all that a robot's launch file starts.
-        said = f'linkage_node ended with {event.returncode}: its last lines say why'
-        context.asyncio_loop.call_exception_handler({'message': said})
+        # A raised exception would shut down all other nodes of the launch file.
+        message = f'linkage_node ended with {event.returncode}: its last lines say why'
+        context.asyncio_loop.call_exception_handler({'message': message})
 
 
 def generate_launch_description():
-    """Return what `ros2 launch` asks a launch file for."""
+    """Return the launch description, as `ros2 launch` requires it."""
     return LaunchDescription(
         [
             *(

@@ -22,8 +22,6 @@ registry alone, and needs neither root nor libraries beyond C's. The Chromium is
 x86-64; elsewhere `browser/chromium.py` finds what the system has.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 import os
 from pathlib import Path
@@ -35,7 +33,6 @@ import sys
 
 _HERE = Path(__file__).parent
 _PACKAGE = ('package.json', 'package-lock.json')
-
 FOREIGN_READER = Path(sys.prefix, 'foreign_reader')
 """Where the packages of the reader are installed."""
 
@@ -74,19 +71,7 @@ def node(*parts: str) -> Path:
 
 
 def install_foreign_reader() -> None:
-    """
-    Install what `bag/foreign_reader/read.cjs` needs, unless it is there.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        There is no Node.js.
-    UnreachableError
-        The npm registry cannot be reached.
-    RuntimeError
-        It can, and something else is wrong.
-
-    """
+    """Install what `bag/foreign_reader/read.cjs` needs, unless it is there."""
     _install(_HERE / 'bag' / 'foreign_reader', _PACKAGE, FOREIGN_READER)
 
 

@@ -13,12 +13,10 @@
 # limitations under the License.
 
 """
-What a scene may say to each effect, drive and fault: as what it is read, and how it is refused.
+Parameters of each effect, drive and fault: how they are read from a scene, and refused.
 
 A row is what stands behind the name in a scene file; in a message, … stands for any text.
 """
-
-from __future__ import annotations
 
 from importlib import import_module
 import re
@@ -214,7 +212,7 @@ REFUSED_DRIVES = {
         ('{table: [[0, 1]]}', 'table: has one row'),
         (
             '{table: [[0, 1], [1, 2]], interpolation: quintic}',
-            "interpolation: 'quintic' is none; write linear or cubic or min",
+            "interpolation: 'quintic' is not a choice; write linear or cubic or min",
         ),
     ],
     'sine': [
@@ -235,24 +233,28 @@ REFUSED_DRIVES = {
         (f'{{{CHIRP}, end_frequency: 2, seconds: 0}}', 'seconds: 0 is out of bounds'),
         (
             f'{{{CHIRP}, end_frequency: 2, seconds: 1, sweep: log}}',
-            "sweep: 'log' is none; write linear or logarithmic",
+            "sweep: 'log' is not a choice; write linear or logarithmic",
         ),
     ],
     'bag': [
         ('{}', "the key 'file' is missing"),
         ('{file: 3}', 'file: 3 is not a text'),
         ('{file: b, topc: x}', "topc: unknown key; did you mean 'topic'?"),
-        ('{file: b, pace: slow}', "pace: 'slow' is none; write recorded or fast"),
+        ('{file: b, pace: slow}', "pace: 'slow' is not a choice; write recorded or fast"),
         ('{file: b, max_age: 0}', 'max_age: 0 is out of bounds'),
     ],
 }
 
 REFUSED_FAULTS = [
     ('mine', '{silense: {}}', "faults.mine.silense: unknown key; did you mean 'silence'?"),
-    ('mine', '{}', 'faults.mine: 0 kinds; name one of'),
+    ('mine', '{}', 'faults.mine: names no kind of fault; write mine: {freeze: '),
     ('my own', '{silence: {}}', "faults.my own: 'my own' is no ROS name; use letters"),
     ('1st', '{silence: {}}', "faults.1st: '1st' is no ROS name; use letters"),
-    ('mine', '{silence: {}, freeze: {}}', 'faults.mine: 2 kinds; name one of'),
+    (
+        'mine',
+        '{silence: {}, freeze: {}}',
+        'faults.mine: names 2 kinds of fault; leave all but one of ',
+    ),
     ('mine', '{stuck: {joint: rokker_joint}}', "faults.mine…did you mean 'rocker_joint'?"),
     ('mine', '{stuck: {}}', "faults.mine.stuck: the key 'joint' is missing"),
     ('mine', '{broken_link: {link: ground}}', "faults.mine…there is no link 'ground'"),

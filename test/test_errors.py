@@ -14,8 +14,6 @@
 
 """Errors: each can go from one process to another, and says no more than can be read."""
 
-from __future__ import annotations
-
 from importlib import import_module
 import pickle
 from pkgutil import walk_packages
@@ -46,7 +44,7 @@ def errors_of_the_package() -> list[type[BaseException]]:
     return list(found)
 
 
-def test_every_error_comes_back_from_another_process() -> None:
+def test_every_error_comes_back_from_another_process():
     kinds = errors_of_the_package()
     assert {LinkageError, FileError, PartError} <= set(kinds)
     for kind in kinds:
@@ -56,7 +54,7 @@ def test_every_error_comes_back_from_another_process() -> None:
         assert (str(copy), copy.args, vars(copy)) == (str(error), error.args, vars(error))
 
 
-def test_a_list_of_names_is_short_and_says_how_many_more_there_are() -> None:
+def test_a_list_of_names_is_short_and_says_how_many_more_there_are():
     assert listed(['a', 'b\n', 'c']) == 'a, b\\n, c'
     assert listed([]) == ''
     names = [f'joint_{number:03}' for number in range(1000)]
@@ -68,7 +66,7 @@ def test_a_list_of_names_is_short_and_says_how_many_more_there_are() -> None:
     assert len(listed(['x' * 100_000] * 3)) < 1000
 
 
-def test_an_error_that_lists_the_names_of_a_file_can_be_read() -> None:
+def test_an_error_that_lists_the_names_of_a_file_can_be_read():
     names = [f'{number:04}_{"x" * 60}' for number in range(300)]
     links = '\n'.join(f'  {name}: {{A: [0, 0], P{name}: [1, 0]}}' for name in names)
     text = f"""

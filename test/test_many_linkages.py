@@ -15,8 +15,6 @@
 
 """A scene of several linkages: each as it would be alone, and one joint state for all."""
 
-from __future__ import annotations
-
 from linkage_ros.errors import FileError
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.pipeline.pipeline import Pipeline

@@ -14,13 +14,10 @@
 
 """Declarations of messages, against the definitions that rosbags has of Jazzy's."""
 
-from __future__ import annotations
-
 from linkage_ros.messages.joint_state import JOINT_STATE
-from linkage_ros.messages.joint_trajectory import JOINT_TRAJECTORY
+from linkage_ros.messages.joint_values import JOINT_TRAJECTORY, MULTI_DOF_JOINT_STATE
 from linkage_ros.messages.layout import MalformedError, packed, parsed
 from linkage_ros.messages.marker_array import MARKER_ARRAY
-from linkage_ros.messages.multi_dof_joint_state import MULTI_DOF_JOINT_STATE
 from linkage_ros.report.diagnostics_summary import DIAGNOSTIC_ARRAY
 import pytest
 from rosbags.interfaces import Nodetype

@@ -18,8 +18,6 @@ JointState messages that are read, as crank samples and as effort commands, agai
 The readers answer every sequence of bytes with what they read or a rejection, and never raise.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Callable
 from math import isnan
@@ -28,9 +26,10 @@ from typing import Any, NamedTuple
 
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from linkage_ros.messages.joint_effort import EffortCommand, JointEffortReader
 from linkage_ros.messages.joint_state import (
     CrankSample,
+    EffortCommand,
+    JointEffortReader,
     JointStateReader,
     JointStateWriter,
     OwnJointStates,
@@ -42,7 +41,6 @@ from .support.messages import joint_state as serialized
 
 NS = 1_000_000_000
 CRANK = 'crank_joint'
-
 names_ = st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0'), max_size=12)
 doubles = st.floats(width=64)
 

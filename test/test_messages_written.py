@@ -14,8 +14,6 @@
 
 """Messages that are written: by rosbags and by rclpy they are the same to the last byte."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from math import cos, sin
@@ -24,9 +22,8 @@ from typing import Any, NamedTuple
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.joint_trajectory import JointTrajectoryWriter
+from linkage_ros.messages.joint_values import JointTrajectoryWriter, PlanarWrenchWriter
 from linkage_ros.messages.marker_array import ADD, DELETE, Marker, MarkerArrayWriter
-from linkage_ros.messages.multi_dof_joint_state import PlanarWrenchWriter
 import numpy as np
 import pytest
 
@@ -35,7 +32,6 @@ from .support.messages import header, JOINT_STATE, STORE
 NS = 1_000_000_000
 LAST = (2**31 - 1) * NS
 TYPES = STORE.types
-
 texts = st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0'), max_size=12)
 times = st.integers(0, LAST)
 doubles = st.floats(width=64)
@@ -44,19 +40,12 @@ places = st.tuples(finite, finite, finite)
 # A value that a float32 can hold is read back unchanged.
 share = st.sampled_from([0.0, 0.25, 0.5, 1.0])
 markers_ = st.builds(
-    Marker,
-    ns=texts,
-    number=st.integers(-(2**31), 2**31 - 1),
-    kind=st.integers(0, 12),
-    scale=places,
-    colour=st.tuples(share, share, share, share),
+    Marker, ns=texts, number=st.integers(-(2**31), 2**31 - 1), kind=st.integers(0, 12),
+    scale=places, colour=st.tuples(share, share, share, share),
     points=st.lists(places, max_size=4),
-    at=st.complex_numbers(allow_nan=False, allow_infinity=False),
-    z=finite,
-    text=texts,
-    action=st.sampled_from([ADD, DELETE]),
-    lifetime=times,
-)
+    at=st.complex_numbers(allow_nan=False, allow_infinity=False), z=finite, text=texts,
+    action=st.sampled_from([ADD, DELETE]), lifetime=times
+)  # fmt: skip
 FULL = Marker(
     'links', 7, 4, (1.0, 2.0, 3.0), (0.25, 0.5, 0.75, 1.0),
     [(4.0, 5.0, 6.0), (7.0, 8.0, 9.0)], 10 + 11j, 12.0, 'offen', ADD, 13 * NS + 14,
@@ -110,29 +99,22 @@ def marker_message(frame, marker, stamp, angle=0.0):
     point = TYPES['geometry_msgs/msg/Point']
     nothing = np.array([], np.uint8)
     return TYPES['visualization_msgs/msg/Marker'](
-        header=header(divmod(stamp, NS), frame),
-        ns=marker.ns,
-        id=marker.number,
-        type=marker.kind,
+        header=header(divmod(stamp, NS), frame), ns=marker.ns, id=marker.number, type=marker.kind,
         action=marker.action,
         pose=TYPES['geometry_msgs/msg/Pose'](
             point(marker.at.real, marker.at.imag, marker.z),
-            TYPES['geometry_msgs/msg/Quaternion'](0.0, 0.0, sin(angle / 2), cos(angle / 2)),
+            TYPES['geometry_msgs/msg/Quaternion'](0.0, 0.0, sin(angle / 2), cos(angle / 2))
         ),
         scale=TYPES['geometry_msgs/msg/Vector3'](*marker.scale),
         color=TYPES['std_msgs/msg/ColorRGBA'](*marker.colour),
         lifetime=TYPES['builtin_interfaces/msg/Duration'](*divmod(marker.lifetime, NS)),
-        frame_locked=False,
-        points=[point(*place) for place in marker.points],
-        colors=[],
+        frame_locked=False, points=[point(*place) for place in marker.points], colors=[],
         texture_resource='',
-        texture=TYPES['sensor_msgs/msg/CompressedImage'](header(), '', nothing),
-        uv_coordinates=[],
-        text=marker.text,
-        mesh_resource='',
+        texture=TYPES['sensor_msgs/msg/CompressedImage'](header(), '', nothing), uv_coordinates=[],
+        text=marker.text, mesh_resource='',
         mesh_file=TYPES['visualization_msgs/msg/MeshFile']('', nothing),
-        mesh_use_embedded_materials=False,
-    )
+        mesh_use_embedded_materials=False
+    )  # fmt: skip
 
 
 def marker_array(frame, markers, stamp):

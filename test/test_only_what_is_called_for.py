@@ -13,13 +13,11 @@
 # limitations under the License.
 
 """
-What a scene does not call for is not imported, not built, and not in the trace of a tick.
+A scene imports and builds only what it calls for; nothing else is in the trace of a tick.
 
 One scene for each effect, drive, fault and solver, with that alone, in a process of its own: its
 arrays, stages and topics are those that were asked for, and so is what Python has loaded.
 """
-
-from __future__ import annotations
 
 import json
 import os

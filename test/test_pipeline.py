@@ -15,8 +15,6 @@
 
 """A scene at work: crank messages in, joint states out, and the same again to the last bit."""
 
-from __future__ import annotations
-
 from cmath import exp
 from math import pi, remainder, tau
 import os
@@ -30,10 +28,9 @@ from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.pipeline.pipeline import LinkageTick
 import pytest
 
-from .node.loops import FIVE_BAR
 from .support.messages import read_joint_state as read
 from .support.messages import STORE
-from .support.scenes import pipeline_of
+from .support.scenes import FIVE_BAR, pipeline_of
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
@@ -118,7 +115,7 @@ def test_without_velocity_the_array_is_empty():
         ('{velocity: {}}', {'effects.velocity'}),
         (
             '{acceleration: {}}',
-            {'effects.velocity', 'effects.acceleration', 'messages.joint_trajectory'},
+            {'effects.velocity', 'effects.acceleration', 'messages.joint_values'},
         ),
     ],
 )
@@ -140,7 +137,7 @@ def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
         check=True,
     )
     modules = set(done.stdout.split())
-    optional = {'effects.velocity', 'effects.acceleration', 'messages.joint_trajectory'}
+    optional = {'effects.velocity', 'effects.acceleration', 'messages.joint_values'}
     assert {name for name in optional if f'linkage_ros.{name}' in modules} == imported
     assert not modules & {'rclpy', 'trajectory_msgs'}
 

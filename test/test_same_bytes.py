@@ -15,8 +15,6 @@
 
 """Two runs of one scene, in processes of their own, give identical bytes: every shipped scene."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 import subprocess

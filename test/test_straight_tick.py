@@ -14,8 +14,6 @@
 
 """The usual tick, written as one function, does to the last bit what the plain steps do."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

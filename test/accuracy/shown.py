@@ -15,21 +15,27 @@
 
 """Results that have all that results may have; nobody has measured them."""
 
-from __future__ import annotations
-
 from math import inf, nan
 
-from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Results, Table
+from linkage_ros.accuracy.results import (
+    Axis,
+    Choice,
+    Curve,
+    Diagram,
+    Part,
+    Point,
+    Rate,
+    Results,
+    Table,
+)
 from linkage_ros.measuring import Spread
 
 TIME, ERROR = Axis('time per state', 'µs'), Axis('greatest error', 'rad')
-
 CLOSING = 'closing </script><b>tag</b> & "quotes"'
 LONG = (
     'Newton warm-started from the state before, to a tolerance, with its Jacobian in closed form'
 )
 FOREIGN = 'größe ω̇ of 曲柄, $5$ and | a_b*c*'
-
 CHEAP = Curve('closed form', [Point(0.7, 2.1e-16, Spread(0.68, 0.7, 0.75), None, 'double')])
 NEWTON = Curve(
     LONG,
@@ -45,6 +51,8 @@ ASTRAY = Curve(
     FOREIGN, [Point(9.0, 0.1, None, None, 'started well'), Point(9.5, inf)], joined=False
 )
 
+ONE = Spread(0.9, 1.0, 1.1)
+
 POSITION = Diagram(
     'solving_position',
     f'Position: {CLOSING} is what $is$ most accurate, and this title goes on for so long that it '
@@ -52,6 +60,7 @@ POSITION = Diagram(
     TIME,
     ERROR,
     [CHEAP, NEWTON, EXACT, ASTRAY],
+    front=True,
 )
 MANY = Diagram(
     'solving_many',
@@ -112,12 +121,33 @@ RESULTS = Results(
         Part(
             'solving',
             'Solving the loop',
-            ['How it was measured, in <i>words</i>.', 'And what it says: $x$ and $y$.'],
+            f'Exact to a headline of {CLOSING}.',
+            ['And what it says: $x$ and $y$.', FOREIGN],
+            ['How it was measured, in <i>words</i>.'],
             [POSITION, MANY],
             [METHODS],
             ['For 1e-6 rad: a table.', f'For 1e-12 rad: {CLOSING}.'],
+            f'exact to {CLOSING}',
+            [
+                Choice(1e-3, 'solver: {table: {tolerance: 0.001}}', ONE, Spread(1.9, 2.0, 2.1)),
+                Choice(2.1e-16, 'solver: closed_form # the default', ONE, Spread(2.9, 3.0, 3.1)),
+            ],
         ),
-        Part('ticking', 'Ticking', [], [EMPTY, FAILED, LINE], [NOTHING]),
-        Part('recording', 'Recording', []),
+        Part(
+            'ticking',
+            'Ticking',
+            'A headline.',
+            [],
+            [],
+            [EMPTY, FAILED, LINE],
+            [NOTHING],
+            rates=[
+                Rate(100.0, 0.1, 'held'),
+                Rate(100.0, 1e-2, 'carried forward'),
+                Rate(1000.0, 1e-2, 'held'),
+                Rate(1000.0, 1e-4, 'carried forward'),
+            ],
+        ),
+        Part('recording', 'Recording', 'Nothing was recorded.'),
     ],
 )

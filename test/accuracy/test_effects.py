@@ -15,8 +15,6 @@
 
 """The error of published states, for effects whose error has a formula."""
 
-from __future__ import annotations
-
 from itertools import islice
 from math import isclose, pi, radians, sin, sqrt, tau
 

@@ -14,8 +14,6 @@
 
 """Methods are as accurate, and of the order, that their theory says."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -42,7 +40,6 @@ from linkage_ros.accuracy.solving import PEERS
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.sweep_analysis import InputSweep
-from linkage_ros.solvers.table import Order
 import numpy as np
 import pytest
 
@@ -97,7 +94,7 @@ MADE: dict[str, tuple[Callable[[Linkage], Method | None], float]] = {
 
 @pytest.mark.parametrize('name', [*FOUR_BARS, 'turned about', 'crank too'])
 @pytest.mark.parametrize('made', MADE)
-def test_a_four_bar_is_solved_to_the_digits_of_the_method(name: str, made: str) -> None:
+def test_a_four_bar_is_solved_to_the_digits_of_the_method(name, made):
     linkage = linkage_of(name)
     make, bound = MADE[made]
     method = make(linkage)
@@ -116,9 +113,7 @@ def test_a_four_bar_is_solved_to_the_digits_of_the_method(name: str, made: str) 
 
 @pytest.mark.parametrize('name', [*FOUR_BARS, 'turned about', 'crank too'])
 @pytest.mark.parametrize('make', PEERS)
-def test_peers_solve_the_same_four_bars(
-    name: str, make: Callable[[Linkage], Method | None]
-) -> None:
+def test_peers_solve_the_same_four_bars(name, make):
     pytest.importorskip(make.__name__)
     linkage = linkage_of(name)
     method = make(linkage)
@@ -132,23 +127,19 @@ def test_peers_solve_the_same_four_bars(
 
 @pytest.mark.parametrize('make', [single_precision, textbook, *PEERS])
 @pytest.mark.parametrize('name', ['jansen_leg', 'slider_crank', 'class_3', 'five_bar', 'watt_1'])
-def test_what_is_no_four_bar_is_not_taken_for_one(
-    name: str, make: Callable[[Linkage], Method | None]
-) -> None:
+def test_what_is_no_four_bar_is_not_taken_for_one(name, make):
     assert plain_four_bar(shipped_linkage(name)) is None
     assert make(shipped_linkage(name)) is None
 
 
-def test_what_is_iterated_is_not_called_a_closed_form() -> None:
+def test_what_is_iterated_is_not_called_a_closed_form():
     assert closed_form(shipped_linkage('class_3')).name == ITERATED
     assert closed_form(shipped_linkage('jansen_leg')).name == CLOSED_FORM
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'crank too', 'jansen_leg', 'slider_crank'])
 @pytest.mark.parametrize('make', [closed_form, single_precision])
-def test_arrays_hold_what_single_states_do(
-    name: str, make: Callable[[Linkage], Method | None]
-) -> None:
+def test_arrays_hold_what_single_states_do(name, make):
     linkage = linkage_of(name)
     method = make(linkage)
     if method is None:
@@ -165,7 +156,7 @@ def test_arrays_hold_what_single_states_do(
         assert np.allclose(rows, expected, rtol=0.0, atol=30 * np.finfo(rows.dtype).eps)
 
 
-def test_float32_is_float32_all_the_way() -> None:
+def test_float32_is_float32_all_the_way():
     method = single_precision(shipped_linkage('four_bar'))
     assert method is not None
     assert method.motion is not None
@@ -188,12 +179,12 @@ def wrong(angle: float, d: float = 1.0) -> float | None:
     return off(linkage, joints, truth_at(linkage, angle)) if joints else None
 
 
-def test_the_textbook_form_has_no_answer_where_the_pin_stands_over_the_pivot() -> None:
+def test_the_textbook_form_has_no_answer_where_the_pin_stands_over_the_pivot():
     # numerics.md: a = 2, b = c = 3, d = 1 at 60 degrees; in doubles 2·cos 60° is 1 + 2⁻⁵².
     assert wrong(radians(60.0), d=2.0 * cos(radians(60.0))) is None
 
 
-def test_the_textbook_form_is_wrong_by_the_inverse_square_next_to_it() -> None:
+def test_the_textbook_form_is_wrong_by_the_inverse_square_next_to_it():
     # numerics.md: both roots 0.2 to 0.3 rad off at 1e-9 rad, as 1/(d − Ax)² farther away.
     near = [abs(wrong(radians(60.0) + side * 1e-9) or 0.0) for side in (-1, 1)]
     assert max(near) > 0.1
@@ -203,14 +194,14 @@ def test_the_textbook_form_is_wrong_by_the_inverse_square_next_to_it() -> None:
     assert far[0] > 20 * far[1] > 400 * far[2] > 0.0
 
 
-def test_the_textbook_root_is_the_other_assembly_beyond_it() -> None:
+def test_the_textbook_root_is_the_other_assembly_beyond_it():
     assert (wrong(1.2) or 0.0) < 1e-13
     assert (wrong(0.9) or 0.0) > 0.5
 
 
 @pytest.mark.parametrize('name', ['double_rocker', 'excavator_bucket', 'class_3'])
 @pytest.mark.parametrize(('method', 'order'), [('Euler', 1), ('Runge-Kutta 4', 4)])
-def test_integration_has_its_order(name: str, method: str, order: int) -> None:
+def test_integration_has_its_order(name, method, order):
     linkage = shipped_linkage(name)
     inputs = easy(Closure(linkage), 8)
     way = path(Poses('easy', '', name, linkage, inputs), 32)
@@ -270,7 +261,7 @@ def slope(errors: Sequence[float], factor: float) -> float:
 @pytest.mark.parametrize(
     ('kind', 'orders'), [('linear', (2, 1, None)), ('hermite', (4, 3, 2))]
 )  # of positions, rates and accelerations; a chord has no acceleration of its own
-def test_tables_have_their_orders(name: str, kind: Order, orders: tuple[int | None, ...]) -> None:
+def test_tables_have_their_orders(name, kind, orders):
     linkage = dyads_of(name)
     cells = (135, 405, 1215)
     interval = InputSweep(Closure(linkage)).widest_range
@@ -288,7 +279,7 @@ def test_tables_have_their_orders(name: str, kind: Order, orders: tuple[int | No
 
 
 @pytest.mark.parametrize('kind', ['linear', 'hermite'])
-def test_a_table_holds_what_its_knots_need(kind: Order) -> None:
+def test_a_table_holds_what_its_knots_need(kind):
     linkage = shipped_linkage('four_bar')
     small, large = (table(linkage, n, kind) for n in (64, 256))
     assert small.memory
@@ -301,7 +292,7 @@ def test_a_table_holds_what_its_knots_need(kind: Order) -> None:
 
 # Iterated links start from the curve of their branch, whatever the last state was.
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'jansen_leg'])
-def test_a_step_of_newton_squares_the_distance_that_it_starts_from(name: str) -> None:
+def test_a_step_of_newton_squares_the_distance_that_it_starts_from(name):
     linkage = dyads_of(name)
     begin = tau / 256 * 40
     errors = []
@@ -317,7 +308,7 @@ def test_a_step_of_newton_squares_the_distance_that_it_starts_from(name: str) ->
 
 @pytest.mark.parametrize('name', SOME)
 @pytest.mark.parametrize('start', STARTS)
-def test_what_newton_leaves_is_of_the_square_of_the_tolerance(name: str, start: str) -> None:
+def test_what_newton_leaves_is_of_the_square_of_the_tolerance(name, start):
     linkage = dyads_of(name)
     states = easy(Closure(linkage), 24)
     truths = truths_of(linkage, states)
@@ -327,7 +318,7 @@ def test_what_newton_leaves_is_of_the_square_of_the_tolerance(name: str, start: 
         assert error < 200.0 * tolerance**2 + 2e-14, tolerance
 
 
-def test_newton_is_called_by_where_it_starts() -> None:
+def test_newton_is_called_by_where_it_starts():
     linkage = shipped_linkage('four_bar')
     assert {start: newton(linkage, 1e-6, start).remembers for start in STARTS} == {
         FROM_KNOTS: False,

@@ -15,8 +15,6 @@
 
 """The folder of a page: its files are complete or absent, and have the expected content."""
 
-from __future__ import annotations
-
 import csv
 from html import unescape
 import io
@@ -24,6 +22,7 @@ from math import isnan
 import re
 import xml.etree.ElementTree as ET
 
+from linkage_ros.accuracy.page.diagrams import places
 from linkage_ros.accuracy.page.files import page_files, write_page
 from linkage_ros.accuracy.page.numbers import diagram_csv, table_csv
 from linkage_ros.accuracy.results import Diagram, Part, Results, Table
@@ -132,7 +131,8 @@ def test_a_picture_has_all_curves_and_says_their_names_units_and_message(files, 
     said = ' '.join(
         ' '.join(unescape(each.text).split()) for each in picture.iter() if each.tag is ET.Comment
     )
-    for text in (diagram.title, diagram.x.unit, diagram.y.unit, *(c.name for c in diagram.curves)):
+    named = [curve.curve.name for curve in places(diagram).curves if curve.named]
+    for text in (diagram.title, diagram.x.unit, diagram.y.unit, *named):
         assert ' '.join(text.split()) in said
 
 
@@ -180,7 +180,7 @@ def test_what_draws_is_missed_before_anything_is_written(tmp_path, monkeypatch, 
     def find_spec(name):
         return None if name == missing else object()
 
-    monkeypatch.setattr('linkage_ros.accuracy.page.files.find_spec', find_spec)
+    monkeypatch.setattr('linkage_ros.errors.find_spec', find_spec)
     with pytest.raises(LinkageError, match=rf'{missing}: is not installed; pip install'):
         write_page(RESULTS, tmp_path / 'page')
 
@@ -189,4 +189,4 @@ def test_what_draws_is_missed_before_anything_is_written(tmp_path, monkeypatch, 
 def test_a_key_is_the_name_of_one_file(keys):
     diagrams = [Diagram(key, '', POSITION.x, POSITION.y, []) for key in keys]
     with pytest.raises(ValueError, match='is no name of a file'):
-        page_files(Results('', [], [Part('solving', '', [], diagrams)]))
+        page_files(Results('', [], [Part('solving', '', '', diagrams=diagrams)]))

@@ -14,8 +14,6 @@
 
 """Numbers on the page are written, and points placed, where a reader expects them."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from math import inf, nan
 
@@ -125,6 +123,37 @@ def test_a_point_says_its_values_with_their_units_and_its_setting():
     )
 
 
+def drawn_front(*values):
+    diagram = Diagram('key', '', LOGARITHMIC, LOGARITHMIC, [Curve('curve', values)], front=True)
+    return places(diagram)
+
+
+def test_what_is_worse_on_both_axes_is_pale_and_the_front_is_the_rest():
+    found = drawn_front(
+        Point(1.0, 1e-3), Point(2.0, 1e-6), Point(3.0, 1e-5), Point(2.0, 1e-4), Point(9.0, 1e-9)
+    )
+    assert [point.pale for point in found.curves[0].points] == [False, False, True, True, False]
+    assert [(point.x, point.y) for point in found.front] == [(1.0, 1e-3), (2.0, 1e-6), (9.0, 1e-9)]
+
+
+def test_a_method_that_fails_somewhere_is_on_no_front():
+    found = drawn_front(Point(1.0, 1e-9, fails=True), Point(2.0, 1e-3), Point(1.0, inf))
+    assert [point.pale for point in found.curves[0].points] == [True, False, True]
+
+
+def test_where_more_may_be_better_nothing_is_pale():
+    found = drawn(Point(1.0, 1.0), Point(2.0, 2.0))
+    assert not any(point.pale for point in found.curves[0].points)
+    assert not found.front
+
+
+def test_a_name_stands_beside_the_best_point_of_its_curve():
+    best = drawn_front(Point(1.0, 1e-3), Point(1.0, 1e-6), Point(2.0, 1e-9), Point(3.0, 1e-9))
+    assert best.curves[0].named == best.curves[0].points[1]
+    assert drawn(Point(1.0, 1.0), Point(2.0, 2.0)).curves[0].named.x == 2.0
+    assert drawn(Point(nan, 1.0)).curves[0].named is None
+
+
 NUMBERS = strategies.floats()
 
 
@@ -148,7 +177,7 @@ def test_a_method_looks_the_same_in_all_diagrams_and_like_no_other_beside_it():
 def test_methods_that_never_meet_share_the_first_look():
     def part(name):
         diagram = Diagram(name, '', LINEAR, LINEAR, [Curve(name, [])])
-        return Part(name, '', [], [diagram])
+        return Part(name, '', '', diagrams=[diagram])
 
     styles = styles_of([Results('', [], [part('one'), part('two')])])
     assert styles['one'] == styles['two']

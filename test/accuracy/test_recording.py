@@ -15,8 +15,6 @@
 
 """Cost of recording: the counts of real runs agree, and figures equal those computed by hand."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 from linkage_ros.accuracy import recording
@@ -178,6 +176,15 @@ def test_advice_is_the_cheapest_that_is_safe_enough(scene_at):
     assert '12.0 µs of processor time, not packed 10.5 µs' in packed
 
 
+def test_the_headline_is_that_of_the_setting_of_the_scene(scene_at):
+    scene = scene_at(1000)
+    costs = [cost(0.5, cpu=20.0), cost(1.0, 'zstd', cpu=15.0), cost(1.0), cost(2.0, cpu=9.0)]
+    part = part_of(scene, costs)
+    assert part.headline == 'Recording costs 10 µs a message and may lose 1 s in a crash.'
+    assert part.clause == 'recording costs 10 µs a message and may lose 1 s in a crash'
+    assert 'zstd' in part.sentences[1]
+
+
 def test_what_no_period_keeps_safe_is_said(scene_at):
     first, *_ = part_of(scene_at(1000), [cost(0.5), cost(2.0)]).advice
     assert first == 'No flush period here keeps what a power cut may take below 0.1 s.'
@@ -217,17 +224,18 @@ def test_a_part_of_the_page(scene_at, tmp_path, monkeypatch):
         'flush_period: 0.2',
         'flush_period: 0.2, compression: lz4',
         'flush_period: 0.2, compression: zstd',
+        'flush_period: 1',
     ]
     assert all(len(row) == len(table.columns) for row in table.rows)
     rows = [dict(zip(table.columns, row, strict=True)) for row in table.rows[1:]]
-    assert [row['dropped [messages]'] for row in rows] == [0, 0, 0, 0]
-    *plain, lz4, zstd = (row['in the bag [bytes/message]'].high for row in rows)
-    assert min(plain) > max(lz4, zstd), 'half of a message is names and zeros'
+    assert [row['dropped [messages]'] for row in rows] == [0] * 5
+    *plain, lz4, zstd, default = (row['in the bag [bytes/message]'].high for row in rows)
+    assert min(*plain, default) > max(lz4, zstd), 'half of a message is names and zeros'
     stakes = [row['a power cut may take [ms]'].low for row in rows]
-    assert all(at >= 900 * p for at, p in zip(stakes, (0.05, 0.2, 0.2, 0.2), strict=True))
+    assert all(at >= 900 * p for at, p in zip(stakes, (0.05, 0.2, 0.2, 0.2, 1.0), strict=True))
     for diagram in part.diagrams:
         assert [(c.name, len(c.points)) for c in diagram.curves] == [
-            ('not packed', 2),
+            ('not packed', 3),
             ('lz4', 1),
             ('zstd', 1),
         ]

@@ -14,8 +14,6 @@
 
 """The reference is true: by algebra, by another's balls, by its own differences, and proved."""
 
-from __future__ import annotations
-
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -73,7 +71,7 @@ def coefficient(truth: Any, joint: int, order: int, turning: bool) -> mpf:
 
 
 @pytest.mark.parametrize('family', FAMILIES)
-def test_random_linkages_of_every_dyad_are_as_the_campaign_has_them(family: str) -> None:
+def test_random_linkages_of_every_dyad_are_as_the_campaign_has_them(family):
     compared = 0
     for index in range(3):
         mechanism, angles, accelerations = make(7, family, index)
@@ -94,7 +92,7 @@ def test_random_linkages_of_every_dyad_are_as_the_campaign_has_them(family: str)
 
 
 @pytest.mark.parametrize('family', ['any lengths', 'fold and stretch', 'crank along ground'])
-def test_four_bars_are_as_by_algebra(family: str) -> None:
+def test_four_bars_are_as_by_algebra(family):
     compared = 0
     for a, b, c, d, phi, side in four_bars(family, 100):
         expected = algebra.four_bar(a, b, c, d, phi, side, digits=120)
@@ -115,7 +113,7 @@ def test_four_bars_are_as_by_algebra(family: str) -> None:
     assert compared > 15
 
 
-def test_the_worked_inverted_slider_crank_to_twenty_digits() -> None:
+def test_the_worked_inverted_slider_crank_to_twenty_digits():
     # AB 15, A to D 25, D to C 10, crank at 60 degrees: r3 and θ3, as the sources' README has them.
     linkage = Linkage(
         links={
@@ -136,7 +134,7 @@ def test_the_worked_inverted_slider_crank_to_twenty_digits() -> None:
 
 
 @pytest.mark.parametrize('distance', [1e-3, -1e-3, 1e-6, 1e-9, -1e-9, 1e-12])
-def test_a_parallelogram_next_to_its_change_point_turns_as_its_crank(distance: float) -> None:
+def test_a_parallelogram_next_to_its_change_point_turns_as_its_crank(distance):
     found = Reference(shipped_linkage('parallelogram')).solve([distance], [1.0], [0.5])
     for order, value in enumerate((distance, 1.0, 0.5)):
         rod, follower = found.orders[order]
@@ -147,7 +145,7 @@ def test_a_parallelogram_next_to_its_change_point_turns_as_its_crank(distance: f
 @pytest.mark.parametrize(
     'name', ['class_3', 'five_bar', 'excavator_bucket', 'whitworth_quick_return']
 )
-def test_derivatives_are_those_of_its_positions(name: str) -> None:
+def test_derivatives_are_those_of_its_positions(name):
     linkage = shipped_linkage(name)
     reference, inputs = Reference(linkage), usual_inputs(Closure(linkage))
     rates = [0.7 - 1.1 * k for k in range(len(inputs))]
@@ -194,7 +192,7 @@ def held_by(proof: Any, truth: Any, turning: tuple[bool, ...]) -> bool:
 
 
 @pytest.mark.parametrize('name', [*SHIPPED, 'five dyads'])
-def test_balls_prove_it_for_every_shipped_linkage(name: str) -> None:
+def test_balls_prove_it_for_every_shipped_linkage(name):
     linkage = linkage_of(name)
     closure = Closure(linkage)
     inputs = usual_inputs(closure)
@@ -207,7 +205,7 @@ def test_balls_prove_it_for_every_shipped_linkage(name: str) -> None:
     [('double_rocker', near_toggle), ('excavator_bucket', near_toggle),
      ('parallelogram', near_change_point)],
 )  # fmt: skip
-def test_balls_prove_it_next_to_trouble(name: str, find: Any) -> None:
+def test_balls_prove_it_next_to_trouble(name, find):
     linkage = shipped_linkage(name)
     closure, reference = Closure(linkage), Reference(linkage)
     for inputs in find(closure)[0][::7]:
@@ -215,7 +213,7 @@ def test_balls_prove_it_next_to_trouble(name: str, find: Any) -> None:
         assert held_by(prove(linkage, *driven), reference.solve(*driven), closure.turning), inputs
 
 
-def test_a_ball_does_not_hold_what_is_off_by_1e_30() -> None:
+def test_a_ball_does_not_hold_what_is_off_by_1e_30():
     linkage = shipped_linkage('four_bar')
     driven = [1.0], [1.0], [0.5]
     truth = Reference(linkage).solve(*driven)
@@ -226,7 +224,7 @@ def test_a_ball_does_not_hold_what_is_off_by_1e_30() -> None:
     assert not held_by(proof, moved, (True, True))
 
 
-def test_a_change_point_itself_has_no_reference() -> None:
+def test_a_change_point_itself_has_no_reference():
     linkage = shipped_linkage('parallelogram')
     with pytest.raises(SingularError, match='singular'):
         Reference(linkage).solve([0.0])
@@ -234,14 +232,14 @@ def test_a_change_point_itself_has_no_reference() -> None:
         prove(linkage, [0.0])
 
 
-def test_what_does_not_close_has_none() -> None:
+def test_what_does_not_close_has_none():
     linkage = shipped_linkage('double_rocker')
     for solve in (Reference(linkage).solve, lambda inputs: prove(linkage, inputs)):
         with pytest.raises(ValueError, match='open'):
             solve([3.0])
 
 
-def test_a_run_confirms_some_of_its_states_and_notices_one_that_differs() -> None:
+def test_a_run_confirms_some_of_its_states_and_notices_one_that_differs():
     linkage = shipped_linkage('jansen_leg')
     poses = Poses('easy', '', 'jansen_leg', linkage, tuple((0.1 * k,) for k in range(9)))
     truths = true_states(poses)

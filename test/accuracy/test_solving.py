@@ -14,8 +14,6 @@
 
 """Poses are near what they claim, errors repeat to the last bit, and advice follows from data."""
 
-from __future__ import annotations
-
 from math import inf, nan, pi
 
 from linkage_ros.accuracy.methods import Method
@@ -49,7 +47,7 @@ EVERYWHERE = ('four_bar', 'double_rocker', 'jansen_leg', 'excavator_bucket', 'el
 
 
 @pytest.mark.parametrize('name', EVERYWHERE)
-def test_easy_poses_are_many_different_closed_and_away_from_trouble(name: str) -> None:
+def test_easy_poses_are_many_different_closed_and_away_from_trouble(name):
     closure = Closure(shipped_linkage(name))
     poses = easy(closure, 24)
     assert len(poses) == len(set(poses)) == 24
@@ -60,7 +58,7 @@ def test_easy_poses_are_many_different_closed_and_away_from_trouble(name: str) -
         assert near.toggle_distance > (0.005 if closure.linkage.inputs[0].slider else 0.05)
 
 
-def test_easy_poses_are_a_path_there_and_back() -> None:
+def test_easy_poses_are_a_path_there_and_back():
     values = [x for (x,) in easy(Closure(shipped_linkage('four_bar')), 40)]
     span = max(values) - min(values)
     assert span > 0.95 * 2 * pi
@@ -69,14 +67,14 @@ def test_easy_poses_are_a_path_there_and_back() -> None:
 
 
 @pytest.mark.parametrize('count', [48, 128])
-def test_easy_poses_lie_anywhere_between_the_knots_of_tables(count: int) -> None:
+def test_easy_poses_lie_anywhere_between_the_knots_of_tables(count):
     values = [x for (x,) in easy(Closure(shipped_linkage('four_bar')), count)]
     for knots in KNOTS:
         places = [(x + pi) / (2 * pi) * knots % 1.0 for x in values]
         assert min(places) < 0.2 < 0.8 < max(places), knots
 
 
-def test_poses_near_a_toggle_are_as_far_from_it_as_they_say() -> None:
+def test_poses_near_a_toggle_are_as_far_from_it_as_they_say():
     linkage = shipped_linkage('double_rocker')
     inputs, distances = near_toggle(Closure(linkage))
     assert distances == DISTANCES
@@ -91,7 +89,7 @@ def test_poses_near_a_toggle_are_as_far_from_it_as_they_say() -> None:
     assert min(distances) < 1.001e-9 < 0.999e-2 < max(distances)
 
 
-def test_poses_at_a_change_point_pass_through_it() -> None:
+def test_poses_at_a_change_point_pass_through_it():
     inputs, distances = near_change_point(Closure(shipped_linkage('parallelogram')))
     values = [x for (x,) in inputs]
     assert values == sorted(values)
@@ -101,7 +99,7 @@ def test_poses_at_a_change_point_pass_through_it() -> None:
         assert any(abs(x - distance) < 1e-6 * distance for x in values)
 
 
-def test_what_a_linkage_does_not_have_a_guest_shows() -> None:
+def test_what_a_linkage_does_not_have_a_guest_shows():
     sets = {poses.key: poses for poses in pose_sets('mine', shipped_linkage('four_bar'), 8)}
     assert {key: (poses.name, poses.own) for key, poses in sets.items()} == {
         'easy': ('mine', True),
@@ -116,7 +114,7 @@ def test_what_a_linkage_does_not_have_a_guest_shows() -> None:
     assert own['toggle']
 
 
-def test_the_chain_has_five_dyads_and_closes_everywhere() -> None:
+def test_the_chain_has_five_dyads_and_closes_everywhere():
     closure = Closure(five_dyads())
     assert [isinstance(group, Dyad) for group in closure.structure.groups].count(True) == 5
     (interval,) = closure.input_ranges
@@ -131,7 +129,7 @@ def poses_of(name: str, *inputs: float, key: str = 'easy', away: float = 0.0) ->
     return Poses(key, key, name, shipped_linkage(name), states, (away,) * len(states))
 
 
-def test_an_angle_counts_modulo_a_turn_and_a_slide_by_the_size() -> None:
+def test_an_angle_counts_modulo_a_turn_and_a_slide_by_the_size():
     linkage = shipped_linkage('slider_crank')
     truth = Reference(linkage).solve([1.0])
     turning = Closure(linkage).turning
@@ -149,7 +147,7 @@ def test_an_angle_counts_modulo_a_turn_and_a_slide_by_the_size() -> None:
                truth) == pytest.approx(1e-3 / size)  # fmt: skip
 
 
-def test_no_answer_and_another_pose_count_as_failed() -> None:
+def test_no_answer_and_another_pose_count_as_failed():
     poses = poses_of('four_bar', 0.5, 1.0, 1.5, 2.0)
     truths = true_states(poses)
     answers = {
@@ -163,7 +161,7 @@ def test_no_answer_and_another_pose_count_as_failed() -> None:
     assert errors.worst == errors.middle == pytest.approx(1e-5)
 
 
-def test_next_to_a_change_point_the_other_assembly_is_a_failure() -> None:
+def test_next_to_a_change_point_the_other_assembly_is_a_failure():
     poses = poses_of('parallelogram', 1e-4, 1e-4, key='change_point', away=1e-4)
     truths = true_states(poses)
     answers = iter([[float(x) + by for x in truths[0].joints] for by in (1e-6, 2e-4)])
@@ -172,7 +170,7 @@ def test_next_to_a_change_point_the_other_assembly_is_a_failure() -> None:
     assert errors.worst == pytest.approx(1e-6)
 
 
-def test_what_remembers_is_judged_on_its_second_way() -> None:
+def test_what_remembers_is_judged_on_its_second_way():
     poses = poses_of('four_bar', 0.5, 1.0)
     truths = true_states(poses)
     calls: list[float] = []
@@ -187,7 +185,7 @@ def test_what_remembers_is_judged_on_its_second_way() -> None:
     assert (errors.worst or inf) < 1e-15
 
 
-def test_errors_of_two_runs_are_the_same_to_the_last_bit() -> None:
+def test_errors_of_two_runs_are_the_same_to_the_last_bit():
     linkage = shipped_linkage('four_bar')
     poses = Poses('easy', 'easy poses', 'four_bar', linkage, easy(Closure(linkage), 6))
     one, other = (
@@ -211,12 +209,12 @@ def found(name: str, micros: float, error: float, key: str = 'easy', spread: flo
                     {'position': time})  # fmt: skip
 
 
-def test_where_the_closed_form_wins_everywhere_advice_says_so_plainly() -> None:
+def test_where_the_closed_form_wins_everywhere_advice_says_so_plainly():
     (said,) = advice([found('closed form', 2.0, 1e-16), found('table, Hermite', 3.0, 1e-7)])
     assert said.startswith('The closed form wins at every accuracy')
 
 
-def test_where_another_is_cheaper_advice_names_it_for_what_it_reaches() -> None:
+def test_where_another_is_cheaper_advice_names_it_for_what_it_reaches():
     said = advice([
         found('closed form', 2.0, 1e-16),
         found('table, Hermite', 1.0, 5e-7, setting='256 knots'),
@@ -230,19 +228,19 @@ def test_where_another_is_cheaper_advice_names_it_for_what_it_reaches() -> None:
     assert 'For 1e-12 rad at easy poses: closed form' in said[3]
 
 
-def test_what_a_scene_cannot_have_is_not_advised() -> None:
+def test_what_a_scene_cannot_have_is_not_advised():
     (said,) = advice([found('closed form', 2.0, 1e-16), found('textbook form', 1.0, 1e-16)])
     assert said.startswith('The closed form wins')
 
 
-def test_what_is_cheaper_within_the_spread_only_does_not_win() -> None:
+def test_what_is_cheaper_within_the_spread_only_does_not_win():
     (said,) = advice(
         [found('closed form', 2.0, 1e-16, spread=0.1), found('table, Hermite', 1.9, 1e-16)]
     )
     assert 'wins at every accuracy' in said
 
 
-def test_advice_says_where_the_cheapest_does_not_hold() -> None:
+def test_advice_says_where_the_cheapest_does_not_hold():
     said = advice([
         found('closed form', 2.0, 1e-16),
         found('table, Hermite', 1.0, 1e-16),
@@ -252,7 +250,7 @@ def test_advice_says_where_the_cheapest_does_not_hold() -> None:
     assert 'but not at toggle or at change_point' in said[0]
 
 
-def test_of_what_takes_the_same_time_the_smallest_table_is_named() -> None:
+def test_of_what_takes_the_same_time_the_smallest_table_is_named():
     large, small = (
         found('table, Hermite', 1.0 + by, 1e-7, setting=f'{knots} knots')
         for by, knots in ((0.0, 1024), (0.001, 64))
@@ -263,7 +261,23 @@ def test_of_what_takes_the_same_time_the_smallest_table_is_named() -> None:
     assert 'table, Hermite, 64 knots' in said[0]
 
 
-def test_a_part_shows_every_method_with_its_setting_and_its_failures() -> None:
+@pytest.mark.parametrize(
+    ('other', 'said'),
+    [
+        (found('textbook form', 3.0, 1e-16), 'nothing measured is cheaper'),
+        (found('textbook form', 1.99, 1e-16), 'nothing measured is cheaper'),
+        (found('textbook form', 1.0, 1e-7), 'nothing cheaper is within 9 digits of it'),
+        (found('textbook form', 1.0, 5e-16), 'textbook form is as exact in 1 µs'),
+        (found('textbook form', 1.0, 1e-16, failed=0.1), 'nothing measured is cheaper'),
+    ],
+)
+def test_the_headline_names_the_nearest_of_what_is_cheaper(other, said):
+    some = [found('closed form', 2.0, 1e-16, key) for key in ('easy', 'toggle', 'change_point')]
+    part = part_of([*some, other], quick=True)
+    assert part.headline == f'Exact to 1e-16 rad in 2 µs; {said}.'
+
+
+def test_a_part_shows_every_method_with_its_setting_and_its_failures():
     some = [
         one
         for key in ('easy', 'toggle', 'change_point')

@@ -14,8 +14,6 @@
 
 """Times of states and ticks."""
 
-from __future__ import annotations
-
 import gc
 from itertools import pairwise
 from statistics import median
@@ -59,7 +57,7 @@ class Clock:
         return Contender(run, states)
 
 
-def test_a_time_is_that_of_a_state() -> None:
+def test_a_time_is_that_of_a_state():
     clock = Clock()
     contenders = [clock.contender('a', 0.25, 10), clock.contender('b', 2.0**-13, 1)]
     ten, one = in_turn(contenders, 1.0, clock=clock)
@@ -67,7 +65,7 @@ def test_a_time_is_that_of_a_state() -> None:
     assert one == pytest.approx((2.0**-13,) * 3)
 
 
-def test_blocks_follow_each_other_there_and_back() -> None:
+def test_blocks_follow_each_other_there_and_back():
     clock = Clock()
     in_turn([clock.contender(name, 1.0, 1) for name in 'abc'], 0.0, clock=clock)
     # Twice each to warm up and to see how long it takes; then round by round.
@@ -75,27 +73,27 @@ def test_blocks_follow_each_other_there_and_back() -> None:
     assert FEWEST == 5
 
 
-def test_a_short_run_is_repeated_until_its_block_is_long_for_the_clock() -> None:
+def test_a_short_run_is_repeated_until_its_block_is_long_for_the_clock():
     clock = Clock()
     in_turn([clock.contender('a', BLOCK / 64, 1)], 0.0, clock=clock)
     assert len(clock.log) == 2 + 64 * FEWEST
 
 
-def test_rounds_fill_the_time_and_no_more_than_is_of_use() -> None:
+def test_rounds_fill_the_time_and_no_more_than_is_of_use():
     for seconds, rounds in ((10.0, 10), (1e9, MOST)):
         clock = Clock()
         in_turn([clock.contender('a', 0.5, 1), clock.contender('b', 0.5, 1)], seconds, clock=clock)
         assert clock.log.count('b') == 2 + rounds
 
 
-def test_no_garbage_is_collected_within_a_block_and_it_is_afterwards() -> None:
+def test_no_garbage_is_collected_within_a_block_and_it_is_afterwards():
     clock = Clock()
     in_turn([clock.contender('a', 1.0, 1)], 0.0, clock=clock)
     assert clock.collecting == [True, True] + [False] * FEWEST
     assert gc.isenabled()
 
 
-def test_collection_is_switched_on_again_where_a_method_raises() -> None:
+def test_collection_is_switched_on_again_where_a_method_raises():
     calls = iter([None, None, None])
 
     def run() -> None:
@@ -106,13 +104,13 @@ def test_collection_is_switched_on_again_where_a_method_raises() -> None:
     assert gc.isenabled()
 
 
-def test_progress_ends_at_one() -> None:
+def test_progress_ends_at_one():
     clock, told = Clock(), []
     in_turn([clock.contender('a', 1.0, 1)], 0.0, told.append, clock=clock)
     assert told == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
 
 
-def test_of_nothing_there_are_no_times() -> None:
+def test_of_nothing_there_are_no_times():
     assert in_turn([], 1.0) == []
 
 
@@ -210,3 +208,7 @@ def test_the_part_says_what_a_rate_buys(monkeypatch):
         for point in (point for curve in diagram.curves for point in curve.points):
             assert point.y_spread.low <= point.y <= point.y_spread.high
     assert len(part.advice) == 4
+    assert len(part.sentences) == 3
+    assert [(rate.rate, rate.use) for rate in part.rates] == [
+        (rate, use) for rate in (25, 250) for use in (HELD, CARRIED)
+    ]

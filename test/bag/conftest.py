@@ -13,9 +13,7 @@
 # limitations under the License.
 
 
-"""What the tests of bags share: joint states made by rosbags, and two readers not ours."""
-
-from __future__ import annotations
+"""Fixtures of the tests of bags: joint states by rosbags, and the readers of mcap and rosbags."""
 
 from collections.abc import Iterator
 import os
@@ -50,7 +48,7 @@ def _topic(name: str, qos: QosProfile) -> Topic:
 
 
 @pytest.fixture
-def topics() -> tuple[Topic, Topic]:
+def topics():
     """Return what the node records: the crank that came in, the joints that went out."""
     return (
         _topic('/crank', QosProfile(depth=5, reliability='best_effort')),
@@ -59,7 +57,7 @@ def topics() -> tuple[Topic, Topic]:
 
 
 @pytest.fixture(scope='session')
-def messages() -> list[Written]:
+def messages():
     """Return 12000 joint states on two topics; the log times of the two are out of order."""
     joint_state = STORE.types[TYPE]
     header = STORE.types['std_msgs/msg/Header']
@@ -122,12 +120,12 @@ class Readers:
 
 
 @pytest.fixture
-def readers() -> Readers:
+def readers():
     return Readers()
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
+def small_disk(tmp_path):
     """Mount a disk of 2 MiB, where that is allowed."""
     folder = tmp_path / 'disk'
     folder.mkdir()

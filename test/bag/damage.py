@@ -14,8 +14,6 @@
 
 """A bag to be damaged, and the ways to do it."""
 
-from __future__ import annotations
-
 from io import BytesIO
 from pathlib import Path
 

@@ -12,16 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+"""Topics of a bag by count, bytes and time; who wrote a file; and whether it is in use."""
 
-"""`contents_of`: counts, bytes and times by topic, also to a damage or a wish to stop."""
-
-from __future__ import annotations
-
+import fcntl
 from pathlib import Path
+import subprocess
+import sys
 
-from linkage_ros.bag.contents import contents_of
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.contents import contents_of, layout_of
+from linkage_ros.bag.reader import is_in_use, read_bag, serialized_metadata
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import BagError
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, MCAP0_MAGIC, Writer
 import pytest
 
 
@@ -50,7 +54,7 @@ def test_each_topic_has_its_own_count_bytes_and_times(folder, topics, messages):
 
 
 @pytest.mark.parametrize(('count', 'span'), [(0, 0), (1, 0), (2, 0)])
-def test_without_a_span_there_is_no_rate(tmp_path: Path, topics, count, span):
+def test_without_a_span_there_is_no_rate(tmp_path, topics, count, span):
     writer = BagWriter(tmp_path / 'run', topics)
     for _ in range(count):
         writer.write(0, 5 + span, 5, b'\0\1\0\0')
@@ -60,7 +64,7 @@ def test_without_a_span_there_is_no_rate(tmp_path: Path, topics, count, span):
     assert (second.first, second.last) == (0, 0)
 
 
-def test_log_times_stand_in_any_order(tmp_path: Path, topics):
+def test_log_times_stand_in_any_order(tmp_path, topics):
     writer = BagWriter(tmp_path / 'run', topics)
     for log_time in (7_000, 5_000, 9_000, 8_000):
         writer.write(1, log_time, 5, b'\0\1\0\0')
@@ -89,3 +93,147 @@ def test_progress_is_told_and_a_wish_to_stop_is_heard(folder, messages):
     assert told == sorted(told)
     # A message takes 31 bytes beside its own: opcode, length, channel, sequence, two times.
     assert told[-1] == sum(len(message.data) + 31 for message in messages[:8192])
+
+
+# `layout_of`: who wrote a file and how it is compressed, also of one that is cut or rubbish.
+
+
+PAYLOAD = b'\0\1\0\0' + b'the same again ' * 100
+
+
+def write(file: Path, compression: CompressionType, *, chunked: bool = True) -> None:
+    with file.open('wb') as stream:
+        writer = Writer(stream, 20_000, compression, use_chunking=chunked)
+        writer.start(library='somebody else 1.0')
+        schema = writer.register_schema('a/msg/B', 'ros2msg', b'')
+        channel = writer.register_channel('/b', 'cdr', schema)
+        for number in range(200):
+            writer.add_message(channel, number, PAYLOAD, number)
+        writer.add_metadata('other', {'serialized_metadata': 'version: 1'})
+        writer.finish()
+
+
+@pytest.mark.parametrize(
+    ('compression', 'name'),
+    [
+        (CompressionType.NONE, 'none'),
+        (CompressionType.LZ4, 'lz4'),
+        (CompressionType.ZSTD, 'zstd'),
+    ],
+)
+def test_compression_is_as_mcaps_own_index_has_it(tmp_path, compression, name):
+    file = tmp_path / 'a.mcap'
+    write(file, compression)
+    with file.open('rb') as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    chunks = summary.chunk_indexes
+    assert len(chunks) > 5
+    assert {chunk.compression or 'none' for chunk in chunks} == {name}
+    found = layout_of(file)
+    # A chunk's length in the index counts its nine bytes of opcode and length too.
+    stored = sum(chunk.chunk_length - 9 for chunk in chunks)
+    made = sum(chunk.uncompressed_size for chunk in chunks)
+    assert found.compressions == {name: (stored, made)}
+    assert found.content > 200 * len(PAYLOAD)
+    assert found.library.startswith('somebody else')
+    assert found.rosbag2 is None
+
+
+def test_without_chunks_nothing_is_compressed(tmp_path):
+    write(tmp_path / 'a.mcap', CompressionType.ZSTD, chunked=False)
+    found = layout_of(tmp_path / 'a.mcap')
+    assert found.compressions == {}
+    assert found.content > 200 * len(PAYLOAD)
+
+
+def test_what_rosbag2_says_is_found(tmp_path):
+    BagWriter(tmp_path / 'bag', []).close({'seed': '7'})
+    record = layout_of(tmp_path / 'bag' / 'bag_0.mcap').rosbag2
+    assert record is not None
+    found = serialized_metadata(record)
+    assert (found['version'], found['custom_data']) == (9, {'seed': '7'})
+
+
+def test_cut_anywhere_it_tells_what_is_whole(tmp_path):
+    write(tmp_path / 'a.mcap', CompressionType.ZSTD)
+    content = (tmp_path / 'a.mcap').read_bytes()
+    stored = []
+    for size in range(0, len(content), 7):
+        (tmp_path / 'cut.mcap').write_bytes(content[:size])
+        stored.append(layout_of(tmp_path / 'cut.mcap').compressions.get('zstd', (0, 0))[0])
+    assert stored == sorted(stored)
+    assert stored[0] == 0
+    assert stored[-1] == layout_of(tmp_path / 'a.mcap').compressions['zstd'][0]
+
+
+@pytest.mark.parametrize(
+    'record',
+    [
+        (Opcode.CHUNK, bytes(3)),
+        (Opcode.CHUNK, bytes(28) + b'\xff\xff\xff\xff' + b'x' * 200),
+        (Opcode.CHUNK, bytes(28) + b'\3\0\0\0' + b'\xff\x1b\n' + b'x' * 200),
+        (Opcode.HEADER, b'\xff' * 8),
+        (Opcode.HEADER, b''),
+        (Opcode.METADATA, b'\xff' * 8),
+        (Opcode.METADATA, b'\7\0\0\0rosbag2' + bytes(4)),
+        (200, b'nobody knows'),
+    ],
+)
+def test_no_record_is_too_odd(tmp_path, record):
+    opcode, content = record
+    file = tmp_path / 'odd.mcap'
+    head = bytes([opcode]) + len(content).to_bytes(8, 'little')
+    file.write_bytes(MCAP0_MAGIC + head + content + b'\x05' + b'\xff' * 8)
+    found = layout_of(file)
+    assert found.library == ''
+    assert found.rosbag2 is None or serialized_metadata(found.rosbag2) == {}
+    assert all(len(name) < 200 for name in found.compressions)
+
+
+def test_what_cannot_be_read_says_so(tmp_path):
+    with pytest.raises(BagError, match='cannot be read: Is a directory'):
+        layout_of(tmp_path)
+
+
+# `is_in_use`: asked of the system, while somebody holds the file and after.
+
+
+WRITES = 'import sys; stream = open(sys.argv[1], "ab"); print(flush=True); sys.stdin.read()'
+
+
+def lease_is_refused(file):
+    """Return whether the system knows of a writer, and so refuses a read lease."""
+    with file.open('rb') as stream:
+        try:
+            fcntl.fcntl(stream, fcntl.F_SETLEASE, fcntl.F_RDLCK)
+        except BlockingIOError:
+            return True
+    return False
+
+
+def test_it_is_while_another_process_holds_it_open(tmp_path):
+    file = tmp_path / 'run.mcap'
+    file.write_bytes(b'some')
+    with subprocess.Popen(
+        [sys.executable, '-c', WRITES, str(file)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        process.stdout.readline()
+        if not lease_is_refused(file):
+            pytest.skip('this file system grants leases to anybody')
+        assert is_in_use(file)
+        process.stdin.close()
+    assert not is_in_use(file)
+    assert file.read_bytes() == b'some'
+
+
+def test_who_reads_is_no_writer(tmp_path):
+    file = tmp_path / 'run.mcap'
+    file.write_bytes(b'some')
+    with file.open('rb'):
+        assert not is_in_use(file)
+
+
+def test_what_cannot_be_known_is_no_writer(tmp_path):
+    assert not is_in_use(tmp_path / 'missing')
+    assert not is_in_use(tmp_path)

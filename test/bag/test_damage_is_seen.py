@@ -12,15 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+"""A reader gives nothing that a checksum does not prove, and says where an end is missing."""
 
-"""Reading: what no checksum vouches for is not given, and nothing outside of the folder."""
-
-from __future__ import annotations
-
+from collections.abc import Callable
 import os
+from pathlib import Path
+import shutil
 
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.metadata import BagSummary, RecordingStats
+from linkage_ros.bag.reader import Bag, read_bag
 from linkage_ros.bag.recover import recover
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 from mcap.writer import CompressionType, IndexType, Writer
@@ -154,3 +156,174 @@ class TestOutside:
         (run / 'run_0.mcap').unlink()
         os.mkfifo(run / 'run_0.mcap')
         self._refused(run, 'is no file')
+
+
+# A bag says that an end is missing: of a file, or after files that are all whole.
+
+
+SECOND = 1_000_000_000
+
+
+class Recording:
+    """A recording in files of 1 s, of ten messages a second, of which each state can be kept."""
+
+    def __init__(self, folder: Path, topics: object, keep_files: int = 0) -> None:
+        storage = Storage(split_seconds=1.0, keep_files=keep_files)
+        self.writer = BagWriter(folder / 'run', topics, {'run.json': ('', b'{}')}, storage)
+        self.writer.account = self._account
+        self._kept = folder
+        self._number = 0
+
+    @staticmethod
+    def _account(summary: BagSummary) -> RecordingStats:
+        none = (0,) * len(summary.counts)
+        return RecordingStats(summary.counts, summary.counts, none, none)
+
+    def write(self, messages: int) -> None:
+        for _ in range(messages):
+            self._number += 1
+            time = self._number * SECOND // 10
+            self.writer.write(0, time, time, b'\0\1\0\0' + self._number.to_bytes(8, 'little'))
+
+    def keep(self, name: str) -> Path:
+        """Return a copy of the bag as it is on the disk now."""
+        return Path(shutil.copytree(self.writer.folder, self._kept / name))
+
+
+def killed_in_a_file(folder: Path, topics: object) -> Path:
+    recording = Recording(folder, topics)
+    recording.write(15)
+    recording.writer.flush()
+    return recording.keep('killed')
+
+
+def killed_between_files(folder: Path, topics: object) -> Path:
+    # The first file has got its end; the second one is not there, and nobody has named it.
+    recording = Recording(folder, topics)
+    recording.write(9)
+    before = recording.keep('before')
+    recording.write(9)
+    recording.writer.close()
+    bag = recording.keep('killed')
+    (bag / 'run_1.mcap').unlink()
+    shutil.copy(before / 'metadata.yaml', bag / 'metadata.yaml')
+    return bag
+
+
+def without_metadata(folder: Path, topics: object) -> Path:
+    bag = killed_between_files(folder, topics)
+    (bag / 'metadata.yaml').unlink()
+    return bag
+
+
+def a_file_that_is_not_the_last(folder: Path, topics: object) -> Path:
+    return killed_between_files(folder, topics) / 'run_0.mcap'
+
+
+def finished(folder: Path, topics: object) -> Path:
+    recording = Recording(folder, topics)
+    recording.write(15)
+    recording.writer.close()
+    return recording.keep('finished')
+
+
+def finished_but_for_the_last_words(folder: Path, topics: object) -> Path:
+    # Killed between the end of the last file and the renewal of metadata.yaml.
+    recording = Recording(folder, topics)
+    recording.write(15)
+    words = recording.keep('before') / 'metadata.yaml'
+    recording.writer.close()
+    bag = recording.keep('finished')
+    shutil.copy(words, bag / 'metadata.yaml')
+    return bag
+
+
+def the_last_file(folder: Path, topics: object) -> Path:
+    return finished(folder, topics) / 'run_1.mcap'
+
+
+def recovered(folder: Path, topics: object) -> Path:
+    recovery = recover(killed_between_files(folder, topics))
+    assert recovery is not None
+    return recovery.folder
+
+
+# For each bag whether an end is missing, and its number of messages.
+BAGS: dict[Callable[[Path, object], Path], tuple[bool, int]] = {
+    killed_in_a_file: (True, 15),
+    killed_between_files: (True, 10),
+    without_metadata: (True, 10),
+    a_file_that_is_not_the_last: (True, 10),
+    finished: (False, 15),
+    finished_but_for_the_last_words: (False, 15),
+    the_last_file: (False, 5),
+    recovered: (False, 10),
+}
+
+
+@pytest.mark.parametrize('made', BAGS, ids=lambda made: made.__name__)
+def test_a_bag_says_whether_an_end_is_missing(made, tmp_path, topics):
+    truncated, count = BAGS[made]
+    path = made(tmp_path, topics)
+    bag: Bag = read_bag(path, allow_truncated=True)
+    assert bag.truncated == truncated
+    assert len(list(bag.messages())) == count
+    if truncated and path.is_dir():
+        with pytest.raises(BagError, match='its recording was killed, or still runs'):
+            read_bag(path)
+    else:
+        assert len(list(read_bag(path).messages())) == count
+
+
+def test_of_a_ring_the_older_files_that_a_kill_has_left_come_first(tmp_path, topics):
+    # Killed between the renewal of metadata.yaml and the removal of the file that is not in it.
+    recording = Recording(tmp_path, topics, keep_files=2)
+    recording.write(19)
+    before = recording.keep('before')
+    recording.write(10)
+    recording.writer.flush()
+    killed = recording.keep('killed')
+    shutil.copy(before / 'run_0.mcap', killed)
+    assert sorted(file.name for file in killed.glob('*.mcap')) == [
+        'run_0.mcap', 'run_1.mcap', 'run_2.mcap'
+    ]  # fmt: skip
+    assert len(list(read_bag(killed, allow_truncated=True).messages())) == 19
+    recovery = recover(killed)
+    assert recovery is not None
+    times = [message.log_time for message in read_bag(recovery.folder).messages()]
+    assert times == [number * SECOND // 10 for number in range(1, 30)]
+
+
+def test_what_a_file_says_holds_where_the_metadata_are_lost(tmp_path, topics):
+    recording = Recording(tmp_path, topics, keep_files=2)
+    recording.write(45)
+    recording.writer.close({'seed': '7'})
+    said = read_bag(recording.writer.folder).custom
+    assert 'linkage_ros.let_go' in said
+    (recording.writer.folder / 'metadata.yaml').unlink()
+    assert read_bag(recording.writer.folder).custom == said
+
+
+@pytest.mark.parametrize('cut', [5, 400])
+def test_the_hook_hears_of_what_is_searched_for_channels(tmp_path, topics, cut):
+    # Of a file with an index nothing is searched.
+    recording = Recording(tmp_path, topics)
+    recording.write(9)
+    recording.writer.close()
+    heard: list[int] = []
+    read_bag(recording.writer.folder, progress=heard.append)
+    assert heard == []
+    file = recording.writer.folder / 'run_0.mcap'
+    file.write_bytes(file.read_bytes()[:-cut])
+    read_bag(recording.writer.folder, allow_truncated=True, progress=heard.append)
+    assert heard == sorted(heard)
+    assert len(heard) > 1
+
+    class EnoughError(Exception):
+        pass
+
+    def enough(_read: int) -> None:
+        raise EnoughError
+
+    with pytest.raises(EnoughError):
+        read_bag(recording.writer.folder, allow_truncated=True, progress=enough)

@@ -19,8 +19,6 @@ A disk whose calls fail, one by one: what ends a recording, what does not, and w
 All calls in all ways are the matter of ``campaigns.disk``.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 from pathlib import Path
@@ -134,12 +132,12 @@ def test_a_ring_whose_names_cannot_be_renewed_removes_no_file(
         write(writer, messages[:1000])
         # What the metadata name is there, for who reads it now.
         assert (tmp_path / 'run' / 'run_0.mcap').exists()
-        assert writer.let_go == (0, 0)
+        assert writer.discarded == (0, 0)
     write(writer, messages[1000:2000])
     summary = writer.close()
     kept = sum(summary.counts)
     assert len(list((tmp_path / 'run').glob('*.mcap'))) == 2
-    assert kept + sum(summary.let_go) == 2000
+    assert kept + sum(summary.discarded) == 2000
     assert data_of(tmp_path / 'run') == data(messages[:2000][-kept:])
 
 
@@ -154,7 +152,7 @@ def test_a_file_of_a_ring_that_cannot_be_removed_is_tried_again(
         assert (tmp_path / 'run' / 'run_0.mcap').exists()
     summary = writer.close()
     assert len(list((tmp_path / 'run').glob('*.mcap'))) == 2
-    assert sum(summary.counts) + sum(summary.let_go) == 1000
+    assert sum(summary.counts) + sum(summary.discarded) == 1000
 
 
 def losing(file, numbers):
@@ -222,7 +220,7 @@ def test_the_account_closes_whatever_fails(tmp_path, topics, messages, monkeypat
     summary = recorder.stop()
     for counts in summary.topics:
         assert counts.received == 2500
-        assert counts.received == counts.recorded + counts.dropped + counts.let_go
+        assert counts.received == counts.recorded + counts.dropped + counts.discarded
     # A reserve that cannot grow is no reason as long as it is large enough.
     assert (summary.failure is None) == (failed == 'os.posix_fallocate')
 

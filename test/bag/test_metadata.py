@@ -15,8 +15,6 @@
 
 """``metadata.yaml`` and the QoS in it, as rosbag2 of Jazzy writes them (metadata version 9)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,15 +49,9 @@ QOS = {
 @pytest.fixture
 def summary(tmp_path, topics):
     return BagSummary(
-        folder=tmp_path,
-        file='run_0.mcap',
-        topics=topics,
-        counts=(3, 4),
-        refused=(0, 1),
-        start=1_700_000_000_000_000_000,
-        duration=2_000_000,
-        size=1234,
-    )
+        folder=tmp_path, file='run_0.mcap', topics=topics, counts=(3, 4), refused=(0, 1),
+        start=1_700_000_000_000_000_000, duration=2_000_000, size=1234
+    )  # fmt: skip
 
 
 def test_the_file_says_what_rosbag2_says(summary, topics, monkeypatch):
@@ -143,13 +135,13 @@ def test_files_together_are_a_bag(summary):
         summary, file='run_2.mcap', counts=(1, 0), start=summary.start - 10, duration=11, size=6
     )
     whole = together([summary, empty, early], (1, 2), (3, 4))
-    assert (whole.counts, whole.refused, whole.let_go) == ((4, 4), (1, 2), (3, 4))
+    assert (whole.counts, whole.refused, whole.discarded) == ((4, 4), (1, 2), (3, 4))
     assert (whole.start, whole.duration) == (summary.start - 10, summary.duration + 10)
     assert (whole.size, whole.file) == (1234 + 5 + 6, 'run_2.mcap')
     information = yaml.safe_load(metadata_text(whole, {}, root=False))
     assert information['relative_file_paths'] == ['run_0.mcap', 'run_1.mcap', 'run_2.mcap']
     assert [each['message_count'] for each in information['files']] == [7, 0, 1]
-    assert together([empty], (0, 0), (0, 0)) == replace(empty, refused=(0, 0), let_go=(0, 0))
+    assert together([empty], (0, 0), (0, 0)) == replace(empty, refused=(0, 0), discarded=(0, 0))
 
 
 def test_the_record_in_the_file_has_no_root_key(summary):
@@ -209,11 +201,7 @@ def test_keys_stand_in_the_order_of_rosbag2(summary):
     # rosbag2_storage's yaml.hpp: of a file first when it begins, of the whole bag first how long.
     information = yaml.safe_load(metadata_text(summary, {}))['rosbag2_bagfile_information']
     assert list(information)[:5] == [
-        'version',
-        'storage_identifier',
-        'duration',
-        'starting_time',
-        'message_count',
-    ]
+        'version', 'storage_identifier', 'duration', 'starting_time', 'message_count',
+    ]  # fmt: skip
     (file,) = information['files']
     assert list(file) == ['path', 'starting_time', 'duration', 'message_count']

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 `recover` on bags that are cut, flipped, holed and forged.
 
@@ -20,16 +19,34 @@ Whatever the damage: what is saved is true, in order, and read by our reader, mc
 the damaged bag stays as it was.
 """
 
-from __future__ import annotations
+from io import BytesIO
 
+from hypothesis import given, HealthCheck, settings
+from hypothesis import strategies as st
+from linkage_ros.bag.mcap_records import Message, Source
+from linkage_ros.bag.metadata import UNFINISHED, UNFINISHED_DATA
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recording_stats import UNFINISHED, UNFINISHED_DATA
 from linkage_ros.bag.recover import recover
+from linkage_ros.bag.salvage import Salvage
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import BagError, RecordingError
 from mcap.reader import make_reader
 import pytest
 import yaml
 
-from .damage import chunks_of, COUNT, damaged, data_of, flip, in_chunk, without, write_run
+from .damage import (
+    ATTACHMENTS,
+    chunks_of,
+    COUNT,
+    damaged,
+    data_of,
+    flip,
+    in_chunk,
+    without,
+    write_run,
+)
 
 
 @pytest.fixture
@@ -252,3 +269,159 @@ def test_what_was_killed_and_is_recovered_is_finished(run):
     found = read_bag(recover(run).folder).custom
     assert UNFINISHED not in found
     assert found['seed'] == '7'
+
+
+# `recover` where everything is against it: any damage, bad disks, full ones, no bag at all.
+
+
+@settings(
+    max_examples=150,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    damages=st.lists(
+        st.tuples(
+            st.sampled_from(['flip', 'zeros', 'noise', 'out', 'in', 'again', 'cut']),
+            st.floats(0, 1),
+            st.integers(1, 3000),
+        ),
+        min_size=1,
+        max_size=5,
+    ),
+    random=st.randoms(use_true_random=False),
+)
+def test_whatever_is_done_to_it_what_is_found_is_true(run, messages, damages, random):
+    content = bytearray((run / 'run_0.mcap').read_bytes())
+    for kind, place, length in damages:
+        at = int(place * len(content))
+        end = min(at + length, len(content))
+        if kind == 'flip' and at < len(content):
+            content[at] ^= 1 << length % 8
+        elif kind == 'zeros':
+            content[at:end] = bytes(end - at)
+        elif kind == 'noise':
+            content[at:end] = random.randbytes(end - at)
+        elif kind == 'out':
+            del content[at:end]
+        elif kind == 'in':
+            content[at:at] = random.randbytes(length)
+        elif kind == 'again':  # the same bytes twice, as a disk that wrote a block elsewhere too
+            content[at:at] = content[at:end]
+        elif kind == 'cut':
+            del content[at:]
+    salvage = Salvage(Source(BytesIO(content)))
+    found = [each for each in salvage.found() if isinstance(each, Message)]
+    true = iter([('/crank', '/arm/joint_states')[m.topic], *m[1:]] for m in messages[:COUNT])
+    assert all([m.channel.topic, m.log_time, m.publish_time, m.data] in true for m in found)
+    assert len(found) == COUNT or salvage.losses
+
+
+class Worn(BytesIO):
+    """A disk with a bad block."""
+
+    def __init__(self, content: bytes, bad: range) -> None:
+        super().__init__(content)
+        self.bad = bad
+
+    def read(self, size: int = -1) -> bytes:
+        start = self.tell()
+        if start < self.bad.stop and start + size > self.bad.start:
+            raise OSError(5, 'Input/output error')
+        return super().read(size)
+
+
+@pytest.mark.parametrize('cut', [0, 100])
+def test_around_a_bad_block_of_the_disk_all_is_saved(run, messages, cut):
+    content = (run / 'run_0.mcap').read_bytes()
+    start, _ = chunks_of(content)[2]
+    worn = Worn(content[: len(content) - cut], range(start + 500, start + 1012))
+    salvage = Salvage(Source(worn))
+    found = [each.data for each in salvage.found() if isinstance(each, Message)]
+    assert found == without(messages, range(200, 300))
+    assert 'Input/output error' in salvage.losses[0].reason
+
+
+def test_a_bag_that_is_being_written_is_saved_as_far_as_it_got(tmp_path, topics, messages):
+    writer = BagWriter(tmp_path / 'run', topics, ATTACHMENTS)
+    for message in messages[:300]:
+        writer.write(*message)
+    writer.flush()
+    recovery = recover(tmp_path / 'run')
+    assert data_of(recovery.folder) == [m.data for m in messages[:300]]
+    assert recovery.remarks[0].startswith('run_0.mcap is still being written')
+    assert not recovery.whole
+    for message in messages[300:400]:
+        writer.write(*message)
+    assert sum(writer.close().counts) == 400
+    recovery = recover(tmp_path / 'run', tmp_path / 'later')
+    assert recovery.whole
+    assert recovery.remarks == ()
+
+
+@pytest.mark.parametrize('kind', ['folder', 'file', 'link'])
+def test_what_is_there_is_never_written_over(run, tmp_path, kind):
+    target = tmp_path / 'new'
+    if kind == 'folder':
+        target.mkdir()
+    elif kind == 'file':
+        target.write_text('mine')
+    else:
+        target.symlink_to(tmp_path / 'nowhere')
+    with pytest.raises(RecordingError, match='exists already'):
+        recover(run, target)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['new', 'run']
+    if kind == 'file':
+        assert target.read_text() == 'mine'
+
+
+def test_a_full_disk_leaves_nothing_behind(run, small_disk):
+    (small_disk / 'other').write_bytes(bytes(2_000_000))
+    with pytest.raises(RecordingError, match='cannot be written: No space left'):
+        recover(run, small_disk / 'new')
+    assert list(small_disk.iterdir()) == [small_disk / 'other']
+
+
+def test_stopped_it_leaves_nothing_behind(run, tmp_path):
+    assert recover(run, tmp_path / 'new', stopped=lambda: True) is None
+    assert list(tmp_path.iterdir()) == [run]
+
+
+NO_BAG = {
+    # the content of x.mcap, and what is said
+    'empty': (b'', 'x.mcap is empty'),
+    'text': (b'no bag at all', "x.mcap starts with b'no bag a', as no MCAP file does"),
+    'zeros': (bytes(100_000), 'as no MCAP file does'),
+    'a beginning': (b'\x89MCAP0\r\n', 'x.mcap at byte 8'),
+    'an end': (b'\x89MCAP0\r\n' * 2, 'x.mcap at byte 8'),
+    'half a magic': (b'\x89MCA', 'as no MCAP file does'),
+}
+
+
+@pytest.mark.parametrize(('content', 'reason'), NO_BAG.values(), ids=NO_BAG.keys())
+def test_where_nothing_can_be_saved_nothing_is_made(tmp_path, content, reason):
+    (tmp_path / 'x.mcap').write_bytes(content)
+    with pytest.raises(BagError) as caught:
+        recover(tmp_path / 'x.mcap')
+    assert reason in str(caught.value)
+    assert list(tmp_path.iterdir()) == [tmp_path / 'x.mcap']
+
+
+# A ring of files, killed between naming the files that are kept and removing the oldest.
+
+
+def test_a_file_that_made_way_is_recovered_before_those_that_are_kept(tmp_path, monkeypatch):
+    topics = [Topic('/a', 'std_msgs/msg/Empty', '', '')]
+    storage = Storage(split_seconds=1e-8, keep_files=2)
+    writer = BagWriter(tmp_path / 'run', topics, {}, storage)
+    # Twelve files, the last of them `run_11`; what is not removed is as after a kill.
+    monkeypatch.setattr('pathlib.Path.unlink', lambda *_, **__: None)
+    for time in range(120):
+        writer.write(0, time, time, b'\0\1\0\0')
+    writer.flush()
+    monkeypatch.undo()
+    assert [m.log_time for m in read_bag(tmp_path / 'run', allow_truncated=True).messages()] == [
+        *range(100, 120)
+    ]
+    recover(tmp_path / 'run', tmp_path / 'whole')
+    assert [m.log_time for m in read_bag(tmp_path / 'whole').messages()] == [*range(120)]

@@ -15,8 +15,6 @@
 
 """`recover` on bags that others wrote, or forged: packed, split, without checksums, bombs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 import struct
 import sys
@@ -281,7 +279,6 @@ def test_a_bag_within_a_damaged_attachment_stays_in_it(tmp_path, topics, message
     for message in messages[1000:1100]:
         writer.write(*message)
     writer.close()
-
     file = tmp_path / 'run' / 'run_0.mcap'
     content = bytearray(file.read_bytes())
     content[content.index(b'inner.mcap') - 4 - 16 - 8] ^= 1  # the length of the record

@@ -18,8 +18,6 @@ The last seconds in memory, and the bags that are made of them.
 What is kept is told as timelines and held against a plain list of all that was offered.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from functools import partial
 from itertools import accumulate
@@ -47,14 +45,14 @@ def kept_of(offers, seconds, most=PLENTY):
     last = LastSeconds(3, round(seconds * NS), most)
     for number, (topic, time) in enumerate(offers):
         last.add(topic, round(time * NS), number, b'%d' % number)
-    while last.let_old_go(7):
+    while last.discard_old(7):
         pass
     kept = last.kept()
     messages = list(kept.messages())
     assert len(messages) == sum(kept.counts)
     assert all(data == b'%d' % number for _, _, number, data in messages)
-    assert kept.whole == (not any(last.let_go))
-    assert sum(kept.counts) + sum(last.let_go) == len(offers)
+    assert kept.whole == (not any(last.discarded))
+    assert sum(kept.counts) + sum(last.discarded) == len(offers)
     return [(topic, log_time / NS) for topic, log_time, _, _ in messages]
 
 
@@ -106,7 +104,7 @@ def test_by_one_clock_the_last_seconds_are_kept_and_nothing_else(steps, hundredt
     last = LastSeconds(3, span, PLENTY)
     for topic, time in offers:
         last.add(topic, time, 0, b'')
-        while last.let_old_go(1):
+        while last.discard_old(1):
             pass
     found = [(topic, time) for topic, time, _, _ in last.kept().messages()]
     newest = max(time for _, time in offers)
@@ -118,7 +116,7 @@ def test_where_room_is_scarce_the_oldest_ticks_go_as_a_whole():
     for tick in range(20_000):
         for topic in (0, 1):
             last.add(topic, tick * NS // 1000, tick, bytes(100))
-        while last.let_old_go(100):
+        while last.discard_old(100):
             pass
     seconds, size, crowded = last.extent()
     assert crowded
@@ -139,7 +137,7 @@ def test_what_was_taken_stays_as_it_was_while_the_memory_goes_on():
     kept = last.kept()
     for number in range(1000, 9000):
         last.add(0, number * 1_000_000, number, b'since')
-        last.let_old_go(10)
+        last.discard_old(10)
     assert [number for _, _, number, _ in kept.messages()] == list(range(1000))
     assert min(number for _, _, number, _ in last.kept().messages()) == 7999
 
@@ -162,7 +160,7 @@ def memory(topics):
 
 
 def closes(counts):
-    return all(c.received == c.kept + c.let_go + c.dropped and c.kept >= 0 for c in counts)
+    return all(c.received == c.kept + c.discarded + c.dropped and c.kept >= 0 for c in counts)
 
 
 def test_all_that_was_offered_before_is_in_a_snapshot(memory, messages):
@@ -184,7 +182,7 @@ def test_a_memory_that_has_let_go_is_not_whole(memory, messages):
     counts = memory.inspect()
     assert closes(counts)
     assert tuple(c.kept for c in counts) == kept.counts
-    assert all(c.let_go > 4000 for c in counts)
+    assert all(c.discarded > 4000 for c in counts)
     there = list(kept.messages())
     begin = len(messages) - len(there)
     assert there == [tuple(message) for message in messages[begin:]]
@@ -264,7 +262,7 @@ def test_an_error_nobody_thought_of_ends_the_memory_and_not_the_process(
     assert 'ended early: ZeroDivisionError: a slip; please report this' in str(memory.failure)
     with pytest.raises(RecordingError, match='a slip'):
         memory.take()
-    assert [(c.received, c.kept, c.let_go, c.dropped) for c in memory.stop()] == [
+    assert [(c.received, c.kept, c.discarded, c.dropped) for c in memory.stop()] == [
         (2, 0, 1, 1),
         (1, 0, 1, 0),
     ]
@@ -351,7 +349,6 @@ def test_a_full_disk_costs_a_part_of_the_bag_and_the_memory_nothing(
     received, dropped = said_in(small_disk / 'run')
     assert list(received.values()) == [6000, 6000]
     assert sum(dropped.values()) == len(messages) - there
-
     # With little room left no bag is begun; the memory still has all.
     with (small_disk / 'other').open('wb', buffering=0) as other, suppress(OSError):
         while True:

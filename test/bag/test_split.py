@@ -15,8 +15,6 @@
 
 """A bag in several files, packed or not, and a ring of the last: each reader finds it all."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 import json
 from pathlib import Path
@@ -25,9 +23,9 @@ import subprocess
 import sys
 
 from linkage_ros.bag import bag_file
+from linkage_ros.bag.metadata import STATS_RECORD, UNFINISHED
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.recording_stats import STATS_RECORD, UNFINISHED
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
@@ -192,15 +190,15 @@ def test_a_ring_keeps_the_last_files_and_counts_what_it_let_go(
     assert there == [message.data for message in messages[last:]]
     assert sorted(data for *_, data in readers.rosbags(tmp_path / 'run')) == sorted(there)
     for counts in summary.topics:
-        assert counts.received == counts.recorded + counts.let_go == 6000
+        assert counts.received == counts.recorded + counts.discarded == 6000
         assert (counts.dropped, counts.waiting) == (0, 0)
     assert sum(counts.recorded for counts in summary.topics) == len(there)
     custom = information(tmp_path / 'run')['custom_data']
     if keep < 6:
         assert json.loads(custom['linkage_ros.let_go']) == {
-            t.name: t.let_go for t in summary.topics
+            t.name: t.discarded for t in summary.topics
         }
-        assert summary.topics[0].let_go > 0
+        assert summary.topics[0].discarded > 0
     else:
         assert 'linkage_ros.let_go' not in custom
 
@@ -225,9 +223,9 @@ def test_the_account_is_in_the_last_file_and_closes(tmp_path, topics, messages):
             topic.received,
             topic.recorded,
             topic.dropped,
-            topic.let_go,
+            topic.discarded,
         ]
-        assert topic.received == topic.recorded + topic.dropped + topic.let_go
+        assert topic.received == topic.recorded + topic.dropped + topic.discarded
     assert list(account['dropped'].values()) == [120, 0]
 
 
@@ -324,9 +322,9 @@ def test_a_kill_at_any_step_leaves_all_that_was_flushed(tmp_path, topics, messag
         assert found[-1] + 1 >= int(flushed.read_text())
         said = information(folder)
         assert said['relative_file_paths'] == [file.name for file in bag.files]
-        let_go = json.loads((said['custom_data'] or {}).get('linkage_ros.let_go', '{}'))
+        discarded = json.loads((said['custom_data'] or {}).get('linkage_ros.let_go', '{}'))
         if UNFINISHED in (said['custom_data'] or {}):
-            assert sum(let_go.values()) == found[0]
+            assert sum(discarded.values()) == found[0]
             # It promises no more than there is.
             assert said['message_count'] <= len(found)
         else:

@@ -15,8 +15,6 @@
 
 """The benchmark runs and prints finite ratios; nothing that is timed is asserted."""
 
-from __future__ import annotations
-
 from math import isfinite
 from pathlib import Path
 import re

@@ -84,7 +84,7 @@ class Newton:
         return {**links, **{name: (rest[i],) for i, name in enumerate(self._sliders)}}
 
     def _equations(self, phi: Any, unknown: list[Any]) -> tuple[list[Any], list[list[Any]]]:
-        """Return what the equations are off by, and their derivatives."""
+        """Return the residuals of the equations, and their derivatives."""
         at = self._named(unknown)
         columns = {name: 3 * i for i, name in enumerate(self._links)}
         slides = {n: 3 * len(self._links) + i for i, n in enumerate(self._sliders)}

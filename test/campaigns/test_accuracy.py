@@ -24,7 +24,7 @@ import pytest
 
 RANDOM_CASES, HARD_CASES = 100_000, 20_000
 SEED = 20261121
-"""Not the campaign's own: its findings went into the code."""
+"""Another seed than the campaign's, whose findings are fixed."""
 
 LIMIT = 4.0
 """In u·κ, for position, velocity and acceleration."""
@@ -33,8 +33,8 @@ TOGGLE = 32.0
 """
 For positions at a toggle.
 
-What is within 16 u of a limit position is reported as lying there. With δ the distance, the
-position is off by √δ and κ is 1/(2·√δ), which makes 32 of it.
+A state within 16 u of a limit position is reported as this limit position. At a distance δ, the
+error of the position is √δ and κ is 1/(2·√δ), which makes 32 u·κ.
 """
 
 
@@ -63,9 +63,9 @@ ONCE_BEYOND = {
     'chain whose pins meet': ('4040:1', '881:0', '386:1', '2370:2', '3543:3'),
 }
 """
-Cases of the campaign's own seed that were above the limit, by up to 4e11 u·κ, as LINKAGE:CASE.
+Cases of the campaign's seed that once were above the limit, up to 4e11 u·κ, as LINKAGE:CASE.
 
-They are the worst of the eleven million that it ran over the forms and the κ of version 0.1.0.
+They are the worst of the eleven million cases of the formulas and the κ of version 0.1.0.
 """
 
 
@@ -93,7 +93,7 @@ def test_errors_stay_within_their_limits(tallies: dict[str, Tally], family: str)
 
 
 @pytest.mark.parametrize('family', ONCE_BEYOND)
-def test_what_was_beyond_the_limit_is_within_it(family: str) -> None:
+def test_cases_once_above_the_limit_are_within_it(family: str) -> None:
     for place in ONCE_BEYOND[family]:
         linkage, case = map(int, place.split(':'))
         mechanism, phi, alpha = make(1, family, linkage)
@@ -116,11 +116,10 @@ def test_no_status_is_wrong(tallies: dict[str, Tally], family: str) -> None:
 def test_every_case_is_accounted_for(tallies: dict[str, Tally], family: str) -> None:
     counts = tallies[family].counts
     assert counts['closed'] > 0.2 * counts['cases']
-    told = sum(counts[name] for name in ('closed', 'open', 'at limit', *FAULTS))
-    assert told == counts['cases']
+    assert sum(counts[name] for name in ('closed', 'open', 'at limit', *FAULTS)) == counts['cases']
 
 
-def test_the_campaign_does_not_depend_on_how_it_is_shared() -> None:
+def test_the_result_does_not_depend_on_the_number_of_processes() -> None:
     work = [part for part in parts(1500, 800, SEED) if part.family in {'RRR', 'wound crank'}]
     alone, shared = run(work, jobs=1), run(work[::-1], jobs=2)
     assert alone.keys() == shared.keys()

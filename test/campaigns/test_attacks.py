@@ -21,7 +21,7 @@ import random
 from random import Random
 
 from campaigns.attacks import files, signals
-from campaigns.attacks.bags import attack, changed, judged
+from campaigns.attacks.bags import attack, change_bag, fault_of
 from campaigns.attacks.bags import COMMANDS as BAG_COMMANDS
 from campaigns.attacks.files import mutated
 from campaigns.in_process import Ended
@@ -34,21 +34,22 @@ import pytest
 SEED = 20261122
 
 
-"""Not the campaign's own."""
+"""Another seed than the campaign's."""
 
 
-def test_changed_files_are_answered() -> None:
+def test_changed_files_cause_no_findings() -> None:
     tried, findings = files.attack(60, SEED)
     assert findings == []
     assert sum(tried.values()) == 60
-    assert any(how.endswith(': 0') for how in tried)
-    assert any(how.endswith(': 2') for how in tried)
+    assert any(end.endswith(': 0') for end in tried)
+    assert any(end.endswith(': 2') for end in tried)
 
 
 def test_every_command_that_takes_a_linkage_gets_changed_ones() -> None:
     without = {
         'demo',
         'play',
+        'echo',
         'plot',
         'info',
         'report',
@@ -56,6 +57,8 @@ def test_every_command_that_takes_a_linkage_gets_changed_ones() -> None:
         'recover',
         'import',
         'synthesize',
+        'gallery',
+        'completion',
     }
     assert set(files.COMMANDS) == set(COMMANDS) - without
 
@@ -68,13 +71,13 @@ def test_signals_end_commands() -> None:
 
 def test_files_are_changed_in_many_ways() -> None:
     original = b'links: {ground: {A: [0, 0], B: [0.1, 0]}}\ninput: {joint: j}\n'
-    found = {mutated(original, random.Random(number))[1] for number in range(300)}
-    assert len(found) > 200
-    assert sum(b'5e-324' in one for one in found) > 1
+    files_ = {mutated(original, random.Random(number))[1] for number in range(300)}
+    assert len(files_) > 200
+    assert sum(b'5e-324' in file for file in files_) > 1
 
 
 @pytest.mark.parametrize(
-    ('command', 'code', 'said', 'found'),
+    ('command', 'code', 'errors', 'is_fault'),
     [
         ('check', 0, '', False),
         ('check', 2, 'linkage check: x: is wrong; correct it\n', False),
@@ -100,23 +103,23 @@ def test_files_are_changed_in_many_ways() -> None:
         ('check', 'no end', 'more than 60 s', True),
     ],
 )
-def test_the_judge_knows_an_end_that_must_not_be(command, code, said, found) -> None:
-    assert bool(files.judged(command, code, said)) is found
+def test_the_judge_detects_faults(command, code, errors, is_fault) -> None:
+    assert bool(files.fault_of(command, code, errors)) is is_fault
 
 
-# A sample of the attacks with bags: each command shows what it can read, or one line with why not.
+# A sample of the attacks with bags: each command shows the content, or one line with the reason.
 
 
 BAG_SEED = 20261123
 
 
-"""Not the campaign's own: its findings went into the code."""
+"""Another seed than the campaign's, whose findings are fixed."""
 
 
 SAMPLE = 20
 
 
-def test_changed_bags_are_told_in_time_and_within_memory() -> None:
+def test_changed_bags_cause_no_findings() -> None:
     tried, findings = attack(SAMPLE, BAG_SEED)
     assert findings == []
     assert sum(tried.values()) == SAMPLE * len(BAG_COMMANDS)
@@ -126,33 +129,33 @@ def test_the_same_seed_changes_a_bag_alike(tmp_path: Path) -> None:
     made = []
     for name in ('one', 'other'):
         (tmp_path / name).mkdir()
-        done = changed(tmp_path / name, Random('6'))
-        # The bytes are others: a bag says when it was made.
-        made.append((done, sorted(file.stat().st_size for file in (tmp_path / name).iterdir())))
+        changes = change_bag(tmp_path / name, Random('6'))
+        # The bytes differ: a bag holds the time at which it was made.
+        made.append((changes, sorted(file.stat().st_size for file in (tmp_path / name).iterdir())))
     assert made[0] == made[1]
 
 
 @pytest.mark.parametrize(
-    ('end', 'wrong'),
+    ('end', 'fault'),
     [
         ((0, 'a table', ''), ''),
         ((2, '', 'linkage info: x: is damaged\n'), ''),
         ((2, '', 'linkage export: x: unfinished: killed\nlinkage export: x: is damaged\n'), ''),
         ((2, '', ''), '0 lines'),
         ((2, '', 'one\ntwo\n'), '2 lines'),
-        ((0, '', ''), 'nothing is told'),
+        ((0, '', ''), 'no output'),
         ((0, 'a\x1b[0m', ''), 'not printable'),
-        ((2, '', 'x' * 331_000), 'a line of 331000 letters'),
+        ((2, '', 'x' * 331_000), 'a line of 331000 characters'),
         (('traceback', '', 'MemoryError'), 'MemoryError'),
         (('no end', '', 'more than 60 s'), 'more than 60 s'),
     ],
 )
-def test_what_must_not_be_is_a_finding(end: tuple[object, str, str], wrong: str) -> None:
-    code, shown, said = end
-    found = judged(Ended(code, said, shown))
-    assert wrong in found
-    assert bool(found) == bool(wrong)
+def test_faults_are_findings(end: tuple[object, str, str], fault: str) -> None:
+    code, stdout, stderr = end
+    finding = fault_of(Ended(code, stderr, stdout))
+    assert fault in finding
+    assert bool(finding) == bool(fault)
 
 
-def test_every_command_that_only_looks_is_tried() -> None:
+def test_every_command_that_reads_a_bag_is_tried() -> None:
     assert set(BAG_COMMANDS) == {'info', 'report', 'export', 'plot'}

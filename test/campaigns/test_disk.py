@@ -26,6 +26,7 @@ from campaigns.disk.failing import attempt, injections, Part, Tried
 from campaigns.disk.filling import Disk, NotPermittedError
 from campaigns.disk.injection import FAULTS, why_not
 from campaigns.disk.judge import (
+    COMPLETE,
     EARLY,
     Expectation,
     expected_messages,
@@ -35,13 +36,12 @@ from campaigns.disk.judge import (
     Recorded,
     REFUSED,
     SETTINGS,
-    WHOLE,
 )
 from linkage_ros.bag.metadata import METADATA_FILE
 import pytest
 
 EVERY = 29
-"""A sample of one in so many; it shares no divisor with the ways in which a call can fail."""
+"""The sample takes one injection in so many; coprime to the number of faults of a call."""
 
 
 @pytest.fixture(scope='module')
@@ -51,24 +51,24 @@ def tried() -> list[Tried]:
     work = []
     for first, setting in enumerate(SETTINGS):
         (dry,) = next(results_of(attempt, [Part(setting, (None,))] * 2, 2))
-        assert (dry.outcome.faults, dry.outcome.verdict) == ([], WHOLE)
+        assert (dry.outcome.faults, dry.outcome.verdict) == ([], COMPLETE)
         chosen = tuple([*injections(dry.calls)][first::EVERY])
         work += [Part(setting, chosen[:25]), Part(setting, chosen[25:])]
     return [one for some in results_of(attempt, work, 2) for one in some]
 
 
-def test_a_call_that_fails_costs_nothing_that_is_counted(tried: list[Tried]) -> None:
+def test_a_failing_call_loses_no_counted_message(tried: list[Tried]) -> None:
     assert [(one.injection, one.outcome.faults) for one in tried if one.outcome.faults] == []
 
 
-def test_the_sample_has_seen_all_there_is_to_see(tried: list[Tried]) -> None:
+def test_the_sample_has_every_target_phase_and_fault(tried: list[Tried]) -> None:
     assert len(tried) > 100
     verdicts = [one.outcome.verdict for one in tried]
-    assert min(verdicts.count(verdict) for verdict in (EARLY, WHOLE, REFUSED)) > 5
-    struck = [one.struck for one in tried if one.struck]
-    assert len(struck) == len(tried)
-    assert {call.what for call in struck} >= {'file', 'metadata', 'folder', 'reserve'}
-    assert {call.phase for call in struck} == {'beginning', 'recording', 'closing'}
+    assert min(verdicts.count(verdict) for verdict in (EARLY, COMPLETE, REFUSED)) > 5
+    failed = [one.failed_call for one in tried if one.failed_call]
+    assert len(failed) == len(tried)
+    assert {call.target for call in failed} >= {'file', 'metadata', 'folder', 'reserve'}
+    assert {call.phase for call in failed} == {'beginning', 'recording', 'closing'}
     assert {one.injection.fault for one in tried if one.injection} >= {
         fault for fault in FAULTS if fault != 'EOPNOTSUPP'
     }
@@ -79,11 +79,11 @@ def test_the_sample_has_seen_all_there_is_to_see(tried: list[Tried]) -> None:
     ('storage', 'filler'),
     [
         ('one file, a floor', 'the recording alone'),
-        ('split', 'another that takes whatever is freed'),
+        ('split', 'another process, which takes all free space'),
         ('ring of 3', 'the recording alone'),
     ],
 )
-def test_a_disk_that_fills(disk: Disk, storage: str, filler: str) -> None:
+def test_a_disk_that_fills_loses_no_counted_message(disk: Disk, storage: str, filler: str) -> None:
     try:
         filled = filling.fill(disk, storage, filler, 40_000)
     except NotPermittedError as error:
@@ -104,10 +104,10 @@ def stalled(request: pytest.FixtureRequest) -> stalling.Stalled:
 
 
 @pytest.mark.ros
-def test_a_disk_that_stalls_costs_nothing(stalled: stalling.Stalled) -> None:
+def test_a_disk_that_stalls_delays_no_tick_and_loses_no_message(stalled: stalling.Stalled) -> None:
     assert stalled.faults == []
     assert stalled.total('received') == stalled.total('recorded') > 200
-    # The ticks went on meanwhile: none of them waited for the disk.
+    # No tick waited for the disk.
     assert stalled.during > 100
 
 
@@ -115,33 +115,33 @@ def at_rest(folder: Path) -> Recorded:
     return record(folder, SETTINGS['one file'], lambda phase: None)
 
 
-def test_the_judge_sees_a_count_too_many(tmp_path: Path) -> None:
+def test_the_judge_detects_a_wrong_count(tmp_path: Path) -> None:
     done = at_rest(tmp_path / 'bag')
     received, recorded, *rest = done.counts[0]
     done.counts[0] = (received + 1, recorded + 1, *rest)  # type: ignore[assignment]
     outcome = judge(done, tmp_path / 'bag', Expectation(expected_messages(MESSAGES)))
     assert any('received' in fault for fault in outcome.faults)
-    assert any('says nothing, and holds' in fault for fault in outcome.faults)
+    assert any('reports no failure, but holds' in fault for fault in outcome.faults)
 
 
 FALSE = {
     'an exception': ({'escaped': 'KeyError: 1'}, 'escaped'),
-    'two lines': ({'failure': 'bag: it\nended; why'}, 'said badly'),
-    'no remedy': ({'failure': 'it ended'}, 'said badly'),
-    'a failure that is none': ({'failure': '{folder}: it ended; mend it'}, 'metadata say nothing'),
+    'two lines': ({'failure': 'bag: it\nended; why'}, 'bad error message'),
+    'no remedy': ({'failure': 'it ended'}, 'bad error message'),
+    'a false failure': ({'failure': '{folder}: it ended; mend it'}, 'metadata report no failure'),
 }
 
 
 @pytest.mark.parametrize('name', FALSE)
-def test_the_judge_sees_what_is_said_badly(tmp_path: Path, name: str) -> None:
+def test_the_judge_detects_bad_errors(tmp_path: Path, name: str) -> None:
     done = at_rest(tmp_path / 'bag')
-    said, fault = FALSE[name]
-    done = replace(done, **{k: v.format(folder=tmp_path / 'bag') for k, v in said.items()})
+    changes, fault = FALSE[name]
+    done = replace(done, **{k: v.format(folder=tmp_path / 'bag') for k, v in changes.items()})
     outcome = judge(done, tmp_path / 'bag', Expectation(expected_messages(MESSAGES)))
     assert any(fault in found for found in outcome.faults)
 
 
-def test_the_judge_sees_what_is_broken(tmp_path: Path) -> None:
+def test_the_judge_detects_broken_bags(tmp_path: Path) -> None:
     done = at_rest(tmp_path / 'bag')
     expectation = Expectation(expected_messages(MESSAGES))
     assert judge(done, tmp_path / 'bag', expectation).faults == []
@@ -150,7 +150,7 @@ def test_the_judge_sees_what_is_broken(tmp_path: Path) -> None:
     faults = judge(done, tmp_path / 'bag', expectation).faults
     assert 'left behind: metadata.yaml.tmp' in faults
     assert any(fault.startswith('metadata: ') for fault in faults)
-    assert judge(None, tmp_path / 'bag', expectation).faults == ['came to no end']
+    assert judge(None, tmp_path / 'bag', expectation).faults == ['did not end']
 
 
 @pytest.mark.parametrize(
@@ -163,6 +163,6 @@ def test_the_judge_sees_what_is_broken(tmp_path: Path) -> None:
     ],
     ids=['another order', 'gaps', 'one twice', 'other bytes'],
 )
-def test_a_run_is_in_order_whole_and_true(found: list) -> None:
+def test_a_run_is_consecutive_and_unchanged(found: list) -> None:
     assert Expectation(expected_messages(20)).run_of(found) is None
     assert Expectation(expected_messages(20)).run_of(expected_messages(20)[3:9]) == range(3, 9)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A sample of the endurance campaign, and what its judge says of series made up for it."""
+"""A sample of the endurance campaign, and its judgement of synthetic series."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ import sys
 from campaigns.endurance import over_dds
 from campaigns.endurance.accelerated import Plan, run_all
 from campaigns.endurance.memory import flatness, MOST_GROWTH, shortcomings, Usage, usage
-from linkage_ros.bag.recording_stats import RecordingStats
+from linkage_ros.bag.metadata import RecordingStats
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 import pytest
@@ -35,26 +35,26 @@ MINUTES = 15.0 / 60.0  # h
 
 
 @pytest.mark.parametrize('scene', ['demo', 'excavator_delay', 'worn_press'])
-def test_a_quarter_of_an_hour_is_flat_and_accounted_for(scene: str) -> None:
-    # A process of its own: what other tests left free would hide growth.
+def test_memory_is_flat_and_messages_are_counted_over_a_quarter_of_an_hour(scene: str) -> None:
+    # A process of its own: memory freed by other tests would hide growth.
     [done] = run_all([Plan(scene, MINUTES / (3 if scene == 'worn_press' else 1), 100.0)], 1)
     assert done.faults == []
     assert flatness(done.samples).flat
     counts = done.summary.topics[0]
     assert counts.received == done.published > 0
-    assert counts.let_go > 0
+    assert counts.discarded > 0
 
 
 @pytest.mark.ros
 @pytest.mark.skipif(find_spec('rclpy') is None, reason='rclpy is not installed')
-def test_seconds_over_dds_are_accounted_for_and_replay() -> None:
+def test_a_run_over_dds_counts_its_messages_and_replays() -> None:
     done = over_dds.run(6.0 / 60.0)
     assert done.faults == []
     assert done.replayed['verdict'] == 'identical'
-    assert done.account['recorded']['/joint_states'] > 1000
+    assert done.counts['recorded']['/joint_states'] > 1000
     assert len(done.samples) > 20
-    found = flatness(done.samples)
-    assert (found.files, found.threads) == (0, 0)
+    growth = flatness(done.samples)
+    assert (growth.files, growth.threads) == (0, 0)
 
 
 def series(memory, files=lambda _: 8, threads=lambda _: 2) -> list[Usage]:
@@ -62,8 +62,8 @@ def series(memory, files=lambda _: 8, threads=lambda _: 2) -> list[Usage]:
     return [Usage(float(t), round(memory(t)), files(t), threads(t)) for t in range(101)]
 
 
-HELD = {
-    # what was held by the second, and whether that is flat
+SERIES = {
+    # usage over time, and whether it is flat
     'the same': (series(lambda t: 30_000), True),
     'more at first': (series(lambda t: 30_000 + 5000 * min(t, 20) / 20), True),
     'a peak': (series(lambda t: 30_000 + 50_000 * (t == 60)), True),
@@ -86,13 +86,13 @@ HELD = {
 }
 
 
-@pytest.mark.parametrize('name', HELD)
-def test_what_counts_as_flat(name: str) -> None:
-    samples, flat = HELD[name]
+@pytest.mark.parametrize('name', SERIES)
+def test_flat_series_are_told_from_growing_ones(name: str) -> None:
+    samples, flat = SERIES[name]
     assert flatness(samples).flat is flat
 
 
-def test_the_slope_is_that_of_a_line_whatever_a_few_samples_say() -> None:
+def test_the_slope_is_robust_against_a_few_samples() -> None:
     line = series(lambda t: 30_000 + 40 * t)
     for at in (40, 55, 90):
         line[at] = line[at]._replace(resident=90_000)
@@ -111,8 +111,8 @@ input()
 """
 
 
-def test_memory_that_is_held_is_seen_and_so_are_files_and_threads() -> None:
-    # A process of its own: this one may have memory left of other tests that it need not ask for.
+def test_usage_counts_memory_files_and_threads() -> None:
+    # A process of its own: this one may have free memory left from other tests.
     held = 64_000_000
     with Popen(
         [sys.executable, '-c', HOLDS_MORE.format(held=held)], stdin=PIPE, stdout=PIPE, text=True
@@ -130,37 +130,37 @@ def test_memory_that_is_held_is_seen_and_so_are_files_and_threads() -> None:
     assert after.threads == before.threads == 1
 
 
-def write_bag(folder: Path, account: RecordingStats | None) -> Path:
-    """Write three messages of one topic, with this account of it."""
+def write_bag(folder: Path, stats: RecordingStats | None) -> Path:
+    """Write three messages of one topic, with counts of messages."""
     writer = BagWriter(folder, [Topic('/a', 'std_msgs/msg/Empty', '', '')])
-    writer.account = lambda summary: account
+    writer.account = lambda summary: stats
     for time in range(3):
         writer.write(0, time, time, b'\0\1\0\0')
     writer.close()
     return folder
 
 
-ACCOUNTS = {
-    'whole': (RecordingStats([3], [3], [0], [0]), []),
+COUNTS = {
+    'right': (RecordingStats([3], [3], [0], [0]), []),
     'let go': (RecordingStats([9], [3], [0], [6]), []),
-    'none': (None, ['the bag has no account']),
-    'open': (RecordingStats([4], [3], [0], [0]), ['/a: the account does not close']),
+    'none': (None, ['the bag has no counts']),
+    'wrong sum': (RecordingStats([4], [3], [0], [0]), ['/a: the counts do not add up']),
     'dropped': (RecordingStats([5], [3], [2], [0]), ['/a: 2 dropped']),
-    'more than is there': (
+    'more than in the bag': (
         RecordingStats([4], [4], [0], [0]),
-        ['/a: 4 recorded by the account, 3 in the bag'],
+        ['/a: 4 counted, 3 in the bag'],
     ),
 }
 
 
-@pytest.mark.parametrize('name', ACCOUNTS)
-def test_what_does_not_add_up_is_said(tmp_path: Path, name: str) -> None:
-    account, said = ACCOUNTS[name]
-    assert shortcomings(write_bag(tmp_path / 'bag', account)) == said
+@pytest.mark.parametrize('name', COUNTS)
+def test_wrong_counts_are_faults(tmp_path: Path, name: str) -> None:
+    stats, faults = COUNTS[name]
+    assert shortcomings(write_bag(tmp_path / 'bag', stats)) == faults
 
 
-def test_a_bag_that_is_not_there_is_said(tmp_path: Path) -> None:
+def test_a_missing_bag_is_a_fault(tmp_path: Path) -> None:
     folder = write_bag(tmp_path / 'bag', None)
     shutil.rmtree(folder)
-    (said,) = shortcomings(folder)
-    assert 'does not exist' in said
+    (fault,) = shortcomings(folder)
+    assert 'does not exist' in fault

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A sample of the kills campaign: whatever a recording was at, its bag is good; no time judged."""
+"""A sample of the kills campaign: the bag is good in every phase; no durations are judged."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from linkage_ros.bag.writer import BagWriter
 import pytest
 
 SEED = 20261121
-"""Not the campaign's own."""
+"""Another seed than the campaign's."""
 
 KILLS, AIMED = 12, 12
 MS = 1_000_000
@@ -42,11 +42,11 @@ def outcomes() -> list[Outcome]:
     return list(run(plans(SEED, KILLS, AIMED, (0.2, 1.2)), jobs=3))
 
 
-def test_what_a_kill_leaves_is_the_beginning_of_what_was_offered(outcomes: list[Outcome]) -> None:
+def test_a_killed_bag_begins_with_the_offered_messages(outcomes: list[Outcome]) -> None:
     assert [outcome.faults for outcome in outcomes] == [[]] * (KILLS + AIMED)
 
 
-def test_the_sample_has_seen_recordings_that_were_killed_and_some_of_each_verdict(
+def test_the_sample_has_kills_in_all_phases(
     outcomes: list[Outcome],
 ) -> None:
     recorded = [o for o in outcomes if Phase.MAKING < o.phase < Phase.CLOSED]
@@ -66,7 +66,7 @@ PLAN = Plan(0, Storage(flush_period=0.1), 100, Phase.MAKING, 1, 0.0)
 
 @pytest.fixture
 def marks(tmp_path: Path) -> Marks:
-    """Return marks of 100 ticks that were begun, 1 ms apart from 1 s on."""
+    """Return marks of 100 ticks, 1 ms apart, the first at 1 s."""
     marks = Marks.make(tmp_path / 'marks', PLAN.ticks)
     marks.enter(Phase.RECORDING)
     for tick in range(PLAN.ticks):
@@ -77,7 +77,7 @@ def marks(tmp_path: Path) -> Marks:
 
 
 def record(folder: Path, marks: Marks, count: int, storage: Storage | None = None) -> BagWriter:
-    """Write so many messages and flush them, as a recording that is killed then."""
+    """Write and flush a number of messages, as a recording before its kill."""
     writer = BagWriter(folder, TOPICS, {}, storage)
     for number in range(count):
         writer.write(*message(number, marks.times[number // 2]))
@@ -85,7 +85,7 @@ def record(folder: Path, marks: Marks, count: int, storage: Storage | None = Non
     return writer
 
 
-def test_the_age_of_what_is_missing_is_the_loss(tmp_path: Path, marks: Marks) -> None:
+def test_the_loss_is_the_age_of_the_oldest_missing_message(tmp_path: Path, marks: Marks) -> None:
     record(tmp_path / 'bag', marks, 120)
     marks.safe = 90
     outcome = judge(PLAN, tmp_path / 'bag', marks, 1105 * MS)
@@ -99,7 +99,7 @@ def test_the_age_of_what_is_missing_is_the_loss(tmp_path: Path, marks: Marks) ->
     assert outcome.excess == (45 - 100 - 6) * MS
 
 
-def test_what_made_way_in_a_ring_is_not_missing(tmp_path: Path, marks: Marks) -> None:
+def test_messages_removed_by_the_ring_are_not_lost(tmp_path: Path, marks: Marks) -> None:
     record(tmp_path / 'bag', marks, 200, Storage(split_seconds=0.02, keep_files=2))
     outcome = judge(PLAN, tmp_path / 'bag', marks, 1100 * MS)
     # Files of 20 ticks; of the five the last two are kept.
@@ -107,7 +107,7 @@ def test_what_made_way_in_a_ring_is_not_missing(tmp_path: Path, marks: Marks) ->
     assert (outcome.faults, outcome.loss) == ([], 0)
 
 
-def test_nothing_is_expected_of_a_bag_that_is_not_yet_made(tmp_path: Path) -> None:
+def test_a_bag_that_is_not_yet_made_may_be_missing(tmp_path: Path) -> None:
     marks = Marks.make(tmp_path / 'marks', 1)
     marks.enter(Phase.MAKING)
     assert judge(PLAN, tmp_path / 'bag', marks, 0).verdicts == {'bag': NO_FOLDER}
@@ -117,7 +117,7 @@ def test_nothing_is_expected_of_a_bag_that_is_not_yet_made(tmp_path: Path) -> No
     assert (outcome.verdicts['bag'], outcome.faults) == (NO_FILE, [])
     marks.enter(Phase.RECORDING)
     outcome = judge(PLAN, tmp_path / 'bag', marks, 0)
-    assert outcome.verdicts['bag'] == f'{FAULT}nothing whole, although it had begun'
+    assert outcome.verdicts['bag'] == f'{FAULT}no complete file, although recording had begun'
 
 
 def _counts_more(folder: Path) -> None:
@@ -136,22 +136,22 @@ def _empty(folder: Path) -> None:
 
 
 BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
-    'metadata cut': (lambda f: (f / METADATA_FILE).write_text('a: ['), 'metadata'),
+    'metadata truncated': (lambda f: (f / METADATA_FILE).write_text('a: ['), 'metadata'),
     'no metadata': (lambda f: (f / METADATA_FILE).unlink(), 'metadata'),
-    'metadata counts more than is there': (_counts_more, 'metadata'),
-    'metadata names a file that is not there': (_names_another, 'metadata'),
+    'metadata counts too many messages': (_counts_more, 'metadata'),
+    'metadata names a missing file': (_names_another, 'metadata'),
     'an empty folder': (_empty, 'bag'),
     'no folder': (shutil.rmtree, 'bag'),
 }
 
 
 @pytest.mark.parametrize('name', BROKEN)
-def test_the_judge_sees_what_is_broken(tmp_path: Path, marks: Marks, name: str) -> None:
+def test_the_judge_detects_broken_bags(tmp_path: Path, marks: Marks, name: str) -> None:
     record(tmp_path / 'bag', marks, 120)
-    do, what = BROKEN[name]
-    do(tmp_path / 'bag')
+    break_bag, part = BROKEN[name]
+    break_bag(tmp_path / 'bag')
     outcome = judge(PLAN, tmp_path / 'bag', marks, 1100 * MS)
-    assert outcome.verdicts[what].startswith(FAULT)
+    assert outcome.verdicts[part].startswith(FAULT)
 
 
 FALSE: dict[str, Callable[[list[BagMessage]], list[BagMessage]]] = {
@@ -166,7 +166,7 @@ FALSE: dict[str, Callable[[list[BagMessage]], list[BagMessage]]] = {
 
 
 @pytest.mark.parametrize('name', FALSE)
-def test_the_judge_sees_what_is_false(
+def test_the_judge_detects_false_messages(
     tmp_path: Path, marks: Marks, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     record(tmp_path / 'bag', marks, 120)
@@ -177,7 +177,7 @@ def test_the_judge_sees_what_is_false(
     assert outcome.verdicts['bag'].startswith(FAULT)
 
 
-def test_the_judge_sees_what_is_recovered_otherwise(
+def test_the_judge_detects_a_wrong_recovery(
     tmp_path: Path, marks: Marks, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     record(tmp_path / 'bag', marks, 120)
@@ -190,20 +190,20 @@ def test_the_judge_sees_what_is_recovered_otherwise(
     assert outcome.faults == [f'recovered: {FAULT}other messages']
 
 
-def test_a_closed_bag_that_lacks_something_is_a_fault(tmp_path: Path, marks: Marks) -> None:
+def test_an_incomplete_closed_bag_is_a_fault(tmp_path: Path, marks: Marks) -> None:
     record(tmp_path / 'bag', marks, 199).close()
     marks.enter(Phase.CLOSED)
     outcome = judge(PLAN, tmp_path / 'bag', marks, 1100 * MS)
-    assert outcome.verdicts['bag'] == f'{FAULT}finished, but not all'
+    assert outcome.verdicts['bag'] == f'{FAULT}finished, but incomplete'
 
 
-def test_pauses_count_as_far_as_they_fall_into_a_time(tmp_path: Path) -> None:
+def test_pauses_count_within_the_interval(tmp_path: Path) -> None:
     marks = Marks.make(tmp_path / 'marks', 1)
     for _ in range(300):
         with marks.pause(Phase.FLUSHING):
             pass
     begin = marks.enter(Phase.SPLITTING)
-    # The last one has not ended: it lasts until the kill.
+    # The last pause has not ended; it lasts until the kill.
     assert marks.paused(begin, begin + 7 * MS) == 7 * MS
     assert marks.paused(begin + 5 * MS, begin + 7 * MS) == 2 * MS
     assert 0 < marks.paused(0, begin) < begin

@@ -126,7 +126,7 @@ def test_condition_numbers_in_doubles_are_right_where_differences_can_tell(famil
             truth = reference.solve(phi[case], alpha[case])
             if truth.outcome is not Outcome.CLOSED:
                 continue
-            exact = exact_condition_numbers(reference, phi[case], alpha[case], apart=True)
+            exact = exact_condition_numbers(reference, phi[case], alpha[case], independent=True)
             arguments = [truth], [phi[case]], [alpha[case]]
             assert exact is not None
             assert condition_numbers(reference, *arguments)[0] == pytest.approx(

@@ -18,29 +18,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
 import os
 from pathlib import Path
 import pty
+import re
 import subprocess
 import sys
 
 import pytest
 
+from ..support import commands
+
 Run = Callable[..., 'subprocess.CompletedProcess[str]']
 
 if find_spec('rclpy') is None:
     collect_ignore_glob = ['test_*.py']
-
-
-def environment(folder: Path) -> dict[str, str]:
-    """Return what a process of the tests sees; `linkage demo` chooses its own ROS domain."""
-    return os.environ | {
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'ROS_DOMAIN_ID': str(1 + os.getpid() % 101),
-        'ROS_LOG_DIR': str(folder),
-        'RCUTILS_COLORIZED_OUTPUT': '0',
-    }
 
 
 def on_terminal(folder: Path, *arguments: str, columns: int = 120) -> str:
@@ -49,7 +43,7 @@ def on_terminal(folder: Path, *arguments: str, columns: int = 120) -> str:
     process = subprocess.Popen(
         [sys.executable, '-m', 'linkage_ros.cli.main', *arguments],
         cwd=folder,
-        env=environment(folder)
+        env=commands.environment(folder)
         | {'TERM': 'xterm-256color', 'COLUMNS': str(columns), 'LINES': '40'},
         stdout=theirs,
         stderr=subprocess.DEVNULL,
@@ -67,19 +61,14 @@ def on_terminal(folder: Path, *arguments: str, columns: int = 120) -> str:
     return shown.decode()
 
 
+def json_keys(command: str) -> set[str]:
+    """Return the keys that the reference documents for ``linkage COMMAND --json``."""
+    page = (Path(__file__).parents[2] / 'docs' / 'reference' / 'json.md').read_text('utf-8')
+    section = page.split(f'\n## linkage {command}\n')[1].split('\n## ')[0]
+    return set(re.findall(r'^\| `(\w+)` ', section, re.MULTILINE))
+
+
 @pytest.fixture
 def linkage(tmp_path: Path) -> Run:
     """Return a function that runs ``linkage`` in an empty folder."""
-
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, '-m', 'linkage_ros.cli.main', *arguments],
-            cwd=tmp_path,
-            env=environment(tmp_path),
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
-
-    return run
+    return partial(commands.linkage, tmp_path)

@@ -17,10 +17,12 @@
 from __future__ import annotations
 
 import argparse
+from importlib.util import find_spec
+import json
 from threading import Event
 
-from linkage_ros.accuracy.measure import PARTS
-from linkage_ros.accuracy.results import Part, Results, Table
+from linkage_ros.accuracy import PARTS
+from linkage_ros.accuracy.results import Choice, Part, Rate, Results
 from linkage_ros.cli import accuracy as command
 from linkage_ros.cli.accuracy import print_results
 from linkage_ros.errors import LinkageError
@@ -42,8 +44,10 @@ def test_a_part_is_measured_printed_and_written(tmp_path, capfd):
     folder = tmp_path / 'page'
     assert run(DEMO, '--quick', '--only', 'effects', '-o', str(folder)) == 0
     out = capfd.readouterr().out
-    assert out.startswith('What each effect costs, and what it makes of the truth\n')
-    assert out.endswith(f'page      {folder / "index.html"}\n')
+    headline, cost, page = out.splitlines()
+    assert headline == 'demo: measured.'
+    assert cost.startswith('A tick takes ')
+    assert page == f'page      {folder / "index.html"}'
     assert {file.name for file in folder.iterdir()} == {'index.html', 'effects.csv'}
     assert 'velocity' in (folder / 'effects.csv').read_text('utf-8')
 
@@ -80,15 +84,14 @@ def test_no_scene_is_one_line(linkage):
 
 @pytest.mark.parametrize('missing', ['mpmath', 'plotly', 'matplotlib'])
 def test_what_is_not_installed_is_said_before_anything_is_measured(tmp_path, monkeypatch, missing):
-    def hidden(name, find=command.find_spec):
+    def hidden(name, find=find_spec):
         return None if name == missing else find(name)
 
-    monkeypatch.setattr(command, 'find_spec', hidden)
-    monkeypatch.setattr('linkage_ros.accuracy.page.files.find_spec', hidden)
+    monkeypatch.setattr('linkage_ros.errors.find_spec', hidden)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(LinkageError) as caught:
         run(DEMO)
-    assert str(caught.value) == f'{missing}: is not installed; pip install linkage_ros[report]'
+    assert str(caught.value) == f"{missing}: is not installed; pip install 'linkage_ros[report]'"
 
 
 def test_it_can_be_stopped_and_leaves_nothing(tmp_path, monkeypatch):
@@ -99,52 +102,57 @@ def test_it_can_be_stopped_and_leaves_nothing(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-# The tables of ``linkage accuracy`` on a terminal.
+def test_json_has_the_same_answer(tmp_path, capfd):
+    folder = tmp_path / 'page'
+    assert run(DEMO, '--quick', '--only', 'effects', '--json', '-o', str(folder)) == 0
+    said = json.loads(capfd.readouterr().out)
+    assert said['scene'] == 'demo'
+    assert said['headline'] == 'demo: measured.'
+    assert said['answers'] == []
+    assert [part['key'] for part in said['parts']] == ['effects']
+    assert said['parts'][0]['headline'].startswith('A tick takes ')
+    assert said['page'] == str(folder / 'index.html')
 
 
-RESULTS = Results(
-    'four_bar',
-    [('cores', '2')],
-    [
-        Part(
-            'solving',
-            'Solving the loop',
-            ['A text for the page.'],
-            (),
+# The lines of ``linkage accuracy`` on a terminal.
+
+
+def test_the_answer_is_at_most_twelve_lines_of_eighty_columns(capsys):
+    closed = Spread(0.5, 0.53, 0.55)
+    print_results(
+        Results(
+            'torque_crank',
+            [('cores', '2')],
             [
-                Table(
-                    'methods',
-                    'What each takes',
-                    ('method', 'time [µs]', 'error [rad]'),
-                    [
-                        ('closed form', Spread(0.68, 0.7, 0.75), 2.1e-16),
-                        ('Newton', 12.25, None),
-                        ('another', 'failed', 1e-6),
-                    ],
+                Part(
+                    'solving', 'Solving the loop', 'Exact to 6e-16 rad in 0.53 µs.',
+                    clause='exact to 6e-16 rad in 0.53 µs; '
+                    'nothing cheaper is within 9 digits of it',
+                    choices=[Choice(6e-16, 'solver: closed_form # the default', closed, closed)],
                 ),
-                Table('none', 'What nobody takes', ('method', 'time [µs]'), []),
+                Part('ticking', 'Ticking', 'A headline.', rates=[
+                    Rate(2000.0, 5e-3, 'held'), Rate(2000.0, 2e-4, 'carried forward'),
+                ]),
+                Part('effects', 'Effects', 'A tick takes 53.2 µs; effort adds 52 µs.'),
+                Part('dynamics', 'Steps', 'rk4, 1 ms a step: 6e-08 rad off after 10 s.'),
+                Part('recording', 'Recording', 'Recording costs 6 µs a message.',
+                     clause='recording costs 6 µs a message and may lose 0.91 s in a crash'),
             ],
-            ['For 1e-12 rad: the closed form.'],
-        ),
-        Part('ticking', 'Ticking', ['Nothing in numbers.']),
-    ],
-)
-
-
-def test_tables_part_by_part_and_the_advice_at_the_end(capsys):
-    print_results(RESULTS)
-    assert capsys.readouterr().out == (
-        'Solving the loop\n\n'
-        'What each takes\n'
-        'method              time [µs]  error [rad]\n'
-        'closed form  0.70 (0.68–0.75)      2.1e-16\n'
-        'Newton                   12.2\n'
-        'another                failed         1e-6\n'
-        '\n'
-        'What nobody takes\n'
-        'method  time [µs]\n'
-        '\n'
-        'Ticking\n\n'
-        'Solving the loop\n'
-        '  For 1e-12 rad: the closed form.\n'
-    )
+        )
+    )  # fmt: skip
+    lines = capsys.readouterr().out.splitlines()
+    assert lines == [
+        'torque_crank: exact to 6e-16 rad in 0.53 µs; nothing cheaper is within 9 digits',
+        '  of it; recording costs 6 µs a message and may lose 0.91 s in a crash.',
+        '0.01 rad: 0.53 µs (0.53 µs to solve) a tick; 2000 Hz carried forward, 2000 Hz',
+        '  held; solver: closed_form # the default',
+        '1e-4 rad: 0.53 µs (0.53 µs to solve) a tick; none: at 2000 Hz a state is 0.0002',
+        '  rad off when used; solver: closed_form # the default',
+        '1e-8 rad: 0.53 µs (0.53 µs to solve) a tick; none: at 2000 Hz a state is 0.0002',
+        '  rad off when used; solver: closed_form # the default',
+        'A tick takes 53.2 µs; effort adds 52 µs.',
+        'rk4, 1 ms a step: 6e-08 rad off after 10 s.',
+    ]
+    # The path of the page is one more.
+    assert len(lines) < 12
+    assert max(map(len, lines)) <= 80

@@ -39,9 +39,9 @@ from mcap.writer import CompressionType, IndexType, Writer
 import pytest
 import zstandard
 
-from .conftest import environment
 from .recorded import scene_file, SECOND
 from .test_replay import recorded
+from ..support.commands import environment
 
 MEMORY = 3 * 2**29
 """What a process may take, its libraries too [bytes]."""

@@ -47,8 +47,8 @@ def refused(linkage: Run, *typed: str) -> str:
 @pytest.mark.parametrize(
     ('typed', 'said'),
     [
-        (['-o', 'a.cc'], "a.cc: ends in '.cc'; name a file that ends in .c, .h, .js, .py"),
-        (['-o', 'a'], 'a: has no ending; name a file that ends in .c, .h, .js, .py'),
+        (['-o', 'a.cc'], "a.cc: ends in '.cc'; name a file that ends in .c or .h or .js or .py"),
+        (['-o', 'a'], 'a: has no ending; name a file that ends in .c or .h or .js or .py'),
         (
             ['-o', 'a.c', '--joints', 'rocker_joint,coupler'],
             "--joints: 'coupler' is no published joint; did you mean 'coupler_joint'?",

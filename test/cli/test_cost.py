@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 from importlib.util import module_from_spec, spec_from_file_location
 from itertools import islice
+import json
 from pathlib import Path
 from threading import Event
 
@@ -45,7 +46,7 @@ from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest
 
-from .conftest import Run
+from .conftest import json_keys, Run
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / 'config'
@@ -239,7 +240,7 @@ def test_the_table_of_a_scene():
 def test_the_table_of_all_effects():
     drives = {'constant_rate': Times(-1.0, -1.5, -1.0, -1.0)}
     faults = {'freeze': Times(0.5, 0.25, 0.5, 0.5)}
-    assert list(command.table_of_all(COST, 100, drives, faults).rows) == [
+    assert list(command.table_of_all(command.Costs(COST, drives, faults), 100).rows) == [
         ('a tick without effects', '4.00', '6.00', '1.00', ''),
         ('velocity', '+2.00', '+2.50', '+0.50', ''),
         ('friction', '-0.50', '+1.00', '-0.12', 'effort'),
@@ -250,12 +251,46 @@ def test_the_table_of_all_effects():
     ]
 
 
+def told(capsys, *typed: str) -> dict:
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    assert command.run(parser.parse_args([*typed, '--ticks', str(FEW), '--json']), Event()) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_json_of_a_scene_has_the_documented_keys_in_microseconds(capsys):
+    account = told(capsys, str(CONFIG / 'scenes' / 'demo.yaml'))
+    assert set(account) == json_keys('cost')
+    assert account['ticks'] == FEW
+    assert set(account['whole_tick']) == {'median_us', 'p99_us', 'low_us', 'high_us'}
+    assert account['whole_tick']['median_us'] > 0.0
+    assert (account['drives'], account['faults']) == ({}, {})
+    scene = load_scene(CONFIG / 'scenes' / 'demo.yaml')
+    assert set(scene.members[0].effects) <= {effect['name'] for effect in account['effects']}
+
+
+def test_json_of_all_has_every_drive_and_fault():
+    times = Times(1.0, 2.0, 3.0, 4.0)
+    account = command.account_of(command.Costs(COST, {'sine': times}, {'freeze': times}))
+    as_json = {'median_us': 1.0, 'p99_us': 2.0, 'low_us': 3.0, 'high_us': 4.0}
+    assert account['drives'] == {'sine': as_json}
+    assert account['faults'] == {'freeze': as_json}
+    assert [effect['saves_us'] for effect in account['effects']] == [None, 0.25, 5.0, None]
+
+
+def test_progress_counts_the_ticks_of_each_variant(tmp_path):
+    seen = []
+    scene = scene_of(tmp_path, f'linkage: {FOUR_BAR}\n')
+    measure(scene, 250, progress=lambda done, of: seen.append((done, of)))
+    assert seen == [(0, 250), (100, 250), (200, 250), (250, 250)]
+
+
 def test_all_means_all():
     (member,) = command.every_effect().members
     assert list(member.effects) == list(EFFECTS)
     assert list(command.EVERY_DRIVE) == list(DRIVES)
     assert list(command.EVERY_FAULT) == list(FAULTS)
-    table = command.all_effects(FEW)
+    table = command.table_of_all(command.all_effects(FEW), FEW)
     assert [row[0] for row in table.rows] == EVERYTHING
     assert all(row[1] for row in table.rows)
 
@@ -315,11 +350,11 @@ def test_only_what_lies_between_the_marks_is_written():
 @pytest.mark.parametrize(
     ('typed', 'said'),
     [
-        ((), 'one of the arguments scene --all is required'),
+        ((), 'one of the arguments SCENE --all is required'),
         (('x.yaml', '--all'), 'not allowed with argument'),
         (('x.yaml',), 'x.yaml: cannot be read'),
         (('bad.yaml',), "bad.yaml:2: rtae: unknown key; did you mean 'rate'?"),
-        (('good.yaml', '--ticks', '0'), '0 is out of bounds; write 1 to 10000000'),
+        (('good.yaml', '--ticks', '0'), '0 is not between 1 and 1e+07'),
         (('good.yaml', '--ticks', 'many'), 'many'),
     ],
     ids=str,

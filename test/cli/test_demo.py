@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from math import radians
 import os
 from pathlib import Path
 import re
@@ -29,7 +30,8 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 
-from .conftest import environment, on_terminal, Run
+from .conftest import on_terminal, Run
+from ..support.commands import environment
 
 pytestmark = pytest.mark.ros
 
@@ -83,8 +85,10 @@ def test_a_controller_moves_the_crank_of_a_scene_that_is_pushed(
     assert counts['/crank_commands'] > 200
     same, of = map(int, re.search(r'(\d+) of (\d+) joint states replay', answer.stdout).groups())
     assert same == of == counts['/joint_states']
-    *_, last = re.findall(r'crank_joint ([+-]\d+\.\d+)', answer.stdout)
-    assert float(last) > 0.9  # it swings by 1 about 2.0; without commands it stands at 0.5
+    *_, last = re.findall(r'crank_joint (-?\d+\.\d+)°', answer.stdout)
+    assert (
+        radians(float(last)) > 0.9
+    )  # it swings by 1 about 2.0; without commands it stands at 0.5
     assert Path(f'{bag}.png').read_bytes().startswith(PNG)
 
 
@@ -100,7 +104,8 @@ def test_a_scene_that_makes_its_crank_up_needs_nothing_beside_it(
 
 
 def test_a_scene_that_records_nothing_is_not_drawn(linkage: Run, tmp_path: Path) -> None:
-    answer = linkage('demo', 'bare', '--seconds', '2')
+    # On a busy machine the process of the crank source needs more than two seconds to begin.
+    answer = linkage('demo', 'bare', '--seconds', '5')
     assert answer.returncode == 0, answer.stderr
     assert re.search(r'samples +[1-9]', answer.stdout)
     assert 'picture   none: bare records no bag to draw' in answer.stdout
@@ -118,6 +123,19 @@ def test_the_list_names_every_scene_that_comes_along(linkage: Run) -> None:
     assert torque.split(maxsplit=3)[1:3] == ['torque', 'yes']
     assert torque.endswith('the four-bar moves under the effort that a controller commands')
     assert not any('yaml-language-server' in row for row in rows)
+
+
+def test_a_drill_names_its_faults_and_runs_until_they_have_ended(linkage: Run) -> None:
+    answer = linkage('demo', 'fault_drill', '--plain')
+    assert answer.returncode == 0, answer.stderr
+    first, faults = answer.stdout.splitlines()[:2]
+    assert first.startswith('fault_drill: 10.5 s; ')  # the last one ends at 7.5 s
+    assert faults == (
+        'faults    hung_driver (freeze) at 2 s for 0.5 s; worn_gear (stuck) at 3 s for 0.5 s; '
+        'snapped_coupler (broken_link) at 4 s for 0.5 s; pulled_cable (silence) at 5 s for 0.5 s; '
+        'bad_crank (not_a_number) at 6 s for 0.5 s; clock_set (time_jump) at 7 s for 0.5 s; '
+        'loose_plug (silence) by service call'
+    )
 
 
 def test_a_scene_that_does_not_exist(linkage: Run) -> None:

@@ -38,13 +38,18 @@ from linkage_ros.cli import export
 from linkage_ros.errors import LinkageError
 from linkage_ros.files import tables
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.joint_trajectory import JointTrajectoryWriter
-from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues, TRAJECTORY, WRENCHES
+from linkage_ros.messages.joint_values import (
+    JOINT_STATE,
+    JointTrajectoryWriter,
+    MessageValues,
+    TRAJECTORY,
+    WRENCHES,
+)
 from linkage_ros.resources import shipped
 import numpy as np
 import pytest
 
-from .conftest import environment, Run
+from .conftest import Run
 from .recorded import (
     answer,
     BEGIN,
@@ -57,6 +62,7 @@ from .recorded import (
     told,
     topic,
 )
+from ..support.commands import environment
 
 try:
     from pyarrow import parquet

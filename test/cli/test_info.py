@@ -39,7 +39,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
-from .conftest import Run
+from .conftest import json_keys, Run
 from .recorded import (
     answer,
     BEGIN,
@@ -222,6 +222,10 @@ def test_each_of_several_linkages_has_its_own_account(tmp_path: Path, tell: Any)
         )
 
 
+def test_json_has_the_documented_keys(bag: Path, tell: Any) -> None:
+    assert set(tell(bag)) == json_keys('info')
+
+
 def test_a_person_reads_the_same(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert answer(info, bag) == 0
     lines = [' '.join(line.split()) for line in capsys.readouterr().out.splitlines()]
@@ -235,8 +239,8 @@ def test_a_person_reads_the_same(bag: Path, capsys: pytest.CaptureFixture[str]) 
     # Samples and joint states are logged a quarter of a millisecond after what they tell of.
     assert (
         f'nearest toggle conditioning {sqrt(2) * sin(mu / 2):.4g}, '
-        f'transmission angle {degrees(mu):.4g}°, at {least * 1e-3 - 0.00025:+.6f} s, '
-        f'crank_joint {degrees(angle):.3f}° ({angle:.6g} rad)'
+        f'transmission angle {degrees(mu):.3f}°, at {least * 1e-3 - 0.00025:+.6f} s, '
+        f'crank_joint {degrees(angle):.3f}°'
     ) in lines
 
 
@@ -436,7 +440,7 @@ def bad_bags(folder: Path) -> Iterator[tuple[str, str]]:
     (folder / 'text.mcap').write_text('no bag at all')
     (folder / 'empty.mcap').touch()
     (folder / 'nothing').mkdir()
-    yield 'text.mcap', 'starts with'
+    yield 'text.mcap', 'is a text file'
     yield 'empty.mcap', 'is empty'
     yield 'nothing', 'holds no .mcap file'
     yield 'gone', 'does not exist'

@@ -116,11 +116,11 @@ def test_from_within_the_bag_it_is_written_beside_it(
 REFUSED = {
     'a folder': ('taken.html', 'taken.html: is a folder; name another file with -o'),
     'no folder': ('gone/x.html', 'gone/x.html: lies in no folder that there is; name another'),
-    'another kind': ('x.pdf', 'x.pdf: is no name of a page; name FILE.html with -o'),
-    'no kind': ('x', 'x: is no name of a page; name FILE.html with -o'),
-    'a device': ('/dev/full', '/dev/full: is no name of a page; name FILE.html with -o'),
-    'where nobody can write': ('/proc/x.html', '/proc/x.html: cannot be written: No such file'),
-    'too long': (f'{"x" * 300}.html', f'{"x" * 300}.html: cannot be written: File name too long'),
+    'another kind': ('x.pdf', "x.pdf: ends in '.pdf'; name a file that ends in .html or .htm"),
+    'no kind': ('x', 'x: has no ending; name a file that ends in .html or .htm'),
+    'a device': ('/dev/full', '/dev/full: has no ending; name a file'),
+    'where nobody can write': ('/proc/x.html', '/proc/x.html: cannot be written (No such file'),
+    'too long': (f'{"x" * 300}.html', f'{"x" * 300}.html: cannot be written (File name too long'),
 }
 
 
@@ -148,7 +148,7 @@ def test_on_a_full_disk_the_page_that_was_there_stays(
     monkeypatch.setattr(os, 'fsync', full)
     before = {*tmp_path.iterdir()}
     assert refused(bag, '-o', page) == (
-        f'{page}: cannot be written: No space left on device; name another file with -o'
+        f'{page}: cannot be written (No space left on device); name another file'
     )
     assert {*tmp_path.iterdir()} == before
     assert page.read_text() == 'old'
@@ -330,9 +330,9 @@ def test_no_bag_at_all_is_a_line(linkage: Run) -> None:
 def test_without_plotly_it_says_so_before_the_bag_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(command, 'find_spec', lambda name: None)
+    monkeypatch.setattr('linkage_ros.errors.find_spec', lambda name: None)
     line = refused(tmp_path / 'nowhere', '-o', tmp_path / 'x.html')
-    assert line == 'plotly: is not installed; pip install linkage_ros[report]'
+    assert line == "plotly: is not installed; pip install 'linkage_ros[report]'"
 
 
 def test_it_can_be_stopped_and_leaves_nothing(bag: Path) -> None:

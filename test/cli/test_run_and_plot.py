@@ -28,7 +28,8 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.replay.replay import recorded_scene
 import pytest
 
-from .conftest import environment, Run
+from .conftest import Run
+from ..support.commands import environment
 
 pytestmark = pytest.mark.ros
 
@@ -86,6 +87,17 @@ def test_a_linkage_file_runs_as_it_is(linkage: Run, tmp_path: Path) -> None:
         answer.stdout + answer.stderr
     )
     assert not (tmp_path / 'runs').exists()
+
+
+@pytest.mark.parametrize(('options', 'unit'), [((), '°'), (('--radians',), ' rad')])
+def test_a_person_reads_joints_with_their_units(
+    linkage: Run, options: tuple[str, ...], unit: str
+) -> None:
+    file = Path(__file__).parents[2] / 'config' / 'linkages' / 'slider_crank.yaml'
+    answer = linkage('run', str(file), '--seconds', '1.5', '--plain', *options)
+    assert answer.returncode == 0, answer.stderr
+    number = r'-?[\d.]+'
+    assert re.search(rf'crank_joint {number}{unit}  .*piston_slide {number} m', answer.stdout)
 
 
 def test_a_folder_that_exists_is_not_touched_and_the_bag_gets_a_number(

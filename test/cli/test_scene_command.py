@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from math import inf
 from pathlib import Path
 from threading import Event
@@ -26,10 +27,11 @@ from linkage_ros.cli import scene as command
 from linkage_ros.cli.scene import REGISTRIES, table_of
 from linkage_ros.cli.terminal import text
 from linkage_ros.errors import FileError, LinkageError
+from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.scene.schema import as_text
 import pytest
 
-from .conftest import Run
+from .conftest import json_keys, Run
 
 CONFIG = Path(__file__).parents[2] / 'config'
 SCENES = sorted((CONFIG / 'scenes').glob('*.yaml'))
@@ -76,14 +78,42 @@ def test_stages_come_in_their_order_and_say_who_brings_them_in(tmp_path, capsys)
     by_name = {line[1]: ' '.join(line) for line in lines if line and line[0].isdigit()}
     assert by_name['velocity'].endswith('brought in by effort, pin_forces, delay')
     assert 'between motor and crank' in by_name['backlash']
-    assert by_name['delay'].endswith('seconds 0.002')
-    assert by_name['constant_rate'].endswith('rate 6.28')
+    assert by_name['delay'].endswith('seconds 0.002 s')
+    assert by_name['constant_rate'].endswith('rate 6.28 rad/s or m/s')
     said = [' '.join(line) for line in lines]
     assert 'ticks 500 a second' in said
     assert 'recorded no' in said
     assert 'stop freeze at 1, 2.5 s, for 0.5 s' in said
     assert 'publishes ~/pin_forces sensor_msgs/msg/MultiDOFJointState' in said
     assert not any(line.startswith('listens to') for line in said)
+
+
+@pytest.mark.parametrize('path', SCENES, ids=lambda path: path.stem)
+def test_json_of_every_shipped_scene_has_the_documented_keys(path, capsys):
+    assert run(str(path), '--json') == 0
+    account = json.loads(capsys.readouterr().out)
+    assert set(account) == json_keys('scene')
+    assert {'name': 'joint_states', 'type': JOINT_STATE, 'what': 'publishes'} in account['topics']
+
+
+def test_json_of_a_scene_holds_each_stage_with_its_parameters(tmp_path, capsys):
+    (tmp_path / 'scene.yaml').write_text(SCENE)
+    assert run(str(tmp_path / 'scene.yaml'), '--json') == 0
+    account = json.loads(capsys.readouterr().out)
+    assert account['rate_hz'] == 500.0
+    (linkage,) = account['linkages']
+    stages = {stage['name']: stage for stage in linkage['stages']}
+    assert stages['constant_rate']['parameters']['rate'] == 6.28
+    assert stages['delay']['parameters']['seconds'] == 0.002
+    assert stages['velocity']['needed_by'] == ['effort', 'pin_forces', 'delay']
+    (fault,) = account['fault_parameters']
+    assert (fault['kind'], fault['at_s'], fault['seconds']) == ('freeze', [1.0, 2.5], 0.5)
+    assert account['services'] == ['~/inject/stop']
+
+
+def test_json_describes_a_file_and_not_the_lists():
+    with pytest.raises(LinkageError, match='--json: describes one file; name a scene'):
+        run('--list', '--json')
 
 
 BAD = f"""\
@@ -145,14 +175,14 @@ WRONG = [
         'four_bar: {a: 0, b: 1, c: x}\n',
         [
             "l.yaml:1: four_bar: the key 'd' is missing; add d: ground [m]",
-            'l.yaml:1: four_bar.a: 0 is out of bounds; write a number, more than 0 and at most',
+            'l.yaml:1: four_bar.a: 0 is out of bounds; write a number, more than 0 (crank [m]',
             "l.yaml:1: four_bar.c: 'x' is not a number; write a number, more than 0",
         ],
     ),
     (
         'linkage: l.yaml\n',
         'four_bar: {a: 1, b: 1, c: 1, d: 1}\nlinks: {}\n',
-        ['l.yaml: four_bar, links stand beside each other; leave all but 1 out'],
+        ["l.yaml: 'links' does not fit; write units or angles or four_bar"],
     ),
     (
         'linkages:\n- {name: a, linkage: l.yaml}\n- {name: b, linkage: l.yaml, rate: 5}\n',
@@ -164,7 +194,7 @@ WRONG = [
         'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
         [
             "s.yaml:2: faults: 'a-b' does not fit; write a text on one line (a name: letters",
-            's.yaml:2: faults.a-b: 2 kinds; name one of time_jump, not_a_number',
+            's.yaml:2: faults.a-b: names 2 kinds of fault; leave all but one of',
         ],
     ),
     (

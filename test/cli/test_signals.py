@@ -27,7 +27,7 @@ import time
 from mcap.writer import CompressionType, Writer
 import pytest
 
-from .conftest import environment
+from ..support.commands import environment
 
 # SIGINT, SIGTERM and SIGHUP end every command at any moment: exit code 1, one line.
 
@@ -43,6 +43,7 @@ READS = {
     'check': (['four.yaml'], PARSE),
     'solve': (['four.yaml', '-o', 'x.csv'], PARSE),
     'draw': (['four.yaml', '-o', 'x.png'], PARSE),
+    'animate': (['four.yaml', '-o', 'x.gif'], PARSE),
     'compile': (['four.yaml', '-o', 'x.c'], PARSE),
     'urdf': (['four.yaml', '-o', 'x.urdf'], PARSE),
     'mjcf': (['four.yaml', '-o', 'x.xml'], PARSE),
@@ -55,7 +56,18 @@ READS = {
 }
 
 
-COMPUTE = ('check', 'solve', 'draw', 'compile', 'urdf', 'mjcf', 'scene', 'cost', 'accuracy')
+COMPUTE = (
+    'check',
+    'solve',
+    'draw',
+    'animate',
+    'compile',
+    'urdf',
+    'mjcf',
+    'scene',
+    'cost',
+    'accuracy',
+)
 
 
 CLOSES = 'linkage_ros.kinematics.closure:Closure.position'

@@ -81,6 +81,7 @@ def test_three_pairs_end_in_a_linkage_that_check_and_run_take(linkage: Run) -> N
         assert words in made.stdout
     assert [row[3] for row in proof(made.stdout)] == ['left', 'left', 'right']
     assert all(abs(float(row[4])) < 1e-12 for row in proof(made.stdout))
+    assert made.stdout.splitlines()[-1] == 'designed.yaml  (branch defect: see above)'
 
     checked = linkage('check', 'designed.yaml')
     assert checked.returncode == 0, checked.stderr
@@ -91,6 +92,12 @@ def test_three_pairs_end_in_a_linkage_that_check_and_run_take(linkage: Run) -> N
     ran = linkage('run', 'designed.yaml', '--seconds', '2', '--plain')
     assert ran.returncode == 0, ran.stderr
     assert re.search(r'published +[1-9]\d* joint states', ran.stdout)
+
+
+def test_a_file_without_defects_is_named_alone(linkage: Run) -> None:
+    pairs = ['--pair', '50', '100', '--pair', '80', '110', '--pair', '110', '125']
+    made = linkage('synthesize', *pairs, '-o', 'sound.yaml')
+    assert made.stdout.splitlines()[-1] == 'sound.yaml'
 
 
 def test_a_negative_length_is_told_as_the_reversed_link_that_it_means(
@@ -234,9 +241,9 @@ WRONG = [
     (['--pair', '0', '0', '--pair', '20', 'nan', '--pair', '40', '40'], 'pair 2'),
     ([*SOURCE_003, '--ground', '-1'], 'ground'),
     ([*SOURCE_003, '--need', 'crankrocker'], "did you mean 'crank-rocker'?"),
-    ([*SOURCE_003, '--min-transmission', 'nan'], 'transmission angle: nan° is none'),
-    ([*SOURCE_003, '--max-link-ratio', '0.5'], 'link ratio: 0.5 is none'),
-    ([*SOURCE_003, '--best', '0'], '0 is none; write 1 or more'),
+    ([*SOURCE_003, '--min-transmission', 'nan'], 'transmission angle: nan° is not in'),
+    ([*SOURCE_003, '--max-link-ratio', '0.5'], 'link ratio: 0.5 is not a ratio'),
+    ([*SOURCE_003, '--best', '0'], '0 is not between 1 and 9.0072e+15'),
     ([*SOURCE_003, '-o', 'no/such/folder/x.yaml'], 'no/such/folder'),
     ([*SOURCE_003, '-o', 'x.yaml', '--pick', '2'], '--pick 2: there are 1 solution(s)'),
     ([*SOURCE_003, '--draw', 'x.xyz'], 'x.xyz'),

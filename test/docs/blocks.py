@@ -16,12 +16,9 @@
 """
 The fenced blocks of the documentation, and which of them are commands.
 
-``sh`` and ``console`` blocks are commands; in a console block a line that begins with ``$`` is
-one, and the others are what it shows: ``…`` stands for anything, as a line for lines. A block
-whose fence goes on with ``no-test: WHY`` is not run.
-
-A block of another language whose first line is ``# FILE.yaml`` or ``// FILE.c`` is that file,
-which the commands behind it on the page find.
+``sh`` and ``console`` blocks are commands. In a console block a line that begins with ``$`` is a
+command, and the other lines are its output: ``…`` stands for any text, as a line for any lines. A
+block whose fence has ``no-test: REASON`` after its language is not run.
 """
 
 from __future__ import annotations
@@ -35,7 +32,6 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *(ROOT / 'docs').rglob('*.md')])
 
 _FENCE = re.compile(r'^( *)(`{3,}|:{3,})([^\n`]*)\n(.*?)^\1\2 *$', re.MULTILINE | re.DOTALL)
-_FILE = re.compile(r'(?:#|//) ([\w./-]+\.(?:yaml|py|csv|c|js))\n')
 COMMANDS = ('sh', 'console')
 
 
@@ -46,13 +42,13 @@ class Block(NamedTuple):
     Attributes
     ----------
     page, line
-        Where it stands.
+        Its page and line.
     language
         The first word of its fence.
     more
-        What stands behind it.
+        The rest of its fence.
     text
-        What is in it.
+        Its content.
 
     """
 
@@ -64,56 +60,50 @@ class Block(NamedTuple):
 
     @property
     def why_not(self) -> str:
-        """Say why it is not run; '' where it is."""
+        """Return the reason why it is not run; '' if it is run."""
         return self.more.removeprefix('no-test: ') if self.more.startswith('no-test: ') else ''
-
-    @property
-    def file(self) -> str:
-        """Return the file that it is; '' for none."""
-        found = _FILE.match(self.text)
-        return found[1] if found and self.language not in COMMANDS else ''
 
 
 def blocks(page: Path) -> Iterator[Block]:
     """Yield the blocks of a page."""
     text = page.read_text('utf-8')
     name = page.relative_to(ROOT).as_posix()
-    for found in _FENCE.finditer(text):
-        language, _, more = found[3].strip().partition(' ')
-        line = text.count('\n', 0, found.start()) + 1
-        yield Block(name, line, language, more, found[4])
+    for match in _FENCE.finditer(text):
+        language, _, more = match[3].strip().partition(' ')
+        line = text.count('\n', 0, match.start()) + 1
+        yield Block(name, line, language, more, match[4])
 
 
 class Command(NamedTuple):
-    """What is typed, and the lines that are shown below it."""
+    """A command, and the lines of its output on the page."""
 
     typed: str
     shown: list[str]
 
 
 def commands(block: Block) -> list[Command]:
-    """Return the commands of a block: of ``sh`` all as one, which shows nothing."""
+    """Return the commands of a block; an ``sh`` block is one command without output."""
     if block.language == 'sh':
         return [Command(block.text, [])]
-    found: list[Command] = []
+    result: list[Command] = []
     for line in block.text.splitlines():
         if line.startswith('$ '):
-            found.append(Command(line[2:], []))
+            result.append(Command(line[2:], []))
         elif line.startswith('> '):
-            found[-1] = found[-1]._replace(typed=f'{found[-1].typed}\n{line[2:]}')
+            result[-1] = result[-1]._replace(typed=f'{result[-1].typed}\n{line[2:]}')
         else:
-            found[-1].shown.append(line)
-    return found
+            result[-1].shown.append(line)
+    return result
 
 
 def missing(shown: list[str], out: str) -> str:
-    """Return the first line that is shown and does not come in its place; '' where all do."""
+    """Return the first line of the page that is missing in the output; '' for none."""
     lines = iter(out.splitlines())
     for line in shown:
         if line.strip() in ('', '…'):
             continue
         parts = [re.escape(' '.join(part.split())) for part in line.split('…')]
         pattern = re.compile('.*'.join(parts))
-        if not any(pattern.fullmatch(' '.join(came.split())) for came in lines):
+        if not any(pattern.fullmatch(' '.join(printed.split())) for printed in lines):
             return line
     return ''

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The tutorial runs as a file, and as the page that shows what came of it."""
+"""The tutorial runs as a file, and as a page with its results."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ TUTORIAL = ROOT / 'docs' / 'tutorial.py'
 
 @pytest.fixture
 def website(monkeypatch):
-    """Import what makes the page, which lies beside the package."""
+    """Import the module that makes the page, which is not in the package."""
     monkeypatch.syspath_prepend(ROOT)
     from docs.website import tutorial
 
     return tutorial
 
 
-def test_it_runs_as_it_is(tmp_path):
+def test_the_file_runs(tmp_path):
     done = subprocess.run(
         [sys.executable, '-W', 'error', str(TUTORIAL)],
         cwd=tmp_path,
@@ -52,7 +52,7 @@ def test_it_runs_as_it_is(tmp_path):
     assert (done.returncode, done.stderr) == (0, '')
 
 
-def test_a_page_shows_what_was_printed_the_last_value_and_the_picture(website):
+def test_a_page_shows_printed_output_the_last_value_and_the_picture(website):
     text = (
         '"""Not shown."""\n'
         '# %% [markdown]\n# # A title\n#\n# And text.\n'
@@ -73,14 +73,14 @@ def test_the_same_cells_make_the_same_page(website):
     assert website.page(text, 'file.py') == website.page(text, 'file.py')
 
 
-def test_what_goes_wrong_is_told_by_file_and_line(website):
+def test_an_exception_has_file_and_line(website):
     with pytest.raises(ZeroDivisionError) as caught:
         website.page('# %% [markdown]\n# Text\n# %%\nx = 0\n1 / x\n', 'file.py')
     last = caught.traceback[-1]
     assert (str(last.path).rpartition('/')[2], last.lineno + 1) == ('file.py', 5)
 
 
-def test_it_leaves_the_folder_as_it_was(website, tmp_path, monkeypatch):
+def test_the_page_leaves_no_files(website, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     website.page("# %%\nfrom pathlib import Path\nPath('here').touch()\n", 'file.py')
     assert list(tmp_path.iterdir()) == []

@@ -19,27 +19,23 @@ from __future__ import annotations
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-import subprocess
-import sys
 from threading import Thread
 
 from .blocks import blocks, ROOT
 from ..browser.chromium import browser as chromium
+from ..support.commands import linkage
 
 
 class Quiet(SimpleHTTPRequestHandler):
     def log_message(self, *_: object) -> None:
-        """Say nothing: what the page asks for is no news."""
+        """Do not log requests."""
 
 
-def test_it_shows_the_joints(tmp_path: Path) -> None:
+def test_the_web_page_shows_the_joints(tmp_path: Path) -> None:
     page = ROOT / 'docs' / 'how_to' / 'compile.md'
     texts = {block.language: block.text for block in blocks(page)}
     (tmp_path / 'page.html').write_text(f'<!doctype html>\n{texts["html"]}')
-    (tmp_path / 'four_bar.yaml').write_text(texts['yaml'])
-    typed = ['compile', 'four_bar.yaml', '-o', 'four_bar.js']
-    command = [sys.executable, '-m', 'linkage_ros.cli.main', *typed]
-    subprocess.run(command, cwd=tmp_path, check=True, timeout=60)
+    assert linkage(tmp_path, 'compile', 'four_bar', '-o', 'four_bar.js').returncode == 0
     with (
         ThreadingHTTPServer(('127.0.0.1', 0), partial(Quiet, directory=tmp_path)) as server,
         chromium() as browser,

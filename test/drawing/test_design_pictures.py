@@ -15,8 +15,6 @@
 
 """A design's picture shows what was wanted, what is met, and on which assembly."""
 
-from __future__ import annotations
-
 from cmath import phase, rect
 from functools import cache
 from itertools import combinations
@@ -25,7 +23,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from linkage_ros.drawing import design as drawing
-from linkage_ros.drawing import painting
 from linkage_ros.drawing.design import draw_design
 from linkage_ros.drawing.painting import INK, OTHER, WANTED
 from linkage_ros.errors import LinkageError
@@ -275,7 +272,7 @@ def test_a_design_that_closes_nowhere_is_refused(tmp_path):
         draw_design(design, 'none', tmp_path / 'none.png')
 
 
-def test_the_same_design_is_the_same_bytes(tmp_path: Path):
+def test_the_same_design_is_the_same_bytes(tmp_path):
     one, other = tmp_path / 'one.svg', tmp_path / 'other.svg'
     for file in (one, other):
         draw_design(EXAMPLE, 'twice', file)
@@ -284,7 +281,7 @@ def test_the_same_design_is_the_same_bytes(tmp_path: Path):
 
 
 def test_without_matplotlib_it_says_what_to_install(monkeypatch, tmp_path):
-    monkeypatch.setattr(painting, 'find_spec', lambda _name: None)
+    monkeypatch.setattr('linkage_ros.errors.find_spec', lambda _name: None)
     with pytest.raises(LinkageError, match=r'linkage_ros\[report\]'):
         draw_design(EXAMPLE, 'none', tmp_path / 'none.png')
 

@@ -14,8 +14,6 @@
 
 """The pages of gallery and effects are those of the files and the code."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 import inspect
@@ -35,69 +33,59 @@ import pytest
 
 
 ROOT = Path(__file__).parents[2]
-
-
 FILES = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
-
-
 PNG = b'\x89PNG\r\n\x1a\n'
-
-
 SPEC = spec_from_file_location('make_gallery', ROOT / 'docs' / 'make_gallery.py')
-
-
 make_gallery = module_from_spec(SPEC)
 
 
 @pytest.fixture(scope='module')
-def page() -> str:
+def page():
     pytest.importorskip('PIL')
     SPEC.loader.exec_module(make_gallery)
     return (ROOT / 'docs' / 'gallery.md').read_text('utf-8')
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_a_linkage_is_told_as_its_file_has_it(page: str, file: Path) -> None:
+def test_a_linkage_is_told_as_its_file_has_it(page, file):
     picture = ROOT / 'docs' / 'gallery' / f'{file.stem}.png'
     chapter = make_gallery.chapter(load(file), file, picture)
-    assert '\n'.join(chapter) in page, 'make gallery makes it anew'
+    text = picture.with_suffix('.md').read_text('utf-8')
+    assert text.rstrip().splitlines() == list(chapter), 'make gallery makes it anew'
     assert picture.read_bytes().startswith(PNG)
     assert picture.stat().st_size < make_gallery.LARGEST
+    small = picture.parent / 'thumbnails' / picture.name
+    assert small.read_bytes().startswith(PNG)
+    assert small.stat().st_size < make_gallery.LARGEST_SMALL
 
 
-def test_nothing_else_is_in_the_gallery(page: str) -> None:
-    assert page.count('\n## ') == len(FILES)
-    drawn = {file.stem for file in (ROOT / 'docs' / 'gallery').iterdir()}
-    assert drawn == {file.stem for file in FILES}
+def test_nothing_else_is_in_the_gallery(page):
+    listed = re.findall(r'^- \[!\[\]\(gallery/thumbnails/(\w+)\.png', page, re.MULTILINE)
+    assert listed == [file.stem for file in FILES]
+    folder = ROOT / 'docs' / 'gallery'
+    for kind in ('*.png', '*.md', 'thumbnails/*'):
+        assert {file.stem for file in folder.glob(kind)} == {*listed}
 
 
-# The page of drives, effects and faults agrees with the code, and shows its own scenes.
+@pytest.mark.parametrize('kind', ['svg', 'gif'])
+def test_the_moving_picture_of_the_first_page_is_small(page, kind):
+    size = (ROOT / 'docs' / f'hero.{kind}').stat().st_size
+    assert 0 < size <= make_gallery.LARGEST_MOVING[kind]
+
+
+# The pages of drives, effects and faults agree with the code, and show their own scenes.
 
 
 LINKAGES = ROOT / 'config' / 'linkages'
-
-
 EFFECTS_SPEC = spec_from_file_location('make_effects', ROOT / 'docs' / 'make_effects.py')
-
-
 make_effects = module_from_spec(EFFECTS_SPEC)
-
 
 EFFECTS_SPEC.loader.exec_module(make_effects)
 
-
-PAGE = make_effects.PAGE.read_text('utf-8')
-
-
+PAGE = make_effects.text_of_pages()
 SECTIONS = make_effects.sections(PAGE)
-
-
 BY_NAME = {section.name: section for section in SECTIONS}
-
-
 MODULES = {**DRIVES, **EFFECTS, **FAULTS}
-
-
 DRAWN = [section for section in SECTIONS if section.scene]
 
 
@@ -133,7 +121,7 @@ def test_a_section_says_what_a_reader_wants_to_know(name):
     if name not in FAULTS:
         assert re.search(r'\*\*Source\.\*\* \S', text)
         assert '\n```text\n' in text
-        assert re.search(rf'^!\[[^\]]{{40,}}\]\(effects/{name}\.png\)$', text, re.MULTILINE)
+        assert re.search(rf'^!\[[^\]]{{40,}}\]\({name}\.png\)$', text, re.MULTILINE)
 
 
 @pytest.mark.parametrize(
@@ -175,10 +163,16 @@ def test_a_picture_shows_the_scene_beside_it(section):
     with image.open(file) as picture:
         assert picture.format == 'PNG'
         assert picture.text['Scene'] == section.scene, 'make effects draws it anew'
+        size = picture.size
+    small = make_effects.PICTURES / 'thumbnails' / file.name
+    assert small.stat().st_size < make_effects.LARGEST_SMALL
+    with image.open(small) as picture:
+        assert picture.size == (size[0] // 2, size[1] // 2)
 
 
-def test_no_other_picture_lies_there():
-    drawn = {file.name for file in make_effects.PICTURES.iterdir()}
+@pytest.mark.parametrize('folder', ['.', 'thumbnails'])
+def test_no_other_picture_lies_there(folder):
+    drawn = {file.name for file in (make_effects.PICTURES / folder).glob('*.png')}
     assert drawn == {f'{section.name.lower()}.png' for section in DRAWN}
 
 

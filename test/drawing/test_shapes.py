@@ -15,16 +15,14 @@
 
 """Shapes in metres: what is drawn is where the closure says that it is."""
 
-from __future__ import annotations
-
-from itertools import pairwise
-from math import cos, isnan, nan, pi, sin, tau
+from itertools import accumulate
+from math import cos, pi, remainder, sin, tau
 from pathlib import Path
 import random
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drawing.curves import drawn_once, sweep, wrapped_curve
+from linkage_ros.drawing.curves import continuous, drawn_once, sweep
 from linkage_ros.drawing.painting import Label, place_labels
 from linkage_ros.drawing.shapes import Circle, hull, Polygon, rounded, Segment, shapes, skeleton
 from linkage_ros.files.linkage_file import read_linkage
@@ -37,7 +35,6 @@ import pytest
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 FILES = sorted(LINKAGES.glob('*.yaml'))
 SIZE = 0.002
-
 coordinates = st.integers(-50, 50)
 places = st.builds(complex, coordinates, coordinates)
 
@@ -66,7 +63,7 @@ def contains(polygon: Polygon, point: complex) -> bool:
 
 
 @given(st.lists(places, min_size=1, max_size=12))
-def test_a_hull_is_convex_and_holds_all_points(points: list[complex]) -> None:
+def test_a_hull_is_convex_and_holds_all_points(points):
     corners = hull(points)
     assert set(corners) <= set(points)
     if len(corners) < 3:
@@ -80,14 +77,14 @@ def test_a_hull_is_convex_and_holds_all_points(points: list[complex]) -> None:
 
 
 @given(st.lists(places, min_size=1, max_size=8), st.floats(0.1, 3.0))
-def test_an_outline_lies_at_its_distance(points: list[complex], radius: float) -> None:
+def test_an_outline_lies_at_its_distance(points, radius):
     corners = hull(points)
     for place in rounded(corners, radius):
         assert min(abs(place - corner) for corner in corners) == pytest.approx(radius)
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_pin_is_a_circle_at_its_place(file: Path) -> None:
+def test_every_pin_is_a_circle_at_its_place(file):
     closure, points, found = drawn(file.stem)
     circles = {shape.name: shape.centre for shape in found if isinstance(shape, Circle)}
     carriers: dict[str, int] = {}
@@ -101,7 +98,7 @@ def test_every_pin_is_a_circle_at_its_place(file: Path) -> None:
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_link_is_drawn_around_all_its_points(file: Path) -> None:
+def test_every_link_is_drawn_around_all_its_points(file):
     closure, points, found = drawn(file.stem)
     for link, named in closure.linkage.links.items():
         if link == GROUND:
@@ -113,14 +110,14 @@ def test_every_link_is_drawn_around_all_its_points(file: Path) -> None:
             assert any(contains(body, points[link, point]) for body in bodies)
 
 
-def test_ground_pivots_stand_on_hatched_ground() -> None:
+def test_ground_pivots_stand_on_hatched_ground():
     _, points, found = drawn('four_bar')
     tips = [s.corners[0] for s in found if isinstance(s, Polygon) and s.role == 'ground']
     assert tips == [points[GROUND, 'O2'], points[GROUND, 'O4']]
     assert sum(isinstance(s, Segment) and s.role == 'hatch' for s in found) >= 6
 
 
-def test_driven_links_are_told_apart_and_lie_on_top() -> None:
+def test_driven_links_are_told_apart_and_lie_on_top():
     _, _, found = drawn('four_bar')
     links = [
         s.name for s in found if isinstance(s, Polygon) and s.role in ('link', 'plate', 'input')
@@ -128,14 +125,14 @@ def test_driven_links_are_told_apart_and_lie_on_top() -> None:
     assert links == ['coupler', 'rocker', 'crank']
 
 
-def test_three_points_make_a_plate_and_points_in_line_a_bar() -> None:
+def test_three_points_make_a_plate_and_points_in_line_a_bar():
     _, _, found = drawn('klann_leg')
     assert {s.name: s.role for s in found if isinstance(s, Polygon)}['leg'] == 'plate'
     _, _, found = drawn('hoeken')
     assert {s.name: s.role for s in found if isinstance(s, Polygon)}['coupler'] == 'link'
 
 
-def test_a_cylinder_is_a_rod_in_a_tube_and_a_slider_is_a_block() -> None:
+def test_a_cylinder_is_a_rod_in_a_tube_and_a_slider_is_a_block():
     _, points, found = drawn('excavator_bucket')
     tube = next(s for s in found if isinstance(s, Polygon) and s.role == 'tube')
     rod = next(s for s in found if isinstance(s, Polygon) and s.name == 'cylinder_rod')
@@ -146,7 +143,7 @@ def test_a_cylinder_is_a_rod_in_a_tube_and_a_slider_is_a_block() -> None:
     assert sum(block.corners) / 4 == pytest.approx(points['connecting_rod', 'B'])
 
 
-def test_ghosts_run_from_pin_to_pin() -> None:
+def test_ghosts_run_from_pin_to_pin():
     closure, points, _ = drawn('four_bar')
     position = closure.position(*usual_inputs(closure))
     lines = {frozenset((line.start, line.end)) for line in skeleton(closure, position)}
@@ -154,33 +151,14 @@ def test_ghosts_run_from_pin_to_pin() -> None:
     assert len(lines) == 5  # crank, rocker, and three sides of the coupler
 
 
-@given(st.lists(st.floats(-0.5, 0.5), min_size=1, max_size=60), st.floats(-20.0, 20.0))
-def test_a_wrapped_curve_never_jumps_but_over_a_gap(steps: list[float], start: float) -> None:
-    angles = [start]
-    for step in steps:
-        angles.append(angles[-1] + step)
-    xs, ys = wrapped_curve(range(len(angles)), angles)
-    assert len(xs) == len(ys)
-    assert xs == sorted(xs)
-    for before, after in pairwise(ys):
-        if isnan(before) or isnan(after):
-            # The pen is lifted at one edge and set down at the other.
-            assert abs(after if isnan(before) else before) == pi
-        else:
-            assert abs(after - before) <= 0.5 + 1e-9
-    # Each sample is there still, but for whole turns.
-    there = [y for x, y in zip(xs, ys, strict=True) if x == int(x) and not isnan(y)]
-    for angle in angles:
-        assert any(abs(cos(y) - cos(angle)) + abs(sin(y) - sin(angle)) < 1e-9 for y in there)
+@given(st.lists(st.floats(-3.1, 3.1), min_size=1, max_size=60), st.integers(-3, 3))
+def test_a_curve_of_angles_has_no_jump_and_keeps_each_angle_but_for_whole_turns(steps, turns):
+    angles = list(accumulate(steps, initial=0.5))
+    wrapped = [remainder(angle + turns * tau, tau) for angle in angles]
+    assert continuous(wrapped) == pytest.approx(angles)
 
 
-def test_a_turn_crosses_the_edge_where_the_line_does() -> None:
-    xs, ys = wrapped_curve([0.0, 1.0], [pi - 0.1, pi + 0.3])
-    assert xs == [0.0, *[pytest.approx(0.25)] * 3, 1.0]
-    assert ys == [pi - 0.1, pi, pytest.approx(nan, nan_ok=True), -pi, pytest.approx(0.3 - pi)]
-
-
-def test_traced_points_of_a_peaucellier_cell_run_straight() -> None:
+def test_traced_points_of_a_peaucellier_cell_run_straight():
     closure = Closure(read_linkage(read_yaml(LINKAGES / 'peaucellier.yaml')[0]))
     way = InputSweep(closure)
     path = sweep(way, way.ranges[0]).paths['P']
@@ -188,7 +166,7 @@ def test_traced_points_of_a_peaucellier_cell_run_straight() -> None:
     assert all(abs(place.real - 0.13125) < 1e-14 for place in path)
 
 
-def test_a_path_there_and_back_is_drawn_once_and_a_loop_as_it_is() -> None:
+def test_a_path_there_and_back_is_drawn_once_and_a_loop_as_it_is():
     turn = [tau * i / 720 for i in range(721)]
     arc = [complex(cos(sin(t)), sin(sin(t))) for t in turn]  # as a rocker's end goes
     there = drawn_once(arc)
@@ -198,7 +176,7 @@ def test_a_path_there_and_back_is_drawn_once_and_a_loop_as_it_is() -> None:
     assert drawn_once(loop) == tuple(loop)
 
 
-def test_labels_have_room_and_do_not_overlap() -> None:
+def test_labels_have_room_and_do_not_overlap():
     rng = random.Random(3)
     labels = [
         Label((complex(rng.uniform(100, 500), rng.uniform(100, 300)),), 40.0, 10.0, 6.0)
@@ -211,7 +189,7 @@ def test_labels_have_room_and_do_not_overlap() -> None:
             assert abs(apart.real) >= 40.0 or abs(apart.imag) >= 10.0
 
 
-def test_a_label_keeps_off_what_is_drawn_and_on_the_paper() -> None:
+def test_a_label_keeps_off_what_is_drawn_and_on_the_paper():
     line = [complex(x, 50.0) for x in range(0, 200, 3)]
     (found,) = place_labels([Label((100.0 + 50.0j,), 30.0, 8.0, 4.0)], line, (0j, 200.0 + 100.0j))
     assert abs(found.centre.imag - 50.0) >= 4.0
@@ -220,7 +198,7 @@ def test_a_label_keeps_off_what_is_drawn_and_on_the_paper() -> None:
     assert corner.centre.imag >= 4.0
 
 
-def test_a_whole_turn_of_an_outline_is_one_turn() -> None:
+def test_a_whole_turn_of_an_outline_is_one_turn():
     outline = rounded([0j], 1.0)
     assert len(outline) == 16
     assert all(abs(place) == pytest.approx(1.0) for place in outline)

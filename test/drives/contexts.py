@@ -15,12 +15,10 @@
 
 """Contexts for drives in tests: linkages of one input and of two, and a scene."""
 
-from __future__ import annotations
-
 from linkage_ros.drives.drive import Context
 from linkage_ros.pipeline.pipeline import Pipeline
 
-from ..support.scenes import closure_of, FOUR_BAR, pipeline_of
+from ..support.scenes import closure_of, FIVE_BAR, FOUR_BAR, pipeline_of
 
 
 def _context(linkage: str, *, needs_rate: bool) -> Context:
@@ -34,23 +32,7 @@ def one_input(*, needs_rate: bool = True) -> Context:
 
 def two_inputs(*, needs_rate: bool = True) -> Context:
     """Return a five-bar's: its inputs are ``left_crank`` and ``right_crank``."""
-    return _context(
-        """
-links:
-  ground: {O1: [0, 0], O2: [0.1, 0]}
-  left: {O1: [0, 0], A: [0.04, 0]}
-  right: {O2: [0, 0], C: [0.05, 0]}
-  upper: {A: [0, 0], B: [0.12, 0]}
-  lower: {C: [0, 0], B: [0.11, 0]}
-input:
-  - {joint: left_crank, parent: ground, child: left}
-  - {joint: right_crank, parent: ground, child: right}
-assembly: {B: left}
-joints:
-  upper_joint: {parent: ground, child: upper}
-""",
-        needs_rate=needs_rate,
-    )
+    return _context(FIVE_BAR, needs_rate=needs_rate)
 
 
 def pipeline(drive: str) -> Pipeline:

@@ -15,8 +15,6 @@
 
 """The crank from a bag: timelines, what is skipped, which topic is taken, and what is no crank."""
 
-from __future__ import annotations
-
 import json
 from math import inf, nan
 
@@ -39,7 +37,6 @@ MS = 1_000_000
 RECORDED = 1_600_000_000_000_000_000
 BEGIN = 1_700_000_000_123_456_789
 SILENT = None
-
 TYPE = 'sensor_msgs/msg/JointState'
 CRANK = JointStateWriter(['other', 'crank_joint'])
 NO_CRANK = JointStateWriter(['rocker_joint'])
@@ -293,22 +290,15 @@ def test_the_topic_that_is_taken(tmp_path, messages, run, topic, angle):
 STRING = {'/text': 'std_msgs/msg/String'}
 
 
-@pytest.mark.parametrize(
-    ('messages', 'parameters', 'said'),
-    [
-        (TWO_TOPICS, {}, 'holds crank samples on /a/crank, /b/crank; name one of them as'),
-        (
-            TWO_TOPICS[:1],
-            {'topic': '/crank'},
-            f"holds no topic '/crank' of {TYPE}; it holds /a/crank",
-        ),
-        ([('/text', b'')], {'topic': '/text'}, f"no topic '/text' of {TYPE}; it holds no other"),
-        (TWO_TOPICS[2:], {}, 'holds no crank sample of crank_joint, /joint_states: crank joint'),
-        (TWO_TOPICS, {'topic': '/joint_states'}, 'of crank_joint, /joint_states: crank joint mis'),
-        ([('/text', b'')], {}, 'holds no crank sample of crank_joint; name another bag'),
-        ([], {}, 'holds no crank sample of crank_joint; name another bag'),
-    ],
-)
+@pytest.mark.parametrize(('messages', 'parameters', 'said'), [
+    (TWO_TOPICS, {}, 'holds crank samples on /a/crank, /b/crank; name one of them as'),
+    (TWO_TOPICS[:1], {'topic': '/crank'}, f"holds no topic '/crank' of {TYPE}; it holds /a/crank"),
+    ([('/text', b'')], {'topic': '/text'}, f"no topic '/text' of {TYPE}; it holds no other"),
+    (TWO_TOPICS[2:], {}, 'holds no crank sample of crank_joint, /joint_states: crank joint'),
+    (TWO_TOPICS, {'topic': '/joint_states'}, 'of crank_joint, /joint_states: crank joint mis'),
+    ([('/text', b'')], {}, 'holds no crank sample of crank_joint; name another bag'),
+    ([], {}, 'holds no crank sample of crank_joint; name another bag'),
+])  # fmt: skip
 def test_a_bag_without_the_crank_says_so(tmp_path, messages, parameters, said):
     file = write(tmp_path / 'bag', messages, STRING)
     with pytest.raises(BagError) as caught:
@@ -321,7 +311,7 @@ def test_a_bag_without_the_crank_says_so(tmp_path, messages, parameters, said):
 def test_what_is_no_bag_says_so(tmp_path):
     file = tmp_path / 'crank.csv'
     file.write_text('time, angle\n')
-    for path, said in ((file, 'as no MCAP file does'), (tmp_path / 'none', 'does not exist')):
+    for path, said in ((file, 'and no MCAP file'), (tmp_path / 'none', 'does not exist')):
         with pytest.raises(BagError, match=said):
             build(BagParameters(str(path)), one_input())
 

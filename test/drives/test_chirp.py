@@ -19,8 +19,6 @@ A chirp against its definition: the sine of 2π times the integral of its freque
 The integral is mpmath's, by quadrature; so are the derivatives of the position.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import hypot, log2, tau
 
@@ -32,7 +30,6 @@ import pytest
 from .contexts import one_input, pipeline, readings
 
 SECOND = 1_000_000_000
-
 UP = Chirp(amplitude=0.5, start_frequency=0.5, end_frequency=8.0, seconds=4.0, mean=0.2)
 DOWN = Chirp(amplitude=0.5, start_frequency=9.7, end_frequency=0.3, seconds=3.3)
 LONG = Chirp(amplitude=0.1, start_frequency=100.0, end_frequency=200.0, seconds=1e6)

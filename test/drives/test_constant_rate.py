@@ -15,8 +15,6 @@
 
 """A constant rate: the double nearest to θ₀ + ω·t, t from the first tick on, of each input."""
 
-from __future__ import annotations
-
 from math import ulp
 
 from hypothesis import given

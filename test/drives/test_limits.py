@@ -15,36 +15,21 @@
 
 """Drives and the limits of joints: what would leave them is refused, and a torque is stopped."""
 
-from __future__ import annotations
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from linkage_ros.drives.profile import curve, extent, ProfileParameters
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_effort import EffortCommand
+from linkage_ros.messages.joint_state import EffortCommand
 import pytest
 
-from ..support.scenes import pipeline_of
+from ..support.scenes import four_bar_text, pipeline_of, symmetric_five_bar
 
 MS = 1_000_000
 BEGIN = 1_700_000_000 * 1_000 * MS
 OWN = ', input: {limits: [0.5, 1.5]}'
+MASSES = [(0.1, 0.05, 1e-4), (0.1, 0.035, 1e-4), (0.1, 0.03, 1e-4)]
 PUBLISHED = ', joints: {rocker_joint: {limits: [1.5, 2]}}'
-MASSES = """
-links:
-  ground: {O2: [0, 0], O4: [0.05, 0]}
-  crank: {O2: [0, 0], A: [0.1, 0]}
-  coupler: {A: [0, 0], B: [0.07, 0]}
-  rocker: {O4: [0, 0], B: [0.06, 0]}
-input: {joint: crank_joint, parent: ground, child: crankLIMITS}
-assembly: {B: left}
-joints: {rocker_joint: {parent: ground, child: rockerROCKER}}
-masses:
-  crank: {mass: 0.1, center: [0.05, 0], inertia: 1e-4}
-  coupler: {mass: 0.1, center: [0.035, 0], inertia: 1e-4}
-  rocker: {mass: 0.1, center: [0.03, 0], inertia: 1e-4}
-"""
 
 
 def four_bar(limits):
@@ -63,9 +48,9 @@ DRIVES = {
     'on and on': (
         'constant_rate: {rate: 0.1, start: 1}',
         OWN,
-        "drive.constant_rate: takes 'crank_joint' from 1 to inf, beyond its limits [0.5, 1.5];",
+        "takes 'crank_joint' from 1 rad to inf rad, beyond its limits [0.5, 1.5] rad; stay",
     ),
-    'at rest beyond': ('constant_rate: {rate: 0, start: 2}', OWN, "'crank_joint' from 2 to 2, be"),
+    'at rest beyond': ('constant_rate: {rate: 0, start: 2}', OWN, ' from 2 rad to 2 rad, beyond'),
     'a sine to the limits': ('sine: {amplitude: 0.5, mean: 1, frequency: 1}', OWN, ''),
     'a sine to limits in tenths': (
         'sine: {amplitude: 0.35, mean: 0.45, frequency: 1}',
@@ -75,12 +60,12 @@ DRIVES = {
     'a sine beyond': (
         'sine: {amplitude: 0.51, mean: 1, frequency: 1}',
         OWN,
-        "drive.sine: takes 'crank_joint' from 0.49 to 1.51, beyond its limits [0.5, 1.5]",
+        "drive.sine: takes 'crank_joint' from 0.49 rad to 1.51 rad, beyond its limits [0.5, 1.5]",
     ),
     'a chirp beyond': (
         'chirp: {amplitude: 0.6, mean: 1, start_frequency: 1, end_frequency: 2, seconds: 3}',
         OWN,
-        "takes 'crank_joint' from 0.4 to 1.6",
+        "takes 'crank_joint' from 0.4 rad to 1.6 rad",
     ),
     'a chirp that ends on its way up': (
         CHIRP,
@@ -90,29 +75,29 @@ DRIVES = {
     'the same, there and back': (
         f'{CHIRP[:-1]}, repeat: true}}',
         OWN,
-        "takes 'crank_joint' from 0.4 to 1.6",
+        "takes 'crank_joint' from 0.4 rad to 1.6 rad",
     ),
     'rows within': ('profile: {table: [[0, 1], [1, 1.5]], interpolation: linear}', OWN, ''),
     'a spline that swings beyond its rows': (
         'profile: {table: [[0, 1], [1, 1.5], [2, 1.49], [3, 1]]}',
         OWN,
-        "drive.profile: takes 'crank_joint' from 1 to 1.61884, beyond its limits [0.5, 1.5]",
+        "drive.profile: takes 'crank_joint' from 1 rad to 1.61884 rad, beyond its limits",
     ),
     'rows that gain': (
         'profile: {table: [[0, 1], [1, 1.2]], interpolation: linear, repeat: true}',
         OWN,
-        "takes 'crank_joint' from 1 to inf",
+        "takes 'crank_joint' from 1 rad to inf rad",
     ),
     'a joint that follows': (
         'constant_rate: {rate: 1, start: 2}',
         PUBLISHED,
-        "takes 'crank_joint' from 2 to inf, beyond 2.79718, where 'rocker_joint' is at its limit",
+        "from 2 rad to inf rad, beyond 2.79718 rad, where 'rocker_joint' is at its limit",
     ),
     'a joint within': ('sine: {amplitude: 0.4, mean: 2.2, frequency: 1}', PUBLISHED, ''),
     'a start where a joint is beyond': (
         'sine: {amplitude: 0.1, mean: 1, frequency: 1}',
         PUBLISHED,
-        'starts at 1, beyond limits: rocker_joint at 1.11226, limits [1.5, 2]; start within them',
+        'starts at 1 rad, beyond limits: rocker_joint at 1.11226 rad, limits [1.5, 2] rad; start',
     ),
     'no limits': ('constant_rate: {rate: 1}', '', ''),
 }  # fmt: skip
@@ -152,19 +137,7 @@ def test_between_which_values_a_table_stays(values, interpolation, repeat):
 
 
 def test_one_input_of_several_is_named():
-    linkage = """
-links:
-  ground: {A: [0, 0], E: [0.3, 0]}
-  left: {A: [0, 0], B: [0.2, 0]}
-  left_rod: {B: [0, 0], C: [0.25, 0]}
-  right_rod: {C: [0, 0], D: [0.25, 0]}
-  right: {E: [0, 0], D: [0.2, 0]}
-input:
-- {joint: left_joint, parent: ground, child: left, limits: [1, 2]}
-- {joint: right_joint, parent: ground, child: right}
-assembly: {C: right}
-joints: {rod_joint: {parent: left, child: left_rod}}
-"""
+    linkage = symmetric_five_bar(', limits: [1, 2]')
     drive = 'sine: {amplitude: 0.2, mean: 1.5, frequency: 1, inputs: {left_joint: SAID}}'
     fine = '{amplitude: 0.5, mean: 1.5, frequency: 1}'
     assert pipeline(drive.replace('SAID', fine), linkage)
@@ -177,7 +150,7 @@ def pushed(limits, effort, rocker='', seconds=3.0, start=1.0, **more):
     said = ''.join(f', {key}: {value}' for key, value in more.items())
     built = pipeline(
         f'torque: {{start: {start}, timeout: 100{said}}}',
-        MASSES.replace('LIMITS', limits).replace('ROCKER', rocker),
+        four_bar_text(0.1, 0.07, 0.06, 0.05, MASSES, limits, rocker),
     )
     (line,) = built.lines
     line.drive.state(BEGIN)

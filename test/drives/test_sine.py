@@ -15,8 +15,6 @@
 
 """A sine against 60 digits: value, and its derivatives as mpmath differentiates them."""
 
-from __future__ import annotations
-
 from math import pi
 
 from hypothesis import given

@@ -14,8 +14,6 @@
 
 """The crank from a topic, also as ros2_control sends it."""
 
-from __future__ import annotations
-
 from math import inf, nan
 from pathlib import Path
 import re
@@ -40,23 +38,11 @@ from ..support.messages import read_joint_state
 
 
 MS = 1_000_000
-
-
 SECOND = 1000 * MS
-
-
 NOW = 10 * SECOND
-
-
 CARRIED = TopicParameters(carry_forward=True, max_age=0.2, max_lead=0.1)
-
-
 HELD = TopicParameters(carry_forward=False, max_age=0.2, max_lead=0.1)
-
-
 SILENT = None
-
-
 GOOD = None
 
 
@@ -66,93 +52,52 @@ def sample(stamp, angle, rate=0.0):
 
 # Name: (parameters, [(time, sample or None, its rejection or (angle, rate, age in ms) or None)]).
 TIMELINES = {
-    'before the first sample there is no crank': (
-        CARRIED,
-        [(1000, None, SILENT), (5000, None, SILENT)],
-    ),
-    'carried forward by its rate': (
-        CARRIED,
-        [
-            (1000, sample(1000, 0.5, 2.0), GOOD),
-            (1000, None, (0.5, 2.0, 0)),
-            (1100, None, (0.7, 2.0, 100)),
-            (1200, None, (0.9, 2.0, 200)),
-        ],
-    ),
-    'held as measured': (
-        HELD,
-        [
-            (1000, sample(1000, 0.5, 2.0), GOOD),
-            (1100, None, (0.5, 2.0, 100)),
-            (1200, None, (0.5, 2.0, 200)),
-        ],
-    ),
-    'silent from the age limit on, until the next sample': (
-        CARRIED,
-        [
-            (1000, sample(1000, 0.5, 2.0), GOOD),
-            (1200, None, (0.9, 2.0, 200)),
-            (1201, None, SILENT),
-            (9000, None, SILENT),
-            (9001, sample(9001, 3.0), GOOD),
-            (9001, None, (3.0, 0.0, 0)),
-        ],
-    ),
-    'it is the stamp that ages, not the arrival': (
-        CARRIED,
-        [
-            (1150, sample(1000, 0.5, 2.0), GOOD),
-            (1150, None, (0.8, 2.0, 150)),
-            (1201, None, SILENT),
-        ],
-    ),
-    'a sample that comes too late is no crank': (
-        CARRIED,
-        [(2000, sample(1000, 0.5, 2.0), GOOD), (2000, None, SILENT)],
-    ),
-    'a repeat does not make it younger': (
-        HELD,
-        [
-            (1000, sample(1000, 0.5), GOOD),
-            (1150, sample(1000, 0.5), GOOD),
-            (1150, None, (0.5, 0.0, 150)),
-            (1250, sample(1000, 0.5), GOOD),
-            (1250, None, SILENT),
-        ],
-    ),
-    'a stamp a little ahead is carried back': (
-        CARRIED,
-        [(1000, sample(1100, 0.5, 2.0), GOOD), (1000, None, (0.3, 2.0, -100))],
-    ),
-    'a stamp further ahead is refused': (
-        CARRIED,
-        [
-            (1000, sample(1000, 0.5), GOOD),
-            (1010, sample(1111, 0.9), Rejection.STAMP_FUTURE),
-            (1010, None, (0.5, 0.0, 10)),
-            (1011, sample(1111, 0.9), GOOD),
-        ],
-    ),
-    'an older stamp is refused': (
-        CARRIED,
-        [
-            (1000, sample(1000, 0.5), GOOD),
-            (1010, sample(999, 0.9), Rejection.STAMP_OLD),
-            (1010, None, (0.5, 0.0, 10)),
-            (1020, sample(1005, 0.6), GOOD),
-            (1020, None, (0.6, 0.0, 15)),
-        ],
-    ),
-    'of several samples between two ticks the newest counts': (
-        CARRIED,
-        [
-            (1000, sample(998, 0.1), GOOD),
-            (1000, sample(999, 0.2), GOOD),
-            (1000, sample(1000, 0.3), GOOD),
-            (1000, None, (0.3, 0.0, 0)),
-        ],
-    ),
-}
+    'before the first sample there is no crank': (CARRIED, [
+        (1000, None, SILENT), (5000, None, SILENT),
+    ]),
+    'carried forward by its rate': (CARRIED, [
+        (1000, sample(1000, 0.5, 2.0), GOOD), (1000, None, (0.5, 2.0, 0)),
+        (1100, None, (0.7, 2.0, 100)), (1200, None, (0.9, 2.0, 200)),
+    ]),
+    'held as measured': (HELD, [
+        (1000, sample(1000, 0.5, 2.0), GOOD), (1100, None, (0.5, 2.0, 100)),
+        (1200, None, (0.5, 2.0, 200)),
+    ]),
+    'silent from the age limit on, until the next sample': (CARRIED, [
+        (1000, sample(1000, 0.5, 2.0), GOOD), (1200, None, (0.9, 2.0, 200)), (1201, None, SILENT),
+        (9000, None, SILENT), (9001, sample(9001, 3.0), GOOD), (9001, None, (3.0, 0.0, 0)),
+    ]),
+    'it is the stamp that ages, not the arrival': (CARRIED, [
+        (1150, sample(1000, 0.5, 2.0), GOOD), (1150, None, (0.8, 2.0, 150)), (1201, None, SILENT),
+    ]),
+    'a sample that comes too late is no crank': (CARRIED, [
+        (2000, sample(1000, 0.5, 2.0), GOOD), (2000, None, SILENT),
+    ]),
+    'a repeat does not make it younger': (HELD, [
+        (1000, sample(1000, 0.5), GOOD), (1150, sample(1000, 0.5), GOOD),
+        (1150, None, (0.5, 0.0, 150)), (1250, sample(1000, 0.5), GOOD), (1250, None, SILENT),
+    ]),
+    'a stamp a little ahead is carried back': (CARRIED, [
+        (1000, sample(1100, 0.5, 2.0), GOOD), (1000, None, (0.3, 2.0, -100)),
+    ]),
+    'a stamp further ahead is refused': (CARRIED, [
+        (1000, sample(1000, 0.5), GOOD),
+        (1010, sample(1111, 0.9), Rejection.STAMP_FUTURE),
+        (1010, None, (0.5, 0.0, 10)),
+        (1011, sample(1111, 0.9), GOOD),
+    ]),
+    'an older stamp is refused': (CARRIED, [
+        (1000, sample(1000, 0.5), GOOD),
+        (1010, sample(999, 0.9), Rejection.STAMP_OLD),
+        (1010, None, (0.5, 0.0, 10)),
+        (1020, sample(1005, 0.6), GOOD),
+        (1020, None, (0.6, 0.0, 15)),
+    ]),
+    'of several samples between two ticks the newest counts': (CARRIED, [
+        (1000, sample(998, 0.1), GOOD), (1000, sample(999, 0.2), GOOD),
+        (1000, sample(1000, 0.3), GOOD), (1000, None, (0.3, 0.0, 0)),
+    ]),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('name', TIMELINES)
@@ -276,20 +221,14 @@ def test_of_several_inputs_one_that_is_bad_spoils_the_sample(bad, reason, place)
 
 
 PAGE = (Path(__file__).parents[2] / 'docs' / 'how_to' / 'stand_in.md').read_text('utf-8')
-
-
 SYSTEM = re.search(r'```xml\n(.*?)```', PAGE, re.DOTALL)[1]
 
-
 SCENE, LINKAGE = (
-    re.search(rf'```yaml\n# {name}\n(.*?)```', PAGE, re.DOTALL)[1]
+    re.search(rf"cat > {name} <<'EOF'\n(.*?)EOF\n", PAGE, re.DOTALL)[1]
     for name in ('under_torque.yaml', 'press.yaml')
 )
 
-
 ALWAYS = '<param name="trigger_joint_command_threshold">-1</param>'
-
-
 INTERFACES = ('position', 'velocity', 'effort')
 
 

@@ -20,8 +20,6 @@ Where a motion is to be in closed form, the links weigh next to nothing, and the
 the motor.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, isfinite, nan, pi
 import random
@@ -35,8 +33,7 @@ from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Mass
 from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_effort import EffortCommand
-from linkage_ros.messages.joint_state import Rejection
+from linkage_ros.messages.joint_state import EffortCommand, Rejection
 import pytest
 
 from .contexts import two_inputs
@@ -48,14 +45,11 @@ from ..support.scenes import pipeline_of
 MS = 1_000_000
 SECOND = 1000 * MS
 BEGIN = 1_700_000_000 * SECOND
-
 GOOD = None
 GRAVITY = Loads(gravity=(0.0, -9.81))
-
 LIGHT = Mass(1e-12, (0.0, 0.0), 0.0)
 WHEEL = four_bar(dict.fromkeys(('crank', 'coupler', 'rocker'), LIGHT), 0.04, 0.12, 0.08, 0.1)
 MOTOR = Loads(drive_inertia=0.5)
-
 FOUR_BAR = Closure(shipped('four_bar'))
 EXCAVATOR = Closure(shipped('excavator_bucket'))
 ROD = Mass(0.2, (0.03, 0.01), 2e-5)
@@ -79,98 +73,59 @@ def command(effort):
 # Name: (parameters, [(time in ms, effort commanded, or None and (angle, rate, acceleration))]).
 BRAKE = {'on_timeout': 'brake', 'brake': 3.0}
 TIMELINES = {
-    'without a command nothing acts': (
-        {'start': 0.3, 'rate': 2.0},
-        [(0, None, (0.3, 2.0, 0.0)), (50, None, (0.4, 2.0, 0.0)), (1000, None, (2.3, 2.0, 0.0))],
-    ),
-    'a command acts from when it comes': (
-        {},
-        [
-            (0, None, (0.0, 0.0, 0.0)),
-            (20, 1.0, None),
-            (20, None, (0.0, 0.0, 2.0)),
-            (120, None, (0.01, 0.2, 0.0)),
-        ],
-    ),
-    'a command runs out, and nothing acts': (
-        {},
-        [
-            (0, None, (0.0, 0.0, 0.0)),
-            (0, 1.0, None),
-            (99, None, (0.009801, 0.198, 2.0)),
-            (100, None, (0.01, 0.2, 0.0)),
-            (600, None, (0.11, 0.2, 0.0)),
-        ],
-    ),
-    'a command runs out, and the brake acts': (
-        BRAKE,
-        [
-            (0, None, (0.0, 0.0, 0.0)),
-            (0, 1.0, None),
-            (100, None, (0.01, 0.2, -6.0)),
-            (120, None, (0.0128, 0.08, -6.0)),
-            (500, None, (0.01 + 0.2 * 0.2 / 12, 0.0, 0.0)),
-        ],
-    ),
-    'before the first command the brake acts too': (
-        {'rate': 0.6, **BRAKE},
-        [
-            (0, None, (0.0, 0.6, -6.0)),
-            (50, None, (0.0225, 0.3, -6.0)),
-            (101, None, (0.03, 0.0, 0.0)),
-        ],
-    ),
-    'a command lets the brake go': (
-        BRAKE,
-        [
-            (0, None, (0.0, 0.0, 0.0)),
-            (50, 0.5, None),
-            (150, None, (0.005, 0.1, -6.0)),
-        ],
-    ),
-    'each command holds anew': (
-        {},
-        [
-            (0, None, (0.0, 0.0, 0.0)),
-            *((time, 1.0, None) for time in range(0, 1000, 80)),
-            (1000, None, (1.0, 2.0, 2.0)),
-            (1060, None, (1.1236, 2.12, 0.0)),
-            (1160, None, (1.3356, 2.12, 0.0)),
-        ],
-    ),
-    'between two steps too': (
-        {'step': 0.01, 'method': 'gauss_legendre'},
-        [
-            (0, None, (0.0, 0.0, 0.0)),
-            (13, 1.0, None),
-            (17, None, (1.6e-5, 8e-3, 2.0)),
-            (18, -1.0, None),
-            (23, None, (5e-5, 0.0, -2.0)),
-            (24, None, (4.9e-5, -2e-3, -2.0)),
-        ],
-    ),
-    'one before the first tick acts from that on': (
-        {},
-        [(0, 1.0, None), (40, None, (0.0, 0.0, 2.0)), (100, None, (0.0036, 0.12, 0.0))],
-    ),
-    'one long before the first tick does not act': (
-        {},
-        [(0, 1.0, None), (140, None, (0.0, 0.0, 0.0)), (200, None, (0.0, 0.0, 0.0))],
-    ),
-    'it is not looked at for a while': (
-        {'rate': 1.0},
-        [(0, None, (0.0, 1.0, 0.0)), (900, None, (0.9, 1.0, 0.0))],
-    ),
+    'without a command nothing acts': ({'start': 0.3, 'rate': 2.0}, [
+        (0, None, (0.3, 2.0, 0.0)), (50, None, (0.4, 2.0, 0.0)), (1000, None, (2.3, 2.0, 0.0)),
+    ]),
+    'a command acts from when it comes': ({}, [
+        (0, None, (0.0, 0.0, 0.0)), (20, 1.0, None), (20, None, (0.0, 0.0, 2.0)),
+        (120, None, (0.01, 0.2, 0.0)),
+    ]),
+    'a command runs out, and nothing acts': ({}, [
+        (0, None, (0.0, 0.0, 0.0)), (0, 1.0, None), (99, None, (0.009801, 0.198, 2.0)),
+        (100, None, (0.01, 0.2, 0.0)), (600, None, (0.11, 0.2, 0.0)),
+    ]),
+    'a command runs out, and the brake acts': (BRAKE, [
+        (0, None, (0.0, 0.0, 0.0)),
+        (0, 1.0, None),
+        (100, None, (0.01, 0.2, -6.0)),
+        (120, None, (0.0128, 0.08, -6.0)),
+        (500, None, (0.01 + 0.2 * 0.2 / 12, 0.0, 0.0)),
+    ]),
+    'before the first command the brake acts too': ({'rate': 0.6, **BRAKE}, [
+        (0, None, (0.0, 0.6, -6.0)), (50, None, (0.0225, 0.3, -6.0)),
+        (101, None, (0.03, 0.0, 0.0)),
+    ]),
+    'a command lets the brake go': (BRAKE, [
+        (0, None, (0.0, 0.0, 0.0)), (50, 0.5, None), (150, None, (0.005, 0.1, -6.0)),
+    ]),
+    'each command holds anew': ({}, [
+        (0, None, (0.0, 0.0, 0.0)),
+        *((time, 1.0, None) for time in range(0, 1000, 80)),
+        (1000, None, (1.0, 2.0, 2.0)),
+        (1060, None, (1.1236, 2.12, 0.0)),
+        (1160, None, (1.3356, 2.12, 0.0)),
+    ]),
+    'between two steps too': ({'step': 0.01, 'method': 'gauss_legendre'}, [
+        (0, None, (0.0, 0.0, 0.0)), (13, 1.0, None), (17, None, (1.6e-5, 8e-3, 2.0)),
+        (18, -1.0, None), (23, None, (5e-5, 0.0, -2.0)), (24, None, (4.9e-5, -2e-3, -2.0)),
+    ]),
+    'one before the first tick acts from that on': ({}, [
+        (0, 1.0, None), (40, None, (0.0, 0.0, 2.0)), (100, None, (0.0036, 0.12, 0.0)),
+    ]),
+    'one long before the first tick does not act': ({}, [
+        (0, 1.0, None), (140, None, (0.0, 0.0, 0.0)), (200, None, (0.0, 0.0, 0.0)),
+    ]),
+    'it is not looked at for a while': ({'rate': 1.0}, [
+        (0, None, (0.0, 1.0, 0.0)), (900, None, (0.9, 1.0, 0.0)),
+    ]),
     'longer than can be made up for, it has stood still meanwhile': (
         {'rate': 1.0},
         [
-            (0, None, (0.0, 1.0, 0.0)),
-            (100, 1.0, None),
-            (5000, None, (1.1, 1.0, 0.0)),
+            (0, None, (0.0, 1.0, 0.0)), (100, 1.0, None), (5000, None, (1.1, 1.0, 0.0)),
             (5100, None, (1.2, 1.0, 0.0)),
         ],
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('name', TIMELINES)
@@ -369,40 +324,33 @@ def test_a_start_whole_turns_away_is_in_the_same_range(turns):
 
 MASSLESS = Closure(replace(shipped('four_bar'), masses={}))
 
-
 OUT_OF_REACH = (
     'drive.torque.start: {} is not between the stops; reachable: -1.2987 to 1.2987 rad; '
     'start there, {} of the range or more from its ends'
 )
 UNBUILT = {
     'several inputs': (
-        two_inputs(),
-        {},
-        'drive.torque: the linkage has 2 inputs, and a torque moves one; use a linkage with ',
+        two_inputs(), {},
+        'drive.torque: the linkage has 2 inputs, and the torque drive moves one; use a linkage ',
     ),
     'no masses': (MASSLESS, {}, "masses: link 'crank' has no mass, and forces are asked for; "),
     'a start out of reach': (DOUBLE_ROCKER, {'start': 1.5}, OUT_OF_REACH.format(1.5, 0.001)),
     'a start behind the stop': (
-        DOUBLE_ROCKER,
-        {'start': 1.2, 'stop_margin': 0.1},
-        OUT_OF_REACH.format(1.2, 0.1),
+        DOUBLE_ROCKER, {'start': 1.2, 'stop_margin': 0.1}, OUT_OF_REACH.format(1.2, 0.1),
     ),
     'no start for a slide': (
-        EXCAVATOR,
-        {},
+        EXCAVATOR, {},
         'drive.torque.start: 0 is not between the stops; reachable: 0.682846 to 1.32285 m; ',
     ),
     'a brake without a moment': (
-        WHEEL,
-        {'on_timeout': 'brake'},
-        'drive.torque.brake: a brake that holds nothing; say what it holds, in [N·m] or [N]',
+        WHEEL, {'on_timeout': 'brake'},
+        'drive.torque.brake: the brake is 0 and holds nothing; write its torque or force, ',
     ),
     'a brake without a use': (
-        WHEEL,
-        {'brake': 2.0},
-        'drive.torque.brake: a brake that is never set; add on_timeout: brake',
+        WHEEL, {'brake': 2.0},
+        'drive.torque.brake: the brake is never applied; add on_timeout: brake',
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(('context', 'parameters', 'line'), UNBUILT.values(), ids=UNBUILT)
@@ -457,9 +405,7 @@ def test_two_runs_of_a_scene_give_the_same_bytes():
 
 
 def test_what_is_wrong_in_a_scene_has_its_line():
-    with pytest.raises(
-        FileError, match=r'scene\.yaml:2: drive\.torque\.brake: a brake that holds'
-    ):
+    with pytest.raises(FileError, match=r'scene\.yaml:2: drive\.torque\.brake: the brake is 0'):
         scene('{on_timeout: brake}')
     with pytest.raises(FileError, match='gauss_legendre'):
         scene('{method: gauss_legender}')

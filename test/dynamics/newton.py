@@ -21,8 +21,6 @@ of every link, the equations are the joints' own, the Jacobian is differences, a
 starts from a pose close by.
 """
 
-from __future__ import annotations
-
 from cmath import rect
 from math import hypot, tau
 
@@ -32,19 +30,7 @@ import numpy as np
 
 
 def displaced(closure: Closure, inputs: tuple[float, ...], offsets) -> np.ndarray:
-    """
-    Return the published joints where joints are off.
-
-    Parameters
-    ----------
-    closure
-        The linkage without offsets; the pose to start from, and nothing else, is taken from it.
-    inputs
-        Values of the driven joints.
-    offsets
-        For each joint of the structure the place of its point on ``link`` less that on ``to``.
-
-    """
+    """Return the published joints where pins miss by offsets: the place on `link` less `to`'s."""
     linkage, structure = closure.linkage, closure.structure
     position = closure.position(*inputs)
     points, angles = closure.points(position), closure.link_angles(position)
@@ -108,7 +94,6 @@ def displaced(closure: Closure, inputs: tuple[float, ...], offsets) -> np.ndarra
         ).T
         x = x - np.linalg.solve(jacobian, residual(x))
     assert np.abs(residual(x)).max() < 1e-13
-
     return np.array(
         [
             frame(x, joint.child)[1] - frame(x, joint.parent)[1]

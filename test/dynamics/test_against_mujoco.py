@@ -27,8 +27,6 @@ a linear system for τ and λ. Without λ, τ = Kᵀ·Q with the ratios K = dq/d
 (virtual work). With τ and λ known, MuJoCo also gives the forces in the pins of the tree.
 """
 
-from __future__ import annotations
-
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.dynamics.reactions import Reactions
@@ -39,31 +37,23 @@ import pytest
 from .loaded import shipped, slope, weighed
 
 mujoco = pytest.importorskip('mujoco')
-
 GRAVITY = (1.5, -9.81)
 
 # The links of each tree with their parents and pins, in the order of the published joints, and
 # the pins that are cut, each with the two links that it joined: joint.link and joint.to.
 TREES = {
     'four_bar': (
-        (
-            ('crank', 'ground', 'O2'),
-            ('coupler', 'crank', 'A'),
-            ('rocker', 'ground', 'O4'),
-        ),
+        (('crank', 'ground', 'O2'), ('coupler', 'crank', 'A'), ('rocker', 'ground', 'O4')),
         (('B', 'rocker', 'coupler'),),
     ),
     'watt_1': (
         (
-            ('crank', 'ground', 'O2'),
-            ('coupler', 'crank', 'A'),
-            ('rocker', 'ground', 'O4'),
-            ('upper_link', 'coupler', 'C'),
-            ('output_link', 'rocker', 'D'),
+            ('crank', 'ground', 'O2'), ('coupler', 'crank', 'A'), ('rocker', 'ground', 'O4'),
+            ('upper_link', 'coupler', 'C'), ('output_link', 'rocker', 'D'),
         ),
         (('B', 'rocker', 'coupler'), ('E', 'output_link', 'upper_link')),
     ),
-}
+}  # fmt: skip
 RATE, PULL = 2.3, -4.0
 
 
@@ -177,7 +167,6 @@ def test_reactions(case, angle):
     solution = np.linalg.solve(np.hstack([drive, jacobian.T]), forces)
     effort, reactions = ours(closure, angle)
     assert solution[0] == pytest.approx(effort, rel=1e-7)
-
     loads = solution[1:].reshape(-1, 2)
     size = np.abs(loads).max()
     for (pin, link, to), load in zip(cuts, loads, strict=True):

@@ -12,20 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+"""Each method has the order that it says, and finds the instant of an event within a step."""
 
-"""Each method has the order that it says, measured as the slope of its error over its step."""
-
-from __future__ import annotations
-
-from importlib import import_module
 from itertools import pairwise
-from math import log2, sin, sqrt
+from math import cos, exp, log2, pi, sin, sqrt
 
-from linkage_ros.dynamics.integrators import gauss_legendre, rk4
-from linkage_ros.dynamics.integrators.method import METHODS
+from linkage_ros.dynamics.integrators import (
+    gauss_legendre,
+    GAUSS_MATRIX,
+    GAUSS_NODES,
+    GAUSS_WEIGHTS,
+    METHODS,
+    rk4,
+)
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.motion import OneFreedom
+from linkage_ros.dynamics.motion import last_before, OneFreedom
 from linkage_ros.kinematics.closure import Closure
 import mpmath
 import numpy as np
@@ -33,7 +35,7 @@ import pytest
 
 from .loaded import shipped
 
-STEP = {name: import_module(module).step for name, module in METHODS.items()}
+STEP = {name: method.step for name, method in METHODS.items()}
 ORDER = {'semi_implicit_euler': 1, 'rk4': 4, 'gauss_legendre': 6}
 
 
@@ -43,7 +45,7 @@ def slopes(errors):
 
 
 def test_the_methods_say_their_order():
-    assert {name: import_module(module).ORDER for name, module in METHODS.items()} == ORDER
+    assert {name: method.order for name, method in METHODS.items()} == ORDER
 
 
 # A pendulum, θ̈ = −ω²·sin θ, let go at an angle: sin(θ/2) = k·cd(ω·t, k), with k = sin(θ₀/2).
@@ -128,11 +130,7 @@ def turned(loaded, method, seconds, steps):
 
 
 def time_to(loaded, end):
-    """
-    Return when the crank comes to an angle, by the energy integral and not by steps.
-
-    t = ∫ √(I/(2·(E − V))) dq, by Gauss's rule on short pieces.
-    """
+    """Return t = ∫ √(I/(2·(E − V))) dq up to an angle, by Gauss's rule on short pieces."""
     position = loaded.closure.position
     whole = loaded.energy(position(BEGIN), SPEED)
     nodes, weights = np.polynomial.legendre.leggauss(20)
@@ -189,9 +187,9 @@ def test_the_best_keeps_the_energy_of_an_undamped_linkage(four_bar, steps):
 
 def test_the_coefficients_of_gauss_integrate_polynomials():
     # Collocation: Σ a_ij·c_jᵏ⁻¹ = c_iᵏ/k for k ≤ 3, Σ b_j·c_jᵏ⁻¹ = 1/k for k ≤ 6.
-    nodes, weights = gauss_legendre.NODES, gauss_legendre.WEIGHTS
+    nodes, weights = GAUSS_NODES, GAUSS_WEIGHTS
     for k in (1, 2, 3):
-        for c, row in zip(nodes, gauss_legendre.MATRIX, strict=True):
+        for c, row in zip(nodes, GAUSS_MATRIX, strict=True):
             total = sum(a * d ** (k - 1) for a, d in zip(row, nodes, strict=True))
             assert total == pytest.approx(c**k / k, abs=1e-16)
     for k in range(1, 7):
@@ -200,15 +198,15 @@ def test_the_coefficients_of_gauss_integrate_polynomials():
 
 
 def test_gauss_goes_back_the_way_it_came():
-    there = gauss_legendre.step(weight, 1.0, 2.0, weight(1.0, 2.0), 0.05)
-    back = gauss_legendre.step(weight, *there, weight(*there), -0.05)
+    there = gauss_legendre(weight, 1.0, 2.0, weight(1.0, 2.0), 0.05)
+    back = gauss_legendre(weight, *there, weight(*there), -0.05)
     assert back == pytest.approx((1.0, 2.0), abs=1e-15)
 
 
 def test_gauss_does_not_answer_where_it_does_not_converge():
     stiff = lambda value, _rate: -1e9 * value  # noqa: E731
-    assert gauss_legendre.step(stiff, 1.0, 0.0, -1e9, 1e-2) is None
-    assert gauss_legendre.step(stiff, 1.0, 0.0, -1e9, 1e-6) is not None
+    assert gauss_legendre(stiff, 1.0, 0.0, -1e9, 1e-2) is None
+    assert gauss_legendre(stiff, 1.0, 0.0, -1e9, 1e-6) is not None
 
 
 @pytest.mark.parametrize('method', [rk4, gauss_legendre])
@@ -216,5 +214,61 @@ def test_where_a_stage_has_no_motion_there_is_no_step(method):
     def ends(value, _rate):
         return 0.0 if value < 1.0 else None
 
-    assert method.step(ends, 0.0, 1.0, 0.0, 0.5) == pytest.approx((0.5, 1.0))
-    assert method.step(ends, 0.0, 1.0, 0.0, 1.5) is None
+    assert method(ends, 0.0, 1.0, 0.0, 0.5) == pytest.approx((0.5, 1.0))
+    assert method(ends, 0.0, 1.0, 0.0, 1.5) is None
+
+
+# The instant at which something happens within a step, against functions whose zero is known.
+
+
+def found(function, end, *, exists=lambda _t: True):
+    """Return instant, last state, whether it is that, and how often it was looked."""
+    looks = []
+
+    def reach(t):
+        looks.append(t)
+        return (t, function(t)) if exists(t) else None
+
+    at, (time, margin), known = last_before(
+        reach, lambda state: state[1], (0.0, function(0.0)), end, (end, function(end))
+    )
+    assert margin >= 0.0
+    assert time == max([0.0, *(t for t in looks if t <= at and exists(t) and function(t) >= 0.0)])
+    return at, known, len(looks)
+
+
+@pytest.mark.parametrize(
+    ('function', 'end', 'zero'),
+    [
+        (lambda t: 1.0 - 3.0 * t, 1.0, 1 / 3),
+        (lambda t: 2.0 - t * t, 2.0, 2.0**0.5),
+        (cos, 3.0, pi / 2),
+        (lambda t: exp(-20.0 * t) - 1e-3, 5.0, 0.34538776394910684),
+        (lambda t: (0.7 - t) ** 3, 1.0, 0.7),
+        # At the start it leaves what it comes back to: a flight between two bounces.
+        (lambda t: t * (0.01 - t), 1.0, 0.01),
+        (lambda t: t * (1e-9 - t), 1.0, 1e-9),
+    ],
+)
+def test_the_zero_is_found(function, end, zero):
+    at, known, looks = found(function, end)
+    assert known
+    assert at == pytest.approx(zero, abs=1e-5 if function(0.0) == 0.7**3 else 1e-13)
+    assert looks <= 80
+
+
+def test_a_smooth_one_is_found_soon():
+    for function, end in ((cos, 3.0), (lambda t: 2.0 - t * t, 2.0)):
+        assert found(function, end)[2] < 20
+
+
+def test_where_there_is_no_state_it_ends_before_that():
+    at, known, _ = found(lambda t: 1.0 - t, 2.0, exists=lambda t: t < 0.25 or t == 2.0)
+    assert not known
+    assert at == pytest.approx(0.25, abs=1e-13)
+
+
+def test_beyond_a_gap_it_is_still_looked_for_in_front_of_it():
+    at, known, _ = found(lambda t: 0.125 - t, 2.0, exists=lambda t: not 0.5 < t < 1.5)
+    assert known
+    assert at == pytest.approx(0.125, abs=1e-13)

@@ -23,13 +23,11 @@ and the time is the integral of dq/q̇, by Gauss's rule between the places at wh
 and rates are those of textbooks (R. L. Norton, Design of Machinery, ch. 4 and 6).
 """
 
-from __future__ import annotations
-
 from cmath import phase, rect
 from itertools import pairwise
 from math import acos, log2, pi, sin, sqrt
 
-from linkage_ros.dynamics.integrators.method import METHODS
+from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.loads import Friction, JointFriction, Loads
 from linkage_ros.dynamics.mechanics import Mechanics, Terms
 from linkage_ros.dynamics.motion import OneFreedom

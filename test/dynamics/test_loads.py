@@ -15,8 +15,6 @@
 
 """Forces on what a linkage does not have, refused in one line; and what a spring pulls with."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from linkage_ros.dynamics.loads import (
@@ -41,47 +39,34 @@ SPRING = Spring('ground', 'O2', 'rocker', 'B', 100.0, 0.1, 3.0)
 REFUSED = {
     'a link that is not there': (
         'four_bar',
-        Loads(springs=(Spring('ground', 'O2', 'roker', 'B', 1.0, 0.1, name='return'),)),
-        {},
+        Loads(springs=(Spring('ground', 'O2', 'roker', 'B', 1.0, 0.1, name='return'),)), {},
         "loads.springs.return: 'roker' is not a link; name one of coupler, crank, ground, rocker",
     ),
     'a point of another link': (
-        'four_bar',
-        Loads(springs=(Spring('rocker', 'P', 'ground', 'O2', 1.0, 0.1),)),
-        {},
+        'four_bar', Loads(springs=(Spring('rocker', 'P', 'ground', 'O2', 1.0, 0.1),)), {},
         "loads.springs.1: 'P' is not a point of 'rocker'; name one of B, O4",
     ),
     'the second spring': (
-        'four_bar',
-        Loads(springs=(SPRING, Spring('ground', 'O3', 'rocker', 'B', 1.0, 0.1))),
-        {},
+        'four_bar', Loads(springs=(SPRING, Spring('ground', 'O3', 'rocker', 'B', 1.0, 0.1))), {},
         "loads.springs.2: 'O3' is not a point of 'ground'; name one of O2, O4",
     ),
     'a spring within a link': (
-        'four_bar',
-        Loads(springs=(Spring('rocker', 'O4', 'rocker', 'B', 1.0, 0.1),)),
-        {},
+        'four_bar', Loads(springs=(Spring('rocker', 'O4', 'rocker', 'B', 1.0, 0.1),)), {},
         "loads.springs.1: both its ends lie on 'rocker', so that nothing stretches it; name p",
     ),
     'friction in a point of one link': (
-        'four_bar',
-        Loads(),
-        {'P': RUBBING},
+        'four_bar', Loads(), {'P': RUBBING},
         "effects.friction.joints.P: 'P' is no pin or slider; name one of A, B, O2, O4",
     ),
     'friction in a slider that is not there': (
-        'slider_crank',
-        Loads(),
-        {'bore': RUBBING},
+        'slider_crank', Loads(), {'bore': RUBBING},
         "effects.friction.joints.bore: 'bore' is no pin or slider; name one of A, B, O2, cylinder",
     ),
     'the point of a block that is a link, and no pin': (
-        'scotch_yoke',
-        Loads(),
-        {'Y': RUBBING},
+        'scotch_yoke', Loads(), {'Y': RUBBING},
         "effects.friction.joints.Y: 'Y' is no pin or slider; name one of A, O2, guide, slot",
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('kind', REFUSED)

@@ -20,8 +20,6 @@ The efforts are held against Lagrange's equations, differentiated numerically fr
 energy itself against closed forms here and against another engine in `test_against_mujoco`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, hypot, sin
 
@@ -138,13 +136,7 @@ def test_slopes_are_those_of_inertia_and_potential(name):
 
 
 def lagrange(mechanics, q, rates, pulls):
-    """
-    Return the left sides of Lagrange's equations, by differences of the energy alone.
-
-    With the mass matrix M of the kinetic energy ½·q̇ᵀ·M(q)·q̇ and its derivatives ∂M/∂qₖ::
-
-        τ = M·q̈ + Σₖ q̇ₖ·(∂M/∂qₖ)·q̇ − ½·(q̇ᵀ·(∂M/∂qᵢ)·q̇)ᵢ + ∂V/∂q
-    """
+    """Return M·q̈ + Σₖ q̇ₖ·(∂M/∂qₖ)·q̇ − ½·(q̇ᵀ·(∂M/∂qᵢ)·q̇)ᵢ + ∂V/∂q, by differences alone."""
     size, closure = len(q), mechanics.closure
     units = np.eye(size)
 
@@ -195,7 +187,6 @@ def test_what_drives_put_in_is_stored_or_rubbed_away(name):
         for i, joint in enumerate(closure.structure.joints)
     }
     mechanics = Mechanics(closure, loads, Friction(joints))
-
     for q in STATES[name]:
         rates, pulls = [1.3, -0.8][: len(q)], [-2.0, 3.5][: len(q)]
         position = closure.position(*q)

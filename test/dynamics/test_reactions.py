@@ -19,8 +19,6 @@ Forces in pins and sliders: statics of the textbook, and Newton's law for the li
 Pins of a four-bar and a six-bar are held against another engine in `test_against_mujoco`.
 """
 
-from __future__ import annotations
-
 from cmath import rect
 from dataclasses import replace
 from math import asin, cos, hypot, sin, tan
@@ -34,7 +32,16 @@ from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
 
-from .loaded import closed, four_bar, loads_of, scotch_yoke, shipped, slope, STATES
+from .loaded import (
+    closed,
+    efforts_by_forces,
+    four_bar,
+    loads_of,
+    scotch_yoke,
+    shipped,
+    slope,
+    STATES,
+)
 
 WEIGHTLESS = 1e-300
 """In [kg]: a mass there must be."""
@@ -51,7 +58,7 @@ def at_rest(mechanics, *inputs):
 def moving(mechanics, position, velocity, acceleration):
     reactions = Reactions(mechanics)
     found = reactions.solve(position, velocity, acceleration)
-    effort = reactions.efforts(position, velocity, acceleration)[0]
+    effort = efforts_by_forces(mechanics, position, velocity, acceleration)[0]
     return dict(zip(reactions.names, found, strict=True)), effort
 
 
@@ -118,7 +125,6 @@ def test_scotch_yoke(angle):
     velocity = closure.velocity(position, rate)
     acceleration = closure.acceleration(position, velocity, pull)
     found, effort = moving(mechanics, position, velocity, acceleration)
-
     sine, cosine = sin(angle), cos(angle)
     speed, bend = -a * sine * rate, -a * (cosine * rate**2 + sine * pull)
     rubbing = -(2.0 * speed + (0.4 if speed > 0 else -0.4))
@@ -140,13 +146,12 @@ def test_both_ways_to_the_effort(name):
         {joint.name: JointFriction(0.1, 0.3) for joint in closure.structure.joints}
     )
     mechanics = Mechanics(closure, loads_of(closure.linkage, damping=15.0), friction)
-    reactions = Reactions(mechanics)
     for q in STATES[name]:
         rates, pulls = [1.3, -0.8][: len(q)], [-2.0, 3.5][: len(q)]
         position = closure.position(*q)
         velocity = closure.velocity(position, *rates)
         acceleration = closure.acceleration(position, velocity, *pulls)
-        assert reactions.efforts(position, velocity, acceleration) == pytest.approx(
+        assert efforts_by_forces(mechanics, position, velocity, acceleration) == pytest.approx(
             mechanics.drive_efforts(position, velocity, acceleration), rel=1e-10
         )
 
@@ -158,11 +163,11 @@ def test_the_ground_bears_what_the_linkage_does(name):
     closure = closed(name)
     linkage, structure = closure.linkage, closure.structure
     loads = replace(loads_of(linkage), springs=())
-    reactions = Reactions(Mechanics(closure, loads))
+    mechanics = Mechanics(closure, loads)
+    reactions = Reactions(mechanics)
     gravity = complex(*loads.gravity)
     centers = [(link, complex(*mass.center)) for link, mass in linkage.masses.items()]
     follower = closure.point_tracker(centers)
-
     for q in STATES[name]:
         rates, pulls = [1.3, -0.8][: len(q)], [-2.0, 3.5][: len(q)]
 
@@ -195,7 +200,7 @@ def test_the_ground_bears_what_the_linkage_does(name):
                 force += push
                 moment += (points[joint.link, point].conjugate() * push).imag
                 moment += sign * reaction.moment
-        efforts = reactions.efforts(position, velocity, acceleration)
+        efforts = efforts_by_forces(mechanics, position, velocity, acceleration)
         for given, effort, pull in zip(linkage.inputs, efforts, pulls, strict=True):
             moved = effort - loads.drive_inertia * pull
             if given.slider:
@@ -286,4 +291,3 @@ def test_nothing_where_no_rates_exist():
         assert reactions.shift(position, [0j] * 4) is None
         # There is no velocity to give.
         assert reactions.solve(position, None, None) is None
-        assert reactions.efforts(position, None, None) is None

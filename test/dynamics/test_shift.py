@@ -14,13 +14,11 @@
 
 
 """
-What joints that do not meet exactly move: the first order of the exact solution.
+Joints that do not meet exactly move the linkage: the first order of the exact solution.
 
 The exact solution is Newton's method on the poses of all links (`newton.py`), or the closure of a
 linkage with other lengths. Half the offset leaves a quarter of the error.
 """
-
-from __future__ import annotations
 
 from cmath import rect
 from dataclasses import replace

@@ -21,8 +21,6 @@ times acceleration, the accelerations being differences of places. Nothing of th
 the forces is used: not its list of joints, and not its matrix.
 """
 
-from __future__ import annotations
-
 from cmath import rect
 from dataclasses import replace
 from math import copysign, hypot
@@ -34,7 +32,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
 import pytest
 
-from .loaded import slope, STATES, weighed
+from .loaded import efforts_by_forces, slope, STATES, weighed
 
 GRAVITY = complex(1.5, -9.81)
 
@@ -143,13 +141,13 @@ def test_each_link_that_is_cut_free_obeys_newton(linkage, name):
     start = STATES[name][0]
     rates, pulls = [1.3, -0.8][: len(start)], [-2.0, 3.5][: len(start)]
     moved = Moved(linkage, start, rates, pulls)
-    reactions = Reactions(Mechanics(moved.closure, loads, friction))
+    mechanics = Mechanics(moved.closure, loads, friction)
+    reactions = Reactions(mechanics)
     position = moved.position(0.0)
     velocity = moved.closure.velocity(position, *rates)
     acceleration = moved.closure.acceleration(position, velocity, *pulls)
     wrenches = reactions.solve(position, velocity, acceleration)
-    efforts = reactions.efforts(position, velocity, acceleration)
-
+    efforts = efforts_by_forces(mechanics, position, velocity, acceleration)
     acting = {}  # for each link forces with their places, and moments
 
     def act(link, force, place, moment=0.0):
@@ -179,7 +177,6 @@ def test_each_link_that_is_cut_free_obeys_newton(linkage, name):
     tension = 200.0 * (length - 0.03) + 7.0 * slope(lambda t: stretched(t)[0], 0.0)
     if length:
         act(moving[-1], tension * (one - other) / length, other)
-
     for link in moving:
         mass = linkage.masses[link]
 

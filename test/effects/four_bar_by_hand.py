@@ -20,8 +20,6 @@ Nothing here is the package's own: the pose is that of two circles, rates are di
 forces come from the balance of each link.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from mpmath import MPContext
@@ -40,19 +38,7 @@ class Body(NamedTuple):
 
 
 class FourBar:
-    """
-    A crank a, a coupler b and a rocker c on a ground d, with a motion θ + ωt + ½αt² of the crank.
-
-    Parameters
-    ----------
-    linkage
-        Where the numbers are read off: lengths, masses.
-    motion
-        θ, ω, α.
-    gravity
-        Downwards, in [m/s²].
-
-    """
+    """The four-bar of a linkage, with θ, ω, α of its crank and the gravity downwards in [m/s²]."""
 
     def __init__(self, linkage, motion, gravity):
         points = linkage.links

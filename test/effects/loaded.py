@@ -15,8 +15,6 @@
 
 """A linkage with masses under gravity, and its motion through the effects that use forces."""
 
-from __future__ import annotations
-
 from importlib import import_module
 
 from linkage_ros.drives.drive import Context, CrankState
@@ -24,6 +22,8 @@ from linkage_ros.dynamics.loads import Loads
 from linkage_ros.effects import velocity
 from linkage_ros.effects.stage import EFFECTS, MechanismState
 from linkage_ros.kinematics.closure import Closure
+
+from ..support.scenes import four_bar_text
 
 GRAVITY = 9.81
 
@@ -38,19 +38,7 @@ def parameters(effect, *given):
 
 
 def moved(within, crank, effects):
-    """
-    Return the motion that leaves the stages of some effects.
-
-    Parameters
-    ----------
-    within
-        A context.
-    crank
-        Angle or slide of the input, its rate and its acceleration.
-    effects
-        For each effect the parameters that it is given.
-
-    """
+    """Return the motion that effects make of a crank's (value, rate, acceleration)."""
     state = CrankState(*((value,) for value in crank), 0)
     motion = velocity.stage(velocity.PARAMETERS(), within)(
         MechanismState(state, within.closure.position(crank[0]), None, None, (), (), ())
@@ -63,18 +51,5 @@ def moved(within, crank, effects):
     return motion
 
 
-SINGULAR = """
-links:
-  ground: {O2: [0, 0], O4: [3, 0]}
-  crank: {O2: [0, 0], A: [1, 0]}
-  coupler: {A: [0, 0], B: [1, 0]}
-  rocker: {O4: [0, 0], B: [1, 0]}
-input: {joint: crank_joint, parent: ground, child: crank}
-assembly: {B: left}
-joints: {rocker_joint: {parent: ground, child: rocker}}
-masses:
-  crank: {mass: 1, center: [0.5, 0], inertia: 0.1}
-  coupler: {mass: 1, center: [0.5, 0], inertia: 0.1}
-  rocker: {mass: 1, center: [0.5, 0], inertia: 0.1}
-"""
+SINGULAR = four_bar_text(1, 1, 1, 3, [(1, 0.5, 0.1)] * 3)
 """A four-bar that is stretched out, at a toggle, where its crank is at 0."""

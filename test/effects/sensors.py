@@ -13,23 +13,17 @@
 # limitations under the License.
 
 
-"""What the tests of the sensors share: two linkages, readings by hand, scenes, and statistics."""
-
-from __future__ import annotations
+"""Set-up of the tests of sensors: two linkages, readings by hand, scenes, and statistics."""
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import SensorReading
 from linkage_ros.messages.joint_state import JointStateWriter
 from mpmath import gammainc
 
-from ..support.scenes import closure_of, FOUR_BAR, pipeline_of
+from ..support.scenes import closure_of, FOUR_BAR, pipeline_of, SLIDER_CRANK
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
-
-SLIDER_CRANK = b'inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}'
-
-
 ANGLES = closure_of(FOUR_BAR)
 """Publishes coupler_joint and rocker_joint, both angles."""
 SLIDE = closure_of(SLIDER_CRANK)

@@ -15,8 +15,6 @@
 
 """Acceleration: the slope of the rates, from velocity alone, and none at a toggle."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, isfinite, nan
 
@@ -28,11 +26,10 @@ from linkage_ros.effects.stage import MechanismState, SensorReading
 from linkage_ros.kinematics.status import Status
 import pytest
 
+from .sensors import ANGLES, SLIDE
 from ..support.messages import STORE
 from ..support.scenes import closure_of
 
-FOUR_BAR = closure_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
-SLIDER = closure_of('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}')
 STRETCHED_AT_0 = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 3}')
 EVERY_OTHER = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 2}')
 
@@ -49,7 +46,7 @@ def moved(loop, angle, rate, alpha=0.0):
 
 
 @given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
-@pytest.mark.parametrize('loop', [FOUR_BAR, SLIDER], ids=['four-bar', 'slider-crank'])
+@pytest.mark.parametrize('loop', [ANGLES, SLIDE], ids=['four-bar', 'slider-crank'])
 def test_it_is_the_slope_of_the_rates(loop, angle, rate, alpha):
     # The crank's own motion: θ(t) = angle + rate·t + alpha·t²/2.
     step = 1e-5
@@ -65,13 +62,13 @@ def test_it_is_the_slope_of_the_rates(loop, angle, rate, alpha):
 
 @given(st.floats(-10.0, 10.0))
 def test_a_crank_at_rest_has_joints_at_rest(angle):
-    assert all(value == 0.0 for value in moved(FOUR_BAR, angle, 0.0).acceleration.joints)
+    assert all(value == 0.0 for value in moved(ANGLES, angle, 0.0).acceleration.joints)
 
 
 @given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
 def test_a_crank_at_a_constant_rate_still_has_it(angle, rate):
     # What the topic drive gives: the unknown acceleration of the crank is 0, not the joints'.
-    one, two = (moved(SLIDER, angle, r).acceleration.joints for r in (rate, 2.0 * rate))
+    one, two = (moved(SLIDE, angle, r).acceleration.joints for r in (rate, 2.0 * rate))
     assert list(two) == pytest.approx([4.0 * value for value in one], rel=1e-12, abs=1e-300)
 
 
@@ -94,7 +91,7 @@ def test_next_to_a_toggle_it_is_finite_or_none(exponent):
 def test_what_is_no_number_is_left_out(value):
     class Overflowing:
         def acceleration(self, *_):
-            found = FOUR_BAR.acceleration(POSITION, VELOCITY, 0.0)
+            found = ANGLES.acceleration(POSITION, VELOCITY, 0.0)
             return replace(found, joints=(1.0, value))
 
     context = Context(Overflowing(), 1000.0, True, 'seed', None, None)
@@ -104,16 +101,16 @@ def test_what_is_no_number_is_left_out(value):
 
 
 def test_the_rest_of_the_motion_is_passed_on():
-    motion = moved(FOUR_BAR, 1.0, 2.0)
+    motion = moved(ANGLES, 1.0, 2.0)
     assert motion[:3] == (CRANK, POSITION, VELOCITY)
 
 
 def test_the_message_is_the_motion_at_one_point():
-    motion = moved(FOUR_BAR, 1.0, 2.0)
+    motion = moved(ANGLES, 1.0, 2.0)
     rates, accelerations = motion.velocity.joints, motion.acceleration.joints
     # Turns added, and whatever else sensors do: what is written is what is read.
     reading = SensorReading(3_000_000_004, (7.0, 8.0), rates, accelerations, ())
-    context = Context(FOUR_BAR, 1000.0, True, 'seed', None, None, prefix='left_')
+    context = Context(ANGLES, 1000.0, True, 'seed', None, None, prefix='left_')
     data = acceleration.writer(acceleration.PARAMETERS(), context)(9, motion, reading)
     message = STORE.deserialize_cdr(data, 'trajectory_msgs/msg/JointTrajectory')
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
@@ -127,5 +124,5 @@ def test_the_message_is_the_motion_at_one_point():
 
 
 CRANK = CrankState((1.0,), (2.0,), (0.0,), 0)
-POSITION = FOUR_BAR.position(1.0)
-VELOCITY = FOUR_BAR.velocity(POSITION, 2.0)
+POSITION = ANGLES.position(1.0)
+VELOCITY = ANGLES.velocity(POSITION, 2.0)

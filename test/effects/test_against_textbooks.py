@@ -13,14 +13,12 @@
 # limitations under the License.
 
 """
-What a scene publishes of linkages that textbooks solve in closed form, in 40 digits.
+A scene publishes the closed forms of textbooks, worked out in 40 digits.
 
 Poses are those of textbooks (R. L. Norton, Design of Machinery, ch. 4); rates and accelerations
 are mpmath's derivatives of them by time, along the motion of the crank. Nothing of the package is
 used for them.
 """
-
-from __future__ import annotations
 
 from mpmath import MPContext
 import pytest
@@ -32,7 +30,6 @@ from ..support.scenes import LINKAGES, pipeline_of, shipped
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
-
 mp = MPContext()
 mp.dps = 40
 mpf = mp.mpf

@@ -15,8 +15,6 @@
 
 """Backlash: timelines of a motor and what the crank makes of it."""
 
-from __future__ import annotations
-
 from math import pi, remainder, sin, tau
 
 from hypothesis import given

@@ -15,8 +15,6 @@
 
 """Bias: what is read of a joint is off by a constant, and nothing else is."""
 
-from __future__ import annotations
-
 from linkage_ros.effects import bias
 from linkage_ros.effects.bias import BiasParameters
 import pytest

@@ -15,8 +15,6 @@
 
 """Clearance: pins that lean along their force, against the exact massless-clearance-link model."""
 
-from __future__ import annotations
-
 from cmath import rect
 from math import hypot, sqrt
 
@@ -206,8 +204,8 @@ masses:
 def test_a_slider_is_refused(name):
     with pytest.raises(
         DefinitionError,
-        match=f"^effects.clearance.pins.{name}: '{name}' is a slider, and what leans is a pin in "
-        'its hole; name pins: A, B, O2$',
+        match=f"^effects.clearance.pins.{name}: '{name}' is a slider, and clearance is a property "
+        'of pins; name pins: A, B, O2$',
     ):
         clearance.stage(ClearanceParameters({name: 1e-5}), context(SLIDER_CRANK))
 

@@ -15,8 +15,6 @@
 
 """Compliance: a link that is pulled is longer, against the linkage with that length."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from linkage_ros.effects import compliance
@@ -163,9 +161,9 @@ def test_it_is_added_to_a_shift_and_the_rest_is_passed_on():
 @pytest.mark.parametrize(
     ('of', 'link', 'reason'),
     [
-        (WATT, 'coupler', "'coupler' has the pins A, B, C, and is no bar between two"),
-        (shipped('excavator_bucket'), 'cylinder_rod', "has the slider 'bore', and is no bar"),
-        (shipped('excavator_bucket'), 'cylinder_tube', "has the slider 'bore', and is no bar"),
+        (WATT, 'coupler', "'coupler' has the pins A, B, C, so it is not a bar between two pins"),
+        (shipped('excavator_bucket'), 'cylinder_rod', "has the slider 'bore', so it is not"),
+        (shipped('excavator_bucket'), 'cylinder_tube', "has the slider 'bore', so it is not"),
     ],
 )
 def test_what_is_no_bar_between_two_pins_is_refused(of, link, reason):

@@ -14,8 +14,6 @@
 
 """Delay: exact to the nanosecond; and the history that delay and jitter read."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from functools import partial
 from math import cos, sin

@@ -15,8 +15,6 @@
 
 """Dropout: as much is lost as it says, in bursts as long as it says, and never the same twice."""
 
-from __future__ import annotations
-
 from itertools import groupby, pairwise
 from math import ceil, inf, log
 

@@ -14,8 +14,6 @@
 
 """Effort: what the drive must give, also under torque, against closed forms."""
 
-from __future__ import annotations
-
 from math import cos, pi, sin
 
 from hypothesis import given
@@ -33,22 +31,13 @@ from .four_bar_by_hand import FourBar, mp
 from .loaded import context, GRAVITY, moved, SINGULAR
 from ..support.messages import joint_state as serialized
 from ..support.messages import read_joint_state, STORE
-from ..support.scenes import linkage_of, LINKAGES, pipeline_of, shipped
+from ..support.scenes import linkage_of, LINKAGES, PENDULUM, pipeline_of, shipped
 
 # Effort that the drive must exert, against closed forms and energy balances by hand.
 
 
 FOUR_BAR = shipped('four_bar')
-
-
-HANGING = linkage_of("""
-links:
-  ground: {O: [0, 0], X: [1, 0]}
-  crank: {O: [0, 0], end: [0.5, 0]}
-input: {joint: drive_joint, parent: ground, child: crank}
-joints: {crank_joint: {parent: ground, child: crank}}
-masses: {crank: {mass: 2, center: [0.3, 0], inertia: 0.05}}
-""")
+HANGING = linkage_of(PENDULUM)
 
 
 def efforts(within, *crank):
@@ -219,25 +208,9 @@ def test_without_masses_it_is_refused_in_one_line():
 
 
 MS = 1_000_000
-
-
 BEGIN = 1_700_000_000_000_000_000
-
-
 WEIGHT = 2.0 * 9.81 * 0.3
-
-
 """Largest moment of the crank's weight, in [N·m]."""
-
-
-CRANK = """
-links:
-  ground: {O: [0, 0], X: [1, 0]}
-  crank: {O: [0, 0], end: [0.5, 0]}
-input: {joint: drive_joint, parent: ground, child: crank}
-joints: {crank_joint: {parent: ground, child: crank}}
-masses: {crank: {mass: 2, center: [0.3, 0], inertia: 0.05}}
-"""
 
 
 RAM = """
@@ -255,29 +228,11 @@ masses:
   ram: {mass: 4, center: [0, 0], inertia: 0.001}
   bar: {mass: 1.0e-9, center: [0, 0], inertia: 1.0e-12}
 """
-
-
 """A ram that lifts 4 kg, and is stopped where the bar stands upright, at 0.5 m."""
 
 
 def timeline(linkage, torque, commands, until, friction=''):
-    """
-    Return position, rate and effort of the input for each time in [ms].
-
-    Parameters
-    ----------
-    linkage
-        The text of its file.
-    torque
-        Parameters of the drive.
-    commands
-        Effort by the time at which it comes, in [ms]; each holds for 100 ms.
-    until
-        Time at which it ends, in [ms].
-    friction
-        Parameters of the effect; '' for none.
-
-    """
+    """Return position, rate and effort by [ms]; a command, by its [ms], holds for 100 ms."""
     text = f'drive: {{torque: {torque}}}\nloads: {{gravity: [0, -9.81], drive_inertia: 0.02}}\n'
     text += f'effects: {{velocity: {{}}, effort: {{}}{friction and ", friction: " + friction}}}\n'
     pipeline = pipeline_of(text, linkage)
@@ -298,14 +253,14 @@ RUBBING = '{joints: {O: {viscous: 0.1, coulomb: 1.5}}}'
 def test_where_it_moves_freely_it_is_what_is_commanded():
     # Whatever weight, inertia and friction do: they are what the command works against.
     commands = dict.fromkeys(range(0, 600, 90), 9.0)
-    found = timeline(CRANK, '{start: -1.2}', commands, 500, RUBBING)
+    found = timeline(PENDULUM, '{start: -1.2}', commands, 500, RUBBING)
     assert found[499][1] > 1.0, 'it moves'
     for time in range(1, 500):
         assert found[time][2] == pytest.approx(9.0, abs=1e-10)
 
 
 def test_where_no_command_holds_it_is_none():
-    found = timeline(CRANK, '{start: 1.0}', {}, 300, RUBBING)
+    found = timeline(PENDULUM, '{start: 1.0}', {}, 300, RUBBING)
     assert found[299][1] < -1.0, 'it falls'
     for time in range(1, 300):
         assert found[time][2] == pytest.approx(0.0, abs=1e-10)
@@ -319,7 +274,7 @@ def test_where_friction_holds_it_it_is_the_weight_and_not_the_command(command):
     angle = 0.5 * pi - 0.1
     weight = WEIGHT * cos(angle)
     assert abs(command - weight) < 1.5
-    found = timeline(CRANK, f'{{start: {angle!r}}}', {0: command}, 90, RUBBING)
+    found = timeline(PENDULUM, f'{{start: {angle!r}}}', {0: command}, 90, RUBBING)
     for time in range(90):
         position, rate, effort = found[time]
         assert (position, rate) == (angle, 0.0)
@@ -329,18 +284,18 @@ def test_where_friction_holds_it_it_is_the_weight_and_not_the_command(command):
 def test_while_the_brake_slips_it_is_the_brakes():
     # It turns forward, and the brake exerts −2 on it; friction of the pin is no part of that.
     torque = '{start: 0.2, rate: 6.0, on_timeout: brake, brake: 2.0}'
-    found = timeline(CRANK, torque, {}, 60, RUBBING)
+    found = timeline(PENDULUM, torque, {}, 60, RUBBING)
     for time in range(1, 60):
         assert found[time][1] > 0.0
         assert found[time][2] == pytest.approx(-2.0, abs=1e-10)
-    back = timeline(CRANK, torque.replace('6.0', '-6.0'), {}, 60, RUBBING)
+    back = timeline(PENDULUM, torque.replace('6.0', '-6.0'), {}, 60, RUBBING)
     assert back[59][1] < 0.0
     assert back[59][2] == pytest.approx(2.0, abs=1e-10)
 
 
 def test_where_the_brake_holds_it_it_is_the_weight():
     torque = '{start: 0.2, on_timeout: brake, brake: 20.0}'
-    found = timeline(CRANK, torque, {}, 60)
+    found = timeline(PENDULUM, torque, {}, 60)
     for time in range(60):
         assert found[time][:2] == (0.2, 0.0)
         assert found[time][2] == pytest.approx(WEIGHT * cos(0.2), abs=1e-12)

@@ -20,8 +20,6 @@ places; what a crank and an arm of two links take, by the closed forms of textbo
 J. Craig, Introduction to Robotics, 3rd ed., 2005, 6.7).
 """
 
-from __future__ import annotations
-
 from math import cos, sin, tau
 
 from linkage_ros.errors import FileError
@@ -29,20 +27,12 @@ from linkage_ros.scene.load import parse_scene
 import pytest
 
 from ..support.messages import read_joint_state
-from ..support.scenes import pipeline_of, scene_of
+from ..support.scenes import PENDULUM, pipeline_of, scene_of
 
 GRAVITY = 9.81
 MS = 1_000_000
 SECOND = 1000 * MS
 
-CRANK = """
-links:
-  ground: {O: [0, 0], X: [1, 0]}
-  crank: {O: [0, 0], end: [0.5, 0]}
-input: {joint: drive_joint, parent: ground, child: crank}
-joints: {crank_joint: {parent: ground, child: crank}}
-masses: {crank: {mass: 2, center: [0.3, 0], inertia: 0.05}}
-"""
 ARM = """
 links:
   ground: {O: [0, 0], X: [1, 0]}
@@ -106,7 +96,7 @@ def test_within_the_play_a_drive_bears_its_own_inertia_alone():
     # On a shaft that is loaded by weight and friction, a motor to and fro, with 0.2 rad of play.
     times = [5 * i * MS for i in range(240)]
     found = published(
-        CRANK,
+        PENDULUM,
         'drive: {sine: {mean: 0.5, amplitude: 0.4, frequency: 1.0}}\n'
         f'effects: {{backlash: {{play: 0.2}}, effort: {{}}, {FRICTION}}}\n{LOADS}',
         times,
@@ -134,7 +124,7 @@ def test_a_timeline_of_a_motor_that_turns_back():
     # Rows at which a linear profile stands, moves, turns back: play 0.2, so 0.1 to either side.
     times = [0, 50, 150, 950, 1050, 1150, 1250, 1850, 2100]
     found = published(
-        CRANK,
+        PENDULUM,
         'drive: {profile: {table: [[0, 0], [1, 1], [2, 0]], interpolation: linear}}\n'
         f'effects: {{backlash: {{play: 0.2}}, effort: {{}}}}\n{LOADS}',
         [time * MS for time in times],
@@ -166,7 +156,7 @@ def test_a_play_of_zero_is_none():
     times = [100 * i * MS for i in range(12)]
     drive = 'drive: {profile: {table: [[0, 0], [0.5, 1]], interpolation: minimum_jerk}}\n'
     with_it, without = (
-        published(CRANK, f'{drive}effects: {{{effect}effort: {{}}}}\n{LOADS}', times)
+        published(PENDULUM, f'{drive}effects: {{{effect}effort: {{}}}}\n{LOADS}', times)
         for effect in ('backlash: {play: 0}, ', '')
     )
     assert with_it == without
@@ -174,15 +164,7 @@ def test_a_play_of_zero_is_none():
 
 
 def arm(upper, fore):
-    """
-    Return what shoulder and elbow must give, by the closed form of the arm.
-
-    Parameters
-    ----------
-    upper, fore
-        Of both joints angle, rate and acceleration; the elbow's from the upper arm.
-
-    """
+    """Return the efforts of an arm in closed form; each joint has angle, rate, acceleration."""
     (q1, w1, a1), (q2, w2, a2) = upper, fore
     m1, c1, j1, length, m2, c2, j2 = 1.5, 0.2, 0.02, 0.4, 0.8, 0.15, 0.006
     coupled = m2 * length * c2
@@ -262,7 +244,7 @@ masses: {ram: {mass: 4, center: [0, 0], inertia: 0.001}}
 def test_torque_with_backlash_is_refused_in_one_line():
     for effects in ('{backlash: {play: 0.1}}', '{velocity: {}, backlash: {play: 0}}'):
         with pytest.raises(FileError) as refused:
-            scene_of(f'drive: {{torque: {{}}}}\neffects: {effects}', CRANK)
+            scene_of(f'drive: {{torque: {{}}}}\neffects: {effects}', PENDULUM)
         assert str(refused.value) == (
             'here: scene.yaml:3: effects.backlash: needs a model of motor and crank as two '
             'masses, and torque moves them as one; leave backlash out, or name another drive '
@@ -277,8 +259,8 @@ def test_of_several_linkages_that_with_torque_may_have_none():
                 f'effects: {{backlash: {{play: 0.1}}}}\n'
                 f'linkages: [{{name: a, linkage: a, {first}}}, {{name: b, linkage: b, {second}}}]'
             ).encode(),
-            'a.yaml': CRANK.encode(),
-            'b.yaml': CRANK.encode(),
+            'a.yaml': PENDULUM.encode(),
+            'b.yaml': PENDULUM.encode(),
         }
         return parse_scene('scene', 'here', files)
 

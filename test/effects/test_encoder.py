@@ -15,8 +15,6 @@
 
 """Encoder: whole counts, however many turns; what it knows before its index mark; its rates."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import pairwise
 from math import floor, isclose, pi, tau, ulp

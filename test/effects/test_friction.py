@@ -15,8 +15,6 @@
 
 """Friction: parameters that everything with forces takes into account, and no stage of its own."""
 
-from __future__ import annotations
-
 from linkage_ros.dynamics.loads import Friction, JointFriction
 from linkage_ros.effects import friction
 from linkage_ros.effects.friction import FrictionParameters, OneJoint

@@ -19,8 +19,6 @@ The reference is the loop of the linkage, written apart: with the crank's angle 
 stamp, the published joints have to close it.
 """
 
-from __future__ import annotations
-
 from cmath import rect
 from math import pi, sin
 

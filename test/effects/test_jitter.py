@@ -15,8 +15,6 @@
 
 """Jitter: within its bounds, of its distribution, and read off a motion that is still exact."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import erf, sqrt
 

@@ -15,8 +15,6 @@
 
 """Markers: where things are drawn, when they are sent, and what stands in the place of no pose."""
 
-from __future__ import annotations
-
 from cmath import phase, rect
 from fractions import Fraction
 from itertools import pairwise

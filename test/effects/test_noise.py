@@ -15,8 +15,6 @@
 
 """Noise: as strong as it says, each of its own, and the same again from the same seed."""
 
-from __future__ import annotations
-
 from itertools import accumulate, cycle, islice, pairwise
 from math import sqrt
 

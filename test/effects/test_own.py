@@ -15,12 +15,9 @@
 
 """Effects that a scene names by the module that holds them, outside of this package."""
 
-from __future__ import annotations
-
 from hashlib import sha256
 from itertools import count
 import json
-import os
 from pathlib import Path
 import subprocess
 import sys
@@ -35,11 +32,13 @@ from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.replay.replay import own_effects_here
+from linkage_ros.replay.replay import user_effects_here
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.schema import scene_schema
 from linkage_ros.scene.violations import violations
 import pytest
+
+from ..support.commands import linkage
 
 ROOT = Path(__file__).parents[2]
 SECOND = 10**9
@@ -350,20 +349,8 @@ def test_a_run_says_which_module_it_was(tmp_path, package, where, line, expected
     mine = package(**{name: text + line * (name == where) for name, text in code.items()})
     file = scene_file(tmp_path, [f'{mine}.effect: {{}}', 'bias: {joints: {rocker_joint: 1}}'])
     digest = sha256((tmp_path / mine / 'effect.py').read_bytes()).hexdigest()[:16]
-    assert own_effects_here(load_scene(file)) == {f'{mine}.effect': expected.format(digest)}
-    assert own_effects_here(load_scene(scene_file(tmp_path, list(EFFECTS)[:0]))) == {}
-
-
-def linkage(folder, *typed, path=''):
-    return subprocess.run(
-        [sys.executable, '-m', 'linkage_ros.cli.main', *typed],
-        cwd=folder,
-        env=os.environ | {'PYTHONPATH': os.pathsep.join(filter(None, [str(ROOT), path]))},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    assert user_effects_here(load_scene(file)) == {f'{mine}.effect': expected.format(digest)}
+    assert user_effects_here(load_scene(scene_file(tmp_path, list(EFFECTS)[:0]))) == {}
 
 
 def crank_bag(folder):
@@ -383,15 +370,13 @@ def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
     scene_file(folder, []).write_text(f'linkage: linkage.yaml\neffects: {{{mine}.add: {{}}}}\n')
     crank_bag(folder / 'crank')
     typed = ('replay', 'crank', '--scene', 'scene.yaml', '-o', 'bag')
-    assert linkage(folder, *typed, path=str(tmp_path)).returncode == 0
+    assert linkage(folder, *typed, PYTHONPATH=str(tmp_path)).returncode == 0
     file = tmp_path / mine / 'add.py'
     then = sha256(file.read_bytes()).hexdigest()[:16]
-
     trusting = ('replay', 'bag', '--trust-effects')
-    same = linkage(folder, *trusting, path=str(tmp_path))
+    same = linkage(folder, *trusting, PYTHONPATH=str(tmp_path))
     assert same.returncode == 0
     assert f', {mine}.add (sha256 {then})\n' in same.stdout
-
     gone = linkage(folder, *trusting)
     assert gone.returncode == 2
     assert gone.stderr == (
@@ -399,11 +384,10 @@ def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
         f'linkage replay: bag: scene.yaml:2: effects.{mine}.add: there is no module {mine}; '
         'put the folder that it lies in on PYTHONPATH, or source its workspace\n'
     )
-
     # Of another size too: what Python has compiled it takes again within the same second.
     file.write_text(file.read_text().replace('+ parameters', '- 1.0 * parameters'))
     now = sha256(file.read_bytes()).hexdigest()[:16]
-    changed = linkage(folder, *trusting, '--json', path=str(tmp_path))
+    changed = linkage(folder, *trusting, '--json', PYTHONPATH=str(tmp_path))
     account = json.loads(changed.stdout)
     assert (changed.returncode, account['verdict']) == (3, 'different')
     versions = account['versions']
@@ -416,4 +400,4 @@ def test_the_node_writes_it_into_its_bag(tmp_path, package):
     mine = package(add=HEAD + ADD)
     scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
     files = run_recording._attachments(scene, [], 'with the run', Pipeline(scene).lines)
-    assert json.loads(files[RUN_FILE][1])['effects'] == own_effects_here(scene)
+    assert json.loads(files[RUN_FILE][1])['effects'] == user_effects_here(scene)

@@ -15,8 +15,6 @@
 
 """Pin forces: the balance of every link, published as one message of one instant."""
 
-from __future__ import annotations
-
 from cmath import rect
 
 from hypothesis import given
@@ -31,18 +29,10 @@ import pytest
 from .four_bar_by_hand import FourBar
 from .loaded import context, GRAVITY, moved, SINGULAR
 from ..support.messages import read_joint_state, STORE
-from ..support.scenes import linkage_of, LINKAGES, shipped
+from ..support.scenes import linkage_of, LINKAGES, PENDULUM, shipped
 
 TYPE = 'sensor_msgs/msg/MultiDOFJointState'
 FOUR_BAR = shipped('four_bar')
-PENDULUM = linkage_of("""
-links:
-  ground: {O: [0, 0], X: [1, 0]}
-  crank: {O: [0, 0], end: [0.5, 0]}
-input: {joint: drive_joint, parent: ground, child: crank}
-joints: {crank_joint: {parent: ground, child: crank}}
-masses: {crank: {mass: 2, center: [0.3, 0], inertia: 0.05}}
-""")
 numbers = st.floats(-10.0, 10.0)
 
 
@@ -53,7 +43,7 @@ def reactions(within, *crank):
 @given(numbers, numbers, numbers)
 def test_the_pin_of_a_pendulum_bears_weight_and_inertia(angle, rate, acceleration):
     # m·(a + g), with a = r·(iα − ω²)·e^{iθ}.
-    (found,) = reactions(context(PENDULUM), angle, rate, acceleration)
+    (found,) = reactions(context(linkage_of(PENDULUM)), angle, rate, acceleration)
     pull = 0.3 * (1j * acceleration - rate * rate) * rect(1.0, angle)
     force = 2.0 * (pull + 1j * GRAVITY)
     assert found == pytest.approx((force.real, force.imag, 0.0), abs=1e-11)

@@ -15,8 +15,6 @@
 
 """Rate limit: samples on a grid of their own that never drifts, and held in between."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import floor
 

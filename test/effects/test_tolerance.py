@@ -15,8 +15,6 @@
 
 """Tolerance: points lie elsewhere, by a seed or as given, and what does not close is refused."""
 
-from __future__ import annotations
-
 from cmath import phase, pi
 from itertools import pairwise
 from math import erf, hypot, sqrt
@@ -33,8 +31,6 @@ import pytest
 from ..support.scenes import linkage_of, pipeline_of
 
 GALLERY = sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
-
-
 FOUR_BAR = linkage_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
 
 

@@ -15,8 +15,6 @@
 
 """Angles that run on beyond a turn, and angles wrapped to (−π, π]."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import nextafter, pi, tau
 
@@ -27,7 +25,6 @@ from linkage_ros.effects.stage import SensorReading
 import pytest
 
 EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')
-
 steps = st.floats(-3.0, 3.0)
 
 

@@ -15,8 +15,6 @@
 
 """Velocity: the slope of the position, none at a toggle, and nothing in a scene without it."""
 
-from __future__ import annotations
-
 from math import isfinite, remainder, tau
 
 from hypothesis import given
@@ -27,10 +25,9 @@ from linkage_ros.effects.stage import MechanismState
 from linkage_ros.kinematics.status import Status
 import pytest
 
+from .sensors import ANGLES, SLIDE
 from ..support.scenes import closure_of
 
-FOUR_BAR = closure_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
-SLIDER = closure_of('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}')
 STRETCHED_AT_0 = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 3}')
 EVERY_OTHER = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 2}')
 
@@ -45,7 +42,7 @@ def moved(loop, angle, rate):
 
 
 @given(st.floats(-10.0, 10.0), st.floats(-100.0, 100.0))
-@pytest.mark.parametrize('loop', [FOUR_BAR, SLIDER], ids=['four-bar', 'slider-crank'])
+@pytest.mark.parametrize('loop', [ANGLES, SLIDE], ids=['four-bar', 'slider-crank'])
 def test_it_is_the_slope_of_the_position(loop, angle, rate):
     step = 1e-5
     slopes = [
@@ -62,7 +59,7 @@ def test_it_is_the_slope_of_the_position(loop, angle, rate):
 
 @given(st.floats(-10.0, 10.0))
 def test_a_crank_at_rest_has_joints_at_rest(angle):
-    assert all(rate == 0.0 for rate in moved(FOUR_BAR, angle, 0.0).velocity.joints)
+    assert all(rate == 0.0 for rate in moved(ANGLES, angle, 0.0).velocity.joints)
 
 
 def test_at_a_toggle_there_is_none():
@@ -82,7 +79,7 @@ def test_next_to_a_toggle_rates_are_finite_or_none(exponent):
 
 
 def test_the_rest_of_the_motion_is_passed_on():
-    position = FOUR_BAR.position(1.0)
-    motion = moved(FOUR_BAR, 1.0, 2.0)
+    position = ANGLES.position(1.0)
+    motion = moved(ANGLES, 1.0, 2.0)
     assert motion[:2] == (CrankState((1.0,), (2.0,), (0.0,), 0), position)
-    assert motion.velocity == FOUR_BAR.velocity(position, 2.0)
+    assert motion.velocity == ANGLES.velocity(position, 2.0)

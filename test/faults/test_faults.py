@@ -14,8 +14,6 @@
 
 """Faults, as timelines, at a rate and with each message."""
 
-from __future__ import annotations
-
 from math import isnan
 
 from linkage_ros.faults.fault import Fault
@@ -36,17 +34,9 @@ from ..support.scenes import scene_of
 
 
 MS = 1_000_000
-
-
 BEGIN = 1_700_000_000_000_000_000
-
-
 TURNING = 'drive: {constant_rate: {rate: 1.0}}\neffects: {velocity: {}}\n'
-
-
 CRANK = JointStateReader(['crank_joint'])
-
-
 ROCKER = JointStateReader(['rocker_joint'])
 
 
@@ -75,8 +65,6 @@ def stamps(messages):
 
 
 TIMES = [0, 10, 20, 30, 40, 50]
-
-
 NOTHING = b''
 
 
@@ -205,19 +193,11 @@ def test_several_faults_at_once():
 
 
 OLD = 3
-
-
 MESSAGE_TIMES = [0, 10, 15, 21, 35, 39, 41, 50]
-
-
 """When samples come, in [ms]; the crank turns at 1 rad/s."""
 
-
 IN_WINDOW = [21, 35, 39]
-
-
 """Those of them that come while a fault of `window` is on."""
-
 
 WRITE = JointStateWriter(['crank_joint']).write
 

@@ -20,8 +20,6 @@ lies on the ground line. The crank may carry the dyad's first or its second oute
 input may be the angle of the crank to the ground or of the ground to the crank.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import pi
 import random
@@ -43,25 +41,7 @@ Sided = Callable[[Points], float]
 
 
 class Flat(NamedTuple):
-    """
-    A linkage, and what is known of it without solving it.
-
-    Attributes
-    ----------
-    linkage
-        The linkage.
-    sign
-        Of the crank's angle in the input: +1 or −1.
-    at
-        Crank angles of its change points, in [0, 2π), in [rad].
-    meets
-        Crank angles at which two pins meet and no pose can be told, likewise.
-    holds
-        The crank angles between which the named side holds, in [rad].
-    side
-        Which side the linkage is on.
-
-    """
+    """A linkage, and what is known of it without solving it; crank angles in [rad]."""
 
     linkage: Linkage
     sign: int

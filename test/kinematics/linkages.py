@@ -14,8 +14,6 @@
 
 """Linkage objects for the tests: textbook shapes, in any frames, and dyads alone on a crank."""
 
-from __future__ import annotations
-
 from math import cos, sin
 from typing import Any
 
@@ -37,10 +35,7 @@ from linkage_ros.kinematics.step import State
 
 
 Frame = tuple[float, float, float]
-
-
 """Where a link's plain frame lies in the frame that the linkage file uses: x, y and angle."""
-
 
 PLAIN: Frame = (0.0, 0.0, 0.0)
 
@@ -86,12 +81,7 @@ def inverted_slider_crank_linkage(
     frames: dict[str, Frame] | None = None,
     along: float = 0.0,
 ) -> Linkage:
-    """
-    Return an inverted slider-crank: crank a, ground d, a rod at an offset from the crank pin.
-
-    The rod's line is parallel to the x axis of its plain frame; the slide is measured from a point
-    that lies ``along`` metres from the foot of the pin.
-    """
+    """Return an inverted slider-crank; its slide counts from `along` [m] past the pin's foot."""
     a, d, offset = lengths
     frames = frames or {}
     _, _, angle = frames.get('rod', PLAIN)

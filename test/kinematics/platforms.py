@@ -26,8 +26,6 @@ crank. The curve in (p, φ, x) is walked by its length, 1/250 of a radian or of 
 all platforms side by side, until x turns back or after some turns.
 """
 
-from __future__ import annotations
-
 from cmath import phase, rect
 from collections.abc import Callable
 from itertools import pairwise
@@ -47,7 +45,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-
 STEP = 1.0 / 250.0
 _ANGLE, _X = 2, 3
 
@@ -275,11 +272,7 @@ def walks(
 
 
 def platform_of(linkage: Linkage, size: float) -> Platform:
-    """
-    Return what a file of a platform on three arms says, lengths divided by a size.
-
-    Its links are L1, the crank from P1 to P2; the platform L2; and the arms L3 to L5.
-    """
+    """Return a platform (L2) on a crank (L1) and two arms, its lengths divided by a size."""
     points = {
         link: {name: complex(*point) / size for name, point in given.items()}
         for link, given in linkage.links.items()

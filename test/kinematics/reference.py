@@ -24,8 +24,6 @@ An error is stated in units of u·κ, with u = 2⁻⁵³ and κ = Σ|xᵢ ∂y/�
 the crank's direction within (-π, π]: what rounding inputs and result once may cause by itself.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -46,8 +44,6 @@ from mpmath import mp, mpc, mpf
 
 
 UNIT_ROUNDOFF = 2.0**-53
-
-
 DIGITS = 50
 
 
@@ -66,11 +62,7 @@ class Quantity(NamedTuple):
         return self._in_units(abs(turned(mpf(computed) - self.value)))
 
     def half_turn_error_of(self, computed: float) -> float:
-        """
-        Return the error of an angle in units of u·κ, its own size counted as π at least.
-
-        A direction is a sum of angles of up to half a turn; where they cancel, rounding stays.
-        """
+        """Return the error of an angle in units of u·κ; the angle counts as π at least."""
         floor = max(mp.pi - abs(self.value), 0)
         return Quantity(self.value, self.condition + floor).angle_error_of(computed)
 
@@ -133,14 +125,12 @@ def four_bar(a: Any, b: Any, c: Any, d: Any, phi: Any, side: int, digits: int = 
         if cross == 0:
             poses = [Quantity(mp.arg(link), mp.inf) for link in (coupler, rocker)]
             return FourBar(mpf(0), cross, *poses)
-
         # a·e^iφ + b·e^iθ3 − c·e^iθ4 − d = 0, of which one partial derivative after the other:
         coupler_unit, rocker_unit = coupler / b, rocker / c
         inputs = (turned(phi), a, b, c, d)
         partials = (1j * a * crank_unit, crank_unit, coupler_unit, -rocker_unit, mpc(-1))
         slopes = [_two_links(coupler, rocker, 1j * partial) for partial in partials]
         rates = slopes[0]
-
         # b·e^iθ3·θ3' − c·e^iθ4·θ4' = −a·e^iφ, and that by each input again:
         crank_slopes = (1j * a * crank_unit, crank_unit, 0, 0, 0)
         rate_slopes = []
@@ -161,12 +151,7 @@ def four_bar(a: Any, b: Any, c: Any, d: Any, phi: Any, side: int, digits: int = 
 
 @dataclass(frozen=True, slots=True)
 class SliderCrank:
-    """
-    An inverted slider-crank at one crank direction; the rod's angle from the ground O→D.
-
-    ``gap`` is what the rod's line misses the swivel by (0: it does not); the rest is None where it
-    does, and rates are None where the slide is 0.
-    """
+    """An inverted slider-crank at one crank direction; None where there is a gap."""
 
     gap: mpf
     rod: Quantity | None = None
@@ -205,14 +190,12 @@ def inverted_slider_crank(
             # A straight rod on its swivel has no direction; a bent one stands across it.
             rod = Quantity(mp.arg(diagonal / mpc(0, h)), mp.inf) if h else None
             return SliderCrank(mpf(0), rod, Quantity(r, mp.inf))
-
         # a·e^iφ + (r + ih)·e^iψ − d = 0
         unit = diagonal / mpc(r, h)
         inputs = (turned(phi), a, d, h)
         partials = (1j * a * crank_unit, crank_unit, mpc(-1), 1j * unit)
         slopes = [_rod(unit, r, h, -partial) for partial in partials]
         rates = slopes[0]
-
         # i(r + ih)·e^iψ·ψ' + e^iψ·r' = −i·a·e^iφ, and that by each input again:
         crank_slopes = (-a * crank_unit, 1j * crank_unit, 0, 0)
         rate_slopes = []
@@ -258,26 +241,15 @@ def _quantity(value: mpf, inputs: tuple[mpf, ...], slopes: list[mpf]) -> Quantit
 
 
 ANGLE = 4.0
-
-
 """Limit for angles; 2.6 was measured. κ counts an angle as at least π."""
 
-
 LENGTH = 4.0
-
-
 """Limit for slides and for gaps, the latter in u times all lengths; 2.4 and 3.5 were measured."""
 
-
 RATE = 4.0
-
-
 """Limit for rates; `docs/accuracy/campaign.md` has what millions of cases reach."""
 
-
 TOGGLE = 32.0
-
-
 """
 Limit for angles at a toggle.
 
@@ -302,11 +274,7 @@ class Worst:
     def note_status(
         self, status: Status, gap: float, true_gap: float, size: float, case: object
     ) -> None:
-        """
-        Check status and gap against the true gap, of which the size is the sum of all lengths.
-
-        A toggle is right where the gap is rounding; how far inside, the limit of its angles says.
-        """
+        """Check status and gap; a toggle is right where the true gap is rounding."""
         assert (status is not Status.OPEN) or true_gap > 0.0, f'no missed closure: {case}'
         assert (status is not Status.CLOSED) or true_gap <= 0.0, f'no false closure: {case}'
         error = abs(gap - max(true_gap, 0.0)) / (UNIT_ROUNDOFF * size)

@@ -20,8 +20,6 @@ but for the rounding of their lengths are left out: the package takes them for c
 purpose (`test_change_points`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from fractions import Fraction
 from math import cos, hypot, pi, sin

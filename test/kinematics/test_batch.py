@@ -19,8 +19,6 @@ Many states at once are solved as well as one: against the reference, and agains
 The accelerations' reference differentiates the closing equation twice, in 70 digits.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from math import inf, nan, pi, remainder
@@ -45,7 +43,6 @@ from .samples import FOUR_BARS, four_bars, FourBarCase
 
 COUNT = 500
 ACCELERATED = 60
-
 ACCELERATION = 4.0
 """Limit for accelerations in units of u·κ; of 12,700 loops of all families the worst had 2.3."""
 
@@ -76,7 +73,6 @@ CHANGE_POINTS = {
 length = st.floats(0.1, 10.0)
 cranks = st.lists(st.floats(-7.0, 7.0), min_size=1, max_size=20)
 side = st.sampled_from((1, -1))
-
 Array = NDArray[np.float64]
 
 
@@ -138,7 +134,7 @@ def truths(family: str) -> list[tuple[FourBarCase, Any]]:
 
 
 @pytest.fixture(params=['tangent', 'sine and cosine'])
-def half_angle(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def half_angle(request, monkeypatch):
     by_tangent = request.param == 'tangent' and numpy_blocks._BY_TANGENT
     monkeypatch.setattr(numpy_blocks, '_BY_TANGENT', by_tangent)
 
@@ -146,7 +142,7 @@ def half_angle(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.slow
 @pytest.mark.usefixtures('half_angle')
 @pytest.mark.parametrize('family', FOUR_BARS)
-def test_all_is_right_in_every_family(family: str) -> None:
+def test_all_is_right_in_every_family(family):
     worst = Worst()
     closed = 0
     for case, truth in truths(family):
@@ -219,15 +215,13 @@ def check_against_scalar(
 
 @settings(derandomize=True, deadline=None, max_examples=300)
 @given(length, length, length, length, cranks, side)
-def test_any_lengths_are_solved_as_by_the_scalar_dyad(
-    a: float, b: float, c: float, d: float, phi: list[float], sign: int
-) -> None:
+def test_any_lengths_are_solved_as_by_the_scalar_dyad(a, b, c, d, phi, sign):
     check_against_scalar((a, b, c, d), sign, phi, 1.0, 0.3)
 
 
 @pytest.mark.parametrize('name', [*SHAPES, *CHANGE_POINTS])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_every_shape_is_solved_as_by_the_scalar_dyad_over_four_turns(name: str, sign: int) -> None:
+def test_every_shape_is_solved_as_by_the_scalar_dyad_over_four_turns(name, sign):
     # Off the change points, near which the scalar dyad's accelerations lose their digits.
     angles = (np.arange(1, 2000) * 0.0126 - 4 * pi + 1e-3).tolist()
     found = check_against_scalar({**SHAPES, **CHANGE_POINTS}[name], sign, angles, 1.0, 0.3)
@@ -237,7 +231,7 @@ def test_every_shape_is_solved_as_by_the_scalar_dyad_over_four_turns(name: str, 
 
 @pytest.mark.parametrize('name', CHANGE_POINTS)
 @pytest.mark.parametrize('at', [0.0, pi, 2 * pi, -pi])
-def test_change_points_are_passed_as_by_the_scalar_dyad(name: str, at: float) -> None:
+def test_change_points_are_passed_as_by_the_scalar_dyad(name, at):
     lengths = CHANGE_POINTS[name]
     near = [10.0**-i for i in (1, 3, 6, 9, 12)] + ([] if at else [1e-100, 1e-150])
     angles = [at, *(at + sign * x for x in near for sign in (1, -1))]
@@ -252,9 +246,8 @@ def test_change_points_are_passed_as_by_the_scalar_dyad(name: str, at: float) ->
             assert velocities[:, i] == pytest.approx(scalar.rates(pose, 1.0), rel=3e-15, abs=3e-15)
 
 
-def test_accelerations_keep_their_digits_at_a_change_point() -> None:
+def test_accelerations_keep_their_digits_at_a_change_point():
     near = [sign * 10.0**-i for i in (1, 3, 6, 9, 12, 100, 290) for sign in (1, -1)]
-
     # The coupler of a parallelogram does not turn, and its rocker turns with the crank.
     for turn, angles in ((0.0, near), (pi, near[:10]), (2 * pi, near[:10])):
         codes, _, _, found = solved(
@@ -263,7 +256,6 @@ def test_accelerations_keep_their_digits_at_a_change_point() -> None:
         assert (codes < TOGGLED).all()
         assert found[0] == pytest.approx(0.0, abs=1e-15)
         assert found[1] == pytest.approx(0.5, abs=1e-15)
-
     # Elsewhere the reference says it; it takes digits to say.
     for name in ('kite that folds', 'kite whose pins meet', 'a + b = c + d', 'a + c = b + d'):
         lengths = CHANGE_POINTS[name]
@@ -276,16 +268,14 @@ def test_accelerations_keep_their_digits_at_a_change_point() -> None:
             assert found[:, i] == pytest.approx([float(x) for x in exact], rel=2e-14, abs=1e-300)
 
 
-def test_the_pose_says_what_a_state_does_not_have() -> None:
-    # Open, at the limit, closed.
-    lengths = (4.0, 5.0, 3.0, 6.5)
-    limit = float(mp.acos((mpf(4) ** 2 + mpf(6.5) ** 2 - 64) / (2 * mpf(4) * mpf(6.5))))
-    found = solved(four_bars_of(*lengths, 1), [limit + 0.1, limit, limit - 0.1])
-    codes, position, velocity, acceleration = found
-    assert codes.tolist() == [OPEN, TOGGLED, CLOSED]
-    assert np.isnan(position).tolist() == [[True, False, False]] * 2
-    for array in (velocity, acceleration):
-        assert np.isnan(array).tolist() == [[True, True, False]] * 2
+def test_accelerations_of_a_rhombus_that_folds_are_numbers():
+    angles = [sign * 10.0**-i for i in range(0, 153, 4) for sign in (1, -1)]
+    codes, _, _, found = solved(four_bars_of(1.0, 1.0, 1.0, 1.0, 1), angles, 1.0, 0.5)
+    assert (codes < TOGGLED).all()
+    # One of the links keeps its angle, and the other turns with the crank.
+    still, turning = np.sort(found, axis=0)
+    assert still == pytest.approx(0.0, abs=1e-15)
+    assert turning == pytest.approx(0.5, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -293,36 +283,14 @@ def test_the_pose_says_what_a_state_does_not_have() -> None:
     [((2.0, 3.0, 3.0, 2.0), INDETERMINATE), ((2.0, 3.0, 3.5, 2.0), OPEN)],
     ids=['kite', 'unequal'],
 )
-def test_where_the_pins_meet_there_is_no_pose(
-    lengths: tuple[float, float, float, float], code: int
-) -> None:
+def test_where_the_pins_meet_there_is_no_pose(lengths, code):
     codes, *arrays = solved(four_bars_of(*lengths, 1), [1.0, 0.0, -0.0, 1e-200, 2.0])
     assert codes.tolist() == [CLOSED, code, code, code, CLOSED]
     for array in arrays:
         assert np.isnan(array).tolist() == [[False, True, True, True, False]] * 2
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
-@given(cranks, st.floats(-50.0, 50.0), st.floats(-50.0, 50.0))
-def test_rates_and_accelerations_follow_the_crank_s(
-    phi: list[float], rate: float, acceleration: float
-) -> None:
-    dyad = four_bars_of(*SHAPES['crank-rocker'], 1)
-    _, position, per_rate, per_square = solved(dyad, phi)
-    rates, changes = np.full(len(phi), rate), np.full(len(phi), acceleration)
-    for found in (
-        solved(dyad, phi, rate, acceleration),
-        solved(dyad, phi, rates, acceleration),
-        solved(dyad, phi, rates, changes),
-    ):
-        np.testing.assert_array_equal(found[1], position)
-        np.testing.assert_allclose(found[2], rate * per_rate, rtol=1e-15, atol=1e-300)
-        expected = rate * rate * per_square + acceleration * per_rate
-        size = rate * rate * np.abs(per_square) + np.abs(acceleration * per_rate)
-        assert (np.abs(found[3] - expected) <= 1e-15 * size + 1e-300).all()
-
-
-def test_no_state_makes_numpy_warn() -> None:
+def test_no_state_makes_numpy_warn():
     angles = [0.0, -0.0, pi, 1e-310, 1e308, nan, inf, *np.linspace(-7.0, 7.0, 50)]
     with warnings.catch_warnings(), np.errstate(all='warn'):
         warnings.simplefilter('error')
@@ -330,7 +298,7 @@ def test_no_state_makes_numpy_warn() -> None:
             solved(four_bars_of(*lengths, 1), angles)
 
 
-def test_angles_go_on_steadily_through_change_points() -> None:
+def test_angles_go_on_steadily_through_change_points():
     phi = np.linspace(-9.0, 9.0, 9000)
     for lengths in CHANGE_POINTS.values():
         _, positions, velocities, _ = solved(four_bars_of(*lengths, 1), phi)

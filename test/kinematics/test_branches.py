@@ -14,8 +14,6 @@
 
 """Iterated links follow one branch over the unwrapped input, as a walk apart from it does."""
 
-from __future__ import annotations
-
 from cmath import rect
 from dataclasses import replace
 from functools import cache
@@ -88,7 +86,7 @@ def off_branch(closure: Closure, walked: Walked, joint: int = 0, count: int = 15
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_the_walk_keeps_the_constraints(kind: str) -> None:
+def test_the_walk_keeps_the_constraints(kind):
     for made, _, *both in family(kind):
         for walked in both:
             for p_x, p_y, angle, x in walked.states[:: max(1, len(walked.states) // 20)].tolist():
@@ -98,7 +96,7 @@ def test_the_walk_keeps_the_constraints(kind: str) -> None:
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_a_platform_stays_on_the_branch_of_its_pose(kind: str) -> None:
+def test_a_platform_stays_on_the_branch_of_its_pose(kind):
     wrong = {}
     for number, (_, linkage, *both) in enumerate(family(kind)):
         closure = Closure(linkage)
@@ -109,7 +107,7 @@ def test_a_platform_stays_on_the_branch_of_its_pose(kind: str) -> None:
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_ranges_end_where_the_curve_turns_back(kind: str) -> None:
+def test_ranges_end_where_the_curve_turns_back(kind):
     for number, (made, linkage, down, up) in enumerate(family(kind)):
         closure = Closure(linkage)
         (interval,) = closure.input_ranges
@@ -133,7 +131,7 @@ def test_ranges_end_where_the_curve_turns_back(kind: str) -> None:
                 assert behind.gap > 0.0
 
 
-def test_ends_are_toggles_to_the_last_digits() -> None:
+def test_ends_are_toggles_to_the_last_digits():
     """With 40 digits: constraints and the determinant of their slopes by place and angle are 0."""
     checked = 0
     for made, linkage, down, up in family('three arms'):
@@ -183,7 +181,7 @@ def exact_toggle(made: Platform, start: list[float]) -> tuple[mp.mpf, float]:
         return root[3], abs(float(root[3])) + condition
 
 
-def test_a_state_does_not_depend_on_what_was_asked_before() -> None:
+def test_a_state_does_not_depend_on_what_was_asked_before():
     for _, linkage, down, up in family('three arms')[:6]:
         inputs = [float(x) for w in (down, up) for x in w.states[:: len(w.states) // 8, 3]]
         forward, mixed = Closure(linkage), Closure(linkage)
@@ -192,7 +190,7 @@ def test_a_state_does_not_depend_on_what_was_asked_before() -> None:
         assert {x: mixed.position(x).joints for x in inputs} == expected
 
 
-def test_after_its_turns_a_branch_begins_again_and_angles_have_grown_by_them() -> None:
+def test_after_its_turns_a_branch_begins_again_and_angles_have_grown_by_them():
     seen = set()
     for made, linkage, down, up in family('three arms'):
         closure = Closure(linkage)
@@ -213,7 +211,7 @@ def test_after_its_turns_a_branch_begins_again_and_angles_have_grown_by_them() -
 
 
 @pytest.mark.parametrize('name', DEFECTS)
-def test_what_once_leapt_stays_on_its_branch(name: str) -> None:
+def test_what_once_leapt_stays_on_its_branch(name):
     closure = defect(name)
     made = platform_of(closure.linkage, DEFECTS[name])
     # Of the linkage whose range is a five-hundredth, the walk's steps are too long for its turns.
@@ -230,7 +228,7 @@ def test_what_once_leapt_stays_on_its_branch(name: str) -> None:
     assert InputSweep(closure).ranges == (interval,)
 
 
-def test_one_direction_of_the_crank_has_a_pose_for_each_of_its_turns() -> None:
+def test_one_direction_of_the_crank_has_a_pose_for_each_of_its_turns():
     closure = defect('class3_over_a_turn')
     (interval,) = closure.input_ranges
     assert interval.highest - interval.lowest > tau
@@ -244,7 +242,7 @@ def test_one_direction_of_the_crank_has_a_pose_for_each_of_its_turns() -> None:
     )
 
 
-def test_beyond_the_end_of_more_than_a_turn_it_is_open() -> None:
+def test_beyond_the_end_of_more_than_a_turn_it_is_open():
     closure = defect('class3_beyond_range')
     (interval,) = closure.input_ranges
     assert interval.highest - interval.lowest > tau > interval.highest + pi
@@ -255,7 +253,7 @@ def test_beyond_the_end_of_more_than_a_turn_it_is_open() -> None:
     assert InputSweep(closure).range_about(6.75324) is None
 
 
-def test_of_less_than_a_turn_whole_turns_of_the_input_change_nothing() -> None:
+def test_of_less_than_a_turn_whole_turns_of_the_input_change_nothing():
     closure = Closure(class_3_linkage())
     (interval,) = InputSweep(closure).ranges
     assert interval.highest - interval.lowest < tau
@@ -266,11 +264,7 @@ def test_of_less_than_a_turn_whole_turns_of_the_input_change_nothing() -> None:
 
 
 def two_inputs(rng: random.Random) -> tuple[Linkage, Platform]:
-    """
-    Return a platform on a leg that a second input turns, and the same along a line of inputs.
-
-    The inputs are those of the pose, and x times the line's direction more.
-    """
+    """Return a platform with two inputs, and the same with x times the line's direction more."""
     made = platform(rng)
     way = rect(1.0, rng.uniform(-pi, pi))
     elbow = rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)
@@ -303,7 +297,7 @@ def two_inputs(rng: random.Random) -> tuple[Linkage, Platform]:
     return replace(linkage, traced=()), line
 
 
-def test_two_inputs_lead_along_a_straight_line() -> None:
+def test_two_inputs_lead_along_a_straight_line():
     rng = random.Random(4)
     cases = [two_inputs(rng) for _ in range(12)]
     walked = walks([line for _, line in cases], [1.0] * 12, turns=0.6)
@@ -331,7 +325,7 @@ def test_two_inputs_lead_along_a_straight_line() -> None:
     assert opened > 2
 
 
-def test_the_other_assemblies_are_those_that_a_scan_finds() -> None:
+def test_the_other_assemblies_are_those_that_a_scan_finds():
     rng = random.Random(8)
     counts = []
     for _ in range(12):
@@ -349,7 +343,7 @@ def test_the_other_assemblies_are_those_that_a_scan_finds() -> None:
     assert max(counts) >= 3
 
 
-def test_an_assembly_that_is_listed_can_be_named_as_the_pose() -> None:
+def test_an_assembly_that_is_listed_can_be_named_as_the_pose():
     closure = defect('class3_beyond_range')
     others = other_assemblies(closure, 1)
     assert len(others) == 3
@@ -361,7 +355,7 @@ def test_an_assembly_that_is_listed_can_be_named_as_the_pose() -> None:
         assert all(abs(places[name] - place) < 1e-9 for name, place in one.points.items())
 
 
-def test_a_branch_of_several_turns_comes_to_assemblies_that_are_listed() -> None:
+def test_a_branch_of_several_turns_comes_to_assemblies_that_are_listed():
     closure = defect('class3_over_a_turn')
     assert closure.linkage.pose is not None
     x = -1.1
@@ -378,7 +372,7 @@ def test_a_branch_of_several_turns_comes_to_assemblies_that_are_listed() -> None
 @pytest.mark.parametrize(
     ('name', 'span'), [('class3_over_a_turn', (-2.1, 5.1)), ('class3_beyond_range', (-6.1, 0.4))]
 )
-def test_a_table_is_proven_over_more_than_a_turn(name: str, span: tuple[float, float]) -> None:
+def test_a_table_is_proven_over_more_than_a_turn(name, span):
     closure = defect(name)
     table = TableClosure(closure.linkage, 1e-5, span=span)
     assert table.proven <= 1e-5

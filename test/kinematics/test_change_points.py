@@ -14,8 +14,6 @@
 
 """Toggles and change points, and the sides that assemblies keep there."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import copysign, cos, nextafter, pi, remainder, sin, tau
 import random
@@ -46,7 +44,6 @@ PARALLELOGRAMS = {
     'decimal': (0.04, 0.12, 0.04, 0.12),
 }
 
-
 # From a visible distance to just above the one at which rates become subnormal numbers.
 NEAR = [1e-3, 1e-6, 1e-9, 1e-12, 1e-100, 1e-290]
 
@@ -59,7 +56,7 @@ def off(angle: float, expected: float) -> float:
 @pytest.mark.parametrize('name', PARALLELOGRAMS)
 @pytest.mark.parametrize('near', NEAR)
 @pytest.mark.parametrize('sign', [1, -1])
-def test_a_parallelogram_passes_zero_as_a_parallelogram(name: str, near: float, sign: int) -> None:
+def test_a_parallelogram_passes_zero_as_a_parallelogram(name, near, sign):
     dyad, phi = FourBar(*PARALLELOGRAMS[name], 1), sign * near
     pose = dyad.close(phi)
     assert pose.status is (Status.CLOSED if near > 1e-14 else Status.CHANGE_POINT)
@@ -76,9 +73,7 @@ def test_a_parallelogram_passes_zero_as_a_parallelogram(name: str, near: float, 
 @pytest.mark.parametrize('name', PARALLELOGRAMS)
 @pytest.mark.parametrize('near', [1e-3, 1e-6, 1e-9, 1e-12, 2.0**-50])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_a_parallelogram_passes_half_a_turn_as_a_parallelogram(
-    name: str, near: float, sign: int
-) -> None:
+def test_a_parallelogram_passes_half_a_turn_as_a_parallelogram(name, near, sign):
     dyad, phi = FourBar(*PARALLELOGRAMS[name], 1), pi + sign * near
     pose = dyad.close(phi)
     assert pose.status is (Status.CLOSED if near > 1e-14 else Status.CHANGE_POINT)
@@ -89,9 +84,7 @@ def test_a_parallelogram_passes_half_a_turn_as_a_parallelogram(
 
 @pytest.mark.parametrize('name', PARALLELOGRAMS)
 @pytest.mark.parametrize('zero', [0.0, -0.0, 5e-324, -1e-310])
-def test_at_the_change_point_position_and_rates_are_those_of_the_motion_through_it(
-    name: str, zero: float
-) -> None:
+def test_at_the_change_point_position_and_rates_are_those_of_the_motion_through_it(name, zero):
     dyad = FourBar(*PARALLELOGRAMS[name], 1)
     pose = dyad.close(zero)
     assert pose.status is Status.CHANGE_POINT
@@ -106,9 +99,7 @@ def test_at_the_change_point_position_and_rates_are_those_of_the_motion_through_
 @pytest.mark.parametrize('step', [0.001, 0.1, 2.9])
 @pytest.mark.parametrize('sign', [1, -1])
 @pytest.mark.parametrize('start', [0.0005, 1.7])
-def test_a_parallelogram_stays_one_at_any_step_in_either_direction(
-    name: str, step: float, sign: int, start: float
-) -> None:
+def test_a_parallelogram_stays_one_at_any_step_in_either_direction(name, step, sign, start):
     dyad = FourBar(*PARALLELOGRAMS[name], 1)
     for i in range(round(max(2, 4 * pi / step))):
         phi = sign * (start + i * step)
@@ -122,7 +113,7 @@ def test_a_parallelogram_stays_one_at_any_step_in_either_direction(
 
 @pytest.mark.parametrize('near', [1e-3, 1e-6, 1e-9, 1e-12, 1e-300, 0.5, 3.0])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_a_folded_kite_turns_as_one_link_about_the_crank_pivot(near: float, sign: int) -> None:
+def test_a_folded_kite_turns_as_one_link_about_the_crank_pivot(near, sign):
     # a = b and c = d, B on the crank's pivot: the crank carries the coupler, the rocker stands.
     dyad, phi = FourBar(1.0, 1.0, 2.0, 2.0, -1), sign * near
     pose = dyad.close(phi)
@@ -134,9 +125,7 @@ def test_a_folded_kite_turns_as_one_link_about_the_crank_pivot(near: float, sign
 
 @pytest.mark.parametrize('near', [1e-3, 1e-6, 1e-9, 1e-12, 1e-100, 0.5, 3.0])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_a_kite_whose_pins_meet_goes_through_with_its_links_in_line(
-    near: float, sign: int
-) -> None:
+def test_a_kite_whose_pins_meet_goes_through_with_its_links_in_line(near, sign):
     # a = d and b = c: A passes D. The diagonal turns at half the crank's rate, and with its
     # length goes the height of the triangle; closed form: B lies at √(b² − s²/4) from its middle.
     a, b = 2.0, 3.0
@@ -152,7 +141,7 @@ def test_a_kite_whose_pins_meet_goes_through_with_its_links_in_line(
 
 
 @pytest.mark.parametrize('zero', [0.0, -0.0])
-def test_a_kite_with_a_pin_on_the_ground_pivot_has_no_pose_that_could_be_told(zero: float) -> None:
+def test_a_kite_with_a_pin_on_the_ground_pivot_has_no_pose_that_could_be_told(zero):
     assert FourBar(2.0, 3.0, 3.0, 2.0, 1).close(zero).status is Status.INDETERMINATE
 
 
@@ -168,7 +157,7 @@ SINGLE = {
 
 @pytest.mark.parametrize('name', SINGLE)
 @pytest.mark.parametrize('side', [1, -1])
-def test_a_single_change_point_is_passed_steadily_over_two_turns(name: str, side: int) -> None:
+def test_a_single_change_point_is_passed_steadily_over_two_turns(name, side):
     lengths, half = SINGLE[name]
     dyad = FourBar(*lengths, side)
     step = 4 * pi / 4000
@@ -187,9 +176,7 @@ def test_a_single_change_point_is_passed_steadily_over_two_turns(name: str, side
 
 @pytest.mark.parametrize('name', [name for name in SINGLE if 'decimal' not in name])
 @pytest.mark.parametrize('phi', [0.3, 2.0, 4.0, 6.0, 7.0, 9.0, 12.0, -1.0, -5.0])
-def test_a_single_change_point_has_the_reference_s_poses_on_both_turns(
-    name: str, phi: float
-) -> None:
+def test_a_single_change_point_has_the_reference_s_poses_on_both_turns(name, phi):
     lengths, half = SINGLE[name]
     dyad = FourBar(*lengths, 1)
     pose = dyad.close(phi)
@@ -204,7 +191,7 @@ def test_a_single_change_point_has_the_reference_s_poses_on_both_turns(
 
 @pytest.mark.parametrize('near', [1e-3, 1e-6, 1e-9, 1e-12, 1e-100])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_next_to_a_single_change_point_poses_keep_their_digits(near: float, sign: int) -> None:
+def test_next_to_a_single_change_point_poses_keep_their_digits(near, sign):
     lengths, phi = (3.0, 2.0, 4.0, 1.0), sign * near
     pose = FourBar(*lengths, 1).close(phi)
     truth = four_bar(*lengths, phi, sign, digits=300)
@@ -216,7 +203,7 @@ def test_next_to_a_single_change_point_poses_keep_their_digits(near: float, sign
     assert rocker_rate == pytest.approx(float(truth.rocker_rate.value), rel=4e-15)
 
 
-def test_lengths_that_cancel_but_for_their_last_digit_are_a_change_point() -> None:
+def test_lengths_that_cancel_but_for_their_last_digit_are_a_change_point():
     # 0.4 - 0.1 and 0.5 - 0.2 differ as floats. As decimals, which a file holds, they do not.
     assert 0.4 - 0.1 != 0.5 - 0.2
     assert FourBar(0.4, 0.2, 0.5, 0.1, 1).diagonal.fold_margin == 0.0
@@ -227,9 +214,7 @@ def test_lengths_that_cancel_but_for_their_last_digit_are_a_change_point() -> No
 @pytest.mark.parametrize('b', [0.2, 1.0, 1.3, 7.0])
 @pytest.mark.parametrize('phi', [1e-9, -1e-9, 1e-15, 1e-16, 1e-20, -1e-100, 1e-150])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(
-    b: float, phi: float, sign: int
-) -> None:
+def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(b, phi, sign):
     # a = d and b = c: the diagonal vanishes, and the triangle on it stands ever more upright. By
     # hand, for a = d = 1 and φ → 0: θ3' = (1 ∓ 1/b)/2 and θ4' = (1 ± 1/b)/2, σ = ±1.
     dyad = FourBar(1.0, b, b, 1.0, sign)
@@ -242,7 +227,6 @@ def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(
 
 
 DISTANCES = [10.0**-exponent for exponent in range(3, 16)]
-
 
 # Lengths a, b, c, d, and whether the dyad limits the crank by stretching or by folding.
 LIMITS = {
@@ -270,9 +254,7 @@ def inward(name: str) -> int:
 @pytest.mark.parametrize('name', LIMITS)
 @pytest.mark.parametrize('distance', DISTANCES)
 @pytest.mark.parametrize('side', [1, -1])
-def test_inside_the_limit_the_loop_closes_to_the_last_digit(
-    name: str, distance: float, side: int
-) -> None:
+def test_inside_the_limit_the_loop_closes_to_the_last_digit(name, distance, side):
     lengths, _ = LIMITS[name]
     with mp.workdps(60):
         phi = float(limit_angle(name) + inward(name) * distance)
@@ -295,9 +277,7 @@ def test_inside_the_limit_the_loop_closes_to_the_last_digit(
 @pytest.mark.parametrize('name', LIMITS)
 @pytest.mark.parametrize('distance', DISTANCES)
 @pytest.mark.parametrize('turn', [1, -1])
-def test_outside_the_limit_the_loop_is_open_by_the_gap(
-    name: str, distance: float, turn: int
-) -> None:
+def test_outside_the_limit_the_loop_is_open_by_the_gap(name, distance, turn):
     lengths, _ = LIMITS[name]
     with mp.workdps(60):
         phi = turn * float(limit_angle(name) - inward(name) * distance)
@@ -312,9 +292,7 @@ def test_outside_the_limit_the_loop_is_open_by_the_gap(
 @pytest.mark.parametrize('name', LIMITS)
 @pytest.mark.parametrize('turn', [1, -1])
 @pytest.mark.parametrize('side', [1, -1])
-def test_at_the_limit_the_position_is_that_of_links_in_line(
-    name: str, turn: int, side: int
-) -> None:
+def test_at_the_limit_the_position_is_that_of_links_in_line(name, turn, side):
     lengths, kind = LIMITS[name]
     a, b, c, d = lengths
     with mp.workdps(60):
@@ -334,13 +312,12 @@ def test_at_the_limit_the_position_is_that_of_links_in_line(
 @pytest.mark.parametrize(('a', 'd', 'h'), [(1.5, 2.0, 1.0), (2.0, 1.5, -1.0), (1.0, 1.0, 1e-3)])
 @pytest.mark.parametrize('side', [1, -1])
 def test_a_bent_rod_reaches_its_swivel_inside_the_limit_and_misses_it_outside(
-    distance: float, a: float, d: float, h: float, side: int
-) -> None:
+    distance, a, d, h, side
+):
     with mp.workdps(60):
         limit = mp.acos((mpf(a) ** 2 + mpf(d) ** 2 - mpf(h) ** 2) / (2 * mpf(a) * d))
         inside, outside = float(limit + distance), float(limit - distance)
     size = UNIT_ROUNDOFF * (a + d + abs(h))
-
     truth = inverted_slider_crank(a, d, h, inside, side)
     dyad = InvertedSliderCrank(a, d, h, side)
     pose = dyad.close(inside)
@@ -353,7 +330,6 @@ def test_a_bent_rod_reaches_its_swivel_inside_the_limit_and_misses_it_outside(
         rod_rate, slide_rate = dyad.rates(pose, 1.0)
         assert truth.rod_rate.error_of(rod_rate) < RATE
         assert truth.slide_rate.error_of(slide_rate) < RATE
-
     missed = InvertedSliderCrank(a, d, h, side).close(outside)
     gap = float(inverted_slider_crank(a, d, h, outside, side).gap)
     assert missed.status in (Status.OPEN, Status.TOGGLE)
@@ -371,9 +347,7 @@ def test_a_bent_rod_reaches_its_swivel_inside_the_limit_and_misses_it_outside(
         ((1.0, 2.0, 1.0, 1.0), 1.0),
     ],
 )
-def test_the_gap_is_what_the_links_miss_each_other_by(
-    lengths: tuple[float, float, float, float], gap: float
-) -> None:
+def test_the_gap_is_what_the_links_miss_each_other_by(lengths, gap):
     # Crank along the ground, where all lengths lie on one line and are added up by hand.
     phi = 0.0 if gap in (4.0, 6.0, 1.0) else pi
     pose = FourBar(*lengths, 1).close(phi)
@@ -389,8 +363,6 @@ def test_the_gap_is_what_the_links_miss_each_other_by(
 
 
 COUNT = 150
-
-
 _STEP = 1e-6
 
 
@@ -399,7 +371,7 @@ def drawn(kind: str, number: int) -> Flat:
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_the_named_side_holds_on_one_side_of_the_line_on_which_it_folds(kind: str) -> None:
+def test_the_named_side_holds_on_one_side_of_the_line_on_which_it_folds(kind):
     for number in range(COUNT):
         flat = drawn(kind, number)
         closure = Closure(flat.linkage)
@@ -416,7 +388,7 @@ def test_the_named_side_holds_on_one_side_of_the_line_on_which_it_folds(kind: st
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_the_linkage_goes_on_through_its_change_points_as_it_moves(kind: str) -> None:
+def test_the_linkage_goes_on_through_its_change_points_as_it_moves(kind):
     for number in range(COUNT // 3):
         flat = drawn(kind, number)
         closure = Closure(flat.linkage)
@@ -450,7 +422,7 @@ def test_the_linkage_goes_on_through_its_change_points_as_it_moves(kind: str) ->
         ('straight_rev_behind', 'r', -0.517638),
     ],
 )
-def test_a_rail_on_the_ground_has_the_named_side(name: str, joint: str, expected: float) -> None:
+def test_a_rail_on_the_ground_has_the_named_side(name, joint, expected):
     closure = defect(name)
     position = closure.position(pi / 6.0)
     value = position.joints[list(closure.linkage.joints).index(joint)]

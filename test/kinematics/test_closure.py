@@ -14,8 +14,6 @@
 
 """A closure: published joints, steps alone and together, and points that are followed."""
 
-from __future__ import annotations
-
 from cmath import rect
 from math import cos, pi, remainder, sin
 import random
@@ -42,11 +40,7 @@ from .test_ranges import FILES
 
 
 CRANK_ANGLES = [-3.0, -1.2, 0.1, 0.9, 2.2, 3.1]
-
-
 FOUR_BAR = (0.04, 0.12, 0.08, 0.1)
-
-
 SLIDER_CRANK = (0.15, 0.27, -0.02)
 
 
@@ -61,7 +55,7 @@ def odd_frames(seed: int, links: tuple[str, ...]) -> dict[str, Frame]:
 
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
 @pytest.mark.parametrize(('side', 'sign'), [('left', 1), ('right', -1)])
-def test_a_four_bar_publishes_child_less_parent(crank_angle: float, side: str, sign: int) -> None:
+def test_a_four_bar_publishes_child_less_parent(crank_angle, side, sign):
     closure = Closure(four_bar_linkage(FOUR_BAR, side))
     position = closure.position(crank_angle)
     truth = four_bar(*FOUR_BAR, crank_angle, sign)
@@ -79,9 +73,7 @@ def test_a_four_bar_publishes_child_less_parent(crank_angle: float, side: str, s
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
 @pytest.mark.parametrize('side', ['left', 'right'])
 @pytest.mark.parametrize('seed', range(5))
-def test_turning_link_frames_shifts_a_four_bar_s_joints_by_the_turns(
-    crank_angle: float, side: str, seed: int
-) -> None:
+def test_turning_link_frames_shifts_a_four_bar_s_joints_by_the_turns(crank_angle, side, seed):
     frames = odd_frames(seed, ('ground', 'crank', 'coupler', 'rocker'))
     turned = {link: angle for link, (_, _, angle) in frames.items()}
     plain, odd = (Closure(four_bar_linkage(FOUR_BAR, side, f)) for f in (None, frames))
@@ -100,9 +92,7 @@ def test_turning_link_frames_shifts_a_four_bar_s_joints_by_the_turns(
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
 @pytest.mark.parametrize(('side', 'sign'), [('ahead', 1), ('behind', -1)])
 @pytest.mark.parametrize('along', [0.0, 0.11, -0.2])
-def test_a_slide_is_measured_from_the_point_it_runs_through(
-    crank_angle: float, side: str, sign: int, along: float
-) -> None:
+def test_a_slide_is_measured_from_the_point_it_runs_through(crank_angle, side, sign, along):
     closure = Closure(inverted_slider_crank_linkage(SLIDER_CRANK, side, along=along))
     truth = inverted_slider_crank(*SLIDER_CRANK, crank_angle, sign)
     position = closure.position(crank_angle)
@@ -120,9 +110,7 @@ def test_a_slide_is_measured_from_the_point_it_runs_through(
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
 @pytest.mark.parametrize('side', ['ahead', 'behind'])
 @pytest.mark.parametrize('seed', range(5))
-def test_turning_link_frames_shifts_the_rod_s_joint_and_leaves_the_slide(
-    crank_angle: float, side: str, seed: int
-) -> None:
+def test_turning_link_frames_shifts_the_rod_s_joint_and_leaves_the_slide(crank_angle, side, seed):
     frames = odd_frames(seed, ('ground', 'crank', 'rod'))
     turned = {link: angle for link, (_, _, angle) in frames.items()}
     plain, odd = (
@@ -141,7 +129,7 @@ def test_turning_link_frames_shifts_the_rod_s_joint_and_leaves_the_slide(
     assert odd.residual(other) < 4e-16
 
 
-def test_the_links_of_a_file_meet_where_the_joints_put_them() -> None:
+def test_the_links_of_a_file_meet_where_the_joints_put_them():
     # Frames that no formula of the package prefers, walked by hand from joint to joint.
     ground = {'O': (0.3, -0.1), 'D': (0.2, 0.35)}
     crank = {'O': (0.01, 0.02), 'A': (-0.05, 0.11)}
@@ -178,7 +166,7 @@ def test_the_links_of_a_file_meet_where_the_joints_put_them() -> None:
 
 
 @pytest.mark.parametrize('build', [four_bar_linkage, inverted_slider_crank_linkage])
-def test_the_residual_is_rounding(build) -> None:
+def test_the_residual_is_rounding(build):
     lengths, side = (FOUR_BAR, 'left') if build is four_bar_linkage else (SLIDER_CRANK, 'behind')
     closure = Closure(build(lengths, side))
     size = sum(map(abs, lengths))
@@ -188,14 +176,14 @@ def test_the_residual_is_rounding(build) -> None:
         assert closure.residual(position) < 16 * UNIT_ROUNDOFF * size
 
 
-def test_the_residual_sees_a_loop_that_is_open_by_a_hair() -> None:
+def test_the_residual_sees_a_loop_that_is_open_by_a_hair():
     closure = Closure(four_bar_linkage(FOUR_BAR, 'left'))
     position = closure.position(1.0)
     position.state.coordinates[3] += 1e-9
     assert closure.residual(position) == pytest.approx(FOUR_BAR[2] * 1e-9, rel=1e-5)
 
 
-def test_an_open_loop_has_a_gap_in_metres_and_no_joints() -> None:
+def test_an_open_loop_has_a_gap_in_metres_and_no_joints():
     closure = Closure(four_bar_linkage((0.04, 0.02, 0.03, 0.05), 'left'))
     position = closure.position(pi)
     assert (position.status, position.joints) == (Status.OPEN, ())
@@ -210,13 +198,13 @@ def test_an_open_loop_has_a_gap_in_metres_and_no_joints() -> None:
         ((0.04, 0.05, 0.10), 'ahead', inverted_slider_crank_linkage),
     ],
 )
-def test_a_linkage_that_closes_nowhere_has_no_range(lengths, side, build) -> None:
+def test_a_linkage_that_closes_nowhere_has_no_range(lengths, side, build):
     closure = Closure(build(lengths, side))
     assert closure.input_ranges == ()
     assert closure.position(1.0).status is Status.OPEN
 
 
-def test_a_slide_line_may_be_given_in_any_length_and_from_any_of_its_points() -> None:
+def test_a_slide_line_may_be_given_in_any_length_and_from_any_of_its_points():
     plain = inverted_slider_crank_linkage(SLIDER_CRANK, 'ahead', along=0.05)
     slider = plain.sliders['swivel']
     for factor in (1e-8, 1.0, 1e8):
@@ -236,7 +224,7 @@ def test_a_slide_line_may_be_given_in_any_length_and_from_any_of_its_points() ->
 
 
 @pytest.mark.parametrize('name', [file.stem for file in FILES])
-def test_a_step_alone_is_as_among_the_others(name: str) -> None:
+def test_a_step_alone_is_as_among_the_others(name):
     closure = closure_of(name)
     usual = usual_inputs(closure)
     inputs = [[value + 0.02 * i for value in usual] for i in range(-150, 150)]
@@ -266,7 +254,7 @@ def side_by_side(count: int) -> Closure:
     )
 
 
-def test_what_a_loop_takes_hardly_grows_with_the_number_of_loops(monkeypatch) -> None:
+def test_what_a_loop_takes_hardly_grows_with_the_number_of_loops(monkeypatch):
     taken = []
     for count in (2, 20):
         closings = [0]
@@ -308,10 +296,7 @@ INPUTS = {
     'five_bar': (1.2, 1.9),
 }
 
-
 OFF = 0.03 - 0.05j
-
-
 """From the first point of a link to one that has no name, in the link's frame."""
 
 

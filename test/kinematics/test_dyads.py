@@ -14,8 +14,6 @@
 
 """Dyads on a crank: as exact as lengths and angle allow, at every scale."""
 
-from __future__ import annotations
-
 import math
 from math import cos, hypot, ldexp, pi, remainder, sin, tau
 
@@ -48,19 +46,13 @@ from ..support.scenes import closure_of
 
 
 COUNT = 2000
-
-
 length = st.floats(0.1, 10.0)
-
-
 crank = st.floats(-7.0, 7.0)
-
-
 side = st.sampled_from((1, -1))
 
 
 @pytest.mark.parametrize('family', FOUR_BARS)
-def test_a_four_bar_has_its_positions_rates_and_status_in_every_family(family: str) -> None:
+def test_a_four_bar_has_its_positions_rates_and_status_in_every_family(family):
     worst = Worst()
     seen: dict[Status, int] = dict.fromkeys(Status, 0)
     for case in four_bars(family, COUNT):
@@ -86,7 +78,7 @@ def test_a_four_bar_has_its_positions_rates_and_status_in_every_family(family: s
     assert seen[Status.INDETERMINATE] == 0
 
 
-def test_the_sweep_holds_open_loops_and_toggles_too() -> None:
+def test_the_sweep_holds_open_loops_and_toggles_too():
     found = {
         FourBar(a, b, c, d, sign).close(phi).status
         for family in FOUR_BARS
@@ -97,9 +89,7 @@ def test_the_sweep_holds_open_loops_and_toggles_too() -> None:
 
 @settings(derandomize=True, deadline=None, max_examples=300)
 @given(length, length, length, length, crank, side)
-def test_walking_the_loop_of_a_four_bar_ends_where_it_began(
-    a: float, b: float, c: float, d: float, phi: float, sign: int
-) -> None:
+def test_walking_the_loop_of_a_four_bar_ends_where_it_began(a, b, c, d, phi, sign):
     pose = FourBar(a, b, c, d, sign).close(phi)
     assume(pose.status is Status.CLOSED)
     x = a * cos(phi) + b * cos(pose.first) - c * cos(pose.second) - d
@@ -113,9 +103,7 @@ def test_walking_the_loop_of_a_four_bar_ends_where_it_began(
 
 @settings(derandomize=True, deadline=None, max_examples=300)
 @given(length, length, length, length, crank, side)
-def test_the_closing_pin_lies_on_the_side_that_the_assembly_says(
-    a: float, b: float, c: float, d: float, phi: float, sign: int
-) -> None:
+def test_the_closing_pin_lies_on_the_side_that_the_assembly_says(a, b, c, d, phi, sign):
     pose = FourBar(a, b, c, d, sign).close(phi)
     assume(pose.status is Status.CLOSED)
     # Change points turn over with the half angle, which their own tests hold.
@@ -129,9 +117,7 @@ def test_the_closing_pin_lies_on_the_side_that_the_assembly_says(
 
 @settings(derandomize=True, deadline=None, max_examples=300)
 @given(length, length, length, length, crank, side)
-def test_a_mirrored_four_bar_moves_in_the_mirror(
-    a: float, b: float, c: float, d: float, phi: float, sign: int
-) -> None:
+def test_a_mirrored_four_bar_moves_in_the_mirror(a, b, c, d, phi, sign):
     dyad, mirrored = FourBar(a, b, c, d, sign), FourBar(a, b, c, d, -sign)
     pose, image = dyad.close(phi), mirrored.close(-phi)
     assert (pose.status, pose.gap) == (image.status, image.gap)
@@ -148,9 +134,7 @@ def test_a_mirrored_four_bar_moves_in_the_mirror(
 
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(length, length, length, length, crank, side, st.integers(-40, 40))
-def test_rates_are_proportional_to_the_crank_rate(
-    a: float, b: float, c: float, d: float, phi: float, sign: int, power: int
-) -> None:
+def test_rates_are_proportional_to_the_crank_rate(a, b, c, d, phi, sign, power):
     dyad = FourBar(a, b, c, d, sign)
     pose = dyad.close(phi)
     assume(pose.status is Status.CLOSED)
@@ -168,7 +152,7 @@ offset = st.one_of(st.just(0.0), st.floats(-8.0, 8.0).filter(lambda h: h == 0.0 
 
 
 @pytest.mark.parametrize('family', SLIDER_CRANKS)
-def test_a_slider_crank_has_its_positions_rates_and_status_in_every_family(family: str) -> None:
+def test_a_slider_crank_has_its_positions_rates_and_status_in_every_family(family):
     worst = Worst()
     closed = 0
     for case in inverted_slider_cranks(family, COUNT):
@@ -190,7 +174,7 @@ def test_a_slider_crank_has_its_positions_rates_and_status_in_every_family(famil
     assert closed >= COUNT / 2, 'a sweep that closes nothing proves nothing'
 
 
-def test_the_sweep_holds_open_loops_too() -> None:
+def test_the_sweep_holds_open_loops_too():
     found = {
         InvertedSliderCrank(a, d, h, sign).close(phi).status
         for family in SLIDER_CRANKS
@@ -201,9 +185,7 @@ def test_the_sweep_holds_open_loops_too() -> None:
 
 @settings(derandomize=True, deadline=None, max_examples=300)
 @given(length, length, offset, crank, side)
-def test_walking_the_loop_of_a_slider_crank_ends_where_it_began(
-    a: float, d: float, h: float, phi: float, sign: int
-) -> None:
+def test_walking_the_loop_of_a_slider_crank_ends_where_it_began(a, d, h, phi, sign):
     pose = InvertedSliderCrank(a, d, h, sign).close(phi)
     assume(pose.status is Status.CLOSED)
     x = a * cos(phi) + pose.slide * cos(pose.rail) - h * sin(pose.rail) - d
@@ -216,9 +198,7 @@ def test_walking_the_loop_of_a_slider_crank_ends_where_it_began(
 
 @settings(derandomize=True, deadline=None, max_examples=300)
 @given(length, length, offset, crank, side)
-def test_a_mirrored_linkage_moves_in_the_mirror(
-    a: float, d: float, h: float, phi: float, sign: int
-) -> None:
+def test_a_mirrored_linkage_moves_in_the_mirror(a, d, h, phi, sign):
     assume(abs(a - d) != abs(h))
     dyad, mirrored = InvertedSliderCrank(a, d, h, sign), InvertedSliderCrank(a, d, -h, sign)
     pose, image = dyad.close(phi), mirrored.close(-phi)
@@ -234,9 +214,7 @@ def test_a_mirrored_linkage_moves_in_the_mirror(
 
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(length, length, crank)
-def test_a_straight_rod_behind_is_the_one_ahead_turned_round(
-    a: float, d: float, phi: float
-) -> None:
+def test_a_straight_rod_behind_is_the_one_ahead_turned_round(a, d, phi):
     assume(a != d)
     ahead, behind = InvertedSliderCrank(a, d, 0.0, 1), InvertedSliderCrank(a, d, 0.0, -1)
     one, other = ahead.close(phi), behind.close(phi)
@@ -247,9 +225,7 @@ def test_a_straight_rod_behind_is_the_one_ahead_turned_round(
 
 
 @pytest.mark.parametrize(('a', 'd', 'h'), [(1.0, 2.0, 1.0), (2.0, 1.0, -1.0), (0.75, 2.0, 1.25)])
-def test_a_bent_rod_that_just_reaches_its_swivel_is_at_a_change_point(
-    a: float, d: float, h: float
-) -> None:
+def test_a_bent_rod_that_just_reaches_its_swivel_is_at_a_change_point(a, d, h):
     # At φ = 0 the pin is |d − a| = |h| from the swivel: the rod stands across the ground.
     pose = InvertedSliderCrank(a, d, h, 1).close(0.0)
     assert (pose.status, pose.gap, pose.slide) == (Status.CHANGE_POINT, 0.0, 0.0)
@@ -389,13 +365,8 @@ def test_a_slide_on_the_ground_is_no_cylinder():
 
 
 FOUR_BAR = (0.04, 0.12, 0.08, 0.1)
-
-
 SLIDER_CRANK = (0.15, 0.27, 0.02)
-
-
 CRANK_ANGLES = [-3.0, -0.4, 1e-7, 0.9, 2.2, 3.14159]
-
 
 # Each makes another sum of lengths cancel; all but the last two are drawn by what they move.
 NEEDLES = {
@@ -410,7 +381,7 @@ NEEDLES = {
 
 @pytest.mark.parametrize('exponent', [-900, -300, -41, -1, 1, 2, 41, 300, 900])
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
-def test_scaling_by_a_power_of_two_changes_no_bit(exponent: int, crank_angle: float) -> None:
+def test_scaling_by_a_power_of_two_changes_no_bit(exponent, crank_angle):
     factor = 2.0**exponent
     for build, lengths, side in (
         (four_bar_linkage, FOUR_BAR, 'left'),
@@ -430,12 +401,9 @@ def test_scaling_by_a_power_of_two_changes_no_bit(exponent: int, crank_angle: fl
 @pytest.mark.parametrize('factor', [1e-150, 1e-9, 1e9, 1e150])
 @pytest.mark.parametrize('phi', CRANK_ANGLES)
 @pytest.mark.parametrize('side', [1, -1])
-def test_lengths_of_any_size_are_solved_to_the_last_digit(
-    factor: float, phi: float, side: int
-) -> None:
+def test_lengths_of_any_size_are_solved_to_the_last_digit(factor, phi, side):
     lengths = tuple(factor * x for x in FOUR_BAR)
     check_four_bar(lengths, phi, side, RATE)
-
     a, d, h = (factor * x for x in SLIDER_CRANK)
     closure = Closure(inverted_slider_crank_linkage((a, d, h), 'ahead' if side > 0 else 'behind'))
     truth = inverted_slider_crank(a, d, h, phi, side)
@@ -450,9 +418,7 @@ def test_lengths_of_any_size_are_solved_to_the_last_digit(
 
 @pytest.mark.parametrize('name', NEEDLES)
 @pytest.mark.parametrize('side', [1, -1])
-def test_lengths_that_differ_by_twelve_decades_are_solved_to_the_last_digit(
-    name: str, side: int
-) -> None:
+def test_lengths_that_differ_by_twelve_decades_are_solved_to_the_last_digit(name, side):
     a, b, c, d = NEEDLES[name]
     closed = 0
     for i in range(-40, 41):
@@ -465,13 +431,11 @@ def test_lengths_that_differ_by_twelve_decades_are_solved_to_the_last_digit(
 
 @pytest.mark.parametrize('turns', [1, 10, 159_155, -159_155, 10**9])
 @pytest.mark.parametrize('phi', [0.3, 1.0, 2.5])
-def test_a_crank_that_has_turned_often_loses_only_what_its_angle_has_lost(
-    turns: int, phi: float
-) -> None:
+def test_a_crank_that_has_turned_often_loses_only_what_its_angle_has_lost(turns, phi):
     assert check_four_bar(FOUR_BAR, phi + turns * 2 * pi, 1, RATE)
 
 
-def test_a_crank_angle_of_a_million_radians_is_where_it_belongs() -> None:
+def test_a_crank_angle_of_a_million_radians_is_where_it_belongs():
     # 1e6 rad are 159154 turns and 5.927… rad, digits that a sloppy reduction loses.
     closure = Closure(four_bar_linkage(FOUR_BAR, 'left'))
     turned = 1e6 - 159154 * 2 * pi

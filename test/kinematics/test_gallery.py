@@ -20,8 +20,6 @@ inputs, in the frame of the ground. They come from Newton's method on the poses 
 this package. Every constraint is met there to 1e-16 m.
 """
 
-from __future__ import annotations
-
 import json
 from math import radians, remainder, sqrt, tau
 from pathlib import Path
@@ -79,14 +77,14 @@ def inputs_of(closure: Closure, name: str, count: int) -> list[tuple[float, ...]
             for s in steps for t in steps]  # fmt: skip
 
 
-def test_every_file_of_the_gallery_is_tested() -> None:
+def test_every_file_of_the_gallery_is_tested():
     files = {file.stem for file in FOLDER.glob('*.yaml')}
     assert files == set(KINDS)
     assert files == {name.removesuffix('.yaml') for name in EXPECTED}
 
 
 @pytest.mark.parametrize('name', KINDS)
-def test_it_consists_of_the_dyads_that_it_is_known_for(name: str) -> None:
+def test_it_consists_of_the_dyads_that_it_is_known_for(name):
     groups = closure_of(name).structure.groups
     kinds = [
         group.kind if isinstance(group, Dyad) else 'iterated'
@@ -97,7 +95,7 @@ def test_it_consists_of_the_dyads_that_it_is_known_for(name: str) -> None:
 
 
 @pytest.mark.parametrize('name', KINDS)
-def test_every_point_is_where_the_independent_solver_has_it(name: str) -> None:
+def test_every_point_is_where_the_independent_solver_has_it(name):
     closure = closure_of(name)
     expected = EXPECTED[f'{name}.yaml']
     size = size_of(closure)
@@ -112,7 +110,7 @@ def test_every_point_is_where_the_independent_solver_has_it(name: str) -> None:
 
 
 @pytest.mark.parametrize('name', KINDS)
-def test_it_moves_through_its_whole_range_with_a_residual_at_rounding_level(name: str) -> None:
+def test_it_moves_through_its_whole_range_with_a_residual_at_rounding_level(name):
     closure = closure_of(name)
     size = size_of(closure)
     worst = 0.0
@@ -124,7 +122,7 @@ def test_it_moves_through_its_whole_range_with_a_residual_at_rounding_level(name
 
 
 @pytest.mark.parametrize('name', [name for name in KINDS if name != 'five_bar'])
-def test_its_range_is_the_one_that_the_independent_solver_met(name: str) -> None:
+def test_its_range_is_the_one_that_the_independent_solver_met(name):
     closure = closure_of(name)
     low, high = EXPECTED[f'{name}.yaml']['range']
     if closure.input_ranges[0].whole:
@@ -141,7 +139,7 @@ def test_its_range_is_the_one_that_the_independent_solver_met(name: str) -> None
 
 
 @pytest.mark.parametrize('name', KINDS)
-def test_velocities_and_accelerations_are_the_slopes_of_the_positions(name: str) -> None:
+def test_velocities_and_accelerations_are_the_slopes_of_the_positions(name):
     closure = closure_of(name)
     size = size_of(closure)
     count = len(closure.linkage.inputs)
@@ -171,7 +169,7 @@ def test_velocities_and_accelerations_are_the_slopes_of_the_positions(name: str)
             assert abs(curve - bent) < 1e-5 * (pull + size), (values, key)
 
 
-def test_andrews_squeezer_stands_where_its_sources_start_it() -> None:
+def test_andrews_squeezer_stands_where_its_sources_start_it():
     # Hairer and Wanner, and the Bari test set: consistent initial values.
     joints = closure_of('andrews_squeezer').linkage.joints
     position = closure_of('andrews_squeezer').position(-0.0617138900142764496358948458001)
@@ -188,7 +186,7 @@ def test_andrews_squeezer_stands_where_its_sources_start_it() -> None:
         assert remainder(found[name] - value, tau) == pytest.approx(0.0, abs=3e-15), name
 
 
-def test_peaucellier_draws_a_straight_line() -> None:
+def test_peaucellier_draws_a_straight_line():
     closure = closure_of('peaucellier')
     for (value,) in inputs_of(closure, 'peaucellier', 200):
         place = closure.points(closure.position(value))['far_upper_bar', 'P']
@@ -196,7 +194,7 @@ def test_peaucellier_draws_a_straight_line() -> None:
         assert place.real == pytest.approx(0.13125, abs=3e-16)
 
 
-def test_the_trammel_draws_an_ellipse() -> None:
+def test_the_trammel_draws_an_ellipse():
     closure = closure_of('elliptic_trammel')
     (traced,) = closure.linkage.traced
     points = []
@@ -213,7 +211,7 @@ def test_the_trammel_draws_an_ellipse() -> None:
     assert half_axes[0] != pytest.approx(half_axes[1], rel=0.1)
 
 
-def test_hoeken_draws_nearly_a_straight_line_for_half_a_turn() -> None:
+def test_hoeken_draws_nearly_a_straight_line_for_half_a_turn():
     closure = closure_of('hoeken')
     heights = [
         closure.points(closure.position(radians(90 + i)))['coupler', 'P'].imag for i in range(181)
@@ -222,7 +220,7 @@ def test_hoeken_draws_nearly_a_straight_line_for_half_a_turn() -> None:
     assert max(heights) - min(heights) == pytest.approx(0.000195, abs=1e-6)
 
 
-def test_the_parallelogram_stays_one_through_both_change_points_and_many_turns() -> None:
+def test_the_parallelogram_stays_one_through_both_change_points_and_many_turns():
     closure = closure_of('parallelogram')
     for i in range(-40, 41):
         angle = i * 0.7 + 1e-9
@@ -234,7 +232,7 @@ def test_the_parallelogram_stays_one_through_both_change_points_and_many_turns()
         )
 
 
-def test_a_linkage_does_not_drift_in_a_million_turns() -> None:
+def test_a_linkage_does_not_drift_in_a_million_turns():
     for name in ('jansen_leg', 'class_3'):
         closure = closure_of(name)
         start = closure.points(closure.position(1.0))

@@ -14,8 +14,6 @@
 
 """Links that are iterated, alone and in chains with dyads."""
 
-from __future__ import annotations
-
 from cmath import rect
 from dataclasses import replace
 import json
@@ -42,15 +40,10 @@ from ..support.scenes import shipped
 
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'
-
-
 PLACES = json.loads((Path(__file__).parent / 'gallery.json').read_text('utf-8'))
-
 
 CLOSED_FORM = ['four_bar', 'slider_crank', 'inverted_slider_crank', 'scotch_yoke', 'jansen_leg',
                'whitworth_quick_return', 'elliptic_trammel', 'excavator_bucket']  # fmt: skip
-
-
 """Linkages of all kinds of dyads but PRP; the last ones by a slide that is driven."""
 
 
@@ -68,7 +61,7 @@ def iterated(linkage: Linkage) -> Structure:
 
 
 @pytest.mark.parametrize('name', CLOSED_FORM)
-def test_it_finds_what_the_closed_form_finds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_finds_what_the_closed_form_finds(name, monkeypatch):
     linkage = shipped(name)
     exact = Closure(linkage)
     start = PLACES[f'{name}.yaml']['inputs'][1]
@@ -100,7 +93,7 @@ def test_it_finds_what_the_closed_form_finds(name: str, monkeypatch: pytest.Monk
     assert found.residual(other) < 1e-14 * exact.scale
 
 
-def test_a_state_depends_on_its_input_alone() -> None:
+def test_a_state_depends_on_its_input_alone():
     fresh, used = Closure(class_3_linkage()), Closure(class_3_linkage())
     (interval,) = used.input_ranges
     inputs = [
@@ -112,7 +105,7 @@ def test_a_state_depends_on_its_input_alone() -> None:
     assert forward == [shuffled[value] for value in sorted(inputs)]
 
 
-def test_beyond_its_limits_it_is_open_with_a_gap_and_says_no_pose() -> None:
+def test_beyond_its_limits_it_is_open_with_a_gap_and_says_no_pose():
     closure = Closure(class_3_linkage())
     (interval,) = closure.input_ranges
     for value in (interval.lowest - 0.05, interval.highest + 0.05, interval.highest + 1.0):
@@ -123,7 +116,7 @@ def test_beyond_its_limits_it_is_open_with_a_gap_and_says_no_pose() -> None:
         assert closure.position(value).status is Status.CLOSED
 
 
-def test_near_a_limit_its_conditioning_falls_to_nothing() -> None:
+def test_near_a_limit_its_conditioning_falls_to_nothing():
     closure = Closure(class_3_linkage())
     (interval,) = closure.input_ranges
     found = [
@@ -134,7 +127,7 @@ def test_near_a_limit_its_conditioning_falls_to_nothing() -> None:
     assert found[-1] < 1e-2 * found[0]
 
 
-def test_whole_turns_of_its_input_change_nothing() -> None:
+def test_whole_turns_of_its_input_change_nothing():
     closure = Closure(class_3_linkage())
     start = closure.points(closure.position(1.0))
     for turns in (1, -3, 1000):
@@ -143,7 +136,7 @@ def test_whole_turns_of_its_input_change_nothing() -> None:
             assert abs(moved[key] - place) < 1e-15 * (20.0 + 20.0 * abs(turns)), key
 
 
-def test_a_pose_that_leads_nowhere_is_an_open_loop() -> None:
+def test_a_pose_that_leads_nowhere_is_an_open_loop():
     # The pose's input is beyond the limit: there is nothing to continue from.
     sound = class_3_linkage()
     assert sound.pose is not None
@@ -223,7 +216,7 @@ def misfit(closure: Closure, position: Position) -> float:
 
 @pytest.mark.parametrize('tail', [False, True], ids=['', 'a dyad behind'])
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_a_chain_goes_its_ranges_without_a_leap_and_no_farther(name: str, tail: bool) -> None:
+def test_a_chain_goes_its_ranges_without_a_leap_and_no_farther(name, tail):
     rng = random.Random(3)
     for _ in range(6):
         closure = Closure(chain(rng, FOUR_BARS[name], tail))
@@ -251,7 +244,7 @@ def test_a_chain_goes_its_ranges_without_a_leap_and_no_farther(name: str, tail: 
                     assert not closure.position(end + sign * 1e-9).status.has_pose
 
 
-def test_a_platform_on_a_change_point_linkage_repeats_after_two_turns() -> None:
+def test_a_platform_on_a_change_point_linkage_repeats_after_two_turns():
     found = 0
     for seed in (4, 8, 9, 11, 12):
         closure = Closure(chain(random.Random(seed), FOUR_BARS['change point'], tail=False))
@@ -270,7 +263,7 @@ def test_a_platform_on_a_change_point_linkage_repeats_after_two_turns() -> None:
 
 
 @pytest.mark.parametrize('tail', [False, True], ids=['', 'a dyad behind'])
-def test_a_table_of_a_chain_is_proven(tail: bool) -> None:
+def test_a_table_of_a_chain_is_proven(tail):
     rng = random.Random(3)
     linkage = chain(rng, FOUR_BARS['crank-rocker'], tail)
     closure = Closure(linkage)

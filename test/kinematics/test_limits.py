@@ -13,9 +13,7 @@
 # limitations under the License.
 
 
-"""What a joint of the machine can do: which states are beyond it, and where an input can go."""
-
-from __future__ import annotations
+"""Limits of joints: the states beyond them, and the range that they leave to an input."""
 
 from dataclasses import replace
 from math import inf, nextafter, pi, remainder, tau
@@ -35,10 +33,9 @@ import numpy as np
 import pytest
 
 from .platforms import linkage_of, platform
-from ..support.scenes import closure_of
+from ..support.scenes import closure_of, symmetric_five_bar
 
 CLOSED, LIMITED, TOGGLE, OPEN = Status.CLOSED, Status.LIMITED, Status.TOGGLE, Status.OPEN
-
 CRANK_ROCKER = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1LIMITS}'
 DOUBLE_ROCKER = 'four_bar: {a: 0.1, b: 0.07, c: 0.06, d: 0.05LIMITS}'
 SLIDER_CRANK = """
@@ -60,31 +57,22 @@ def closed(text, limits=''):
 # Linkage, limits, and the result at values of the input.
 STATES = {
     'within': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', {0.5: CLOSED, 1.0: CLOSED}),
-    'beyond, either way': (
-        CRANK_ROCKER,
-        ', input: {limits: [0.5, 1.5]}',
-        {0.499: LIMITED, 1.501: LIMITED},
-    ),
+    'beyond, either way': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', {
+        0.499: LIMITED, 1.501: LIMITED,
+    }),
     'an input counts with its turns': (
-        CRANK_ROCKER,
-        ', input: {limits: [0.5, 1.5]}',
-        {1.0 + tau: LIMITED, 1.0 - tau: LIMITED},
+        CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', {1.0 + tau: LIMITED, 1.0 - tau: LIMITED},
     ),
     'limits of more than a turn': (
-        CRANK_ROCKER,
-        ', input: {limits: [-7, 7]}',
-        {6.9: CLOSED, -6.9: CLOSED, 7.1: LIMITED},
+        CRANK_ROCKER, ', input: {limits: [-7, 7]}', {6.9: CLOSED, -6.9: CLOSED, 7.1: LIMITED},
     ),
     'one limit': (CRANK_ROCKER, ', input: {limits: [0, .inf]}', {1e6: CLOSED, -0.1: LIMITED}),
     'the other': (CRANK_ROCKER, ', input: {limits: [-.inf, 0]}', {-1e6: CLOSED, 0.1: LIMITED}),
     'no limits but of rate and effort': (
-        CRANK_ROCKER,
-        ', input: {velocity: 1, effort: 1}',
-        {1e6: CLOSED},
+        CRANK_ROCKER, ', input: {velocity: 1, effort: 1}', {1e6: CLOSED},
     ),
     'a published angle': (
-        CRANK_ROCKER,
-        ', joints: {rocker_joint: {limits: [1.5, 2]}}',
+        CRANK_ROCKER, ', joints: {rocker_joint: {limits: [1.5, 2]}}',
         {2.0: CLOSED, 1.0: LIMITED, 3.0: LIMITED},
     ),
     'a published angle in another turn is the same pose': (
@@ -93,21 +81,16 @@ STATES = {
         {2.0: CLOSED, 1.0: LIMITED, 3.0: LIMITED},
     ),
     'limits of a turn let a published angle be anything': (
-        CRANK_ROCKER,
-        ', joints: {rocker_joint: {limits: [-3.1416, 3.1416]}}',
+        CRANK_ROCKER, ', joints: {rocker_joint: {limits: [-3.1416, 3.1416]}}',
         {0.0: CLOSED, 2.0: CLOSED, 5.0: CLOSED},
     ),
-    'a published slide': (
-        SLIDER_CRANK,
-        ', limits: [0.12, 0.16]',
-        {0.0: LIMITED, 1.0: CLOSED, pi: LIMITED},
-    ),
+    'a published slide': (SLIDER_CRANK, ', limits: [0.12, 0.16]', {
+        0.0: LIMITED, 1.0: CLOSED, pi: LIMITED,
+    }),
     'open is worse than limited': (
-        DOUBLE_ROCKER,
-        ', input: {limits: [-0.5, 0.5]}',
-        {3.0: OPEN, 0.6: LIMITED},
+        DOUBLE_ROCKER, ', input: {limits: [-0.5, 0.5]}', {3.0: OPEN, 0.6: LIMITED},
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('name', STATES)
@@ -176,24 +159,16 @@ RANGES = {
     'all of it': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', [(0.5, 1.5)], 'crank_joint'),
     'more than a turn': (CRANK_ROCKER, ', input: {limits: [-7, 7]}', [(-7, 7)], 'crank_joint'),
     'a toggle and a limit': (
-        DOUBLE_ROCKER,
-        ', input: {limits: [-0.5, 3]}',
-        [(-0.5, 'toggle')],
-        'crank_joint',
+        DOUBLE_ROCKER, ', input: {limits: [-0.5, 3]}', [(-0.5, 'toggle')], 'crank_joint',
     ),
     'a published angle': (
-        CRANK_ROCKER,
-        ', joints: {rocker_joint: {limits: [1.5, 2]}}',
-        [('rocker', 'rocker'), ('rocker', 'rocker')],
-        'rocker_joint',
+        CRANK_ROCKER, ', joints: {rocker_joint: {limits: [1.5, 2]}}',
+        [('rocker', 'rocker'), ('rocker', 'rocker')], 'rocker_joint',
     ),
     'a slide within a stroke': (
-        SLIDER_CRANK,
-        ', limits: [0.12, 0.16]',
-        [('slide', 'slide'), ('slide', 'slide')],
-        'slide',
+        SLIDER_CRANK, ', limits: [0.12, 0.16]', [('slide', 'slide'), ('slide', 'slide')], 'slide',
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('name', RANGES)
@@ -245,12 +220,7 @@ def test_a_narrow_gap_between_samples_is_found():
     coupler=st.none() | st.tuples(st.floats(-pi, pi), st.floats(0.01, 3.0)),
 )
 def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
-    """
-    Of random four-bars with random limits.
-
-    What is beyond the limits is worked out here from the same linkage without limits: of the input
-    as it is sent, of a published angle in all its turns.
-    """
+    """Random four-bars with random limits agree with the same linkage without, limited here."""
     a, b, c, d = sides
     try:
         free = closed(f'four_bar: {{a: {a!r}, b: {b!r}, c: {c!r}, d: {d!r}}}')
@@ -334,11 +304,7 @@ def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
     [(0, 10, 0), (0, 50, 0), (1, 27, 0), (2, 11, 0), (2, 38, 0), (0, 0, 1), (0, 2, 1)],
 )
 def test_links_that_are_iterated(lines, seed, turns):
-    """
-    Of platforms on a branch that has other poses a turn on (turns 0), or the same (1).
-
-    Where they can go is worked out here from the same linkage without limits, in 601 values.
-    """
+    """Platforms whose branch has other poses a turn on (turns 0), or the same (1)."""
     rng = random.Random(seed)
     linkage = linkage_of(platform(rng, lines=lines), rng)
     free = Closure(linkage)
@@ -395,19 +361,7 @@ def test_rounding_of_typed_numbers_is_within():
 
 
 def test_with_several_inputs_the_limits_of_each_joint_hold():
-    text = """
-links:
-  ground: {A: [0, 0], E: [0.3, 0]}
-  left: {A: [0, 0], B: [0.2, 0]}
-  left_rod: {B: [0, 0], C: [0.25, 0]}
-  right_rod: {C: [0, 0], D: [0.25, 0]}
-  right: {E: [0, 0], D: [0.2, 0]}
-input:
-- {joint: left_joint, parent: ground, child: left, limits: [1, 2]}
-- {joint: right_joint, parent: ground, child: right}
-assembly: {C: right}
-joints: {rod_joint: {parent: left, child: left_rod, limits: [-1.5, 0.5]}}
-"""
+    text = symmetric_five_bar(', limits: [1, 2]', rod=', limits: [-1.5, 0.5]')
     closure = closed(text)
     rod = closure.position(1.5, 1.5).joints[0]
     assert -1.5 < rod < 0.5

@@ -14,8 +14,6 @@
 
 """Ranges of the input, what is found over them, and the names of four-bars."""
 
-from __future__ import annotations
-
 from cmath import rect
 from dataclasses import replace
 from math import acos, cos, degrees, hypot, inf, pi, radians, remainder, sin, sqrt, tau
@@ -61,10 +59,7 @@ FOUR_BARS = {
     'hardly does not stretch': ((4.0, 6.0, 3.0, 5.0 - 2**-40), True, False),
 }
 
-
 ERROR = 8.0
-
-
 """Limit for a range's ends, in u·κ."""
 
 
@@ -88,7 +83,7 @@ def end_of_range(a: float, b: float, c: float, d: float, span: str) -> tuple[mpf
         return angle, condition
 
 
-def test_the_table_says_what_limits_each_crank() -> None:
+def test_the_table_says_what_limits_each_crank():
     for lengths, folds, stretches in FOUR_BARS.values():
         a, b, c, d = lengths
         assert folds == (abs(d - a) < abs(b - c))
@@ -96,12 +91,12 @@ def test_the_table_says_what_limits_each_crank() -> None:
 
 
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_a_four_bar_s_range_ends_where_it_folds_and_stretches(name: str) -> None:
+def test_a_four_bar_s_range_ends_where_it_folds_and_stretches(name):
     lengths, folds, stretches = FOUR_BARS[name]
     check_ranges(lengths, folds, stretches)
 
 
-def test_ranges_of_random_four_bars_end_where_they_fold_and_stretch() -> None:
+def test_ranges_of_random_four_bars_end_where_they_fold_and_stretch():
     rng = random.Random(4)
     kinds = set()
     while len(kinds) < 4 or rng.random() > 1e-3:
@@ -133,7 +128,7 @@ def check_ranges(lengths: tuple[float, float, float, float], folds: bool, stretc
 
 
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name: str) -> None:
+def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name):
     lengths, _, _ = FOUR_BARS[name]
     closure = Closure(four_bar_linkage(lengths, 'right'))
     for i in range(1, 400):
@@ -155,9 +150,7 @@ def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name: str) -> None:
         ((0.2, 0.2, 0.0), True),
     ],
 )
-def test_a_rod_s_range_ends_where_it_cannot_reach_its_swivel(
-    lengths: tuple[float, float, float], whole: bool
-) -> None:
+def test_a_rod_s_range_ends_where_it_cannot_reach_its_swivel(lengths, whole):
     closure = Closure(inverted_slider_crank_linkage(lengths, 'ahead'))
     ((low, high, *_),) = closure.input_ranges
     if whole:
@@ -173,7 +166,7 @@ def test_a_rod_s_range_ends_where_it_cannot_reach_its_swivel(
 
 
 @pytest.mark.parametrize('angle', [0.7, -2.0])
-def test_ranges_are_of_the_input_joint_and_turn_with_its_frame(angle: float) -> None:
+def test_ranges_are_of_the_input_joint_and_turn_with_its_frame(angle):
     lengths, _, _ = FOUR_BARS['both']
     plain = Closure(four_bar_linkage(lengths, 'left')).input_ranges
     turned = Closure(four_bar_linkage(lengths, 'left', {'crank': (0.1, 0.2, angle)})).input_ranges
@@ -181,7 +174,7 @@ def test_ranges_are_of_the_input_joint_and_turn_with_its_frame(angle: float) -> 
         assert (turned_low, turned_high) == pytest.approx((low - angle, high - angle), abs=1e-14)
 
 
-def test_ranges_are_told_in_words() -> None:
+def test_ranges_are_told_in_words():
     words = {
         name: describe(Closure(four_bar_linkage(lengths, 'left')).input_ranges)
         for name, (lengths, _, _) in FOUR_BARS.items()
@@ -225,7 +218,7 @@ def chain(one: float, other: float) -> Linkage:
 
 @pytest.mark.parametrize('narrow', [1e-4, 1e-8, 1e-10])
 @pytest.mark.parametrize('gap', [False, True], ids=['a part', 'a gap'])
-def test_what_is_narrower_than_the_samples_is_found(narrow: float, gap: bool) -> None:
+def test_what_is_narrower_than_the_samples_is_found(narrow, gap):
     # The distance from the rocker's point to the ground's has one summit over the turn. A dyad
     # that reaches all but the last of it leaves a gap there; one that needs it closes only there.
     def distance(phi: float) -> float:
@@ -254,8 +247,6 @@ def test_what_is_narrower_than_the_samples_is_found(narrow: float, gap: bool) ->
 
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
-
-
 FILES = sorted(LINKAGES.glob('*.yaml'))
 
 
@@ -263,16 +254,16 @@ def of_lengths(a: float, b: float, c: float, d: float) -> InputSweep:
     return InputSweep(Closure(four_bar_linkage((a, b, c, d), 'left')))
 
 
-def test_a_full_turn_begins_at_0() -> None:
+def test_a_full_turn_begins_at_0():
     assert of_lengths(2.0, 7.0, 9.0, 6.0).ranges == (InputRange(0.0, tau),)
 
 
-def test_a_single_change_point_needs_two_turns() -> None:
+def test_a_single_change_point_needs_two_turns():
     assert of_lengths(1.0, 4.0, 3.0, 2.0).ranges == (InputRange(0.0, 2.0 * tau),)
     assert of_lengths(1.0, 2.0, 1.0, 2.0).ranges == (InputRange(0.0, tau),)  # a parallelogram: one
 
 
-def test_a_limited_range_lies_about_its_middle() -> None:
+def test_a_limited_range_lies_about_its_middle():
     """Its limit follows from one triangle: O, B and a point that is 0.075 m from B."""
     ((low, high, *_),) = InputSweep(shipped('peaucellier')).ranges
     # The arms close where |OB| = 0.125 − 0.05, and |OB| = 2·0.05·cos(φ/2).
@@ -282,7 +273,7 @@ def test_a_limited_range_lies_about_its_middle() -> None:
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_shipped_linkage_has_a_usual_pose_inside_its_range(file: Path) -> None:
+def test_every_shipped_linkage_has_a_usual_pose_inside_its_range(file):
     closure = shipped(file.stem)
     inputs = usual_inputs(closure)
     assert closure.position(*inputs).status is Status.CLOSED
@@ -292,7 +283,7 @@ def test_every_shipped_linkage_has_a_usual_pose_inside_its_range(file: Path) -> 
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_shipped_linkage_closes_to_rounding_all_over_its_range(file: Path) -> None:
+def test_every_shipped_linkage_closes_to_rounding_all_over_its_range(file):
     closure = shipped(file.stem)
     found = worst_residual(closure)
     assert found is not None
@@ -323,7 +314,7 @@ POSES = {
 
 
 @pytest.mark.parametrize('kind', POSES)
-def test_a_pose_without_points_says_where_a_linkage_starts(kind: str) -> None:
+def test_a_pose_without_points_says_where_a_linkage_starts(kind):
     lengths, pose, expected = POSES[kind]
     linkage = replace(four_bar_linkage(lengths, 'left'), pose=pose)
     assert usual_inputs(Closure(linkage)) == (pytest.approx(expected, abs=1e-14),)
@@ -334,14 +325,12 @@ def test_a_pose_without_points_says_where_a_linkage_starts(kind: str) -> None:
     [((1.3, 1.7), (1.3, 1.7)), ((pi, 0.0), (radians(60.0), radians(60.0)))],
     ids=['closes', 'open: the elbows are 0.3 m apart, 0.22 at most'],
 )
-def test_several_inputs_start_from_their_pose(
-    inputs: tuple[float, float], expected: tuple[float, float]
-) -> None:
+def test_several_inputs_start_from_their_pose(inputs, expected):
     linkage = replace(shipped('five_bar').linkage, pose=Pose(inputs, {}))
     assert usual_inputs(Closure(linkage)) == pytest.approx(expected)
 
 
-def test_the_other_inputs_are_held_along_a_way() -> None:
+def test_the_other_inputs_are_held_along_a_way():
     """The elbows of the five-bar are 0.22 m apart at the ends of the left crank's way."""
     closure = shipped('five_bar')
     way = InputSweep(closure, (radians(60.0), radians(60.0)))
@@ -354,7 +343,7 @@ def test_the_other_inputs_are_held_along_a_way() -> None:
     assert not way.closes(high + 1e-9)
 
 
-def test_a_range_is_found_from_any_turn() -> None:
+def test_a_range_is_found_from_any_turn():
     way = of_lengths(4.0, 8.0, 3.0, 6.0)  # folds: its range is about 180 degrees
     (interval,) = way.ranges
     middle = 0.5 * (interval.lowest + interval.highest)
@@ -365,7 +354,7 @@ def test_a_range_is_found_from_any_turn() -> None:
 
 
 @pytest.mark.parametrize('whole', [True, False])
-def test_samples_go_from_end_to_end(whole: bool) -> None:
+def test_samples_go_from_end_to_end(whole):
     interval = InputRange(0.0, tau) if whole else InputRange(-0.7, 1.1)
     values = samples(interval, 50)
     assert values[0] == interval.lowest
@@ -375,9 +364,7 @@ def test_samples_go_from_end_to_end(whole: bool) -> None:
 
 
 @given(st.floats(-3.0, 3.0), st.floats(0.05, 2.0), st.floats(0.0, 0.9), st.integers(1, 7))
-def test_extremes_are_found_wherever_they_lie(
-    place: float, size: float, other: float, times: int
-) -> None:
+def test_extremes_are_found_wherever_they_lie(place, size, other, times):
     """A cosine with a smaller one of a higher order: lowest value known where they agree."""
 
     def function(x: float) -> float:
@@ -390,17 +377,17 @@ def test_extremes_are_found_wherever_they_lie(
     assert any(abs(remainder(at - place, tau)) < 1.1 * off for at in found.lowest.at)
 
 
-def test_what_does_not_change_has_its_extreme_nowhere() -> None:
+def test_what_does_not_change_has_its_extreme_nowhere():
     found = extremes(lambda _: 1.25, [InputRange(0.0, tau)])
     assert found == ((1.25, ()), (1.25, ()))
 
 
-def test_the_ends_of_a_limited_range_count() -> None:
+def test_the_ends_of_a_limited_range_count():
     found = extremes(lambda x: x, [InputRange(-0.5, 2.0)])
     assert found == ((-0.5, (-0.5,)), (2.0, (2.0,)))
 
 
-def test_the_least_transmission_angle_of_a_crank_rocker_is_that_of_the_textbook() -> None:
+def test_the_least_transmission_angle_of_a_crank_rocker_is_that_of_the_textbook():
     """It is met where the crank lies along the ground: cos μ = (b² + c² − (d ∓ a)²)/(2bc)."""
     rng = random.Random(7)
     for _ in range(20):
@@ -417,13 +404,13 @@ def test_the_least_transmission_angle_of_a_crank_rocker_is_that_of_the_textbook(
             assert found.highest.value == pytest.approx(pi / 2.0, abs=1e-12)
 
 
-def test_a_slider_crank_s_is_least_where_the_crank_pin_is_farthest_from_the_line() -> None:
+def test_a_slider_crank_s_is_least_where_the_crank_pin_is_farthest_from_the_line():
     ((_, found),) = transmission_angles(InputSweep(shipped('slider_crank'))).items()
     assert degrees(found.lowest.value) == pytest.approx(degrees(acos(0.05 / 0.14)), abs=1e-9)
     assert [degrees(at) for at in found.lowest.at] == [pytest.approx(270.0, abs=1e-5)]
 
 
-def test_a_chain_s_four_bars_are_seen_from_what_is_known_first() -> None:
+def test_a_chain_s_four_bars_are_seen_from_what_is_known_first():
     first, second = four_bars(shipped('watt_1').structure)
     assert first.links == ('crank', 'coupler', 'rocker', 'ground')
     assert second.links == ('rocker', 'output_link', 'upper_link', 'coupler')
@@ -435,16 +422,16 @@ def test_a_chain_s_four_bars_are_seen_from_what_is_known_first() -> None:
 @pytest.mark.parametrize(
     ('name', 'count'), [('klann_leg', 1), ('stephenson_3', 1), ('five_bar', 0)]
 )
-def test_a_loop_of_five_links_is_no_four_bar(name: str, count: int) -> None:
+def test_a_loop_of_five_links_is_no_four_bar(name, count):
     assert len(list(four_bars(shipped(name).structure))) == count
 
 
-def test_a_dyad_that_an_input_stretches_is_no_four_bar() -> None:
+def test_a_dyad_that_an_input_stretches_is_no_four_bar():
     (bar,) = four_bars(shipped('excavator_bucket').structure)
     assert bar.links == ('rocker', 'bucket_link', 'bucket', 'ground')
 
 
-def test_a_grid_goes_over_all_inputs() -> None:
+def test_a_grid_goes_over_all_inputs():
     found = list(grid(shipped('five_bar'), 6))
     assert len({inputs for inputs, _ in found}) == len(found) == 36
 
@@ -473,7 +460,7 @@ BARKER = {
 
 
 @pytest.mark.parametrize('code', BARKER)
-def test_each_of_barkers_types_is_named(code: str) -> None:
+def test_each_of_barkers_types_is_named(code):
     assert four_bar_type(*BARKER[code]).code == code
 
 
@@ -490,21 +477,21 @@ def test_each_of_barkers_types_is_named(code: str) -> None:
         ((0.1, 0.1, 0.1, 0.1), 'rhombus'),
     ],
 )
-def test_an_engineer_s_word_is_in_the_name(lengths: tuple[float, ...], word: str) -> None:
+def test_an_engineer_s_word_is_in_the_name(lengths, word):
     assert word in four_bar_type(*lengths).name
 
 
-def test_lengths_in_decimals_that_are_meant_to_cancel_do() -> None:
+def test_lengths_in_decimals_that_are_meant_to_cancel_do():
     assert 0.1 + 0.7 != 0.3 + 0.5  # in floats
     assert four_bar_type(0.1, 0.7, 0.5, 0.3) == ('SCRR', 'change-point crank-rocker', 0.0)
 
 
-def test_the_margin_says_how_far_it_is_from_a_change_point() -> None:
+def test_the_margin_says_how_far_it_is_from_a_change_point():
     assert four_bar_type(2.0, 4.0, 3.5, 3.0).margin == 0.5
     assert four_bar_type(4.0, 3.0, 2.5, 2.0).margin == -0.5
 
 
-def test_what_does_not_close_has_no_name() -> None:
+def test_what_does_not_close_has_no_name():
     no_loop = four_bar_type(1.0, 2.0, 3.0, 7.0)
     assert no_loop.code == ''
     assert no_loop.name.startswith('no loop')
@@ -516,9 +503,7 @@ sides = st.floats(0.1, 10.0)
 
 
 @given(sides, sides, sides, sides)
-def test_seen_from_the_other_end_input_and_output_change_places(
-    a: float, b: float, c: float, d: float
-) -> None:
+def test_seen_from_the_other_end_input_and_output_change_places(a, b, c, d):
     assume(2.0 * max(a, b, c, d) < 0.999 * (a + b + c + d))
     here, there = four_bar_type(a, b, c, d).code, four_bar_type(c, b, a, d).code
     swapped = {'GCRR': 'GRRC', 'SCRR': 'SRRC', 'RRR2': 'RRR4'}
@@ -527,9 +512,7 @@ def test_seen_from_the_other_end_input_and_output_change_places(
 
 
 @given(sides, sides, sides, sides)
-def test_the_input_turns_fully_where_its_letter_is_c(
-    a: float, b: float, c: float, d: float
-) -> None:
+def test_the_input_turns_fully_where_its_letter_is_c(a, b, c, d):
     """Against the closure, whose ranges know nothing of Grashof."""
     assume(2.0 * max(a, b, c, d) < 0.999 * (a + b + c + d))
     kind = four_bar_type(a, b, c, d)
@@ -542,7 +525,7 @@ def test_the_input_turns_fully_where_its_letter_is_c(
         assert max(high - low for low, high, *_ in ranges) < 2.0 * pi < inf
 
 
-def test_a_four_bar_of_a_file_is_found_with_its_lengths() -> None:
+def test_a_four_bar_of_a_file_is_found_with_its_lengths():
     (bar,) = four_bars(Closure(four_bar_linkage((0.04, 0.12, 0.08, 0.1), 'left')).structure)
     assert bar.links == ('crank', 'coupler', 'rocker', 'ground')
     assert bar.lengths == (0.04, 0.12, 0.08, 0.1)

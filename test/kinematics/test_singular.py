@@ -14,8 +14,6 @@
 
 """Singular states: at which inputs they are, and what dyads do there."""
 
-from __future__ import annotations
-
 from math import cos, inf, pi, remainder, tau
 import random
 
@@ -49,7 +47,7 @@ def agree(found: list[float], expected: list[float]) -> bool:
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_change_points_and_pins_that_meet_are_listed(kind: str) -> None:
+def test_change_points_and_pins_that_meet_are_listed(kind):
     for number in range(COUNT):
         flat = FLAT[kind](random.Random(f'singular/{kind}/{number}'))
         closure = Closure(flat.linkage)
@@ -58,7 +56,7 @@ def test_change_points_and_pins_that_meet_are_listed(kind: str) -> None:
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_the_state_says_so_and_moves_on_as_before_and_behind(kind: str) -> None:
+def test_the_state_says_so_and_moves_on_as_before_and_behind(kind):
     for number in range(COUNT):
         flat = FLAT[kind](random.Random(f'singular/{kind}/{number}'))
         closure = Closure(flat.linkage)
@@ -80,7 +78,7 @@ def test_the_state_says_so_and_moves_on_as_before_and_behind(kind: str) -> None:
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_arrays_have_the_same_statuses_rates_and_accelerations_there(kind: str) -> None:
+def test_arrays_have_the_same_statuses_rates_and_accelerations_there(kind):
     for number in range(COUNT):
         flat = FLAT[kind](random.Random(f'singular/{kind}/{number}'))
         closure = Closure(flat.linkage)
@@ -101,7 +99,7 @@ def test_arrays_have_the_same_statuses_rates_and_accelerations_there(kind: str) 
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_the_distance_to_the_nearest_counts_down_to_it(kind: str) -> None:
+def test_the_distance_to_the_nearest_counts_down_to_it(kind):
     flat = FLAT[kind](random.Random(f'singular/{kind}/1'))
     closure = Closure(flat.linkage)
     for at in flat.at:
@@ -110,7 +108,7 @@ def test_the_distance_to_the_nearest_counts_down_to_it(kind: str) -> None:
             assert closure.singularity_margin(position).toggle_distance == pytest.approx(abs(away))
 
 
-def test_a_dyad_that_follows_others_is_searched_for_its_singular_inputs() -> None:
+def test_a_dyad_that_follows_others_is_searched_for_its_singular_inputs():
     # Two four-bars: the rocker of the first, a parallelogram, is the crank of the second, another
     # parallelogram, which folds flat whenever that rocker lies on the ground line.
     links = {
@@ -134,7 +132,7 @@ def test_a_dyad_that_follows_others_is_searched_for_its_singular_inputs() -> Non
     assert agree(met(closure, Status.TOGGLE), [0.0])
 
 
-def test_the_ends_of_a_limited_range_are_toggles() -> None:
+def test_the_ends_of_a_limited_range_are_toggles():
     closure = Closure(four_bar_linkage((6.0, 4.0, 5.0, 4.5), 'left'))
     (interval,) = closure.input_ranges
     assert [one.value for one in closure.singular_inputs] == [interval.lowest, interval.highest]
@@ -152,7 +150,7 @@ def test_the_ends_of_a_limited_range_are_toggles() -> None:
         ('straight_rev_ahead', Status.INDETERMINATE, [0.0]),
     ],
 )
-def test_the_files_that_had_none(name: str, status: Status, places: list[float]) -> None:
+def test_the_files_that_had_none(name, status, places):
     closure = defect(name)
     assert agree(met(closure, status), places)
     assert closure.singularity_margin(closure.position(places[0] + 1e-3)).toggle_distance < inf
@@ -178,8 +176,6 @@ assembly: {{B: left{side}}}
 joints:
   s: {{slider: S}}
 """
-
-
 """The rocker's pin C lies a quarter of a turn ahead of its B."""
 
 
@@ -196,7 +192,7 @@ def statuses_at(solved: Closure, value: float) -> set[Status]:
     }
 
 
-def test_a_rod_as_long_as_the_rocker_goes_on_through_both_of_its_change_points() -> None:
+def test_a_rod_as_long_as_the_rocker_goes_on_through_both_of_its_change_points():
     # C at the height cos φ over the line, the rod 1: it lies flat where the rocker is across, and
     # C and the rod's end are mirrored then: s = 2·cos(φ + π/2).
     solved = closure(
@@ -218,7 +214,7 @@ def test_a_rod_as_long_as_the_rocker_goes_on_through_both_of_its_change_points()
     assert statuses_at(solved, 0.0) == statuses_at(solved, pi) == {Status.CHANGE_POINT}
 
 
-def test_where_the_pins_of_a_straight_rod_meet_in_a_chain_no_pose_can_be_told() -> None:
+def test_where_the_pins_of_a_straight_rod_meet_in_a_chain_no_pose_can_be_told():
     solved = closure(
         '{point: D, along: rod, through: C, direction: [1, 0]}',
         'rod: {C: [0, 0]}',
@@ -232,7 +228,7 @@ def test_where_the_pins_of_a_straight_rod_meet_in_a_chain_no_pose_can_be_told() 
 
 
 @pytest.mark.parametrize('turn', np.arange(0.1, 1.5, 0.1).tolist())
-def test_where_two_lines_are_parallel_in_a_chain_no_pose_can_be_told(turn: float) -> None:
+def test_where_two_lines_are_parallel_in_a_chain_no_pose_can_be_told(turn):
     solved = closure(
         '{point: E, block: one, along: ground, through: O2, direction: '
         f'[{np.cos(turn)}, {np.sin(turn)}]}}\n'

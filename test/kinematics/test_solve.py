@@ -15,8 +15,6 @@
 
 """Any linkage is solved for many states at once as it is for one: the same statuses and values."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib import import_module
 from math import inf, nan, pi, tau
@@ -32,7 +30,7 @@ from campaigns.topologies.families import FAMILIES
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import diagonals, dyads, newton_group, point_steps, rail
+from linkage_ros.kinematics import diagonals, dyads, newton_group, rail, step
 from linkage_ros.kinematics.batch import Batch, CODES
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Answer, Compiled
@@ -94,36 +92,32 @@ OTHERS: dict[str, tuple[Linkage, Inputs]] = {
     'rod in a swivel on two cranks': (
         Linkage(
             links={'ground': GROUND, **CRANKS, 'rod': {'A': (0.0, 0.0), 'T': (0.0, 0.05)}},
-            inputs=DRIVEN,
-            assembly={'swivel': 'ahead'},
+            inputs=DRIVEN, assembly={'swivel': 'ahead'},
             joints={'rod': RevoluteJoint('two', 'rod'), 'slide': SlideJoint('swivel')},
-            sliders={'swivel': Slider('D', 'rod', 'T', (1.0, 0.2))},
+            sliders={'swivel': Slider('D', 'rod', 'T', (1.0, 0.2))}
         ),
         TWO_TURNS,
     ),
     'yoke on two cranks': (
         Linkage(
-            links={'ground': GROUND, **CRANKS, 'yoke': {'U': (0.1, 0.0)}},
-            inputs=DRIVEN,
-            assembly={},
-            joints={'stroke': SlideJoint('way'), 'slot': SlideJoint('slot')},
+            links={'ground': GROUND, **CRANKS, 'yoke': {'U': (0.1, 0.0)}}, inputs=DRIVEN,
+            assembly={}, joints={'stroke': SlideJoint('way'), 'slot': SlideJoint('slot')},
             sliders={
                 'slot': Slider('A', 'yoke', 'U', (0.3, 1.0)),
                 'way': Slider('U', 'two', 'D', (1.0, 0.5), 'yoke', 0.3),
-            },
+            }
         ),
         TWO_TURNS,
     ),
     'pin in two slots': (
         Linkage(
             links={'ground': GROUND, **CRANKS, 'b1': {'P': (0.0, 0.0)}, 'b2': {'P': (0.1, 0.0)}},
-            inputs=DRIVEN,
-            assembly={},
+            inputs=DRIVEN, assembly={},
             joints={'first': SlideJoint('s1'), 'second': SlideJoint('s2')},
             sliders={
                 's1': Slider('P', 'one', 'A', (1.0, 0.5), 'b1'),
                 's2': Slider('P', 'two', 'D', (0.0, 1.0), 'b2', 0.2),
-            },
+            }
         ),
         TWO_TURNS,
     ),
@@ -131,17 +125,15 @@ OTHERS: dict[str, tuple[Linkage, Inputs]] = {
         Linkage(
             links={
                 'ground': {'O': (0.0, 0.0), 'G': (0.1, 0.2)},
-                'crank': {'O': (0.1, -0.2), 'S': (0.4, 0.1)},
-                'b1': {'P': (0.0, 0.0)},
+                'crank': {'O': (0.1, -0.2), 'S': (0.4, 0.1)}, 'b1': {'P': (0.0, 0.0)},
                 'b2': {'P': (0.1, 0.0)},
             },
-            inputs=(Input('crank_joint', 'ground', 'crank'),),
-            assembly={},
+            inputs=(Input('crank_joint', 'ground', 'crank'),), assembly={},
             joints={'first': SlideJoint('s1'), 'second': SlideJoint('s2')},
             sliders={
                 's1': Slider('P', 'crank', 'S', (1.0, 0.5), 'b1'),
                 's2': Slider('P', 'ground', 'G', (0.0, 1.0), 'b2', 0.2),
-            },
+            }
         ),
         ((-7.0, 7.0),),
     ),
@@ -154,25 +146,22 @@ OTHERS: dict[str, tuple[Linkage, Inputs]] = {
                 'rod': {'T': (0.0, 0.0), 'B': (0.5, 0.0)},
                 'rocker': {'E': (0.0, 0.0), 'B': (0.45, 0.1)},
             },
-            inputs=(DRIVEN[0], Input('elbow', 'arm', 'one')),
-            assembly={'B': 'left'},
+            inputs=(DRIVEN[0], Input('elbow', 'arm', 'one')), assembly={'B': 'left'},
             joints={'rod': RevoluteJoint('arm', 'rod'), 'rocker': RevoluteJoint('one', 'rocker')},
-            sliders={},
+            sliders={}
         ),
         TWO_TURNS,
     ),
     'motor within a dyad': (
         Linkage(
             links={
-                'ground': GROUND,
-                'one': {'O': (0.0, 0.0), 'M': (0.5, 0.1)},
+                'ground': GROUND, 'one': {'O': (0.0, 0.0), 'M': (0.5, 0.1)},
                 'two': {'M': (0.1, 0.0), 'B': (0.5, 0.0)},
                 'rocker': {'E': (0.0, 0.0), 'B': (0.7, 0.0)},
             },
-            inputs=(Input('elbow', 'one', 'two'),),
-            assembly={'B': 'left'},
+            inputs=(Input('elbow', 'one', 'two'),), assembly={'B': 'left'},
             joints={'one': RevoluteJoint('ground', 'one'), 'rod': RevoluteJoint('rocker', 'two')},
-            sliders={},
+            sliders={}
         ),
         ((-4.0, 4.0),),
     ),
@@ -186,10 +175,9 @@ OTHERS: dict[str, tuple[Linkage, Inputs]] = {
                 'rod': {'C': (0.0, 0.0), 'F': (0.2, 0.0)},
                 'arm': {'E': (0.0, 0.0), 'F': (0.4, 0.0)},
             },
-            inputs=(Input('crank_joint', 'ground', 'crank'),),
-            assembly={'B': 'left', 'F': 'left'},
+            inputs=(Input('crank_joint', 'ground', 'crank'),), assembly={'B': 'left', 'F': 'left'},
             joints={'rod': RevoluteJoint('rocker', 'rod'), 'arm': RevoluteJoint('ground', 'arm')},
-            sliders={},
+            sliders={}
         ),
         ((-4.0, 4.0),),
     ),
@@ -205,28 +193,21 @@ OTHERS: dict[str, tuple[Linkage, Inputs]] = {
             inputs=(Input('crank_joint', 'ground', 'crank'),),
             assembly={'B': 'left', 'swivel': 'behind'},
             joints={'rod': RevoluteJoint('rocker', 'rod'), 'slide': SlideJoint('swivel')},
-            sliders={'swivel': Slider('E', 'rod', 'T', (1.0, 0.0))},
+            sliders={'swivel': Slider('E', 'rod', 'T', (1.0, 0.0))}
         ),
         ((-4.0, 4.0),),
     ),
     'coupler and rocker short beside crank and ground': (
-        four_bar_linkage((40.0, 3.0, 2.5, 41.0), 'left'),
-        ((-0.2, 0.2),),
+        four_bar_linkage((40.0, 3.0, 2.5, 41.0), 'left'), ((-0.2, 0.2),),
     ),
     'parallelogram on the right': (
-        four_bar_linkage((0.04, 0.12, 0.04, 0.12), 'right'),
-        ((-9.0, 9.0),),
+        four_bar_linkage((0.04, 0.12, 0.04, 0.12), 'right'), ((-9.0, 9.0),),
     ),
     'rod through the crankshaft': (
-        inverted_slider_crank_linkage((0.2, 0.2, 0.0), 'ahead'),
-        ((-9.0, 9.0),),
+        inverted_slider_crank_linkage((0.2, 0.2, 0.0), 'ahead'), ((-9.0, 9.0),),
     ),
-    'rod as long as the crank': (
-        slider_crank_linkage(0.2, 0.2, 0.0, 'ahead'),
-        ((-9.0, 9.0),),
-    ),
-}
-
+    'rod as long as the crank': (slider_crank_linkage(0.2, 0.2, 0.0, 'ahead'), ((-9.0, 9.0),)),
+}  # fmt: skip
 
 LIMITS = ((4e-15, 1), (4e-15, 2), (2e-14, 2))
 """
@@ -252,11 +233,7 @@ def samples(inputs: Inputs, count: int) -> list[Array]:
 
 
 def check(closure: Closure, inputs: list[Array], slenderness: float = 1.0) -> set[Status]:
-    """
-    Hold every state against the scalar closure; return the statuses that were met.
-
-    The slenderness is how much longer a link is than another, at which its roundings are seen.
-    """
+    """Hold every state against the scalar closure within roundings; return the statuses met."""
     rates, pulls = [1.3, 0.7, 0.4][: len(inputs)], [0.3, -0.4, 0.2][: len(inputs)]
     batch = closure.solve(*inputs, rates=rates, accelerations=pulls)
     for i, state in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
@@ -317,7 +294,7 @@ def neighbours(closure: Closure, state: tuple[float, ...]) -> list[Position]:
 
 
 @pytest.mark.parametrize('name', [*KINDS, *OTHERS])
-def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name: str) -> None:
+def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name):
     closure, inputs = case_of(name)
     met = check(closure, samples(inputs, 500))
     assert Status.CLOSED in met
@@ -327,7 +304,7 @@ def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name: str) -
 
 
 @pytest.mark.parametrize('family', [name for name in FAMILIES if 'class III' not in name])
-def test_random_linkages_are_solved_as_state_by_state(family: str) -> None:
+def test_random_linkages_are_solved_as_state_by_state(family):
     topology = FAMILIES[family].make(random.Random(f'{SEED}/{family}/0'))
     closure = Closure(topology.linkage)
     rng = np.random.default_rng(SEED)
@@ -339,9 +316,7 @@ def test_random_linkages_are_solved_as_state_by_state(family: str) -> None:
 
 
 @pytest.mark.parametrize('name', [name for name in KINDS if name != 'class_3'])
-def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(name, monkeypatch):
     closure, inputs = case_of(name)
     asked = []
     answer_of = Compiled.__call__
@@ -356,14 +331,12 @@ def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(
     assert (batch.status == CLOSED).sum() > 5000
 
 
-def test_every_kind_of_step_is_tested() -> None:
+def test_every_kind_of_step_is_tested():
     steps = [step for name in (*KINDS, *OTHERS) for step in case_of(name)[0].steps]
     kinds = [
         import_module(f'{dyads.__name__}.{name}') for _, name, _ in iter_modules(dyads.__path__)
     ]
-    assert {type(step) for step in steps} == classes_with(
-        'close', point_steps, newton_group, *kinds
-    )
+    assert {type(step) for step in steps} == classes_with('close', step, newton_group, *kinds)
     parts = [getattr(step, name, None) for step in steps for name in ('diagonal', 'rail')]
     wanted = classes_with('at', diagonals, diagonals, rail)
     assert {type(part) for part in parts if part is not None} == wanted
@@ -406,9 +379,7 @@ def linkages(draw: Any) -> tuple[Linkage, float]:
 
 @settings(derandomize=True, deadline=None, max_examples=300)
 @given(linkages(), crank_angles)
-def test_any_linkage_of_one_loop_is_solved_as_state_by_state(
-    drawn: tuple[Linkage, float], angles: list[float]
-) -> None:
+def test_any_linkage_of_one_loop_is_solved_as_state_by_state(drawn, angles):
     linkage, slenderness = drawn
     try:
         closure = Closure(linkage)
@@ -418,7 +389,7 @@ def test_any_linkage_of_one_loop_is_solved_as_state_by_state(
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'elliptic_trammel', 'five_bar'])
-def test_how_the_states_are_cut_into_blocks_changes_nothing(name: str) -> None:
+def test_how_the_states_are_cut_into_blocks_changes_nothing(name):
     closure, limits = case_of(name)
     inputs = samples(limits, 2 * BLOCK + 77)
     rates = [1.3] * len(inputs)
@@ -431,7 +402,7 @@ def test_how_the_states_are_cut_into_blocks_changes_nothing(name: str) -> None:
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'five_bar', 'class_3', 'excavator_bucket'])
-def test_no_state_at_all_is_solved_too(name: str) -> None:
+def test_no_state_at_all_is_solved_too(name):
     closure, limits = case_of(name)
     joints = len(closure.linkage.joints)
     batch = closure.solve(*samples(limits, 0), rates=[1.0] * len(limits))
@@ -439,7 +410,7 @@ def test_no_state_at_all_is_solved_too(name: str) -> None:
     assert all(array.shape == (joints, 0) for array in batch[1:])
 
 
-def test_rates_are_numbers_or_arrays_and_1_if_not_given() -> None:
+def test_rates_are_numbers_or_arrays_and_1_if_not_given():
     closure, _ = case_of('four_bar')
     phi = np.linspace(0.0, 6.0, 40)
     rates, pulls = np.linspace(-2.0, 3.0, 40), np.linspace(4.0, -1.0, 40)
@@ -457,7 +428,7 @@ def test_rates_are_numbers_or_arrays_and_1_if_not_given() -> None:
     np.testing.assert_allclose(varied.accelerations, expected, rtol=1e-12, atol=1e-13)
 
 
-def test_an_input_may_be_one_number_for_all_states() -> None:
+def test_an_input_may_be_one_number_for_all_states():
     closure, _ = case_of('five_bar')
     phi = np.linspace(1.0, 2.0, 30)
     one = closure.solve(phi, 0.5, rates=(1.0, 0.0))
@@ -466,7 +437,7 @@ def test_an_input_may_be_one_number_for_all_states() -> None:
         np.testing.assert_array_equal(mine, theirs)
 
 
-def test_what_is_not_asked_for_is_none_and_the_rest_is_the_same() -> None:
+def test_what_is_not_asked_for_is_none_and_the_rest_is_the_same():
     for name in ('four_bar', 'whitworth_quick_return', 'class_3'):
         closure, limits = case_of(name)
         inputs = samples(limits, 50)
@@ -480,7 +451,7 @@ def test_what_is_not_asked_for_is_none_and_the_rest_is_the_same() -> None:
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank'])
-def test_results_go_where_they_are_wanted(name: str) -> None:
+def test_results_go_where_they_are_wanted(name):
     closure, limits = case_of(name)
     inputs = samples(limits, 100)
     expected = closure.solve(*inputs)
@@ -500,7 +471,7 @@ def test_results_go_where_they_are_wanted(name: str) -> None:
     assert (table[:, 2:] == 777.0).all()
 
 
-def test_a_state_that_is_no_number_is_indeterminate_and_alone_in_that() -> None:
+def test_a_state_that_is_no_number_is_indeterminate_and_alone_in_that():
     for name in ('four_bar', 'slider_crank', 'class_3', 'jansen_leg', 'excavator_bucket'):
         closure, ((low, high),) = case_of(name)
         values = np.array([0.5 * (low + high), nan, inf, -inf, 0.5 * (low + high)])
@@ -510,7 +481,7 @@ def test_a_state_that_is_no_number_is_indeterminate_and_alone_in_that() -> None:
             assert np.isnan(array).tolist() == [[False, True, True, True, False]] * len(array)
 
 
-def test_a_toggle_has_a_position_and_no_rate() -> None:
+def test_a_toggle_has_a_position_and_no_rate():
     # Stretched: the bar of the trammel lies in the driven slot.
     closure, _ = case_of('elliptic_trammel')
     batch = closure.solve(np.array([0.12, 0.1, 0.13]))
@@ -521,7 +492,7 @@ def test_a_toggle_has_a_position_and_no_rate() -> None:
     assert batch.positions[:, 0].tolist() == pytest.approx(position.joints, abs=1e-15)
 
 
-def test_lines_that_are_parallel_do_not_cross_or_lie_on_each_other() -> None:
+def test_lines_that_are_parallel_do_not_cross_or_lie_on_each_other():
     linkage, _ = OTHERS['pin in two slots']
     sliders = {
         's1': Slider('P', 'one', 'A', (1.0, 0.0), 'b1'),
@@ -536,7 +507,7 @@ def test_lines_that_are_parallel_do_not_cross_or_lie_on_each_other() -> None:
 
 
 @pytest.mark.parametrize('exponent', [-900, -300, 3, 900])
-def test_the_unit_of_the_lengths_changes_no_bit(exponent: int) -> None:
+def test_the_unit_of_the_lengths_changes_no_bit(exponent):
     unit = 2.0**exponent
     phi = np.linspace(-3.0, 3.0, 50)
     for lengths in ((0.04, 0.12, 0.08, 0.1), (4.0, 2.0, 4.5, 5.0), (0.04, 0.12, 0.04, 0.12)):
@@ -549,7 +520,7 @@ def test_the_unit_of_the_lengths_changes_no_bit(exponent: int) -> None:
 
 
 @pytest.mark.parametrize('name', [*KINDS, *OTHERS])
-def test_nothing_makes_numpy_warn(name: str) -> None:
+def test_nothing_makes_numpy_warn(name):
     closure, limits = case_of(name)
     angles = np.array([0.0, -0.0, pi, 1e-310, -1e5, nan, inf, limits[0][0], limits[0][1]])
     with warnings.catch_warnings(), np.errstate(all='warn'):
@@ -574,9 +545,7 @@ def test_nothing_makes_numpy_warn(name: str) -> None:
          'out.positions: is float64 (5, 2), not float64 (2, 5)'),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_is_said_in_one_line(
-    name: str, inputs: int, more: dict[str, Any], text: str
-) -> None:
+def test_what_does_not_fit_is_said_in_one_line(name, inputs, more, text):
     with pytest.raises(ValueError, match=f'^{re.escape(text)}$'):
         case_of(name)[0].solve(*[np.ones(5)] * inputs, **more)
 
@@ -589,12 +558,12 @@ def test_what_does_not_fit_is_said_in_one_line(
         ((np.ones((2, 3)), 1.0), 'inputs: shapes (2, 3), () do not broadcast to one (N,)'),
     ],
 )
-def test_inputs_are_arrays_of_one_length(arrays: Any, text: str) -> None:
+def test_inputs_are_arrays_of_one_length(arrays, text):
     with pytest.raises(ValueError, match=f'^{re.escape(text)}$'):
         case_of('five_bar')[0].solve(*arrays, rates=(1.0, 1.0))
 
 
-def test_memory_does_not_grow_with_the_states() -> None:
+def test_memory_does_not_grow_with_the_states():
     for name in ('four_bar', 'klann_leg', 'slider_crank'):
         closure, limits = case_of(name)
         peaks = []
@@ -610,7 +579,7 @@ def test_memory_does_not_grow_with_the_states() -> None:
 
 
 @pytest.mark.parametrize('name', ['rail_on_coupler', 'standing_rpr'])
-def test_rails_on_links_that_follow_and_links_that_never_turn(name: str) -> None:
+def test_rails_on_links_that_follow_and_links_that_never_turn(name):
     closure = defect(name)
     (interval,) = closure.input_ranges
     check(closure, [np.linspace(interval.lowest, interval.highest, 97)[1:-1]])

@@ -13,17 +13,15 @@
 # limitations under the License.
 
 """
-What the source texts work out, to double precision, and the poses in which their formulas fail.
+The worked examples of the source texts, to double precision, and where their formulas fail.
 
 Numbers in full are the exact results of the texts' own problems, to twenty digits.
 """
 
-from __future__ import annotations
-
 from math import acos, atan2, cos, degrees, nextafter, pi, radians, sin
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, Side, SlideJoint, Slider
+from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpf
 import pytest
@@ -47,9 +45,7 @@ FOUR_BARS = {
         ('behind', -0.17753658182601928364, 170.3030180128789738),
     ],
 )
-def test_the_slider_crank_of_the_first_text_is_solved(
-    side: Side, slide: float, degree: float
-) -> None:
+def test_the_slider_crank_of_the_first_text_is_solved(side, slide, degree):
     linkage = Linkage(
         links={
             'ground': {'A': (0.0, 0.0), 'C': (0.25, 0.10)},
@@ -71,7 +67,7 @@ def test_the_slider_crank_of_the_first_text_is_solved(
 
 
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_the_pin_of_the_second_text_is_where_both_its_roots_say(name: str) -> None:
+def test_the_pin_of_the_second_text_is_where_both_its_roots_say(name):
     # K1…K4 at 60 digits: what fails in them at sixteen does not matter there.
     a, b, c, d = FOUR_BARS[name]
     compared = 0
@@ -108,7 +104,7 @@ def _pin_error(angle, link: float, ground: float) -> float:
 
 @pytest.mark.parametrize('name', FOUR_BARS)
 @pytest.mark.parametrize('side', [1, -1])
-def test_the_rates_of_the_third_text_are_what_its_loop_equation_says(name: str, side: int) -> None:
+def test_the_rates_of_the_third_text_are_what_its_loop_equation_says(name, side):
     a, b, c, d = FOUR_BARS[name]
     dyad = FourBar(a, b, c, d, side)
     compared = 0
@@ -133,9 +129,7 @@ def test_the_rates_of_the_third_text_are_what_its_loop_equation_says(name: str, 
 @pytest.mark.parametrize('side', [1, -1])
 @pytest.mark.parametrize('offset', [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
 @pytest.mark.parametrize('direction', [1, -1])
-def test_a_crank_pin_square_above_the_ground_pivot_is_an_ordinary_pose(
-    side: int, offset: float, direction: int
-) -> None:
+def test_a_crank_pin_square_above_the_ground_pivot_is_an_ordinary_pose(side, offset, direction):
     # d = Ax, by which the second text divides: near it, its roots are of the other assembly.
     lengths = (2.0, 3.0, 3.0, 1.0)
     for turn in (1, -1):
@@ -159,9 +153,7 @@ def test_a_crank_pin_square_above_the_ground_pivot_is_an_ordinary_pose(
     ],
 )
 @pytest.mark.parametrize('offset', [0.0, 1e-15, -1e-15, 1e-9, -1e-9, 1e-3, -1e-3])
-def test_a_rocker_along_the_ground_has_a_rate(
-    lengths: tuple[float, float, float, float], side: int, rocker: float, offset: float
-) -> None:
+def test_a_rocker_along_the_ground_has_a_rate(lengths, side, rocker, offset):
     # A = (0, 3) and B = (4, 0): a triangle 3-4-5, and the third text divides by sin θ4.
     phi = pi / 2 + offset
     dyad = FourBar(*lengths, side)
@@ -178,9 +170,7 @@ def test_a_rocker_along_the_ground_has_a_rate(
 # Pins nearer than 1e-153 of the crank have no square of their distance.
 @pytest.mark.parametrize('zero', [0.0, -0.0, 5e-324, 1e-310, 1e-300, -1e-160])
 @pytest.mark.parametrize('side', [1, -1])
-def test_a_crank_pin_on_the_swivel_leaves_the_rod_without_a_direction(
-    zero: float, side: int
-) -> None:
+def test_a_crank_pin_on_the_swivel_leaves_the_rod_without_a_direction(zero, side):
     # And not the angle 0, which a formula might give out.
     assert InvertedSliderCrank(1.5, 1.5, 0.0, side).close(zero).status is Status.INDETERMINATE
 
@@ -188,9 +178,7 @@ def test_a_crank_pin_on_the_swivel_leaves_the_rod_without_a_direction(
 @pytest.mark.parametrize('exponent', [-3, -6, -8, -9, -12, -15, -50, -150])
 @pytest.mark.parametrize('direction', [1, -1])
 @pytest.mark.parametrize('side', [1, -1])
-def test_a_crank_pin_next_to_the_swivel_is_an_ordinary_pose(
-    exponent: int, direction: int, side: int
-) -> None:
+def test_a_crank_pin_next_to_the_swivel_is_an_ordinary_pose(exponent, direction, side):
     # a = d: the rod turns at half the crank's rate, through the swivel and on.
     a, phi = 1.5, direction * 10.0**exponent
     dyad = InvertedSliderCrank(a, a, 0.0, side)
@@ -205,7 +193,7 @@ def test_a_crank_pin_next_to_the_swivel_is_an_ordinary_pose(
     assert slide_rate == pytest.approx(side * 2.0 * a * cos(phi / 2), rel=1e-15)
 
 
-def test_the_rod_may_point_into_every_quadrant() -> None:
+def test_the_rod_may_point_into_every_quadrant():
     # The first text's arctan, with a case on the sign of a cosine, is a formula for two of them.
     quadrants = set()
     for degree in range(2, 360, 5):
@@ -220,7 +208,7 @@ def test_the_rod_may_point_into_every_quadrant() -> None:
     assert quadrants == {0, 1, 2, 3}
 
 
-def test_a_rod_straight_up_is_no_special_case() -> None:
+def test_a_rod_straight_up_is_no_special_case():
     # cos θ3 = 0: the swivel is square above the crank pin, between two neighbouring floats.
     a, d = 1.0, 0.5
     phi = acos(0.5)

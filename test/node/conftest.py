@@ -15,8 +15,6 @@
 
 """Fixtures of the tests over ROS; where there is no rclpy, none of them is collected."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 import os
 from pathlib import Path

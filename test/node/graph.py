@@ -19,8 +19,6 @@ The tests' own end of a ROS graph, in plain rclpy, and nodes as real processes.
 Nothing of the package is used here: what a node says is seen as any other program would see it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import fcntl
@@ -98,12 +96,7 @@ def stamp_of(message: Any) -> int:
 
 
 def node_of(context: rclpy.Context, name: str) -> Node:
-    """
-    Return a node without rclpy's type description service.
-
-    rclpy 7.1 frees that service twice when the node is destroyed: once in some 800 tests, the
-    process crashed there.
-    """
+    """Return a node without its type description service, which rclpy 7.1 may free twice."""
     without = Parameter('start_type_description_service', value=False)
     return Node(name, context=context, parameter_overrides=[without])
 

@@ -15,8 +15,6 @@
 
 """The shipped linkages by complex numbers, independent of the package."""
 
-from __future__ import annotations
-
 from cmath import exp, phase
 from math import acos, remainder, sqrt, tau
 
@@ -24,23 +22,6 @@ import pytest
 
 A, B, C, D = 0.040, 0.120, 0.080, 0.100
 """Lengths of config/linkages/four_bar.yaml, in [m]."""
-
-FIVE_BAR = """
-links:
-  ground: {O1: [0, 0], O2: [0.1, 0]}
-  left: {O1: [0, 0], A: [0.04, 0]}
-  right: {O2: [0, 0], C: [0.05, 0]}
-  upper: {A: [0, 0], B: [0.12, 0]}
-  lower: {C: [0, 0], B: [0.11, 0]}
-input:
-  - {joint: left_crank, parent: ground, child: left}
-  - {joint: right_crank, parent: ground, child: right}
-assembly: {B: left}
-joints:
-  upper_joint: {parent: ground, child: upper}
-  lower_joint: {parent: ground, child: lower}
-"""
-"""Two cranks on the ground, two links between them, all straight."""
 
 
 def four_bar(theta: float) -> tuple[float, float]:

@@ -22,8 +22,6 @@ heard; and the node's `tick` diagnostics. Variables of the environment that begi
 the node's, without it.
 """
 
-from __future__ import annotations
-
 from array import array
 import fcntl
 import json

@@ -25,8 +25,6 @@ A scene has one drive for each linkage, and some things exclude each other, so t
 The replay runs in a process of its own too, with other hashes of texts.
 """
 
-from __future__ import annotations
-
 import hashlib
 from itertools import pairwise
 from math import cos, sin
@@ -51,7 +49,6 @@ from .ticked import Moment, run
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
 TICKS = 1500
-
 BACKLASH = '  backlash: {play: 0.01}\n'
 ALL_EFFECTS = f"""effects:
   tolerance: {{standard_deviation: 2.0e-5}}
@@ -70,7 +67,7 @@ ALL_EFFECTS = f"""effects:
   jitter: {{seconds: 3.0e-4, distribution: half_normal}}
   bias: {{joints: {{rocker_joint: 0.01}}}}
   noise: {{joints: {{rocker_joint: {{white: 0.001, walk: 0.001, rate_white: 0.01}}}}}}
-  encoder: {{joints: {{coupler_joint: {{counts: 4096}}}}}}
+  encoder: {{joints: {{crank_joint: {{counts: 4096}}, coupler_joint: {{counts: 4096}}}}}}
   rate_limit: {{rate: 700}}
   dropout: {{probability: 0.1, burst: 3}}
   delay: {{seconds: 0.0025}}

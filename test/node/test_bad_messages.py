@@ -175,9 +175,7 @@ def test_messages_of_other_joints_are_ignored_and_counted_apart(rig, kind):
     assert (status.level, status.message) == (OK, 'Samples arriving')
     assert rig.rejected() == before
     # One of what was sent before may still come: they are throttled.
-    assert not [
-        line for line in warnings(rig)[warned:] if 'missing' in line or 'none with' in line
-    ]
+    assert not [line for line in warnings(rig)[warned:] if 'missing' in line or 'hold' in line]
     rig.hold(0.6)
 
 
@@ -189,12 +187,14 @@ def test_where_no_message_ever_had_the_crank_it_says_so(rig, write_scene, start)
     node = start(write_scene('misnamed', 'rate: 50'), '-r', 'crank_states:=misnamed')
     publisher = rig.graph.publisher(JointState, '/misnamed')
     wait_for(
-        lambda: publisher.publish(crank(1.0, name='Crank')) or 'none with' in node.log,
+        lambda: publisher.publish(crank(1.0, name='Crank')) or ' hold ' in node.log,
         'the warning',
     )
-    (line, *_) = [line for line in node.log.splitlines() if 'none with' in line]
+    (line, *_) = [line for line in node.log.splitlines() if ' hold ' in line]
     assert re.search(
-        r'/misnamed: \d+ messages, none with crank_joint: name the joint so there, or remap', line
+        r"messages on /misnamed hold 'Crank'; the linkage needs 'crank_joint': name the joint so "
+        'there, or remap the topic$',
+        line,
     )
 
 

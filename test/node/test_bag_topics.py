@@ -15,8 +15,6 @@
 
 """How topics are described in bags, by what rosbag2 writes of them."""
 
-from __future__ import annotations
-
 import re
 
 from linkage_ros.bag.topic import INFINITE

@@ -19,8 +19,6 @@ Faults that somebody asks for: they are told, they do what they say, and the bag
 One node goes through all of them, each begun and ended by its service.
 """
 
-from __future__ import annotations
-
 import json
 import time
 
@@ -127,7 +125,6 @@ def test_by_service(graph, folder, drill):
     wait_for(lambda: graph.value('faults', 'Times injected: pulled') == '1', 'the timeline')
     graph.wait_for_level('faults', OK)
     drill.newly_heard()
-
     for name, shows in WITH_STATES.items():
         drill.inject(name, True)
         heard = drill.newly_heard()
@@ -138,7 +135,6 @@ def test_by_service(graph, folder, drill):
             assert int(rejected) > 0
         drill.inject(name, False)
         still_moving(drill.newly_heard())
-
     for name in ('snapped', 'pulled'):
         drill.inject(name, True)
         drill.states.clear()
@@ -147,13 +143,11 @@ def test_by_service(graph, folder, drill):
         assert drill.states == []
         drill.inject(name, False)
         still_moving(drill.newly_heard())
-
     assert graph.value('tick', 'Clock jumps back') == '1'
     asked = [(name, on) for name in (*WITH_STATES, 'snapped', 'pulled') for on in (True, False)]
     assert changes(graph) == [('pulled', True), ('pulled', False), *asked]
     assert drill.node.end() == 0
     assert 'Traceback' not in drill.node.log
-
     bag = read_bag(folder / 'drilled')
     again = list(replay(bag, recorded_scene(bag)))
     assert len(again) > 1000

@@ -15,8 +15,6 @@
 
 """Bags of a node as a reader in another language sees them, and as the graph describes them."""
 
-from __future__ import annotations
-
 import signal
 import time
 

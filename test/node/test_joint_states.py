@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What is published on joint_states, by an independent solution at each message's stamp."""
+"""joint_states holds the linkage's pose at each message's stamp, by an independent solution."""
 
 from cmath import exp
 from math import pi, remainder, tau
@@ -61,7 +61,6 @@ def test_ticks_are_solved_at_their_own_stamp(graph, write_scene, start):
     publish_turning_crank(publisher, 1.5, begin=begin, wrap=True)
     drop_until_quiet(heard)
     assert len(heard) > 100
-
     previous = None
     for message in heard:
         assert message.name == ['coupler_joint', 'rocker_joint']
@@ -93,7 +92,6 @@ def test_rate_0_answers_every_sample_with_its_own_stamp(graph, write_scene, star
     begin = time.time_ns()
     sent = publish_turning_crank(publisher, 0.8, begin=begin, wrap=False)
     drop_until_quiet(heard)
-
     stamps = [stamp_of(message) for message in heard]
     assert len(stamps) > len(sent) / 2
     assert stamps == sorted(set(stamps) & set(sent)), (
@@ -129,6 +127,10 @@ def test_on_a_shared_topic_its_own_messages_are_ignored(graph, write_scene, star
     assert received() <= len(sent)
     assert graph.value('crank', 'Samples rejected') == '0'
     assert node.end() == 0
-    warnings = [line for line in node.log.splitlines() if '[WARN]' in line]
-    # On a busy machine it may see that the crank has ended.
-    assert all(': no message in ' in line for line in warnings)
+    # On a busy machine it may see that the crank has ended, or lose ticks.
+    warnings = [
+        line
+        for line in node.log.splitlines()
+        if '[WARN]' in line and 'no message on ' not in line and ' ticks lost ' not in line
+    ]
+    assert warnings == []

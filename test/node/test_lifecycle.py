@@ -109,7 +109,6 @@ def test_a_managed_life_with_two_bags(write_scene, start, folder, change, state,
     assert change(Transition.TRANSITION_CLEANUP)
     assert change(Transition.TRANSITION_CONFIGURE), 'it may be set up again'
     assert node.end() == 0
-
     bags = sorted(runs.iterdir())
     assert len(bags) == 2
     for bag in bags:
@@ -163,7 +162,6 @@ def test_reset_forgets_turns_and_stamps(graph, write_scene, start, trigger, turn
     for third in range(1, 10):
         heard = turn(angle=third * 2.0943951)
     assert heard[-1].position[0] - first == pytest.approx(-18.85, abs=0.01)
-
     success, message = trigger('reset')
     assert success, message
     time.sleep(0.2)
@@ -252,7 +250,6 @@ def test_a_refused_parameter_says_why(graph, write_scene, start):
         successful, reason = change(refused)
         assert not successful, refused
         assert len(reason.splitlines()) == 1
-
     names = ['scene', 'autostart', 'diagnostics_period', 'warning_period', 'runs_directory']
     names += [f'warn.{what}' for what in ('transmission_angle', 'conditioning', 'toggle_distance')]
     request = DescribeParameters.Request(names=names)

@@ -13,18 +13,15 @@
 # limitations under the License.
 
 
-"""What a tick publishes beyond the limits of a joint, and what the node says of it."""
-
-from __future__ import annotations
+"""Beyond the limits of a joint a tick publishes what the scene says, and the node tells of it."""
 
 from collections import Counter
 from math import pi, tau
 
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.node.diagnostics import DiagnosticsSummary, Snapshot
+from linkage_ros.node.diagnostics import DiagnosticsSummary, Snapshot, Warnings
 from linkage_ros.node.tick_loop import TickLoop
-from linkage_ros.node.warnings import Warnings
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
@@ -153,12 +150,14 @@ def test_what_is_counted_and_told(said, published):
     assert Counter(counts.unclosed) == Counter({Status.LIMITED: 2})
     assert (len(messages), counts.published, counts.withheld) == (published, published, 0)
     lines = Said()
-    Warnings(lines).look(counts, loop.pipeline.closures, '/crank', 1.0)
+    Warnings(lines).check(counts, loop.pipeline.closures, '/crank', 1.0)
     what = 'nothing published' if said else 'published all the same'
-    assert lines == [f'2 ticks beyond limits, {what}: crank_joint at 2.1, limits [0.5, 1.5]']
+    assert lines == [
+        f'2 ticks beyond limits, {what}: crank_joint at 2.1 rad, limits [0.5, 1.5] rad'
+    ]
     status = health(loop).statuses()[2]
     assert (status.level, status.message) == (
-        WARN, 'Beyond limits: crank_joint at 2.1, limits [0.5, 1.5]',
+        WARN, 'Beyond limits: crank_joint at 2.1 rad, limits [0.5, 1.5] rad',
     )  # fmt: skip
     values = {pair.key: pair.value for pair in status.values}
     assert values['Ticks beyond limits'] == '2'

@@ -15,8 +15,6 @@
 
 """~/markers over DDS: what a display receives, what the bag holds, and views that fit the node."""
 
-from __future__ import annotations
-
 import json
 from math import cos, sin
 from pathlib import Path
@@ -73,7 +71,6 @@ def test_a_display_shows_the_pose_then_that_it_is_open_then_the_pose(
     assert {ns for ns, _ in display} == {'links', 'edges', 'pins', 'ground', 'traces'}
     pins = [complex(p.x, p.y) for p in display['pins', 0].points]
     assert min(abs(pin - 0.2 * complex(cos(1.0), sin(1.0))) for pin in pins) < 1e-12
-
     hold(2.0, lambda: ('status', 0) in shown(arrays.copy()), 'that it is open')
     states.clear()
     arrays_before = len(arrays)
@@ -82,7 +79,6 @@ def test_a_display_shows_the_pose_then_that_it_is_open_then_the_pose(
     assert {ns for ns, _ in display} == {'status', 'ground', 'traces'}
     assert re.fullmatch(r'open: the links miss each other by 0\.\d+ m', display['status', 0].text)
     assert states == []
-
     hold(1.0, lambda: ('links', 0) in shown(arrays.copy()), 'the pose again')
     assert ('status', 0) not in shown(arrays.copy())
     assert node.end() == 0
@@ -117,7 +113,6 @@ def test_the_bag_holds_them_and_replays_them(folder, graph, write_scene, start, 
     node = start(write_scene('seen_in_bag', scene, 'double_rocker'))
     wait_for(lambda: len(arrays) > 120, 'markers')
     assert node.end() == 0
-
     with AnyReader([folder / 'seen']) as reader:
         (connection,) = (c for c in reader.connections if c.topic == MARKERS)
         assert connection.msgtype == 'visualization_msgs/msg/MarkerArray'
@@ -132,7 +127,6 @@ def test_the_bag_holds_them_and_replays_them(folder, graph, write_scene, start, 
         assert [m.ns for m in found.markers] == [m.ns for m in array.markers]
     texts = {m.text for array in bagged for m in array.markers if m.action == Marker.ADD}
     assert any(text.startswith('open') for text in texts)
-
     bag = read_bag(folder / 'seen')
     alone = seen = 0
     for tick in replay(bag, recorded_scene(bag)):

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What is published on ~/motion, and that nothing of it is there where no scene asks for it."""
+"""~/motion carries positions, rates and accelerations, only where a scene asks for it."""
 
 from array import array
 from cmath import exp
@@ -35,13 +35,13 @@ from trajectory_msgs.msg import JointTrajectory
 from .graph import crank, NS, stamp_of, wait_for
 from .loops import (
     accelerations,
-    FIVE_BAR,
     five_bar_gap,
     four_bar,
     inverted_slider_crank,
     modulo_turns,
     rates,
 )
+from ..support.scenes import FIVE_BAR
 
 MOTION = '/linkage_node/motion'
 OMEGA = 20.0
@@ -84,7 +84,6 @@ def test_accelerations_of_a_crank_at_a_constant_rate(
     turn(publisher, 1.0, begin)
     wait_for(lambda: len(motions) > 50, 'motions')
     same_tick = {stamp_of(state): state for state in states}
-
     compared = 0
     for message in motions.copy():
         theta = OMEGA * ((stamp_of(message) - begin) / NS)
@@ -151,7 +150,7 @@ def test_half_of_two_inputs_is_not_used(graph, write_scene, start, publisher, mo
 
     def told():
         publisher.publish(crank(1.0, name='left_crank'))
-        return 'none with left_crank, right_crank' in node.log
+        return "hold 'left_crank'; the linkage needs 'left_crank', 'right_crank'" in node.log
 
     wait_for(told, 'the warning')
     wait_for(
@@ -193,7 +192,6 @@ def test_the_bag_holds_it_and_replays_it(folder, write_scene, start, publisher, 
     turn(publisher, 1.0, time.time_ns())
     wait_for(lambda: len(motions) > 50, 'motions')
     assert node.end() == 0
-
     with AnyReader([folder / 'm']) as reader:
         (connection,) = (c for c in reader.connections if c.topic == MOTION)
         assert connection.msgtype == 'trajectory_msgs/msg/JointTrajectory'
@@ -208,7 +206,6 @@ def test_the_bag_holds_it_and_replays_it(folder, write_scene, start, publisher, 
         assert list(kept.positions) == list(heard.positions)
         assert list(kept.velocities) == list(heard.velocities)
         assert list(kept.accelerations) == list(heard.accelerations)
-
     bag = read_bag(folder / 'm')
     again = list(replay(bag, recorded_scene(bag)))
     assert len(again) == len(bagged)

@@ -15,12 +15,8 @@
 
 """Names and QoS that whoever starts the node gives it: namespace, node name, remaps, overrides."""
 
-from __future__ import annotations
-
 from cmath import rect
 import json
-import subprocess
-import sys
 
 from linkage_ros.bag.reader import read_bag
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -29,6 +25,7 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from .graph import crank, wait_for
+from ..support.commands import linkage
 
 TICKED = 'rate: 100\ndrive: {topic: {carry_forward: false}}\n'
 
@@ -89,12 +86,7 @@ def test_remapped_topics_are_heard_recorded_and_replayed(folder, graph, write_sc
     assert 'from /motor/state' in node.log
     bag = folder / 'remapped'
     assert {topic.name for topic in read_bag(bag).topics} >= {'/all_joints', '/motor/state'}
-    answer = subprocess.run(
-        [sys.executable, '-m', 'linkage_ros.cli.main', 'replay', str(bag), '--json'],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    answer = linkage(folder, 'replay', bag.name, '--json')
     said = json.loads(answer.stdout)
     assert said['verdict'] == 'identical'
 
@@ -113,10 +105,10 @@ def test_the_diagnostics_of_two_namespaces_can_be_told_apart(graph, write_scene,
     assert named() == expected
 
 
-def test_with_both_remappings_of_the_readme_it_does_not_take_itself_for_the_crank(
+def test_with_both_remappings_of_the_docs_it_does_not_take_itself_for_the_crank(
     folder, graph, write_scene, start
 ):
-    # README, "RViz, Foxglove and ros2_control": the crank from where its joint states would be.
+    # docs/how_to/see_it.md: the crank comes from the topic of the broadcaster's joint states.
     scene = f'{TICKED}record: {{directory: {folder}, name: both}}'
     publisher = graph.node.create_publisher(
         JointState, '/joint_states', QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -131,7 +131,6 @@ def test_over_the_graph_with_a_limit_that_is_changed_as_it_runs(graph, write_sce
     found = float(graph.value('loop closure', KEYS[0]))
     assert found == pytest.approx(transmission_angle(0.7), abs=1e-5)
     assert graph.next_status('loop closure').level == OK, 'off by default'
-
     value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.5)
     request = SetParameters.Request(
         parameters=[Parameter(name='warn.transmission_angle', value=value)]

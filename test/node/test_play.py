@@ -15,8 +15,6 @@
 
 """`linkage play` as its user types it: what others on the graph hear, and what it says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import chain, pairwise
@@ -54,11 +52,7 @@ def topic_of(name, kind=None, **qos):
 
 @cache  # rclpy leaves in the padding of a message what stood in memory before
 def joints_and_words(count):
-    """
-    Return (topic's number, log time, bytes); at every tenth time both say something.
-
-    The bytes of each are a multiple of four, to which DDS fills them up.
-    """
+    """Return (topic, log time, bytes); both speak at each tenth time, in multiples of 4 bytes."""
     return list(_joints_and_words(count))
 
 
@@ -353,7 +347,6 @@ def test_a_node_on_simulated_time_repeats_what_was_recorded(
     (bag,) = (tmp_path / 'runs').iterdir()
     recorded = [m.data for m in read_bag(bag).messages() if m.topic == '/joint_states']
     assert len(recorded) > 250
-
     start(write_scene('again', 'rate: 0'), '-p', 'use_sim_time:=true')
     again = listen(graph, '/joint_states')
     # Again and again: messages may get lost before all have found each other, or later on a topic
@@ -488,7 +481,7 @@ def wrong(folder):
 WRONG = [
     # what is typed, and what the answer names
     ('missing', 'missing: does not exist'),
-    ('text.mcap', "text.mcap: starts with b'no bag a', as no MCAP file does"),
+    ('text.mcap', 'text.mcap: is a text file, and no MCAP file'),
     ('empty.mcap', 'empty.mcap: is empty'),
     ('folder', 'folder: holds no .mcap file'),
     ('silent', 'silent: holds no messages; there is nothing to play'),

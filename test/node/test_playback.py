@@ -15,8 +15,6 @@
 
 """When messages are sent: on a clock of the test's, to the nanosecond."""
 
-from __future__ import annotations
-
 from threading import Event
 
 from linkage_ros.bag.order import LogTimeOrder
@@ -56,12 +54,7 @@ class Clock:
 
 
 def played(events, rate=1.0, clock_period=None, takes=None, stop_at=None):
-    """
-    Play (ms, topic) at a rate; return what was sent, in (ms since it began, what).
-
-    What is sent is a topic, or for `/clock` the time of the bag in ms. `takes` says of a
-    topic how many ms it takes to be sent.
-    """
+    """Play (ms, topic) at a rate; return (ms, topic or the clock's ms) as they were sent."""
     clock = Clock(stop_at)
     sent = []
 
@@ -120,17 +113,9 @@ def test_late_ones_are_sent_at_once_and_the_next_is_in_time_again():
 def test_the_clock_ticks_in_real_time_and_tells_the_bags():
     sent, _ = played([(0, 'a'), (50, 'b'), (100, 'a')], rate=2.0, clock_period=10)
     assert sent == [
-        (0, 0),
-        (0, 'a'),
-        (10, 20),
-        (20, 40),
-        (25, 'b'),
-        (30, 60),
-        (40, 80),
+        (0, 0), (0, 'a'), (10, 20), (20, 40), (25, 'b'), (30, 60), (40, 80), (50, 100), (50, 'a'),
         (50, 100),
-        (50, 'a'),
-        (50, 100),
-    ]
+    ]  # fmt: skip
 
 
 def test_the_clock_is_never_ahead_of_what_has_not_been_sent():
@@ -152,13 +137,8 @@ def test_a_loop_goes_on_without_a_gap_and_its_clock_jumps_back():
     events = [(0, 'a'), (30, 'b'), (0, 'a', 30), (30, 'b', 30), (0, 'a', 60), (30, 'b', 60)]
     sent, playback = played(events, clock_period=20)
     assert [each for each in sent if isinstance(each[1], str)] == [
-        (0, 'a'),
-        (30, 'b'),
-        (30, 'a'),
-        (60, 'b'),
-        (60, 'a'),
-        (90, 'b'),
-    ]
+        (0, 'a'), (30, 'b'), (30, 'a'), (60, 'b'), (60, 'a'), (90, 'b'),
+    ]  # fmt: skip
     told = [each for each in sent if not isinstance(each[1], str)]
     assert told == [(0, 0), (20, 20), (40, 10), (60, 30), (80, 20), (90, 30)]
     assert playback.played == 90 * MS

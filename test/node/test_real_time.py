@@ -13,12 +13,10 @@
 # limitations under the License.
 
 """
-What a run asks of the system for its ticks, and what it says where the system refuses.
+A run asks the system for real time, and says where the system refuses.
 
 What is in force is read from the kernel, by another process.
 """
-
-from __future__ import annotations
 
 import ctypes
 from functools import cache
@@ -37,7 +35,6 @@ from .graph import wait_for
 TURNING = 'drive: {constant_rate: {rate: 1.0}}\nrate: 200'
 LAST = max(os.sched_getaffinity(0))
 ALL = ['-p', 'thread_priority:=42', '-p', 'lock_memory:=true', '-p', f'cpu_affinity:=[{LAST}]']
-
 PR_CAPBSET_DROP, CAP_IPC_LOCK, CAP_SYS_NICE = 24, 14, 23
 ASKS = """
 import ctypes, os

@@ -169,7 +169,6 @@ def test_a_full_disk_is_told_alike_by_node_diagnostics_and_bag(
     assert 'Traceback' not in node.log
     said, line = [line for line in node.log.splitlines() if 'was interrupted' in line]
     assert reason in said
-
     with AnyReader([disk / 'bag']) as reader:
         kept = Counter(connection.topic for connection, _, _ in reader.messages())
     assert kept['/joint_states'] > 500

@@ -69,7 +69,6 @@ def test_a_ring_of_packed_files(graph, tmp_path, write_scene, start, compression
     assert answer.success
     assert ' let go' in answer.message
     assert node.end() == 0
-
     said = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())
     information = said['rosbag2_bagfile_information']
     names = information['relative_file_paths']

@@ -19,8 +19,6 @@ robot_description over DDS: a model for whoever comes late, which the joint stat
 What robot_state_publisher does with both is done by yourdfpy here.
 """
 
-from __future__ import annotations
-
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from linkage_ros.bag.reader import read_bag

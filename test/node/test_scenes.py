@@ -15,8 +15,6 @@
 
 """Every scene that comes with the package, on a graph: what it publishes, and what that shows."""
 
-from __future__ import annotations
-
 from cmath import exp
 from contextlib import nullcontext
 from math import cos, hypot, remainder, sin, sqrt, tau
@@ -236,7 +234,6 @@ def test_it_publishes_what_it_calls_for_and_no_more(graph, start, name):
         topics = wait_for(lambda: published(graph), 'the names of its topics')
         assert node.end() == 0
     assert 'Traceback' not in node.log
-
     assert topics == {
         '/joint_states': 'sensor_msgs/msg/JointState',
         **{f'/linkage_node/{topic}': kind for topic, kind in extra_topics.items()},

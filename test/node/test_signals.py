@@ -88,7 +88,7 @@ def test_at_a_random_moment(start, recorded, number, moment):
 @pytest.mark.parametrize('number', SIGNALS)
 def test_while_it_configures(start, recorded, number):
     scene, runs = recorded
-    stuck = 'node.load_scene = lambda _: (print("loading", flush=True), time.sleep(600))'
+    stuck = 'node.load_scene = lambda *_: (print("loading", flush=True), time.sleep(600))'
     node = start(scene, ready='loading', program=('-c', PROGRAM.format(stuck)))
     assert node.end(number) == 0, node.log
     assert 'Traceback' not in node.log

@@ -81,7 +81,6 @@ def test_it_ticks_as_the_clock_does(simulation):
     # 1 s at 50 Hz, in which a best-effort /clock may lose a few.
     assert 40 <= len(stamps) <= 51
     assert all(stamp % 10_000_000 == 0 for stamp in stamps), 'at the clock’s own times'
-
     time.sleep(0.3)
     count = len(simulation.heard)
     time.sleep(0.5)
@@ -116,7 +115,6 @@ def test_a_jump_back_starts_anew(simulation, graph):
     time.sleep(0.2)
     # What was sent before the jump and got taken after it has stamps of the future.
     assert all(stamp_of(message) > BEGIN - NS for message in simulation.heard)
-
     simulation.heard.clear()
     simulation.run_until_heard()
     assert stamp_of(simulation.heard[-1]) < BEGIN - 40 * NS

@@ -38,6 +38,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from .graph import crank, NS, wait_for
+from ..support.commands import linkage
 
 OK, ERROR = b'\0', b'\2'
 INCOMPLETE = 1
@@ -114,16 +115,14 @@ def read(folder):
 
 def replayed(folder):
     """Return the account of ``linkage replay``, whose exit code says that nothing differs."""
-    command = [sys.executable, '-m', 'linkage_ros.cli.main', 'replay', str(folder), '--json']
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = linkage(folder.parent, 'replay', folder.name, '--json')
     assert done.returncode == 0, done.stdout + done.stderr
     return json.loads(done.stdout)
 
 
 def told(folder):
     """Return the account of ``linkage info``."""
-    command = [sys.executable, '-m', 'linkage_ros.cli.main', 'info', str(folder), '--json']
-    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    return json.loads(linkage(folder.parent, 'info', folder.name, '--json').stdout)
 
 
 def test_two_snapshots_that_overlap(
@@ -143,7 +142,6 @@ def test_two_snapshots_that_overlap(
     success, message_2 = ask()
     assert success, message_2
     assert f'recorded to {runs}/bag_2: ' in message_2
-
     first, second = read(runs / 'bag'), read(runs / 'bag_2')
     times = [log_time for _, log_time, _ in second]
     assert 2 * NS < times[-1] - times[0] <= 3 * NS
@@ -160,7 +158,6 @@ def test_two_snapshots_that_overlap(
         assert not account['truncated']
         assert {topic['dropped'] for topic in account['topics']} == {0}
     assert 'begun in mid-run' in replayed(runs / 'bag_2')['beginning_missing']
-
     status = graph.next_status('recording')
     assert status.level == OK
     values = {pair.key: pair.value for pair in status.values}
@@ -236,7 +233,6 @@ def test_a_full_disk_is_said_and_the_next_attempt_succeeds(
     assert message.endswith('; the memory goes on')
     assert 'No space left' in graph.wait_for_level('recording', ERROR).message
     assert [path.name for path in small_disk.iterdir()] == ['other']
-
     (small_disk / 'other').unlink()
     success, message = ask()
     assert success, message

@@ -14,7 +14,7 @@
 
 
 """
-What a tick takes from its queue: each sample judged when it is taken, all of them accounted for.
+A tick judges each sample when it takes it from the queue, and accounts for all of them.
 
 The queue is the test's, and its clock goes on by a step with every look at it.
 """

@@ -20,8 +20,6 @@ The linkage is that of config/linkages/four_bar.yaml, worked out here by complex
 the controller holds it, weight, friction and command balance.
 """
 
-from __future__ import annotations
-
 from cmath import exp
 from math import inf, nan
 import os
@@ -175,7 +173,6 @@ def test_the_crank_reaches_its_target_and_stays_and_is_braked_when_nobody_comman
     wait_for(lambda: len(states) > count + 1000, 'a second more')
     assert {tuple(state.position) for state in states[count:]} == {tuple(held.position)}
     assert controller.end() == (0, '')
-
     # Another one, that swings it, is killed while it moves.
     swinging = control('target:=3.0', 'swing:=0.3', 'period:=1.0')
     wait_for(lambda: abs(states[-1].position[0] - 3.0) < 0.1, 'the other target')
@@ -212,7 +209,6 @@ def test_without_a_brake_it_falls_and_what_is_no_number_changes_nothing(
     # It comes to rest where friction holds the weight.
     fallen = wait_until_it_stands(states)
     assert abs(slope_of_the_weight(fallen.position[0])) <= friction(fallen.position[0]) + 1e-6
-
     spoilt = iter([nan, inf, -inf, 1e11] * 10_000)
     publisher = graph.publisher(JointState, '/crank_commands')
     with publishing(publisher, lambda: JointState(name=['crank_joint'], effort=[next(spoilt)])):
@@ -249,7 +245,6 @@ def test_a_controller_without_a_joint_is_silent_and_ends_with_any_signal(graph, 
             wait_for(lambda: states.get_subscription_count() == 3, 'three subscribers')
             time.sleep(0.3)
     assert commands == []
-
     told = JointState(name=['another', 'crank_joint'], position=[9.0, 1.5], velocity=[9.0, 2.0])
     with publishing(states, lambda: told):
         wait_for(lambda: len(commands) > 10, 'commands')

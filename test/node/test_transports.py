@@ -19,8 +19,6 @@ A publisher that opens a subscriber's shared-memory port may stand still for 0.3
 6535); `python -m bench --only comers` shows it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path
@@ -28,7 +26,7 @@ import shutil
 import subprocess
 import sys
 
-from linkage_ros.node.transports import leave_out_shared_memory
+from linkage_ros.node.real_time import leave_out_shared_memory
 from linkage_ros.resources import shipped
 import pytest
 from sensor_msgs.msg import JointState

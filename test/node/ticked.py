@@ -15,8 +15,6 @@
 
 """The node's own tick loop, with its recorder and without DDS: its messages come from a list."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import partial
 import json
@@ -35,21 +33,7 @@ from linkage_ros.scene.load import load_scene
 
 
 class Moment(NamedTuple):
-    """
-    A tick, and what comes before it.
-
-    Attributes
-    ----------
-    time
-        The clock's, in [ns].
-    messages
-        What has come on the crank's topic.
-    reset
-        Whether somebody has asked for a reset.
-    asked
-        Faults by name, and whether they shall begin.
-
-    """
+    """A tick at a time in [ns], and what comes before it; `asked` turns faults on or off."""
 
     time: int
     messages: tuple[bytes, ...] = ()
@@ -95,7 +79,11 @@ def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
     said = {'scene': 's', 'scene_folder': folder_of_scene, 'seed': scene.seed}
     said |= {'extra_topics': others, **names}
     files = {name: ('application/yaml', data) for name, data in scene.files.items()}
-    topics = [Topic(name, 'sensor_msgs/msg/JointState', '', '') for name in names.values()]
+    kinds = {name: each.message for name, each in zip(others, pipeline.extras, strict=True)}
+    topics = [
+        Topic(name, kinds.get(name, 'sensor_msgs/msg/JointState'), '', '')
+        for name in names.values()
+    ]
     attached = {**files, 'run.json': ('application/json', json.dumps(said).encode())}
     recorder = Recorder(BagWriter(folder, topics, attached), capacity=1_000_000)
     loop.recorder = recorder

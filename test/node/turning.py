@@ -15,8 +15,6 @@
 
 """A crank that turns at one rate, published by the tests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event, Thread

@@ -40,9 +40,10 @@ HEIGHTS = (
     ('cost', 'accuracy'),
     ('report',),
     ('node', 'cli'),
+    ('__main__',),
 )
 HEIGHT = {name: height for height, names in enumerate(HEIGHTS) for name in names}
-WITH_ROS = ('node', 'cli')
+WITH_ROS = ('node', 'cli', '__main__')
 ROS = (
     'ament_index_python',
     'builtin_interfaces',

@@ -83,7 +83,7 @@ def test_rosdep_of_the_readme_stops_at_no_key(root, package_xml):
 def test_commands_that_are_not_on_the_path_of_a_robot_are_run_by_ros2(root):
     """After colcon, executables lie in lib/linkage_ros, which is on no path."""
     readme = (root / 'README.md').read_text('utf-8')
-    on_a_robot = readme.partition('## On a robot')[2].partition('**Fed from')[0]
+    on_a_robot = readme.partition('## On a robot')[2].partition('## ')[0]
     assert 'ros2 run linkage_ros linkage ' in on_a_robot
     (block,) = re.findall(r'```sh.*?\n(.*?)```', on_a_robot, re.DOTALL)
     assert not re.findall(r'^(?:linkage|linkage_node|crank_source)\b', block, re.MULTILINE)

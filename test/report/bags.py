@@ -15,8 +15,6 @@
 
 """Bags written by hand for pages: every kind of event, names that are markup, and a long run."""
 
-from __future__ import annotations
-
 from cmath import phase, rect
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import json
@@ -57,9 +55,7 @@ faults: {plug: {silence: {}}}
 PERIOD = SECOND // 100
 LATE = MS // 4  # after it was due a tick takes its sample
 OLD = 3 * MS  # is the sample that a tick takes
-
 LONG_ROWS, LONG_RATE, SPIKE_AT, SPIKE = 40_000, 1000, 12_345, 512.5
-
 Message = tuple[str, int, int, bytes]
 """Topic, log time, publish time, data."""
 
@@ -160,7 +156,7 @@ DRILL_LANES = {
     'no pose, by diagnostics': [(4.5, 5.5, 'open')],
     'at a toggle': [(4.0, 4.04, '')],
     'at a toggle, by diagnostics': [(3.5, 4.5, '')],
-    'no joint states': [(0.99, 1.5, ''), (3.19, 3.6, ''), (4.99, 5.3, '')],
+    'gap in joint states': [(0.99, 1.5, ''), (3.19, 3.6, ''), (4.99, 5.3, '')],
     'withheld': [(1.2, 1.24, '')],
     'samples rejected': [(2.0, 2.09, 'not finite')],
     'no samples': [(2.99, 3.6, '')],
@@ -317,11 +313,7 @@ def fingers(folder: Path) -> Path:
 
 
 def joint_states(bag: Path, of: str) -> list[tuple[int, int, int, list[str], Sequence[float]]]:
-    """
-    Return the joint states on a topic as mcap's own reader has them.
-
-    Each with its number in the bag, log time, stamp, names, and as many positions and rates.
-    """
+    """Return number, log time, stamp, names, positions and rates, as mcap reads them."""
     found = []
     (file,) = bag.glob('*.mcap')
     with file.open('rb') as stream:

@@ -14,8 +14,6 @@
 
 """Runs by the node's own tick loop, without ROS, and what a report reads of their bags."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple

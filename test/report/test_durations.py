@@ -14,8 +14,6 @@
 
 """Numbers of a report: lateness, clocks and silences, and curves thinned with their extremes."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import pairwise
 import json
@@ -40,8 +38,6 @@ import pytest
 
 
 MS = 1_000_000
-
-
 BEGIN = 1_700_000_000_000_000_000
 
 
@@ -197,11 +193,7 @@ def test_percentiles_are_those_of_the_durations_to_a_bin(durations):
 
 
 NUMBERS = st.floats(-1e300, 1e300) | st.sampled_from([np.nan, np.inf, -np.inf, 0.0, -0.0])
-
-
 ROWS = st.lists(st.tuples(NUMBERS, NUMBERS), max_size=300)
-
-
 CUTS = st.lists(st.integers(0, 300), max_size=8)
 
 

@@ -14,8 +14,6 @@
 
 """Messages as arrays, and the blocks in which they are read."""
 
-from __future__ import annotations
-
 from itertools import groupby, pairwise
 from operator import itemgetter
 from types import SimpleNamespace
@@ -39,8 +37,6 @@ from ..support.messages import STORE
 
 
 TYPES = STORE.types
-
-
 STATE, ARRAY = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
 
 
@@ -63,7 +59,6 @@ def encoded(message, little=True):
 
 
 NAMES = st.text('abcé', min_size=1, max_size=6)
-
 
 MESSAGES = st.lists(
     st.tuples(
@@ -100,19 +95,10 @@ def test_all_that_publishers_may_mix_comes_out_as_rosbags_reads_it(messages):
 
 
 GOOD = encoded(state(5, {'a': 1.0, 'b': 2.0}))
-
-
 TWICE = TYPES[STATE](header(5), ['a', 'a'], np.ones(2), np.array([]), np.array([]))
-
-
 UNEQUAL = TYPES[STATE](header(5), ['a', 'b'], np.ones(2), np.ones(1), np.array([]))
-
-
 NOTHING = TYPES[STATE](header(5), [], np.array([]), np.array([]), np.array([]))
-
-
 NAMES_ALONE = TYPES[STATE](header(5), ['a'], np.array([]), np.array([]), np.array([]))
-
 
 BAD = {
     'malformed message': [
@@ -234,10 +220,7 @@ def test_damaged_diagnostics_say_nothing():
 
 
 BLOCK_NAMES = ('/a', '/b', '/c')
-
-
 TOPICS = tuple(Topic(name, 'std_msgs/msg/Empty', '', '') for name in BLOCK_NAMES)
-
 
 BLOCK_MESSAGES = st.lists(
     st.builds(

@@ -12,9 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a report says of curves, diagnostics and samples of a run."""
-
-from __future__ import annotations
+"""A report shows curves, diagnostics and samples of a run as they were recorded."""
 
 import json
 from math import inf, nan
@@ -41,6 +39,7 @@ from .runs import (
     turning,
     TYPES,
 )
+from ..support.scenes import four_bar_text
 
 # Curves agree with the messages of a run; implausible numbers break nothing.
 
@@ -90,22 +89,7 @@ def test_torque_commands_are_samples_of_efforts(tmp_path):
 
 
 TORQUE = 'drive: {torque: {}}\nloads: {drive_inertia: 0.001}\n'
-
-
-FOUR_BAR_WITH_MASSES = """
-links:
-  ground:  {O2: [0, 0], O4: [0.100, 0]}
-  crank:   {O2: [0, 0], A: [0.040, 0]}
-  coupler: {A: [0, 0], B: [0.120, 0]}
-  rocker:  {O4: [0, 0], B: [0.080, 0]}
-input: {joint: crank_joint, parent: ground, child: crank}
-assembly: {B: left}
-joints: {rocker_joint: {parent: ground, child: rocker}}
-masses:
-  crank: {mass: 0.1, center: [0, 0], inertia: 1.0e-5}
-  coupler: {mass: 0.1, center: [0, 0], inertia: 1.0e-5}
-  rocker: {mass: 0.1, center: [0, 0], inertia: 1.0e-5}
-"""
+FOUR_BAR_WITH_MASSES = four_bar_text(0.04, 0.12, 0.08, 0.1, [(0.1, 0, 1e-5)] * 3)
 
 
 def page(found):
@@ -172,8 +156,8 @@ def test_diagnostics_tell_of_the_time_since_those_before(tmp_path):
             (300.3, 300.4, 1, 'error, loop closure: m'),
         ],
     }
-    assert found.said['tick', 'Lost ticks'] == '1'
-    assert ('motor', 'Lost ticks') not in found.said
+    assert found.last_values['tick', 'Lost ticks'] == '1'
+    assert ('motor', 'Lost ticks') not in found.last_values
 
 
 def test_diagnostics_tell_how_long_a_run_went_on_without_a_joint_state(tmp_path):
@@ -202,8 +186,8 @@ def test_ever_new_diagnostics_take_no_ever_growing_room(tmp_path):
         for ms in range(100)
     ]
     found = read(recorded(tmp_path, said=said))
-    assert len(found.said) == 500
-    assert all(len(value) <= 80 for value in found.said.values())
+    assert len(found.last_values) == 500
+    assert all(len(value) <= 80 for value in found.last_values.values())
     assert sum(span[2] for span in on_lanes(found)['health']) == 100
 
 
@@ -241,10 +225,7 @@ def joint_state(stamp, names, positions, rates):
 
 
 AT = 500 * MS
-
-
 ONE = ['crank_joint']
-
 
 REJECTED = {
     'malformed message': b'\0\1\0\0abc',

@@ -12,16 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A page has a bound, whatever is in the bag; so has what is held to make it."""
-
-from __future__ import annotations
+"""Any bag gives a page of bounded size, made in bounded memory, or one clear line."""
 
 from dataclasses import replace
 import json
+from pathlib import Path
 from threading import Event
 
+from hypothesis import given
+from hypothesis import strategies as st
 from linkage_ros.bag.contents import Contents
-from linkage_ros.bag.reader import BagMessage
+from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.bag.run_events import run_account
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
@@ -34,10 +35,11 @@ from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pages.document import plotting_library
 from linkage_ros.replay.replay import recorded_scene
 from linkage_ros.report.blocks import Blocks, Progress
-from linkage_ros.report.curves import Kept, MOST_LINKAGES
+from linkage_ros.report.curves import BoundedCurves, MOST_LINKAGES
 from linkage_ros.report.data import page_data
 from linkage_ros.report.decimation import (  # fmt: skip
     DURATION_BYTES,
+    FORCE_BYTES,
     FRAME_BYTES,
     Histogram,
     MOST_FRAMES,
@@ -47,8 +49,11 @@ from linkage_ros.report.decimation import (  # fmt: skip
     STATE_BYTES,
     TABLE_BYTES,
 )
+from linkage_ros.report.diagnostics_summary import statuses
 from linkage_ros.report.html import ReportHeader, run_html, TableOf
+from linkage_ros.report.joint_states import JointStates
 from linkage_ros.report.labels import LANES
+from linkage_ros.report.reading import SceneRun
 from linkage_ros.report.run import (
     Column,
     Frames,
@@ -59,12 +64,12 @@ from linkage_ros.report.run import (
     Run,
     Window,
 )
-from linkage_ros.report.scene_run import SceneRun
 from linkage_ros.resources import shipped
 import numpy as np
 import pytest
 
-from .runs import BEGIN, MS, recorded, sample
+from .runs import BEGIN, but, diagnostics, MS, recorded, Said, sample
+from .test_messages import encoded, state
 
 pytest.importorskip('plotly')
 WORST = '<\U0001f984\udc80"&' * 100_000
@@ -158,7 +163,7 @@ def test_its_page_is_below_the_bound_and_says_how_much_it_holds(long):
 def filled(room, names, quantity='position'):
     """Return curves that take all the room that they may."""
     columns = [Column(name, quantity, 'rad') for name in names]
-    kept = Kept(WORST, columns, room, Window())
+    kept = BoundedCurves(WORST, columns, room, Window())
     most = kept._kept._most
     kept.add(np.arange(2 * most), np.random.default_rng(1).normal(size=(2 * most, len(columns))))
     return kept.curves()
@@ -216,6 +221,9 @@ def worst_run():
         curves=[
             filled(STATE_BYTES, values),
             filled(SAMPLE_BYTES, [*values][:60]),
+            filled(FORCE_BYTES, [*values][:60], 'force')._replace(
+                columns=[Column(name, 'force', 'N') for name in [*values][:60]]
+            ),
             filled(DURATION_BYTES, ['tick'], 'lateness')._replace(
                 columns=[Column('tick', 'lateness', 'ms')]
             ),
@@ -228,7 +236,7 @@ def worst_run():
         lanes={key: full_lane() for key in LANES},
         lateness=durations,
         age=durations,
-        said={(f'task {n}', WORST[:80]): WORST[:80] for n in range(500)},
+        last_values={(f'task {n}', WORST[:80]): WORST[:80] for n in range(500)},
     )
 
 
@@ -254,8 +262,8 @@ def test_the_page_of_the_worst_run_is_below_the_bound():
 def test_the_rooms_come_to_less_than_the_bound():
     library = len(plotting_library()) + 100_000  # with what is ours of script and style
     texts = len(LANES) * (MOST_TEXT + 60 * MOST_SPANS) + MOST_LINKAGES * 400 * 45
-    numbers = (STATE_BYTES + SAMPLE_BYTES + 2 * DURATION_BYTES + FRAME_BYTES) * 4 / 3
-    assert library + numbers + texts + SHAPE_BYTES + TABLE_BYTES < 0.98 * PAGE_BYTES
+    numbers = STATE_BYTES + SAMPLE_BYTES + FORCE_BYTES + 2 * DURATION_BYTES + FRAME_BYTES
+    assert library + numbers * 4 / 3 + texts + SHAPE_BYTES + TABLE_BYTES < 0.98 * PAGE_BYTES
     assert MOST_FRAMES * 16 < FRAME_BYTES
 
 
@@ -298,3 +306,141 @@ def test_the_same_bag_makes_the_same_page(tmp_path):
 
 def test_no_number_of_a_page_is_none(long):
     json.dumps(page_data(long[0], wrapped=False), allow_nan=False)
+
+
+# Whatever a bag's bytes are: a page, or one clear line; never a traceback.
+
+
+pytest.importorskip('plotly')
+SCENE = 'effects: {velocity: {}}\nfaults: {quiet: {silence: {}, at: [0.01], seconds: 0.005}}\n'
+PIECES = 300
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    bad = sample(0, 0.1)[:50]
+    moments = but(60, lambda tick, m: m._replace(messages=(*m.messages, bad)) if tick == 9 else m)
+    said = [Said(20, 'tick', {'Lost ticks': 1}, 1, 'm')]
+    folder = recorded(tmp_path_factory.mktemp('bag'), SCENE, moments, said=said).path
+    (file,) = folder.glob('*.mcap')
+    return file
+
+
+def told(file: Path) -> str:
+    """Return the line for which a bag is refused; of one that is not, ''."""
+    try:
+        page = report(file, Window(), Event())
+    except LinkageError as error:
+        return str(error) or pytest.fail('without a word')
+    json.loads(page.split('id="data">')[1].split('</script>')[0], parse_constant=pytest.fail)
+    assert page.endswith('</html>\n')
+    return ''
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_flipped_and_cut_bytes(bag, tmp_path, seed, monkeypatch):
+    # The library makes pages long, and nothing else.
+    monkeypatch.setattr('linkage_ros.pages.document.plotting_library', lambda: '')
+    random = np.random.default_rng(seed)
+    whole = bag.read_bytes()
+    file = tmp_path / 'odd.mcap'
+    lines = []
+    for number in range(PIECES // 3):
+        content = bytearray(whole)
+        if number % 3 == 0:
+            content = content[: random.integers(len(content))]
+        for at in random.integers(len(content) or 1, size=random.integers(1, 4)):
+            if len(content):
+                content[at] ^= 1 << int(random.integers(8))
+        file.write_bytes(content)
+        lines.append(told(file))
+    # Some are told as far as they go, and some are refused.
+    assert '' in lines
+    assert any(lines)
+    assert all('\n' not in line for line in lines)
+
+
+@pytest.mark.parametrize('seed', range(2))
+def test_what_fits_its_checksums_may_still_be_anything(bag, tmp_path, seed, monkeypatch):
+    monkeypatch.setattr('linkage_ros.pages.document.plotting_library', lambda: '')
+    random = np.random.default_rng(seed)
+    whole = read_bag(bag)
+    messages = [*whole.messages()]
+    numbers = {each.name: number for number, each in enumerate(whole.topics)}
+    lines = []
+    for number in range(PIECES // 12):
+        attached = {name: ('', data) for name, data in whole.attachments.items()}
+        if number % 2:
+            name = str(random.choice([*attached]))
+            attached[name] = '', changed(attached[name][1], random)
+        writer = BagWriter(tmp_path / f'{number}', whole.topics, attached)
+        odd = {*random.integers(len(messages), size=random.integers(1, 30)).tolist()}
+        for place, (topic, logged, published, data) in enumerate(messages):
+            time = TIMES[random.integers(len(TIMES))] if place in odd else 0
+            writer.write(
+                numbers[topic], time or logged, time and published,
+                changed(data, random) if place in odd else data,
+            )  # fmt: skip
+        writer.close()
+        lines.append(told(writer.folder))
+    assert '' in lines
+    assert all('\n' not in line for line in lines)
+
+
+TIMES = (0, 0, 0, 1, 10**18, 2**62, 2**63 - 1)
+"""In the place of a log time; 0 leaves it."""
+
+
+def changed(data, random):
+    content = bytearray(data)
+    for at in random.integers(len(content) or 1, size=random.integers(1, 4)):
+        if content:
+            content[at] = random.integers(256)
+    return bytes(content)
+
+
+@given(st.binary(max_size=300))
+def test_no_bytes_break_the_reader_of_diagnostics(data):
+    for head in (b'', b'\0\1\0\0' + bytes(8) + b'\1\0\0\0\0\0\0\0'):
+        for status in statuses(head + data):
+            assert status.level in range(256)
+
+
+WHOLE = diagnostics(
+    [Said(0, 'tick', {'a': 'b', 'Lost ticks': 3}, 1, 'late'), Said(0, 'crank', {})]
+)
+
+
+@given(st.lists(st.tuples(st.integers(0, len(WHOLE) - 1), st.integers(0, 255)), max_size=6))
+def test_no_change_of_bytes_breaks_it(changes):
+    data = bytearray(WHOLE)
+    for at, value in changes:
+        data[at] = value
+    for status in statuses(bytes(data)):
+        assert sum(map(len, status.values)) <= 10 * len(WHOLE)
+
+
+GOOD = encoded(state(5, {'a': 1.0, 'b': 2.0}))
+
+
+def replaced(change):
+    at, value = change
+    data = bytearray(GOOD)
+    data[at] = value
+    return bytes(data)
+
+
+@given(
+    st.lists(
+        st.binary(max_size=200)
+        | st.tuples(st.integers(0, len(GOOD) - 1), st.integers(0, 255)).map(replaced),
+        max_size=8,
+    )
+)
+def test_no_bytes_break_the_reader_of_joint_states(messages):
+    reader = JointStates()
+    block = reader.read(messages)
+    assert len(block.good) == len(messages)
+    assert (~block.good).sum() == sum(
+        n for reason, n in reader.left_out.items() if not reason.startswith('joints beyond')
+    )

@@ -14,8 +14,6 @@
 
 """Links stand where their messages say, in the whole gallery."""
 
-from __future__ import annotations
-
 from base64 import b64decode
 from cmath import exp, rect
 from dataclasses import replace
@@ -23,15 +21,14 @@ import json
 
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.drawing.figure import view
-from linkage_ros.drawing.link_frames import drawn_in_frames, link_frames
-from linkage_ros.drawing.shapes import carried_shapes, Circle, shapes
+from linkage_ros.drawing.shapes import carried_shapes, Circle, link_frames, shapes
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.report.data import page_data, poses
+from linkage_ros.report.data import drawn_in_frames, page_data, poses
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 import numpy as np
@@ -44,8 +41,6 @@ from ..node.ticked import Moment, run
 
 
 FILES = sorted(shipped('linkages/four_bar.yaml').parent.glob('*.yaml'))
-
-
 GROUND, CRANK, COUPLER, ROCKER = 0.10, 0.04, 0.12, 0.08
 
 
@@ -78,7 +73,7 @@ def test_points_are_where_the_closure_has_them(file):
     inputs, positions = some(closure)
     names = [f'p_{given.joint}' for given in closure.linkage.inputs]
     found = poses(closure, 'p_', published(closure, positions, inputs, 'p_'), names)
-    assert found.untold == ''
+    assert found.reason == ''
     assert len(inputs) > 1
     size = max(abs(place) for position in positions for place in closure.points(position).values())
     for i, position in enumerate(positions):
@@ -148,7 +143,7 @@ def test_where_joints_do_not_tell_of_a_link_the_loops_are_closed_at_the_input():
     inputs = [(1.0,), (np.nan,), (2.0,)]
     values = {'crank_joint': np.array([1.0, np.nan, 2.0]), 'rocker_joint': np.zeros(3)}
     found = poses(closure, '', values, ['crank_joint'])
-    assert 'coupler' in found.untold
+    assert 'coupler' in found.reason
     assert np.isnan(found.frames[1]).all()
     for i in (0, 2):
         frames = link_frames(whole, whole.position(*inputs[i]))

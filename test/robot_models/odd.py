@@ -15,8 +15,6 @@
 
 """Linkages whose published joints take every way there is from one frame of a tree to the next."""
 
-from __future__ import annotations
-
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
@@ -76,40 +74,38 @@ assembly: {C: right}
 pose: {inputs: [0.9]}
 """
 
+
+def joints(linkage, **published):
+    """Return a linkage's file with joints, each from 'parent child' or the name of a slider."""
+    for name, said in published.items():
+        links = said.split()
+        how = 'parent: {}, child: {}' if len(links) == 2 else 'slider: {}'
+        linkage += '' if 'joints:' in linkage else 'joints:\n'
+        linkage += f'  {name}: {{{how.format(*links)}}}\n'
+    return linkage
+
+
 ODD = {
-    'coupler from the ground': FOUR_BAR
-    + """
-joints:
-  coupler_joint: {parent: ground, child: coupler}
-  rocker_joint: {parent: ground, child: rocker}
-""",
-    'all turned round': FOUR_BAR
-    + """
-joints:
-  coupler_joint: {parent: coupler, child: crank}
-  rocker_joint: {parent: rocker, child: ground}
-""",
-    'coupler from the rocker': FOUR_BAR
-    + """
-joints:
-  coupler_joint: {parent: rocker, child: coupler}
-  rocker_joint: {parent: ground, child: rocker}
-""",
-    'rocker from the crank, which no pin joins': FOUR_BAR
-    + """
-joints:
-  rocker_joint: {parent: crank, child: rocker}
-  coupler_joint: {parent: coupler, child: rocker}
-""",
-    'one more than needed, and the crank once more': FOUR_BAR
-    + """
-joints:
-  B_joint: {parent: coupler, child: rocker}
-  crank_again: {parent: ground, child: crank}
-  coupler_joint: {parent: crank, child: coupler}
-  crossing: {parent: rocker, child: crank}
-  rocker_joint: {parent: ground, child: rocker}
-""",
+    'coupler from the ground': joints(
+        FOUR_BAR, coupler_joint='ground coupler', rocker_joint='ground rocker'
+    ),
+    'all turned round': joints(
+        FOUR_BAR, coupler_joint='coupler crank', rocker_joint='rocker ground'
+    ),
+    'coupler from the rocker': joints(
+        FOUR_BAR, coupler_joint='rocker coupler', rocker_joint='ground rocker'
+    ),
+    'rocker from the crank, which no pin joins': joints(
+        FOUR_BAR, rocker_joint='crank rocker', coupler_joint='coupler rocker'
+    ),
+    'one more than needed, and the crank once more': joints(
+        FOUR_BAR,
+        B_joint='coupler rocker',
+        crank_again='ground crank',
+        coupler_joint='crank coupler',
+        crossing='rocker crank',
+        rocker_joint='ground rocker',
+    ),
     'names that XML and YAML have to quote': FOUR_BAR.replace('coupler', '"a <b> & \\"c\\" --"')
     .replace('rocker', "'öß -- -'")
     .replace('B:', '"B -- <"  :')
@@ -118,40 +114,18 @@ joints:
   '"j" & <k>': {parent: ground, child: "a <b> & \\"c\\" --"}
   "l'm": {parent: ground, child: 'öß -- -'}
 """,
-    'names as frames and joints without a body would have': FOUR_BAR.replace('coupler', 'rocker_1')
-    + """
-joints:
-  crank_joint_in_rocker: {parent: ground, child: rocker_1}
-  B_on_rocker: {parent: rocker_1, child: rocker}
-""",
-    'a ram whose slide is told': SLIDER_CRANK
-    + """
-joints:
-  rod_joint: {parent: crank, child: rod}
-  ram_slide: {slider: guide}
-""",
-    'a ram whose slide is not told': SLIDER_CRANK
-    + """
-joints:
-  rod_joint: {parent: ground, child: rod}
-""",
-    'a ram whose slide is told and the rod from it': SLIDER_CRANK
-    + """
-joints:
-  ram_slide: {slider: guide}
-  rod_joint: {parent: rod, child: ram}
-""",
-    'a pin in a slot, told': QUICK_RETURN
-    + """
-joints:
-  arm_joint: {parent: ground, child: arm}
-  slot_slide: {slider: slot}
-""",
-    'a pin in a slot, not told': QUICK_RETURN
-    + """
-joints:
-  arm_joint: {parent: crank, child: arm}
-""",
+    'names as frames and joints without a body would have': joints(
+        FOUR_BAR.replace('coupler', 'rocker_1'),
+        crank_joint_in_rocker='ground rocker_1',
+        B_on_rocker='rocker_1 rocker',
+    ),
+    'a ram whose slide is told': joints(SLIDER_CRANK, rod_joint='crank rod', ram_slide='guide'),
+    'a ram whose slide is not told': joints(SLIDER_CRANK, rod_joint='ground rod'),
+    'a ram whose slide is told and the rod from it': joints(
+        SLIDER_CRANK, ram_slide='guide', rod_joint='rod ram'
+    ),
+    'a pin in a slot, told': joints(QUICK_RETURN, arm_joint='ground arm', slot_slide='slot'),
+    'a pin in a slot, not told': joints(QUICK_RETURN, arm_joint='crank arm'),
     'a rod that only slides hold': """
 links:
   ground: {O: [0, 0], Q: [0.1, 0]}
@@ -165,28 +139,12 @@ joints:
   slide_again: {slider: driven_slot}
   bar_joint: {parent: bar, child: ground}
 """,
-    'a yoke that slides over a point of the ground': YOKE
-    + """
-joints:
-  guide_slide: {slider: guide}
-""",
-    'a yoke, and its slot': YOKE
-    + """
-joints:
-  slot_slide: {slider: slot}
-""",
-    'a cylinder': CYLINDER
-    + """
-joints:
-  arm_joint: {parent: ground, child: arm}
-  rod_joint: {parent: arm, child: rod}
-""",
-    'a cylinder that is seen from the arm': CYLINDER
-    + """
-joints:
-  arm_joint: {parent: rod, child: arm}
-  tube_joint: {parent: tube, child: ground}
-""",
+    'a yoke that slides over a point of the ground': joints(YOKE, guide_slide='guide'),
+    'a yoke, and its slot': joints(YOKE, slot_slide='slot'),
+    'a cylinder': joints(CYLINDER, arm_joint='ground arm', rod_joint='arm rod'),
+    'a cylinder that is seen from the arm': joints(
+        CYLINDER, arm_joint='rod arm', tube_joint='tube ground'
+    ),
     'three links at a pin': """
 links:
   ground: {O: [0, 0], Q: [0.1, 0], R: [0.05, 0.12]}

@@ -20,14 +20,12 @@ A robot model where its text is read as YAML: one text, with the same elements a
 launch file comes to through ``yaml.safe_load`` (launch_ros, evaluate_parameters.py).
 """
 
-from __future__ import annotations
-
 import re
 from xml.etree import ElementTree as ET
 
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
-from linkage_ros.cli.arguments import model_of
+from linkage_ros.cli.robot_model import model_of
 from linkage_ros.errors import FileError
 from linkage_ros.robot_models.mjcf import mjcf
 from linkage_ros.robot_models.part import Part, PartError

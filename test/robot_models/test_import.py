@@ -15,8 +15,6 @@
 
 """URDFs of others, with the pins that close them, as linkages; and those that are none."""
 
-from __future__ import annotations
-
 from cmath import rect
 from math import cos, hypot, remainder, sin, tau
 
@@ -145,11 +143,7 @@ def test_masses_are_laid_into_the_plane():
 
 
 def test_signs_are_those_of_the_urdf():
-    """
-    A joint about −y counts the other way: its child's angle is taken from its parent's.
-
-    The finger's axis is −y of a frame that is turned round, which is y.
-    """
+    """A joint about −y counts the other way: the finger's axis is −y of a frame turned round."""
     joints = gripper().linkage.joints
     assert joints['finger_joint'] == RevoluteJoint('ground', 'finger', LIMITS)
     assert joints['bar_joint'] == RevoluteJoint('bar', 'motor', LIMITS)
@@ -223,10 +217,16 @@ BAD = {
     ),
     'nothing': (robot(), 'x.urdf: has no link; name a URDF file'),
     'no name': (robot('<link/>'), "x.urdf: a link has the name ''; give it a name"),
-    'a link twice': (robot(LINK('a'), LINK('a')), 'x.urdf: link a: is there twice; rename one'),
+    'a link twice': (
+        robot(LINK('a'), LINK('a')),
+        'x.urdf: link a: is a duplicate name; rename one',
+    ),
     'a joint of no kind': (
         robot(A_B, joint('j', 'base', 'a', '0 0 0', kind='ball')),
-        "x.urdf: joint j: type='ball' is none; write revolute, continuous, prismatic or fixed",
+        (
+            "x.urdf: joint j: type='ball' is not a joint type; "
+            'write revolute, continuous, prismatic or fixed'
+        ),
     ),
     'a planar joint': (
         robot(A_B, joint('j', 'base', 'a', '0 0 0', kind='planar')),
@@ -245,7 +245,7 @@ BAD = {
     ),
     'no number': (
         robot(A_B, joint('j', 'base', 'a', '0 nan 0')),
-        "x.urdf: joint j: xyz='0 nan 0' is not 3 finite numbers; put it right",
+        "x.urdf: joint j: xyz='0 nan 0' is not 3 finite numbers; correct it",
     ),
     'an axis of nothing': (
         robot(A_B, joint('j', 'base', 'a', '0 0 0', axis='0 0 0')),
@@ -254,7 +254,8 @@ BAD = {
     'two parents': (
         robot(A_B, FLAT, joint('k', 'b', 'a', '0 0 0')),
         (
-            'x.urdf: link a: hangs on two joints, j and k; end one of them in a frame of its own, '
+            'x.urdf: link a: is the child of two joints, j and k; end one of them in a frame of '
+            'its own, '
             'and close it by --close'
         ),
     ),
@@ -324,12 +325,14 @@ def test_what_drives_it_has_to_be_said():
     ):
         gripper(inputs=[])
     with pytest.raises(
-        FileError, match="--input motor: is no joint that moves; did you mean 'motor_joint'"
+        FileError, match="--input motor: is not a moving joint; did you mean 'motor_joint'"
     ):
         gripper(inputs=['motor'])
-    with pytest.raises(FileError, match=r"links\.bar: is held twice: by pin 'bar_joint_pin' and"):
+    with pytest.raises(
+        FileError, match=r"links\.bar: is over-constrained by pin 'bar_joint_pin' and"
+    ):
         gripper(inputs=['motor_joint', 'finger_joint'])
-    with pytest.raises(FileError, match='--at elbow: is no joint that moves'):
+    with pytest.raises(FileError, match='--at elbow: is not a moving joint'):
         gripper(at={'elbow': 0.1})
 
 
@@ -384,7 +387,9 @@ class TestCommand:
         assert err == f'linkage urdf: {file}:{line}: {told}\n'
 
     def test_where_it_cannot_be_written(self, tmp_path, capsys):
-        assert main(['urdf', str(LINKAGES / 'four_bar.yaml'), '-o', str(tmp_path)]) == 2
+        folder = tmp_path / 'x.urdf'
+        folder.mkdir()
+        assert main(['urdf', str(LINKAGES / 'four_bar.yaml'), '-o', str(folder)]) == 2
         assert 'is there already and is no file' in capsys.readouterr().err
 
     @pytest.mark.parametrize('typed', [['--close', 'a'], ['--at', 'a=b'], ['--at', 'a']])

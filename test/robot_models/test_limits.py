@@ -15,8 +15,6 @@
 
 """Limits through URDF and back, and in MJCF; what is computed is told from what is given."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from xml.etree import ElementTree as ET
 

@@ -21,11 +21,9 @@ pin should be. The engine's solver lets constraints yield, so that the two agree
 linkage's size that is measured here, and not to rounding.
 """
 
-from __future__ import annotations
-
 from cmath import rect
 
-from linkage_ros.cli.arguments import model_of
+from linkage_ros.cli.robot_model import model_of
 from linkage_ros.dynamics.loads import Loads, Spring
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.errors import LinkageError
@@ -41,7 +39,6 @@ from .walked import moving
 from ..support.scenes import LINKAGES, ONE_INPUT, size_of
 
 mujoco = pytest.importorskip('mujoco')
-
 AT_START, MOVING = 1e-9, 1e-4
 """What cut pins may miss each other by, of the linkage's size."""
 

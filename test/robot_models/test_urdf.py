@@ -14,13 +14,11 @@
 
 """The URDF of a linkage: valid, with limits that its joints keep, and read back."""
 
-from __future__ import annotations
-
 from collections import Counter
 from math import pi, remainder, tau
 from xml.etree import ElementTree as ET
 
-from linkage_ros.cli.arguments import model_of
+from linkage_ros.cli.robot_model import model_of
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import load
 from linkage_ros.files.linkage_text import linkage_text
@@ -44,11 +42,7 @@ from ..support.scenes import linkage_of, LINKAGES, ONE_INPUT, scene_of, size_of
 
 
 SCENES = LINKAGES.parent / 'scenes'
-
-
 CASES = [*ONE_INPUT, 'five_bar', *ODD]
-
-
 URDF_KINDS = {'revolute', 'continuous', 'prismatic', 'fixed'}
 
 
@@ -339,6 +333,4 @@ def test_every_way_from_frame_to_frame(name):
 
 
 LOST = {'one more than needed, and the crank once more': 3, 'a rod that only slides hold': 1}
-
-
 """Joints that no link hangs by; those of links that others tell of are left out."""

@@ -20,8 +20,6 @@ The forward kinematics are yourdfpy's, which knows the URDF and nothing else. So
 links compared with the closure: turned by the link's angle, with their origin on a point of it.
 """
 
-from __future__ import annotations
-
 from cmath import rect
 from math import cos, sin
 

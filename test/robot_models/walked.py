@@ -15,8 +15,6 @@
 
 """A robot model walked by yourdfpy, and what the node says while a linkage moves."""
 
-from __future__ import annotations
-
 import io
 
 from linkage_ros.messages.joint_state import JointStateWriter

@@ -15,8 +15,6 @@
 
 """Fixtures of the tests of scenes."""
 
-from __future__ import annotations
-
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest

@@ -15,15 +15,12 @@
 
 """Files that the tests of scenes start from, and what every error about a file has to be."""
 
-from __future__ import annotations
-
 from pathlib import Path
 import re
 
 from linkage_ros.errors import FileError
 
 CONFIG = Path(__file__).parents[2] / 'config'
-
 SCENE = b'linkage: linkage.yaml\n'
 FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 

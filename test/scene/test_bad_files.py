@@ -14,8 +14,6 @@
 
 """Scene and linkage files that cannot be used: one line says where, what and what helps."""
 
-from __future__ import annotations
-
 import re
 
 from linkage_ros.errors import FileError
@@ -34,7 +32,6 @@ BOMB = b'a: &a [1, 1]\n' + b''.join(
     b'%c: &%c [%s]\n' % (k, k, b', '.join([b'*%c' % (k - 1)] * 9))
     for k in range(ord('b'), ord('p'))
 )
-
 
 # Appended to a good scene; the error's place and reason, and a part of its remedy.
 SCENES = {
@@ -65,7 +62,10 @@ SCENES = {
     'YAML 1.1 thousands': (b'rate: 1_000', ":2: rate: '1_000' is not a number; write a number"),
     'YAML 1.1 date': (b'rate: 2026-01-01', ":2: rate: '2026-01-01' is not a number; write"),
     'merge key': (b'<<: {rate: 1}', ':2: <<: unknown key; known:'),
-    'choice': (b'angles: unwrapped', ":2: angles: 'unwrapped' is none; write continuous or"),
+    'choice': (
+        b'angles: unwrapped',
+        ":2: angles: 'unwrapped' is not a choice; write continuous or",
+    ),
     'list for a mapping': (
         b'effects: [velocity]',
         ":2: effects: ['velocity'] is not a mapping; write effects: {…}",
@@ -143,7 +143,7 @@ SCENES = {
     ),
     'unknown packing': (
         b'record: {compression: gzip}',
-        ":2: record.compression: 'gzip' is none; write none or lz4 or zstd",
+        ":2: record.compression: 'gzip' is not a choice; write none or lz4 or zstd",
     ),
     'tab': (b'drive:\n\ttopic: {}', ':3: is not valid YAML (found character'),
     'open bracket': (b'effects: {velocity: {}', ':2: is not valid YAML (expected'),
@@ -213,16 +213,13 @@ def test_a_scene_that_cannot_be_read(tmp_path, name):
 
 # Without its first line, which is for editors.
 WRITTEN_OUT = (CONFIG / 'linkages' / 'four_bar.yaml').read_bytes().partition(b'\n')[2]
-
-
 SLIDER = b'inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}'
-
 
 # The whole linkage file.
 LINKAGES = {
     'empty': (b'', ': holds None; write a mapping (key: value)'),
     'a list': (b'- four_bar', ": holds ['four_bar']; write a mapping (key: value)"),
-    'nothing known': (b'bars: 4', ':1: bars: unknown key; known: assembly, four_bar, input'),
+    'nothing known': (b'bars: 4', ':1: bars: unknown key; known: angles, assembly, four_bar'),
     'shorthand misspelt': (b'fourbar: {}', ":1: fourbar: unknown key; did you mean 'four_bar'?"),
     'shorthand without a side': (
         b'four_bar: {a: 1, b: 1, c: 1}',
@@ -240,13 +237,16 @@ LINKAGES = {
     ),
     'side of another shape': (
         FOUR_BAR.replace(b'}', b', assembly: ahead}'),
-        ":1: four_bar.assembly: 'ahead' is none; write left or right",
+        ":1: four_bar.assembly: 'ahead' is not a choice; write left or right",
     ),
     'two shorthands': (
         FOUR_BAR + SLIDER,
-        ':2: inverted_slider_crank: unknown key; known: four_bar',
+        ':2: inverted_slider_crank: unknown key; known: angles, four_bar, units',
     ),
-    'shorthand and links': (FOUR_BAR + b'links: {}', ':2: links: unknown key; known: four_bar'),
+    'shorthand and links': (
+        FOUR_BAR + b'links: {}',
+        ':2: links: unknown key; known: angles, four_bar, units',
+    ),
     'closes nowhere': (
         FOUR_BAR.replace(b'0.1}', b'1.0}'),
         ':1: four_bar: the loops close at no value of the input; the longest link of a loop',

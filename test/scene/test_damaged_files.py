@@ -14,8 +14,6 @@
 
 """Shipped files, damaged or changed at random: they run, or one line says why not."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 from math import isfinite
 from pathlib import Path
@@ -120,23 +118,16 @@ def test_damaged_contents(data):
 
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'
-
-
 GALLERY = {file.stem: yaml.safe_load(file.read_text('utf-8')) for file in FOLDER.glob('*.yaml')}
-
-
 Path_ = tuple[Any, ...]
-
 
 NUMBERS = st.sampled_from(
     [0, 0.0, -0.0, 1, -1, 1e-12, 1e-300, 5e-324, 1e9, -1e9, 1e300, float('nan'), float('inf')]
 )
 
-
 WORDS = st.sampled_from(
     ['ground', 'crank', 'A', 'B', 'O2', 'left', 'right', 'ahead', 'behind', '', 'nowhere']
 )
-
 
 JUNK = st.one_of(NUMBERS, WORDS, st.none(), st.booleans(), st.builds(list), st.builds(dict))
 
@@ -201,7 +192,7 @@ def read(name: str, content: Any) -> Linkage | FileError:
     derandomize=True, deadline=None, max_examples=600, suppress_health_check=list(HealthCheck)
 )
 @given(spoilt())
-def test_a_spoilt_file_is_answered_or_refused_in_one_line(case: tuple[str, Any]) -> None:
+def test_a_spoilt_file_is_answered_or_refused_in_one_line(case):
     name, content = case
     found = read(name, content)
     if isinstance(found, FileError):
@@ -228,5 +219,5 @@ def test_a_spoilt_file_is_answered_or_refused_in_one_line(case: tuple[str, Any])
 
 
 @pytest.mark.parametrize('name', sorted(GALLERY))
-def test_what_is_spoilt_here_is_sound_before(name: str) -> None:
+def test_what_is_spoilt_here_is_sound_before(name):
     read_linkage(read_yaml(FOLDER / f'{name}.yaml')[0])

@@ -15,12 +15,9 @@
 
 """A linkage written as a file is read as the same linkage, to the last bit; and whole, or not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf
 import os
-from pathlib import Path
 import resource
 
 from hypothesis import example, given, settings
@@ -51,7 +48,7 @@ def reads_as(linkage: Linkage, text: str) -> bool:
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_shipped_linkage_is_written_as_it_stands(file: Path) -> None:
+def test_every_shipped_linkage_is_written_as_it_stands(file):
     linkage = GALLERY[file.stem]
     written = linkage_text(linkage)
     assert reads_as(linkage, written)
@@ -162,7 +159,7 @@ def linkages(draw: st.DrawFn) -> Linkage:
 
 @settings(deadline=None)
 @given(linkages())
-def test_any_linkage_is_read_back(linkage: Linkage) -> None:
+def test_any_linkage_is_read_back(linkage):
     text = linkage_text(linkage, ['One.', 'Other.'])
     assert reads_as(linkage, text)
     # YAML 1.1 has other numbers and words; both see the same here.
@@ -175,7 +172,7 @@ def test_any_linkage_is_read_back(linkage: Linkage) -> None:
 @example(-1e-7)
 @example(5e-324)
 @example(1.7976931348623157e308)
-def test_any_number_is_read_back_to_the_last_bit(value: float) -> None:
+def test_any_number_is_read_back_to_the_last_bit(value):
     text = f'x: [{number_text(value)}]'
     (found,) = parse_yaml(text.encode(), 'x.yaml').numbers('x')
     assert found.hex() == value.hex()
@@ -188,11 +185,11 @@ def test_any_number_is_read_back_to_the_last_bit(value: float) -> None:
     ('value', 'text'),
     [(0.0, '0'), (-0.0, '-0.0'), (-3.0, '-3'), (0.1, '0.1'), (1e-7, '1.0e-07'), (1e16, '1.0e+16')],
 )
-def test_how_numbers_look(value: float, text: str) -> None:
+def test_how_numbers_look(value, text):
     assert number_text(value) == text
 
 
-def test_what_is_too_long_for_a_line_has_rows() -> None:
+def test_what_is_too_long_for_a_line_has_rows():
     third = 1.0 / 3.0
     linkage = read(FOUR_BAR)
     points = dict.fromkeys(('first', 'second', 'third'), (third, -third))
@@ -213,7 +210,7 @@ def test_what_is_too_long_for_a_line_has_rows() -> None:
     ]
 
 
-def test_comments_stand_at_the_head_within_99_columns() -> None:
+def test_comments_stand_at_the_head_within_99_columns():
     long = 'x' * 120
     comment = ['word ' * 40, '', f'a {long} b', 'two\nlines', 'a\0bell\a']
     text = linkage_text(read(FOUR_BAR), comment)
@@ -223,7 +220,7 @@ def test_comments_stand_at_the_head_within_99_columns() -> None:
     assert reads_as(read(FOUR_BAR), text)
 
 
-def test_a_file_takes_the_place_of_the_one_before(tmp_path: Path) -> None:
+def test_a_file_takes_the_place_of_the_one_before(tmp_path):
     file, link = tmp_path / 'linkage.yaml', tmp_path / 'link.yaml'
     file.write_text('before')
     link.symlink_to(file)
@@ -249,7 +246,7 @@ NOT_WRITTEN = {
 
 
 @pytest.mark.parametrize('name', NOT_WRITTEN)
-def test_a_file_that_cannot_be_written(tmp_path: Path, name: str) -> None:
+def test_a_file_that_cannot_be_written(tmp_path, name):
     (tmp_path / 'file').write_text('')
     os.mkfifo(tmp_path / 'pipe')
     (tmp_path / 'circle').symlink_to(tmp_path / 'circle')
@@ -263,7 +260,7 @@ def test_a_file_that_cannot_be_written(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.skipif(os.geteuid() == 0, reason='root may write everywhere')
 @pytest.mark.parametrize('read_only', ['.', 'linkage.yaml'])
-def test_what_is_read_only_stays(tmp_path: Path, read_only: str) -> None:
+def test_what_is_read_only_stays(tmp_path, read_only):
     file = tmp_path / 'linkage.yaml'
     file.write_text('before')
     mode = (tmp_path / read_only).stat().st_mode
@@ -276,7 +273,7 @@ def test_what_is_read_only_stays(tmp_path: Path, read_only: str) -> None:
     assert file.read_text() == 'before'
 
 
-def test_where_the_disk_is_full_the_file_before_stays(tmp_path: Path) -> None:
+def test_where_the_disk_is_full_the_file_before_stays(tmp_path):
     file = tmp_path / 'linkage.yaml'
     file.write_text('before')
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -290,7 +287,7 @@ def test_where_the_disk_is_full_the_file_before_stays(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_what_is_no_linkage_is_not_written(tmp_path: Path) -> None:
+def test_what_is_no_linkage_is_not_written(tmp_path):
     apart = replace(
         read(FOUR_BAR), links=read(FOUR_BAR).links | {'rocker': {'O4': (0, 0), 'B': (9, 0)}}
     )

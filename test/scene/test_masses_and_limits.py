@@ -14,8 +14,6 @@
 
 """Masses and limits in linkage files."""
 
-from __future__ import annotations
-
 from math import inf
 
 from linkage_ros.errors import FileError
@@ -26,20 +24,14 @@ from linkage_ros.kinematics.linkage import Limits, Mass
 import pytest
 
 from .files import CONFIG, is_one_line
-from ..support.scenes import linkage_of, scene_of
+from ..support.scenes import linkage_of, scene_of, symmetric_five_bar
 
 # The masses of a linkage file: valid ones, and one line for invalid ones.
 
 
 FILE = (CONFIG / 'linkages' / 'four_bar.yaml').read_text('utf-8')
-
-
 BEFORE = FILE[: FILE.index('masses:')]
-
-
 LINE = BEFORE.count('\n') + 1
-
-
 CRANK = '{mass: 0.1, center: [0.02, 0], inertia: 1.0e-5}'
 
 
@@ -128,7 +120,6 @@ def test_bad_masses_are_refused_in_a_line(kind):
 
 SHORT = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, SAID}'
 
-
 LONG = """
 links:
   ground: {O2: [0, 0], O4: [0.1, 0]}
@@ -185,7 +176,6 @@ def test_where_nothing_is_said_there_are_none():
 
 START = 'pose: {inputs: [1.0]}\n'
 
-
 # Text of the input, the rocker and the coupler, and the text after it; the error and its remedy.
 REFUSED = {
     'one number': ([', limits: 3'], ':7: input.limits: 3 is not two numbers; write [low, high]'),
@@ -195,12 +185,12 @@ REFUSED = {
     'not a number': ([', limits: [.nan, 1]'], ':7: input.limits: [nan, 1] is not two numbers;'),
     'crossing': (
         [', limits: [2, 1]'],
-        ":7: input.limits: [2, 1] of 'crank_joint' cross; write [low, high], the lower one first",
+        ":7: input.limits: [2, 1] rad of 'crank_joint' cross; write [low, high]",
     ),
-    'equal': ([', limits: [1, 1]'], ":7: input.limits: [1, 1] of 'crank_joint' are the same numb"),
+    'equal': ([', limits: [1, 1]'], ":7: input.limits: [1, 1] rad of 'crank_joint' are the same"),
     'both infinite above': (
         [', limits: [.inf, .inf]'],
-        ":7: input.limits: [inf, inf] of 'crank_joint' are no limits; write [low, high]; -.inf or",
+        ":7: input.limits: [inf, inf] of 'crank_joint' are not valid limits; write [low, high]; ",
     ),
     'beyond machines': ([', limits: [0, 1e12]'], ':7: input.limits: [0, 1000000000000.0] is out'),
     'no rate': (
@@ -215,27 +205,27 @@ REFUSED = {
     'misspelt': ([', limit: [0, 1]'], ":7: input.limit: unknown key; did you mean 'limits'?"),
     'a published angle on one side': (
         ['', ', limits: [1, .inf]'],
-        ':11: joints.rocker_joint.limits: [1, inf] limits the angle on one side, and angles come',
+        ':11: joints.rocker_joint.limits: [1, inf] rad limits the angle on one side, and',
     ),
     'a published joint, crossing': (
         ['', ', limits: [2, 1]'],
-        ":11: joints.rocker_joint.limits: [2, 1] of 'rocker_joint' cross; write",
+        ":11: joints.rocker_joint.limits: [2, 1] rad of 'rocker_joint' cross; write",
     ),
     'the start is beyond': (
         [', limits: [1.5, 2]', '', '', START],
-        ":12: pose.inputs: 1 is beyond the limits [1.5, 2] of 'crank_joint'; start within",
+        ":12: pose.inputs: 1 rad is beyond the limits [1.5, 2] rad of 'crank_joint'; start within",
     ),
     'the start brings a joint beyond': (
         ['', ', limits: [1.5, 2]', '', START],
-        ":12: pose.inputs: bring 'rocker_joint' to 1.11226, beyond its limits [1.5, 2]; start",
+        ":12: pose.inputs: bring 'rocker_joint' to 1.11226 rad, beyond its limits [1.5, 2] rad",
     ),
     'never met by a joint': (
         ['', ', limits: [0.1, 0.2]'],
-        " [0.1, 0.2] of 'rocker_joint' are never met: it goes from 0.958196 to 2.24593; widen",
+        " [0.1, 0.2] rad of 'rocker_joint' are never met: it goes from 0.958196 to 2.24593 rad",
     ),
     'never met by a joint while the input is within its own': (
         [', limits: [2, 2.5]', ', limits: [1, 1.2]'],
-        ":11: joints.rocker_joint.limits: [1, 1.2] of 'rocker_joint' are never met: it goes from",
+        ":11: joints.rocker_joint.limits: [1, 1.2] rad of 'rocker_joint' are never met: it goes",
     ),
     'never met together': (
         ['', ', limits: [0.95, 1]', ', limits: [-2, -1.9]'],
@@ -258,26 +248,14 @@ def test_limits_that_the_range_never_meets():
     with pytest.raises(FileError) as error:
         linkage_of(text)
     assert str(error.value) == (
-        "linkage.yaml:1: four_bar.input.limits: [2.5, 3] of 'crank_joint' never meet its range, "
-        '-2.0264 to 2.0264 rad; widen them'
+        "linkage.yaml:1: four_bar.input.limits: [2.5, 3] rad of 'crank_joint' never meet its "
+        'range, -2.0264 to 2.0264 rad; widen them'
     )
 
 
 def test_limits_of_several_inputs_that_nothing_meets():
     """The sides stand so that the pin between the two bars is out of reach."""
-    text = """
-links:
-  ground: {A: [0, 0], E: [0.3, 0]}
-  left: {A: [0, 0], B: [0.2, 0]}
-  left_rod: {B: [0, 0], C: [0.25, 0]}
-  right_rod: {C: [0, 0], D: [0.25, 0]}
-  right: {E: [0, 0], D: [0.2, 0]}
-input:
-- {joint: left_joint, parent: ground, child: left, limits: [3.0, 3.3]}
-- {joint: right_joint, parent: ground, child: right, limits: [-0.1, 0.1]}
-assembly: {C: right}
-joints: {rod_joint: {parent: left, child: left_rod}}
-"""
+    text = symmetric_five_bar(', limits: [3.0, 3.3]', ', limits: [-0.1, 0.1]')
     with pytest.raises(FileError) as error:
         linkage_of(text)
     assert "no state was found within the limits of 'left_joint', 'right_joint'" in str(
@@ -296,7 +274,11 @@ def test_what_is_published_beyond_them_is_a_choice():
 
 
 SCENES = {
-    'another word': ('beyond_limits: stop', LIMITED, "'stop' is none; write publish or silent"),
+    'another word': (
+        'beyond_limits: stop',
+        LIMITED,
+        "'stop' is not a choice; write publish or silent",
+    ),
     'no limits': (
         'beyond_limits: silent',
         SHORT.replace(', SAID', '').encode(),

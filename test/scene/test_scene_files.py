@@ -12,12 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What scene and linkage files say, also a linkage file where a scene is expected."""
-
-from __future__ import annotations
+"""Scene and linkage files are read as they say, also a linkage file in place of a scene."""
 
 from math import acos, hypot, pi, tau
-from pathlib import Path
 
 from linkage_ros.drives.constant_rate import ConstantRateParameters
 from linkage_ros.drives.topic import TopicParameters
@@ -32,6 +29,7 @@ from linkage_ros.scene.scene import RecordParameters, StorageParameters
 import pytest
 
 from .files import CONFIG, FOUR_BAR, is_one_line, SCENE
+from ..support.scenes import four_bar_text
 
 # Content of scene and linkage files: the shipped ones, defaults, numbers, shorthands.
 
@@ -194,7 +192,6 @@ joints:
   rocker_joint: {parent: ground, child: rocker}
 """
 
-
 SLIDER_WRITTEN_OUT = b"""
 links:
   ground: {O: [0, 0], C: [0.25, 0.1]}
@@ -271,20 +268,12 @@ def test_a_bag_holds_enough_to_build_the_scene_again(build):
 
 
 BEGIN = 1_700_000_000_000_000_000
-
-
 MS = 1_000_000
-
-
 SIXTY = pi / 3.0
-
 
 # Ends of the input ranges in the gallery, from one triangle each; all others turn fully.
 _FARTHEST = 2.0 * acos(0.75)
-
-
 _MIDDLE = hypot(1.18 - 0.22, 0.30 - 0.01)
-
 
 LIMITED = {
     # The arms reach B from O only as far as 0.125 − 0.05, and |OB| = 2·0.05·cos(φ/2).
@@ -301,7 +290,7 @@ LIMITED = {
 @pytest.mark.parametrize(
     'file', sorted((CONFIG / 'linkages').glob('*.yaml')), ids=lambda file: file.stem
 )
-def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(file: Path) -> None:
+def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(file):
     scene = load_scene(file)
     assert (scene.name, scene.rate, scene.record) == (file.stem, 1000.0, None)
     pipeline = Pipeline(scene)
@@ -336,33 +325,14 @@ def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(fil
 
 # A coupler and a rocker, 8 and 3, that are folded where the crank's pin is 5 from the rocker's
 # pivot, on a crank of 4 and a ground of 6: the crank goes from there round to the other side.
-FOLDS = """\
-links:
-  ground: {O2: [0, 0], O4: [6, 0]}
-  crank: {O2: [0, 0], A: [4, 0]}
-  coupler: {A: [0, 0], B: [8, 0]}
-  rocker: {O4: [0, 0], B: [3, 0]}
-input: {joint: crank_joint, parent: ground, child: crank}
-assembly: {B: left}
-joints: {rocker_joint: {parent: ground, child: rocker}}
-"""
-
-
+FOLDS = four_bar_text(4, 8, 3, 6)
 LOW = acos((4**2 + 6**2 - 5**2) / (2 * 4 * 6))
-
-
 HIGH = tau - LOW
-
-
 NEAR = 0.02 * (HIGH - LOW)
-
-
 """Where the middle 96 % begin, from an end of the range."""
 
-
 # Its crank and its rocker so long that the crank turns fully.
-TURNS = FOLDS.replace('[4, 0]', '[2, 0]').replace('[3, 0]', '[5, 0]')
-
+TURNS = four_bar_text(2, 8, 5, 6)
 
 # Text of the file; the start; the lowest and the highest value reached in 4 s.
 STARTS = {
@@ -378,7 +348,7 @@ STARTS = {
 
 
 @pytest.mark.parametrize('kind', STARTS)
-def test_a_run_begins_where_the_pose_says(tmp_path: Path, kind: str) -> None:
+def test_a_run_begins_where_the_pose_says(tmp_path, kind):
     text, start, lowest, highest = STARTS[kind]
     file = tmp_path / 'designed.yaml'
     file.write_text(f'{text}pose: {{inputs: [{start!r}]}}\n')
@@ -397,9 +367,7 @@ def test_a_run_begins_where_the_pose_says(tmp_path: Path, kind: str) -> None:
 
 @pytest.mark.parametrize('end', [LOW, HIGH])
 @pytest.mark.parametrize('beyond', [0.0, 1e-12, -1e-12])
-def test_a_start_at_a_toggle_is_where_the_swing_turns_back(
-    tmp_path: Path, end: float, beyond: float
-) -> None:
+def test_a_start_at_a_toggle_is_where_the_swing_turns_back(tmp_path, end, beyond):
     file = tmp_path / 'designed.yaml'
     file.write_text(f'{FOLDS}pose: {{inputs: [{end + beyond!r}]}}\n')
     pipeline = Pipeline(load_scene(file))
@@ -426,7 +394,7 @@ def test_a_start_at_a_toggle_is_where_the_swing_turns_back(
         ),
     ],
 )
-def test_a_start_where_no_loop_closes(tmp_path: Path, text: str, said: str) -> None:
+def test_a_start_where_no_loop_closes(tmp_path, text, said):
     (tmp_path / 'designed.yaml').write_text(text)
     with pytest.raises(FileError) as caught:
         load_scene(tmp_path / 'designed.yaml')
@@ -435,14 +403,14 @@ def test_a_start_where_no_loop_closes(tmp_path: Path, text: str, said: str) -> N
     assert f'designed.yaml:{line}: pose.inputs: {said}' in str(caught.value)
 
 
-def test_a_pose_with_points_is_where_an_iteration_starts_and_no_run(tmp_path: Path) -> None:
+def test_a_pose_with_points_is_where_an_iteration_starts_and_no_run(tmp_path):
     text = (CONFIG / 'linkages/class_3.yaml').read_text('utf-8')
     assert 'inputs: [0.0], points:' in text
     (tmp_path / 'posed.yaml').write_text(text)
     assert load_scene(tmp_path / 'posed.yaml').members[0].drive[1].start == SIXTY
 
 
-def test_what_is_iterated_needs_the_points_of_its_pose(tmp_path: Path) -> None:
+def test_what_is_iterated_needs_the_points_of_its_pose(tmp_path):
     text = (CONFIG / 'linkages/class_3.yaml').read_text('utf-8')
     head, _, tail = text.partition(', points: {')
     (tmp_path / 'posed.yaml').write_text(head + tail.partition('}')[2])
@@ -455,7 +423,7 @@ def test_what_is_iterated_needs_the_points_of_its_pose(tmp_path: Path) -> None:
     )
 
 
-def test_a_bag_holds_all_of_it(tmp_path: Path) -> None:
+def test_a_bag_holds_all_of_it(tmp_path):
     (tmp_path / 'designed.yaml').write_bytes(FOUR_BAR)
     scene = load_scene(tmp_path / 'designed.yaml')
     assert set(scene.files) == {'scene.yaml', 'linkage.yaml'}
@@ -468,7 +436,7 @@ def test_a_bag_holds_all_of_it(tmp_path: Path) -> None:
         assert one.tick(now).message == other.tick(now).message != b''
 
 
-def test_what_stands_for_it_is_a_scene_of_the_user_s_own(tmp_path: Path) -> None:
+def test_what_stands_for_it_is_a_scene_of_the_user_s_own(tmp_path):
     (tmp_path / 'linkage.yaml').write_bytes(FOUR_BAR)
     alone = load_scene(tmp_path / 'linkage.yaml')
     (tmp_path / 'scene.yaml').write_bytes(alone.files['scene.yaml'])
@@ -478,7 +446,6 @@ def test_what_stands_for_it_is_a_scene_of_the_user_s_own(tmp_path: Path) -> None
 
 
 NEITHER = 'is neither a scene nor a linkage; write linkage: FILE for a scene, links: {…} for a'
-
 
 # Text of the file, and the error.
 WRONG = {
@@ -494,14 +461,17 @@ WRONG = {
     ),
     'a linkage with a slip': (FOLDS + 'pse: {}', ":9: pse: unknown key; did you mean 'pose'?"),
     'a scene with links': ('linkage: x.yaml\nlinks: {}', ":1: linkage: '"),
-    'a linkage that is none': ('links: {}', ": the key 'input' is missing; add input: a mapping"),
+    'a linkage that is none': (
+        'links: {}',
+        ": the key 'input' is missing; add input: {joint: crank_",
+    ),
     'half a shorthand': ('four_bar: {a: 1}', ":1: four_bar: the key 'b' is missing; add b: a"),
     'a linkage that closes nowhere': ('four_bar: {a: 1, b: 1, c: 1, d: 9}', ':1: four_bar: the l'),
 }
 
 
 @pytest.mark.parametrize('kind', WRONG)
-def test_a_file_that_is_no_scene_and_no_linkage(tmp_path: Path, kind: str) -> None:
+def test_a_file_that_is_no_scene_and_no_linkage(tmp_path, kind):
     text, said = WRONG[kind]
     (tmp_path / 'file.yaml').write_text(text)
     with pytest.raises(FileError) as caught:

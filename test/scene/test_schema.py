@@ -15,12 +15,12 @@
 
 """The JSON Schemas say what the strict reader takes: of shipped files, bad files, random ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
 import json
+from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -63,17 +63,18 @@ from linkage_ros.files.parameters import (
     whole,
 )
 from linkage_ros.files.section import Section
+from linkage_ros.files.units import Units
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.schema import as_text, linkage_schema, parameter_types, scene_schema
 import pytest
 import yaml
 
-from .files import CONFIG, FOUR_BAR, SCENE
-from .test_bad_files import SLIDER, WRITTEN_OUT
+from . import test_bad_files as bad
+from .files import CONFIG, SCENE
+from .test_bad_files import WRITTEN_OUT
 
 Validator = pytest.importorskip('jsonschema').Draft202012Validator
-
 SCENES = sorted((CONFIG / 'scenes').glob('*.yaml'))
 LINKAGES = sorted((CONFIG / 'linkages').glob('*.yaml'))
 SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
@@ -145,21 +146,23 @@ def test_no_mapping_lets_strangers_in():
             assert one['additionalProperties'] != {}
 
 
-# Appended to a scene with only a linkage. Errors that a schema cannot detect follow in
-# SEEN_BY_THE_READER.
+def of_yaml(rows, before=b''):
+    """Return those bad files that are YAML, so that an editor compares them with a schema."""
+    found = {}
+    for kind, (data, _) in rows.items():
+        with suppress(FileError):
+            content_of(before + data)
+            found[kind] = before + data
+    return found
+
+
+# Appended to a scene with only a linkage, beside the bad scenes of `test_bad_files`. Errors that
+# a schema cannot detect follow in SEEN_BY_THE_READER.
 BAD_SCENES = {
-    'unknown key': 'rtae: 5',
-    'unknown drive': 'drive: {tropic: {}}',
     'two drives': 'drive: {topic: {}, sine: {amplitude: 1, frequency: 1}}',
     'unknown parameter of a drive': 'drive: {topic: {age: 1}}',
-    'parameter of a drive out of bounds': 'drive: {topic: {max_age: 0}}',
-    'parameter of a drive of a wrong type': 'drive: {topic: {carry_forward: yes}}',
     'parameter of a drive that is missing': 'drive: {constant_rate: {}}',
     'drive without a mapping': 'drive: {topic: }',
-    'unknown effect': 'effects: {velocty: {}}',
-    'effects in a list': 'effects: [velocity]',
-    'effect without a mapping': 'effects: {velocity: }',
-    'unknown parameter of an effect': 'effects: {velocity: {gain: 2}}',
     'parameter of an effect that is missing': 'effects: {delay: {}}',
     'parameter of an effect out of bounds': 'effects: {dropout: {probability: 1.5}}',
     'parameter of an effect of a wrong type': 'effects: {delay: {seconds: soon}}',
@@ -167,13 +170,6 @@ BAD_SCENES = {
     'number that is not whole': 'effects: {encoder: {joints: {rocker_joint: {counts: 0.5}}}}',
     'nested parameter unknown': 'effects: {noise: {joints: {rocker_joint: {whit: 1}}}}',
     'nested parameter out of bounds': 'effects: {noise: {joints: {rocker_joint: {white: -1}}}}',
-    'rate of text': 'rate: fast',
-    'rate of a flag': 'rate: true',
-    'rate of nothing': 'rate:',
-    'rate below 0': 'rate: -1',
-    'rate beyond a core': 'rate: 1.0e+9',
-    'hardly a rate': 'rate: 1.0e-9',
-    'angles': 'angles: unwrapped',
     'seed below 0': 'seed: -1',
     'seed that is not whole': 'seed: 0.5',
     'publish_input of text': 'publish_input: yes',
@@ -188,50 +184,38 @@ BAD_SCENES = {
     'fault before the first tick': 'faults: {f: {freeze: {}, at: [-1], seconds: 1}}',
     'fault without an end': 'faults: {f: {freeze: {}, at: [1]}}',
     'fault with an end and no beginning': 'faults: {f: {freeze: {}, seconds: 1}}',
-    'bag in a folder': 'record: {name: a/b}',
-    'bag above': 'record: {name: ..}',
     'bag here': 'record: {name: .}',
-    'bag name a number': 'record: {name: 7}',
     'bag without a folder': "record: {directory: ''}",
-    'line break in a name': 'record: {name: "a\\nb"}',
-    'half a message': 'record: {queue: 100.5}',
     'hardly a queue': 'record: {queue: 1}',
-    'flush at every tick': 'record: {flush_period: 0.001}',
-    'hardly a file': 'record: {split_bytes: 1}',
     'half a byte': 'record: {split_bytes: 1000000.5}',
     'time that goes back': 'record: {split_seconds: -1}',
-    'hardly a second': 'record: {split_seconds: 0.5}',
-    'ring of one file': 'record: {keep_files: 2, split_bytes: 0}',
     'room below nothing': 'record: {min_free_bytes: -1}',
-    'memory of a moment': 'record: {snapshot_seconds: 0.05}',
     'memory of a week': 'record: {snapshot_seconds: 604800}',
-    'memory in files': 'record: {snapshot_seconds: 30, split_seconds: 60}',
-    'memory in a ring': 'record: {snapshot_seconds: 30, keep_files: 3}',
-    'memory that is flushed': 'record: {snapshot_seconds: 30, flush_period: 1}',
-    'memory that waits': 'record: {snapshot_seconds: 30, queue: 1000}',
-    'room for nothing': 'record: {snapshot_bytes: 5000000}',
     'room for nothing that is said': 'record: {snapshot_bytes: 5000000, snapshot_seconds: 0}',
     'hardly room': 'record: {snapshot_seconds: 30, snapshot_bytes: 1000}',
-    'unknown packing': 'record: {compression: gzip}',
     'linkages beside linkage': 'linkages: [{name: a, linkage: linkage.yaml}]',
 }
 
 SEEN_BY_THE_READER = {
     'joint that does not exist': 'effects: {bias: {joints: {wrist: 0.1}}}',
     'link that does not exist': 'faults: {f: {broken_link: {link: boom}}}',
-    'not a number': 'rate: .nan',
     'effort of an input that is not published': 'publish_input: false\neffects: {effort: {}}',
 }
 
 
-@pytest.mark.parametrize('kind', BAD_SCENES | SEEN_BY_THE_READER)
+ALL_BAD_SCENES = of_yaml(bad.SCENES, SCENE) | {
+    kind: SCENE + text.encode() for kind, text in (BAD_SCENES | SEEN_BY_THE_READER).items()
+}
+
+
+@pytest.mark.parametrize('kind', ALL_BAD_SCENES)
 def test_a_bad_scene_is_refused_by_the_reader_and_where_it_can_know_by_the_schema(
     kind, build, valid
 ):
-    scene = SCENE + (BAD_SCENES | SEEN_BY_THE_READER)[kind].encode()
+    scene = ALL_BAD_SCENES[kind]
     with pytest.raises(FileError):
         build(scene)
-    assert valid('scene', content_of(scene)) == (kind in SEEN_BY_THE_READER)
+    assert valid('scene', content_of(scene)) == (kind in ('NaN', *SEEN_BY_THE_READER))
 
 
 @pytest.mark.parametrize(
@@ -285,18 +269,8 @@ def slider(text: bytes) -> bytes:
     return full.replace(old, text)
 
 
-# The whole file; errors that a schema cannot detect follow in SEEN_IN_A_LINKAGE.
+# The whole file, beside the bad linkages of `test_bad_files`.
 BAD_LINKAGES = {
-    'nothing known': b'bars: 4',
-    'shorthand without a side': b'four_bar: {a: 1, b: 1, c: 1}',
-    'zero length': FOUR_BAR.replace(b'0.04', b'0'),
-    'a length beyond squaring': FOUR_BAR.replace(b'0.04', b'1.0e+200'),
-    'side of another shape': FOUR_BAR.replace(b'}', b', assembly: ahead}'),
-    'two shorthands': FOUR_BAR + SLIDER,
-    'shorthand and links': FOUR_BAR + b'links: {}',
-    'swivel that is no point': SLIDER.replace(b', 0.1', b''),
-    'point of three': WRITTEN_OUT.replace(b'[0.040, 0]', b'[0.040, 0, 0]'),
-    'point far away': WRITTEN_OUT.replace(b'[0.040, 0]', b'[1.0e+300, 0]'),
     'side that is none': WRITTEN_OUT.replace(b'B: left', b'B: above'),
     'input of nothing': WRITTEN_OUT.replace(
         b'input: {joint: crank_joint, parent: ground, child: crank}', b'input: []'
@@ -305,7 +279,6 @@ BAD_LINKAGES = {
     'slider and parent': WRITTEN_OUT.replace(
         b'{parent: crank, child: coupler}', b'{slider: s, parent: crank}'
     ),
-    'nothing to publish': WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')] + b'joints: {}',
     'joints missing': WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')],
     'paths of no names': WRITTEN_OUT.replace(b'traced: [P]', b'traced: [1]'),
     'pose without inputs': WRITTEN_OUT + b'pose: {points: {A: [0, 0]}}',
@@ -316,19 +289,19 @@ BAD_LINKAGES = {
     ),
     'slider without a direction': slider(b'{point: Y, block: yoke, along: ground, through: O2}'),
 }
-SEEN_IN_A_LINKAGE = {
-    'NaN length': FOUR_BAR.replace(b'0.04', b'.nan'),
-    'closes nowhere': FOUR_BAR.replace(b'0.1}', b'1.0}'),
-    'no ground': WRITTEN_OUT.replace(b'ground:', b'base:'),
-    'crank that is no link': WRITTEN_OUT.replace(b'child: crank}', b'child: krank}'),
-    'no side': WRITTEN_OUT.replace(b'B: left', b''),
-    'slide of no slider': WRITTEN_OUT.replace(b'{parent: crank, child: coupler}', b'{slider: s}'),
-}
+ALL_BAD_LINKAGES = of_yaml(bad.LINKAGES) | BAD_LINKAGES
+# Names, lengths that close, places that coincide.
+SEEN_IN_A_LINKAGE = (
+    'NaN length',
+    'closes nowhere', 'swivel on the pivot', 'link without length', 'no ground',
+    'no pin', 'crank that is no link', 'no side', 'joint of no link', 'the input published',
+    'joint of no text', 'slide of no slider',
+)  # fmt: skip
 
 
-@pytest.mark.parametrize('kind', BAD_LINKAGES | SEEN_IN_A_LINKAGE)
+@pytest.mark.parametrize('kind', ALL_BAD_LINKAGES)
 def test_a_bad_linkage_is_refused_by_the_reader_and_where_it_can_know_by_the_schema(kind, valid):
-    data = (BAD_LINKAGES | SEEN_IN_A_LINKAGE)[kind]
+    data = ALL_BAD_LINKAGES[kind]
     if b'masses:' in data:  # those that the shipped file has make room
         head, _, tail = data.rpartition(b'masses:')
         data = head.partition(b'masses:')[0] + b'masses:' + tail
@@ -389,7 +362,7 @@ def test_what_the_reader_takes_of_damaged_files_the_schema_takes_too(data, valid
 class One:
     """Of each."""
 
-    size: float = number('how large', unit='m', above=0.0, most=2.0)
+    size: float = number('how large', unit='kg', above=0.0, most=2.0)
     loud: bool = flag('whether it is', False)
 
 
@@ -405,7 +378,7 @@ class AllKinds:
     """Parameters of every kind."""
 
     must: float = number('that must be there', unit='s', least=-1.0, most=1.0)
-    table: tuple[tuple[float, ...], ...] = rows('a table', ('time [s]', 'angle [rad]'), most=5.0)
+    table: tuple[tuple[float, ...], ...] = rows('a table', ('time [s]', 'load [N]'), most=5.0)
     path: str = file('where')
     ones: Mapping[str, One] = each('of each', 'pin', One, required=True)
     count: int = whole('that is whole', 1, least=0, most=100)
@@ -413,11 +386,11 @@ class AllKinds:
     on: bool = flag('whether', True)
     word: str = choice('which', ('one', 'other'), 'one')
     title: str = text('what it is called', 'none')
-    place: tuple[float, float] = point('where', (0.0, 0.0), unit='m', most=3.0)
+    place: tuple[float, float] = point('where', (0.0, 0.0), unit='N', most=3.0)
     joint: str = name('which', 'joint', 'rocker')
     joints: tuple[str, ...] = names('which', 'joint')
     gains: Mapping[str, float] = each('of each', 'joint', Number('gain', '', least=0.0))
-    shifts: Mapping[str, Any] = each('of each', 'link', Point('[x, y]', 'm', 1.0))
+    shifts: Mapping[str, Any] = each('of each', 'link', Point('[x, y]', 'N', 1.0))
     within: Within = group('further', Within)  # noqa: RUF009 (a field, as the others are)
 
 
@@ -480,7 +453,9 @@ TYPES = {
 
 def reads(content: dict[str, Any], of: Any) -> bool:
     try:
-        read_parameters(Section('scene.yaml', '', content), of, PARTS)
+        # A schema has the bounds of the smallest units.
+        section = Section('scene.yaml', '', content, units=Units('mm', 'degrees', slides=True))
+        read_parameters(section, of, PARTS)
     except FileError:
         return False
     return True
@@ -560,7 +535,7 @@ def test_an_editor_is_told_meaning_unit_bounds_and_default():
         'description': 'that must be there [s]', 'type': 'number', 'minimum': -1, 'maximum': 1,
     }  # fmt: skip
     assert said['properties']['ones']['additionalProperties']['properties']['size'] == {
-        'description': 'how large [m]', 'type': 'number', 'maximum': 2, 'exclusiveMinimum': 0,
+        'description': 'how large [kg]', 'type': 'number', 'maximum': 2, 'exclusiveMinimum': 0,
     }  # fmt: skip
     defaults = {key: value.get('default') for key, value in said['properties'].items()}
     assert defaults == {
@@ -568,6 +543,13 @@ def test_an_editor_is_told_meaning_unit_bounds_and_default():
         'title': 'none', 'path': None, 'place': [0.0, 0.0], 'joint': 'rocker', 'joints': [],
         'gains': {}, 'shifts': {}, 'ones': None, 'within': {'depth': 3},
     }  # fmt: skip
+
+
+def test_a_schema_takes_a_bounded_length_in_every_unit_of_a_file():
+    one = Number('where', 'rad/s or m/s', least=-0.5, most=2.0).schema()
+    assert (one['minimum'], one['maximum']) == (-500, 2000)  # [mm/s]
+    one = Number('where', 'rad', least=0.0, most=0.5 * pi).schema()
+    assert (one['minimum'], one['maximum']) == (0, 90)  # [deg]
 
 
 def test_every_shipped_scene_is_read_after_all():

@@ -15,8 +15,6 @@
 
 """Linkages that solvers are tried on, and what they are held against."""
 
-from __future__ import annotations
-
 from math import remainder, tau
 from pathlib import Path
 
@@ -30,7 +28,6 @@ from ..kinematics.reference import four_bar, turned
 
 GALLERY = sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
 Lengths = tuple[float, float, float, float]
-
 CRANK_ROCKER: Lengths = (0.04, 0.12, 0.08, 0.1)
 
 

@@ -15,8 +15,6 @@
 
 """Newton's method on dyads: its order, its answers, and that it stays in its assembly."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import log10, pi, tau
 import random
@@ -46,7 +44,7 @@ STARTS = {'from knots': None, 'warm': True, 'cold': False}
 
 
 @pytest.mark.parametrize('phi', [0.3, 2.0, 4.5])
-def test_a_step_leaves_the_square_of_the_error(phi: float) -> None:
+def test_a_step_leaves_the_square_of_the_error(phi):
     closure = Closure(crank_rocker())
     finder = LoopFinder(closure.linkage, closure.structure, closure._known)
     (loops,) = finder.find()
@@ -66,9 +64,7 @@ def test_a_step_leaves_the_square_of_the_error(phi: float) -> None:
 
 @settings(max_examples=60)
 @given(crank_rockers(), st.floats(-20.0, 20.0), st.sampled_from([1e-3, 1e-6, 1e-9, 1e-13]))
-def test_any_four_bar_is_as_near_as_its_tolerance(
-    lengths: Lengths, phi: float, tolerance: float
-) -> None:
+def test_any_four_bar_is_as_near_as_its_tolerance(lengths, phi, tolerance):
     for warm in STARTS.values():
         newton = NewtonClosure(crank_rocker(lengths), tolerance, warm=warm)
         for value in (phi - 0.01, phi):
@@ -80,7 +76,7 @@ def test_any_four_bar_is_as_near_as_its_tolerance(
 
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
 @pytest.mark.parametrize('start', STARTS)
-def test_the_gallery_moves_as_in_closed_form(file, start: str) -> None:
+def test_the_gallery_moves_as_in_closed_form(file, start):
     linkage = shipped(file.stem)
     closure, newton = Closure(linkage), NewtonClosure(linkage, 1e-9, warm=STARTS[start])
     draw = random.Random(file.stem)
@@ -119,7 +115,7 @@ NEAR_CHANGE_POINTS: dict[str, Lengths] = {
 @pytest.mark.parametrize('name', NEAR_CHANGE_POINTS)
 @pytest.mark.parametrize('step', [0.001, 0.0123, 0.2])
 @pytest.mark.parametrize('start', STARTS)
-def test_no_jump_to_the_other_assembly(name: str, step: float, start: str) -> None:
+def test_no_jump_to_the_other_assembly(name, step, start):
     linkage = four_bar_linkage(NEAR_CHANGE_POINTS[name], 'left')
     closure, newton = Closure(linkage), NewtonClosure(linkage, 1e-6, warm=STARTS[start])
     for direction in (1.0, -1.0):
@@ -131,14 +127,14 @@ def test_no_jump_to_the_other_assembly(name: str, step: float, start: str) -> No
                 assert apart(closure, solved.joints, found.joints) < 1e-5
 
 
-def test_easy_states_are_newton_s_own() -> None:
+def test_easy_states_are_newton_s_own():
     newton = NewtonClosure(crank_rocker(), 1e-9)
     for k in range(1000):
         newton.position(0.01 * k)
     assert newton.exact_states == 0
 
 
-def test_at_a_toggle_the_closed_form_answers() -> None:
+def test_at_a_toggle_the_closed_form_answers():
     linkage = four_bar_linkage((4.0, 5.0, 3.0, 6.5), 'left')
     closure, newton = Closure(linkage), NewtonClosure(linkage, 1e-9)
     ((low, high, *_),) = closure.input_ranges
@@ -148,7 +144,7 @@ def test_at_a_toggle_the_closed_form_answers() -> None:
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'five_bar', 'jansen_leg', 'class_3'])
-def test_a_state_depends_on_its_inputs_alone(name: str) -> None:
+def test_a_state_depends_on_its_inputs_alone(name):
     linkage = shipped(name)
     draw = random.Random(1)
     states = [tuple(draw.uniform(0.0, tau) for _ in linkage.inputs) for _ in range(100)]
@@ -159,7 +155,7 @@ def test_a_state_depends_on_its_inputs_alone(name: str) -> None:
         assert back.position(*inputs).joints == there[inputs]
 
 
-def test_a_warm_start_remembers_no_more_than_the_tolerance() -> None:
+def test_a_warm_start_remembers_no_more_than_the_tolerance():
     one, other = (NewtonClosure(crank_rocker(), 1e-4, warm=True) for _ in range(2))
     one.position(0.9)
     other.position(1.1)
@@ -168,7 +164,7 @@ def test_a_warm_start_remembers_no_more_than_the_tolerance() -> None:
     assert apart(one, *found) < 1e-4
 
 
-def test_arrays_are_solved_state_by_state() -> None:
+def test_arrays_are_solved_state_by_state():
     newton = NewtonClosure(crank_rocker(), 1e-9)
     batch = newton.solve([0.5, 1.0], rates=2.0, accelerations=3.0)
     for k, phi in enumerate((0.5, 1.0)):

@@ -14,8 +14,6 @@
 
 """Scenes that name a solver or an accuracy, and the choice among solvers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
@@ -44,13 +42,8 @@ from ..support.scenes import scene_of, shipped
 
 
 FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
-
-
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
-
-
 FIVE_BAR = (LINKAGES / 'five_bar.yaml').read_bytes()
-
 
 SOLVERS = {
     'closed_form': ('solver: closed_form', Closure),
@@ -61,12 +54,11 @@ SOLVERS = {
     'part of a table': ('solver: {table: {tolerance: 1.0e-6, span: [0.2, 2.5]}}', TableClosure),
 }
 
-
 BEGIN = 1_700_000_000_000_000_000
 
 
 @pytest.mark.parametrize('name', SOLVERS)
-def test_what_is_named_is_built(name: str) -> None:
+def test_what_is_named_is_built(name):
     text, kind = SOLVERS[name]
     (line,) = Pipeline(scene_of(text)).lines
     assert type(line.closure) is kind
@@ -74,7 +66,7 @@ def test_what_is_named_is_built(name: str) -> None:
 
 
 @pytest.mark.parametrize('name', SOLVERS)
-def test_a_scene_runs_with_it(name: str) -> None:
+def test_a_scene_runs_with_it(name):
     effects = 'drive: {constant_rate: {rate: 3.0}}\neffects: {acceleration: {}}\n'
     plain = Pipeline(scene_of(effects))
     pipeline = Pipeline(scene_of(effects + SOLVERS[name][0]))
@@ -91,7 +83,7 @@ def test_a_scene_runs_with_it(name: str) -> None:
 
 
 @pytest.mark.parametrize('name', SOLVERS)
-def test_ticks_that_are_not_in_the_bag_change_nothing(name: str) -> None:
+def test_ticks_that_are_not_in_the_bag_change_nothing(name):
     scene = scene_of(f'{SOLVERS[name][0]}\neffects: {{velocity: {{}}}}\nangles: wrapped')
     crank = JointStateWriter(['crank_joint']).write
     whole, part = Pipeline(scene), Pipeline(scene)
@@ -105,7 +97,7 @@ def test_ticks_that_are_not_in_the_bag_change_nothing(name: str) -> None:
 
 
 @pytest.mark.parametrize('name', SOLVERS)
-def test_a_bag_replays_to_the_same_bytes(tmp_path: Path, name: str) -> None:
+def test_a_bag_replays_to_the_same_bytes(tmp_path, name):
     run = Run(tmp_path / 'bag', f'{SOLVERS[name][0]}\neffects: {{velocity: {{}}}}')
     for number in range(400):
         now = BEGIN + number * 1_000_000
@@ -118,7 +110,7 @@ def test_a_bag_replays_to_the_same_bytes(tmp_path: Path, name: str) -> None:
     assert all(tick.recorded == tick.tick.message for tick in ticks)
 
 
-def test_a_reset_builds_no_table_again() -> None:
+def test_a_reset_builds_no_table_again():
     scene = scene_of('accuracy: 1.0e-6')
     first = Pipeline(scene)
     again = Pipeline(scene, first.closures)
@@ -126,7 +118,7 @@ def test_a_reset_builds_no_table_again() -> None:
     assert again.lines[0].choice == first.lines[0].choice is not None
 
 
-def test_linkages_may_differ(tmp_path: Path) -> None:
+def test_linkages_may_differ(tmp_path):
     (tmp_path / 'l.yaml').write_bytes(FOUR_BAR)
     (tmp_path / 's.yaml').write_text("""
 solver: {table: {tolerance: 1.0e-4}}
@@ -142,12 +134,12 @@ linkages:
     assert type(lines[3].closure) is Closure
 
 
-def test_several_inputs_take_newton() -> None:
+def test_several_inputs_take_newton():
     (line,) = Pipeline(scene_of('solver: {newton: {tolerance: 1.0e-9}}', FIVE_BAR)).lines
     assert line.closure.position(0.5, 1.5).joints
 
 
-def test_a_replay_does_not_choose_again(monkeypatch) -> None:
+def test_a_replay_does_not_choose_again(monkeypatch):
     def never(*_):
         raise AssertionError
 
@@ -165,7 +157,7 @@ def test_a_replay_does_not_choose_again(monkeypatch) -> None:
         assert type(line.closure) is kind
 
 
-def test_the_bag_s_account_tells_what_was_chosen(tmp_path: Path) -> None:
+def test_the_bag_s_account_tells_what_was_chosen(tmp_path):
     said = f'"{CHOSEN}": {{"": {{"table": {{"tolerance": 1e-6}}}}}}'
     account = '{"scene": "s", "crank_topic": "/crank", "joint_states_topic": "/joint_states"}'
     run = Run(tmp_path / 'bag', 'accuracy: 1.0e-6', f'{account[:-1]}, {said}}}'.encode())
@@ -173,7 +165,7 @@ def test_the_bag_s_account_tells_what_was_chosen(tmp_path: Path) -> None:
     assert run_account(read_bag(tmp_path / 'bag')).solvers == {'': {'table': {'tolerance': 1e-6}}}
 
 
-def test_forces_leave_the_closed_form_alone() -> None:
+def test_forces_leave_the_closed_form_alone():
     heavy = (LINKAGES / 'four_bar.yaml').read_bytes()
     (line,) = Pipeline(scene_of('accuracy: 1.0e-6\ndrive: {torque: {}}', heavy)).lines
     assert type(line.closure) is Solver
@@ -199,7 +191,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('text', REFUSED)
-def test_a_solver_that_cannot_be_is_refused_by_reader_and_schema(text: str) -> None:
+def test_a_solver_that_cannot_be_is_refused_by_reader_and_schema(text):
     with pytest.raises(FileError) as caught:
         scene_of(text)
     assert REFUSED[text] in str(caught.value)
@@ -215,12 +207,12 @@ BUILT = {
 
 
 @pytest.mark.parametrize('text', BUILT)
-def test_refused_when_it_is_built(text: str) -> None:
+def test_refused_when_it_is_built(text):
     with pytest.raises(FileError, match=BUILT[text]):
         Pipeline(scene_of(text))
 
 
-def test_what_is_read_the_schema_takes() -> None:
+def test_what_is_read_the_schema_takes():
     for text, _ in SOLVERS.values():
         content = parse_yaml(f'linkage: l.yaml\n{text}'.encode(), 'f')
         assert not violations(content, scene_schema())
@@ -249,12 +241,11 @@ TIMINGS = [
     ({'closed_form': 1.0, 'table': 1.5, 'newton': 2.0}, 'closed_form'),
 ]
 
-
 KINDS = {'closed_form': Solver, 'table': TableClosure, 'newton': NewtonClosure}
 
 
 @pytest.mark.parametrize(('times', 'winner'), TIMINGS)
-def test_the_fastest_is_chosen(monkeypatch, times, winner: str) -> None:
+def test_the_fastest_is_chosen(monkeypatch, times, winner):
     timed(monkeypatch, **{name: 1e-6 * time for name, time in times.items()})
     found = choose(crank_rocker(), 1e-6)
     assert type(found) is KINDS[winner]
@@ -277,7 +268,7 @@ ABLE = {
 
 
 @pytest.mark.parametrize('name', ABLE)
-def test_only_solvers_that_prove_the_accuracy_are_timed(monkeypatch, name: str) -> None:
+def test_only_solvers_that_prove_the_accuracy_are_timed(monkeypatch, name):
     asked = timed(monkeypatch, closed_form=1e-6, table=1e-6, newton=1e-6)
     said = choose(shipped(name), 1e-6).choice.why
     assert asked == [ABLE[name]]
@@ -286,19 +277,19 @@ def test_only_solvers_that_prove_the_accuracy_are_timed(monkeypatch, name: str) 
     assert ("Newton's method: " in said) == ('newton' not in ABLE[name])
 
 
-def test_newton_does_not_prove_little(monkeypatch) -> None:
+def test_newton_does_not_prove_little(monkeypatch):
     asked = timed(monkeypatch, closed_form=1e-6, table=1e-6, newton=1e-6)
     choose(crank_rocker((0.1, 2.0, 0.02, 1.95)), 1e-2)
     assert 'newton' not in asked[0]
 
 
-def test_a_real_timing_names_one_that_is_able() -> None:
+def test_a_real_timing_names_one_that_is_able():
     found = choose(crank_rocker(), 1e-6)
     assert found.choice.solver in ABLE['four_bar']
     assert found.choice.why.count(' µs') == 3
 
 
-def test_the_closed_form_says_why_it_is_alone() -> None:
+def test_the_closed_form_says_why_it_is_alone():
     found = only_closed_form(crank_rocker(), 'forces start from it')
     assert found.choice == ('closed_form', {}, 'closed form: forces start from it')
     assert found.position(1.0) == found.closed.position(1.0)

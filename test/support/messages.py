@@ -14,8 +14,6 @@
 
 """Messages as rosbags writes and reads them: its CDR shares no code with ours."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -14,8 +14,6 @@
 
 """Linkages, scenes and pipelines from the text of their files, and the shipped linkages."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from linkage_ros.files.linkage_file import read_linkage
@@ -33,6 +31,70 @@ ONE_INPUT = [name for name in GALLERY if name != 'five_bar']
 """Names of all shipped linkages, and of those that a file alone drives."""
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
 """Publishes coupler_joint and rocker_joint; its input is crank_joint."""
+SLIDER_CRANK = 'inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}'
+"""Publishes rod_joint, an angle, and rod_slide, a slide."""
+PENDULUM = """
+links:
+  ground: {O: [0, 0], X: [1, 0]}
+  crank: {O: [0, 0], end: [0.5, 0]}
+input: {joint: drive_joint, parent: ground, child: crank}
+joints: {crank_joint: {parent: ground, child: crank}}
+masses: {crank: {mass: 2, center: [0.3, 0], inertia: 0.05}}
+"""
+FIVE_BAR = """
+links:
+  ground: {O1: [0, 0], O2: [0.1, 0]}
+  left: {O1: [0, 0], A: [0.04, 0]}
+  right: {O2: [0, 0], C: [0.05, 0]}
+  upper: {A: [0, 0], B: [0.12, 0]}
+  lower: {C: [0, 0], B: [0.11, 0]}
+input:
+  - {joint: left_crank, parent: ground, child: left}
+  - {joint: right_crank, parent: ground, child: right}
+assembly: {B: left}
+joints:
+  upper_joint: {parent: ground, child: upper}
+  lower_joint: {parent: ground, child: lower}
+"""
+"""Two cranks on the ground, two links between them, all straight."""
+
+
+def four_bar_text(a, b, c, d, masses=(), crank='', rocker=''):
+    """Return a four-bar's file; masses: (mass, centre, inertia); limits go on behind a joint."""
+    text = f"""\
+links:
+  ground: {{O2: [0, 0], O4: [{d}, 0]}}
+  crank: {{O2: [0, 0], A: [{a}, 0]}}
+  coupler: {{A: [0, 0], B: [{b}, 0]}}
+  rocker: {{O4: [0, 0], B: [{c}, 0]}}
+input: {{joint: crank_joint, parent: ground, child: crank{crank}}}
+assembly: {{B: left}}
+joints: {{rocker_joint: {{parent: ground, child: rocker{rocker}}}}}
+"""
+    rows = [
+        f'  {link}: {{mass: {mass}, center: [{center}, 0], inertia: {inertia}}}\n'
+        for link, (mass, center, inertia) in zip(
+            ('crank', 'coupler', 'rocker'), masses, strict=False
+        )
+    ]
+    return text + ''.join(['masses:\n', *rows] if rows else [])
+
+
+def symmetric_five_bar(left, right='', rod=''):
+    """Return the file of a five-bar of equal cranks and rods; limits go on behind a joint."""
+    return f"""\
+links:
+  ground: {{A: [0, 0], E: [0.3, 0]}}
+  left: {{A: [0, 0], B: [0.2, 0]}}
+  left_rod: {{B: [0, 0], C: [0.25, 0]}}
+  right_rod: {{C: [0, 0], D: [0.25, 0]}}
+  right: {{E: [0, 0], D: [0.2, 0]}}
+input:
+- {{joint: left_joint, parent: ground, child: left{left}}}
+- {{joint: right_joint, parent: ground, child: right{right}}}
+assembly: {{C: right}}
+joints: {{rod_joint: {{parent: left, child: left_rod{rod}}}}}
+"""
 
 
 def _bytes(text: str | bytes) -> bytes:

@@ -14,8 +14,6 @@
 
 """Four-bars with compass and ruler: circles that meet, and positions that are known from it."""
 
-from __future__ import annotations
-
 from cmath import phase, rect
 from math import pi, radians, sqrt
 
@@ -30,11 +28,7 @@ def cross(one: complex, other: complex) -> float:
 
 
 def pins(lengths: Lengths, direction: float) -> list[complex] | None:
-    """
-    Return where B can be, left of A→O4 first, with O2 in the origin and O4 on the x axis.
-
-    The circle about A with the coupler meets the one about O4 with the rocker.
-    """
+    """Return where B can be, left of A→O4 first; O2 is the origin and O4 lies on the x axis."""
     a, b, c, d = lengths
     crank_pin = rect(a, direction)
     across = d - crank_pin
@@ -61,23 +55,7 @@ def design(
     zeros: tuple[float, float] = (0.0, 0.0),
     ground: float = 0.0,
 ) -> Design:
-    """
-    Return a four-bar, wanted where it is at given directions of the crank on given assemblies.
-
-    Parameters
-    ----------
-    lengths
-        Of crank, coupler, rocker and ground.
-    positions
-        Directions of O2→A from O2→O4, in degrees, and assemblies.
-    side
-        The design's own assembly.
-    zeros
-        Where the pins of crank and rocker lie in their frames, in [rad].
-    ground
-        Direction of O2→O4 in the frame of the ground, in [rad].
-
-    """
+    """Return a four-bar that meets (crank [°], assembly); zeros and ground turn its frames."""
     a, b, c, d = lengths
     alpha, beta = zeros
     o2 = 0.3 - 0.2j if ground else 0j

@@ -13,14 +13,12 @@
 # limitations under the License.
 
 """
-What makes a solution on paper useless, against a linkage that is moved by hand.
+Defects that make a design useless, against a linkage that is moved by hand.
 
 The table's verdicts are worked out from the lengths: where the crank stops is a triangle of three
 known sides. The random ones are held against a simulator that knows nothing but two circles: it
 moves the crank in small steps and keeps to the intersection that is nearest.
 """
-
-from __future__ import annotations
 
 from itertools import pairwise
 from math import acos, asin, cos, degrees, pi, radians, sin, tau
@@ -36,7 +34,6 @@ from .by_hand import cross, design, Lengths, on, pins, transmission
 from .test_proof import THREE_PAIRS
 
 L, R = 'left', 'right'
-
 CRANK_ROCKER = (2.0, 7.0, 9.0, 6.0)
 DOUBLE_CRANK = (5.0, 4.0, 6.0, 2.0)
 # The coupler turns: |d − a| < c − b and a + d > b + c, so that the crank stops at
@@ -169,7 +166,7 @@ CASES = {
 
 @pytest.mark.parametrize('name', CASES)
 @pytest.mark.parametrize('frame', ['plain', 'odd'])
-def test_defects_are_named(name: str, frame: str) -> None:
+def test_defects_are_named(name, frame):
     lengths, positions, defects, travel = CASES[name]
     if frame == 'plain':
         made, zero = design(lengths, positions), 0.0
@@ -183,7 +180,7 @@ def test_defects_are_named(name: str, frame: str) -> None:
         assert found.travel == pytest.approx([radians(angle) + zero for angle in travel])
 
 
-def test_the_text_s_own_design_cannot_be_moved_through_its_pairs() -> None:
+def test_the_text_s_own_design_cannot_be_moved_through_its_pairs():
     """sources/003: a crank of 5.6 and a rocker of 4.9 on a ground of 1, a coupler of 0.17."""
     found = assess(THREE_PAIRS)
     (defect,) = found.defects
@@ -228,14 +225,14 @@ def test_the_text_s_own_design_cannot_be_moved_through_its_pairs() -> None:
         ((0.7, 0.1, 0.7 - 1e-16, 0.1), 'S2X', True),
     ],
 )
-def test_what_turns_is_named(lengths: Lengths, code: str, turns: bool) -> None:
+def test_what_turns_is_named(lengths, code, turns):
     found = assess(design(lengths, [(60, L)]))
     assert found.kind.code == code
     assert found.turns == turns
     assert (found.full_transmission is not None) == turns
 
 
-def test_what_cannot_be_assembled_is_said_first() -> None:
+def test_what_cannot_be_assembled_is_said_first():
     """Stretched, the right angle's coupler and rocker are 5 long; at 180° A is 7 from O4."""
     four_bar = FourBar.of_lengths(*RIGHT_ANGLE)
     found = assess(Design(four_bar, (Wanted(1.0), Wanted(pi), Wanted(2.0))))
@@ -246,14 +243,14 @@ def test_what_cannot_be_assembled_is_said_first() -> None:
     assert found.transmission == 0.0
 
 
-def test_links_that_never_close_have_no_kind() -> None:
+def test_links_that_never_close_have_no_kind():
     found = assess(Design(FourBar.of_lengths(1.0, 1.0, 1.0, 4.0), (Wanted(1.0, 2.0),)))
     assert found.kind.code == ''
     assert [defect.name for defect in found.defects] == ['open']
     assert not found.turns
 
 
-def test_texts_name_positions_and_angles() -> None:
+def test_texts_name_positions_and_angles():
     texts = {
         'two assemblies of a crank that turns': (
             'positions 1 and 2 on the left assembly, position 3 on the right one; only taking it '
@@ -286,7 +283,7 @@ def test_texts_name_positions_and_angles() -> None:
         assert defect.text == text
 
 
-def test_a_crank_rocker_s_transmission_angle_is_least_along_the_ground() -> None:
+def test_a_crank_rocker_s_transmission_angle_is_least_along_the_ground():
     """There cos μ = (b² + c² − (d ∓ a)²)/2bc (Norton, Design of Machinery, ch. 4)."""
     a, b, c, d = CRANK_ROCKER
     inward, outward = (acos((b * b + c * c - s * s) / (2.0 * b * c)) for s in (d - a, d + a))
@@ -304,7 +301,7 @@ def test_a_crank_rocker_s_transmission_angle_is_least_along_the_ground() -> None
     assert around.at == pytest.approx(tau)
 
 
-def test_without_a_way_the_transmission_angle_is_that_of_the_positions() -> None:
+def test_without_a_way_the_transmission_angle_is_that_of_the_positions():
     found = assess(design(DOUBLE_ROCKER, [(55, L), (65, L), (80, R)]))
     angles = {t: transmission(DOUBLE_ROCKER, radians(t)) for t in (55, 65, 80)}
     at = min(angles, key=angles.__getitem__)
@@ -319,15 +316,7 @@ NEAR = 1e-9
 
 
 def follow(lengths: Lengths, start: float, first: complex, places: list, way: int) -> dict:
-    """
-    Move the crank from a direction with B at a place, one way for a turn or to a toggle.
-
-    Returns
-    -------
-    dict
-        For each place that is reached, a direction and where B is, how far the crank had to go.
-
-    """
+    """Move the crank one way to a turn or a toggle; return how far each place lies."""
     stops = {i: (way * (t - start)) % tau for i, (t, _) in enumerate(places)}
     stops = {i: 0.0 if tau - gone < NEAR else gone for i, gone in stops.items()}
     steps = sorted({*stops.values(), *np.arange(0.0, tau, STEP).tolist()})
@@ -356,11 +345,7 @@ def moves_through(lengths: Lengths, places: list) -> float | None:
 
 
 def components(lengths: Lengths) -> tuple:
-    """
-    Return where on a fine ring the loop closes, and the circuit of every place of both sides.
-
-    Neighbours on a side are joined, and the sides where neither has a neighbour any more.
-    """
+    """Return where on a fine ring the loop closes, and the circuit of each place of both sides."""
     count = 3600
     closes = [pins(lengths, tau * (i + 0.5) / count) is not None for i in range(count)]
     label = {(i, side): (i, side) for i in range(count) for side in (0, 1) if closes[i]}
@@ -402,11 +387,7 @@ def clear(lengths: Lengths) -> bool:
 
 
 def random_angles(rng: random.Random, lengths: Lengths) -> list[float]:
-    """
-    Return crank angles in degrees that close, and not within a step of a toggle.
-
-    There the simulator cannot tell. Most of them go one way, as a user asks for it.
-    """
+    """Return crank angles in degrees that close, mostly one way, not within a step of a toggle."""
     a, b, c, d = lengths
     begin = rng.uniform(-180.0, 180.0)
     span = rng.choice((40.0, 150.0, 350.0))
@@ -421,7 +402,7 @@ def random_angles(rng: random.Random, lengths: Lengths) -> list[float]:
     return sorted(angles)[:: rng.choice((1, -1))] if rng.random() < 0.7 else angles
 
 
-def test_random_four_bars_against_the_simulator() -> None:
+def test_random_four_bars_against_the_simulator():
     rng = random.Random(17)
     seen: dict = {}
     tried = 0
@@ -471,7 +452,7 @@ def test_random_four_bars_against_the_simulator() -> None:
         assert seen.get(key, 0) > 3, f'{key} is hardly tried: {seen}'
 
 
-def test_random_travels_against_a_dense_sweep_of_the_transmission_angle() -> None:
+def test_random_travels_against_a_dense_sweep_of_the_transmission_angle():
     rng = random.Random(18)
     tried = 0
     while tried < 100:
@@ -502,8 +483,8 @@ def test_random_travels_against_a_dense_sweep_of_the_transmission_angle() -> Non
     ('ground', 'direction', 'rocker', 'sign'), [(4.0, pi, 3.0, 1.0), (6.0, 0.0, 7.0, -1.0)]
 )
 def test_near_folding_flat_the_transmission_angle_keeps_its_digits(
-    ground: float, direction: float, rocker: float, sign: float, delta: float
-) -> None:
+    ground, direction, rocker, sign, delta
+):
     """
     A crank of 1 along the ground makes the diagonal 5, a coupler of 2 and a rocker nearly fit it.
 

@@ -14,8 +14,6 @@
 
 """A formula is read as written in books, by these rules alone; all else is refused in a line."""
 
-from __future__ import annotations
-
 import ast
 from math import inf, isnan, nan
 import pickle
@@ -85,24 +83,24 @@ RULES = {
 
 
 @pytest.mark.parametrize('text', FORMULAS)
-def test_values_are_those_of_50_digits(text: str) -> None:
+def test_values_are_those_of_50_digits(text):
     with mp.workdps(50):
         expected = [float(FORMULAS[text](mp.mpf(float(x)))) for x in SPAN]
     # Of a sum, digits are lost where it is near 0.
     assert Expression(text)(SPAN) == pytest.approx(expected, rel=4e-15, abs=1e-15)
 
 
-def test_every_function_is_in_that_table() -> None:
+def test_every_function_is_in_that_table():
     assert all(any(f'{name}(' in text for text in FORMULAS) for name in FUNCTIONS)
 
 
 @pytest.mark.parametrize(('text', 'value'), RULES.items())
-def test_signs_powers_and_quotients_bind_as_in_books(text: str, value: float) -> None:
+def test_signs_powers_and_quotients_bind_as_in_books(text, value):
     assert Expression(text)(3.0) == pytest.approx(value, rel=1e-15)
 
 
 @pytest.mark.parametrize('text', ['x', '2', '2*x - 1', 'ln(x)'])
-def test_arrays_keep_their_shape_and_numbers_stay_numbers(text: str) -> None:
+def test_arrays_keep_their_shape_and_numbers_stay_numbers(text):
     formula = Expression(text)
     x = np.array([[0.5, 1.0, 1.5], [2.0, 2.5, 3.0]])
     values = formula(x)
@@ -129,9 +127,7 @@ def test_arrays_keep_their_shape_and_numbers_stay_numbers(text: str) -> None:
         ('x - x', inf, nan),
     ],
 )
-def test_what_has_no_value_is_inf_or_nan_without_a_warning(
-    text: str, x: float, value: float
-) -> None:
+def test_what_has_no_value_is_inf_or_nan_without_a_warning(text, x, value):
     formula = Expression(text)
     with warnings.catch_warnings():
         warnings.simplefilter('error')
@@ -141,7 +137,7 @@ def test_what_has_no_value_is_inf_or_nan_without_a_warning(
     assert np.array_equal(several, [value, value], equal_nan=True)
 
 
-def test_formulas_are_equal_by_their_text_and_can_be_sent_elsewhere() -> None:
+def test_formulas_are_equal_by_their_text_and_can_be_sent_elsewhere():
     formula = Expression('log10(x) + 1')
     assert formula == Expression('log10(x) + 1') != Expression('log10(x)+1')
     assert pickle.loads(pickle.dumps(formula))(100.0) == 3.0
@@ -182,14 +178,14 @@ def test_formulas_are_equal_by_their_text_and_can_be_sent_elsewhere() -> None:
         ('(' * 41, "'(' at character 41 is more than 40 levels deep; write it with fewer"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_place(text: str, message: str) -> None:
+def test_what_is_wrong_is_told_with_its_place(text, message):
     with pytest.raises(SynthesisError) as caught:
         Expression(text)
     assert message in str(caught.value)
     assert str(caught.value).startswith('function ')
 
 
-def test_what_is_just_short_and_flat_enough_is_taken() -> None:
+def test_what_is_just_short_and_flat_enough_is_taken():
     assert Expression('x' + '+x' * 99 + ' ')(1.0) == 100.0
     assert Expression('(' * 39 + 'x' + ')' * 39)(2.0) == 2.0
     assert Expression('-' * 39 + 'x')(2.0) == -2.0
@@ -270,7 +266,7 @@ _AUDIT = _Audit()
 
 
 @pytest.mark.parametrize('text', ATTACKS, ids=lambda text: ascii(text[:20]))
-def test_attacks_are_refused_in_one_line_and_nothing_is_run(text: str) -> None:
+def test_attacks_are_refused_in_one_line_and_nothing_is_run(text):
     _AUDIT.told = []
     try:
         with pytest.raises(SynthesisError) as caught:
@@ -283,7 +279,7 @@ def test_attacks_are_refused_in_one_line_and_nothing_is_run(text: str) -> None:
     assert message.isprintable(), 'no character reaches a terminal that could do something there'
 
 
-def test_the_audit_hears_what_it_is_there_for() -> None:
+def test_the_audit_hears_what_it_is_there_for():
     _AUDIT.told = []
     try:
         eval('1 + 1')
@@ -305,12 +301,12 @@ def _is_a_formula_or_refused(text: str) -> None:
 
 
 @given(strategies.text())
-def test_any_text_is_a_formula_or_refused(text: str) -> None:
+def test_any_text_is_a_formula_or_refused(text):
     _is_a_formula_or_refused(text)
 
 
 @given(strategies.binary())
-def test_any_bytes_are_a_formula_or_refused(raw: bytes) -> None:
+def test_any_bytes_are_a_formula_or_refused(raw):
     _is_a_formula_or_refused(raw.decode('utf-8', 'surrogateescape'))
 
 
@@ -321,7 +317,7 @@ def test_any_bytes_are_a_formula_or_refused(raw: bytes) -> None:
         max_size=30,
     )
 )
-def test_any_parts_of_formulas_are_a_formula_or_refused(parts: list[str]) -> None:
+def test_any_parts_of_formulas_are_a_formula_or_refused(parts):
     _is_a_formula_or_refused(''.join(parts))
 
 
@@ -373,9 +369,7 @@ def _walked(node: ast.AST, x: float) -> np.float64:
 @given(_texts(), strategies.sampled_from([0.5, 2.0, -1.25]))
 @example('2**-x**2', 2.0)
 @example('-x**-x**2', 2.0)
-def test_formulas_are_understood_as_the_grammar_of_python_understands_them(
-    text: str, x: float
-) -> None:
+def test_formulas_are_understood_as_the_grammar_of_python_understands_them(text, x):
     with np.errstate(all='ignore'):
         expected = float(_walked(ast.parse(text, mode='eval').body, x))
     assert np.array_equal(Expression(text)(x), expected, equal_nan=True)

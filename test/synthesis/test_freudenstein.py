@@ -21,11 +21,9 @@ starts from; the pairs of the others below are published, their results are work
 a general solver at 60 digits.
 """
 
-from __future__ import annotations
-
 from math import nan, pi, radians
 
-from campaigns.synthesis.run import FAMILIES, parts, run, Tally
+from campaigns.synthesis import FAMILIES, parts, run
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import SynthesisError
@@ -43,9 +41,7 @@ import numpy as np
 import pytest
 
 mp.dps = 60
-
 Angles = tuple[float, ...]
-
 SEED = 20261121
 """Not the campaign's own."""
 
@@ -80,7 +76,7 @@ def least_squares(crank: Angles, rocker: Angles) -> tuple[list[mpf], list[mpf]]:
     return [k1, k2, k3], [a, sqrt(a * a + c * c + 1 - 2 * a * c * k3), c]
 
 
-def test_the_source_to_its_last_digit() -> None:
+def test_the_source_to_its_last_digit():
     design, found = exact(*PUBLISHED['coordinated'])
     assert found.lengths == pytest.approx(
         (5.5965383934988620854, 0.16985782027961906789, 4.8786334643580194266), rel=4e-15
@@ -94,7 +90,7 @@ def test_the_source_to_its_last_digit() -> None:
 
 
 @pytest.mark.parametrize('name', THREES)
-def test_three_published_pairs(name: str) -> None:
+def test_three_published_pairs(name):
     crank, rocker, ground = PUBLISHED[name]
     k, lengths = least_squares(crank, rocker)
     design, found = exact(crank, rocker, ground)
@@ -108,7 +104,7 @@ def test_three_published_pairs(name: str) -> None:
     assert all(met.closed and abs(met.angle) < 1e-11 for met in prove(design))
 
 
-def test_more_pairs_by_least_squares() -> None:
+def test_more_pairs_by_least_squares():
     crank, rocker, ground = PUBLISHED['weaving']
     _, (a, b, c) = least_squares(crank, rocker)
     four_bar = fit_equation(crank, rocker, ground).four_bar
@@ -118,13 +114,13 @@ def test_more_pairs_by_least_squares() -> None:
 
 
 @pytest.mark.parametrize('name', THREES)
-def test_least_squares_of_three_pairs_is_exact(name: str) -> None:
+def test_least_squares_of_three_pairs_is_exact(name):
     assert fit_equation(*PUBLISHED[name]).four_bar.lengths == pytest.approx(
         exact(*PUBLISHED[name])[0].four_bar.lengths, rel=1e-11
     )
 
 
-def test_reversed_links_keep_the_crank_angle_that_was_asked_for() -> None:
+def test_reversed_links_keep_the_crank_angle_that_was_asked_for():
     """Crank and rocker that come out negative point backwards in their own frames."""
     crank, rocker = rad(20, 40, 60), rad(65, 75, 85)
     design, found = exact(crank, rocker, 2.0)
@@ -139,7 +135,7 @@ MIXED = 'both assemblies'
 
 
 @pytest.fixture(scope='module')
-def tallies() -> dict[str, Tally]:
+def tallies():
     """Return a sample of the campaign; ``python -m campaigns.synthesis`` takes 1,700,000."""
     many = ['ordinary', 'reversed links', MIXED]
     few = [family for family in FAMILIES if family not in many]
@@ -149,7 +145,7 @@ def tallies() -> dict[str, Tally]:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('family', FAMILIES)
-def test_round_trips(tallies: dict[str, Tally], family: str) -> None:
+def test_round_trips(tallies, family):
     """
     Every length within 4·2⁻⁵³·κ, or flagged.
 
@@ -167,7 +163,7 @@ def test_round_trips(tallies: dict[str, Tally], family: str) -> None:
         assert tally.kappa == pytest.approx((1.0, 1.0), abs=1e-3)
 
 
-def test_linkages_that_no_double_tells_apart_are_flagged(tallies: dict[str, Tally]) -> None:
+def test_linkages_that_no_double_tells_apart_are_flagged(tallies):
     """Crank angles within 1e-9 to 1e-4 rad of each other: half of them say nothing."""
     assert 0.3 < tallies['one spot'].flagged / tallies['one spot'].cases < 0.8
     assert tallies['ordinary'].digits / tallies['ordinary'].cases > 13.0
@@ -178,7 +174,7 @@ angles = st.tuples(*[st.integers(-3141, 3141).map(lambda n: n / 1000)] * 3)
 
 @settings(max_examples=40)
 @given(angles, angles)
-def test_sensitivity_is_that_of_changes(crank: Angles, rocker: Angles) -> None:
+def test_sensitivity_is_that_of_changes(crank, rocker):
     """The gradient against differences of solutions at 60 digits."""
     found = three_pairs(crank, rocker)
     assume((found.digits > 4.0).all())
@@ -200,7 +196,7 @@ def test_sensitivity_is_that_of_changes(crank: Angles, rocker: Angles) -> None:
 
 
 @given(angles, angles)
-def test_condition_is_that_of_the_matrix(crank: Angles, rocker: Angles) -> None:
+def test_condition_is_that_of_the_matrix(crank, rocker):
     found = three_pairs(crank, rocker)
     rows = np.stack((np.cos(rocker), np.cos(crank), np.ones(3)), 1)
     true = np.linalg.cond(rows)
@@ -210,7 +206,7 @@ def test_condition_is_that_of_the_matrix(crank: Angles, rocker: Angles) -> None:
         assert not found.condition < 1e8
 
 
-def test_one_code_for_one_and_for_many() -> None:
+def test_one_code_for_one_and_for_many():
     """Bit by bit, across the blocks that many are worked on in."""
     rng = np.random.default_rng(SEED)
     crank, rocker = rng.uniform(-pi, pi, (2, 5, 900, 3))
@@ -226,7 +222,7 @@ def test_one_code_for_one_and_for_many() -> None:
             assert np.array_equal(getattr(one, name), getattr(many, name)[place])
 
 
-def test_what_does_not_exist_is_told_without_a_word() -> None:
+def test_what_does_not_exist_is_told_without_a_word():
     with np.errstate(all='raise'):
         found = three_pairs([[0.1, 0.1, 0.3], [nan, 0.2, 0.3]], [[0.2, 0.2, 0.5], [0.1, 0.2, 0.4]])
     assert not np.isfinite(found.lengths).any()
@@ -243,7 +239,7 @@ SINES = {
 @pytest.mark.parametrize('kind', SINES)
 @settings(max_examples=200)
 @given(data=st.data())
-def test_sines_of_twofold_angles(kind: str, data: st.DataObject) -> None:
+def test_sines_of_twofold_angles(kind, data):
     """Relative error below 2⁻⁶⁸, or what an error of 2⁻¹⁰⁴ of the angle makes of it."""
     high = data.draw(SINES[kind])
     low = high * 2.0**-54 * data.draw(st.floats(-0.9, 0.9))
@@ -316,7 +312,7 @@ REFUSED: dict[str, tuple[Angles, Angles, str]] = {
 
 
 @pytest.mark.parametrize('name', REFUSED)
-def test_what_cannot_be_is_refused_in_one_line(name: str) -> None:
+def test_what_cannot_be_is_refused_in_one_line(name):
     crank, rocker, said = REFUSED[name]
     with pytest.raises(SynthesisError) as caught:
         exact(rad(*crank), rad(*rocker), 1.0)
@@ -324,7 +320,7 @@ def test_what_cannot_be_is_refused_in_one_line(name: str) -> None:
 
 
 @pytest.mark.parametrize('link', ['crank', 'rocker'])
-def test_a_link_without_end_is_refused(link: str) -> None:
+def test_a_link_without_end_is_refused(link):
     """With k1 = 0 the crank has no inverse, with k2 = 0 the rocker."""
     one = np.array([0.3, 1.1, 2.0])
     other = one - np.arccos(0.5 * np.cos(one) + 0.2)
@@ -335,20 +331,20 @@ def test_a_link_without_end_is_refused(link: str) -> None:
 
 
 @pytest.mark.parametrize('ground', [0.0, -1.0, nan, float('inf')])
-def test_a_ground_of_no_length_is_refused(ground: float) -> None:
+def test_a_ground_of_no_length_is_refused(ground):
     with pytest.raises(SynthesisError, match=r'^ground: '):
         exact(rad(25, 35, 50), rad(30, 40, 60), ground)
 
 
 @pytest.mark.parametrize('name', ['parallel', 'mirrored', 'contradicting', 'the same twice'])
-def test_a_fit_refuses_what_does_not_fix_a_four_bar(name: str) -> None:
+def test_a_fit_refuses_what_does_not_fix_a_four_bar(name):
     crank, rocker, said = REFUSED[name]
     with pytest.raises(SynthesisError) as caught:
         fit_equation(rad(*crank), rad(*rocker), 1.0)
     assert str(caught.value) == said
 
 
-def test_pairs_too_near_to_tell_the_links() -> None:
+def test_pairs_too_near_to_tell_the_links():
     """Three pairs of a known linkage within 2e-8 rad: doubles do not hold what they differ by."""
     crank = (1.0, 1.00000001, 1.00000002)
     rocker = tuple(1.5 + 0.4 * (theta - 1.0) + 0.2 * (theta - 1.0) ** 2 for theta in crank)

@@ -19,7 +19,7 @@ from cmath import phase, rect
 from math import inf, nan, pi, radians, tau
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.synthesis.motion import (
     fixed_pivots,
     from_fixed_pivots,
@@ -306,61 +306,37 @@ SLIDING = [pose(0, 0, 5), pose(1, 0, 5), pose(3, 0, 365)]
 OFF_THE_POLE = 1e-15 + 1e-15j
 
 
-@pytest.mark.parametrize(
-    ('way', 'poses', 'pivots', 'where', 'reason'),
-    [
-        ('moving', [START, RAISED], (0j, 1j), 'poses', '2 were given'),
-        (
-            'moving',
-            [START, RAISED, pose(0, nan, 0)],
-            (0j, 1j),
-            'pose 3',
-            r'\(0.0, nan\), 0.0 is none',
-        ),
-        ('fixed', [START, pose(0, 0, inf), OVER], (0j, 1j), 'pose 2', 'inf is none'),
-        ('fixed', [START, RAISED, OVER], (0j, complex(inf, 0)), 'O4', r'\(inf, 0.0\) is no place'),
-        ('moving', [START, RAISED, OVER], (nan + 0j, 0j), 'A', 'no place'),
-        ('moving', [OVER, START, OVER], (0j, 1j), 'poses 1 and 3', r'the same, \(2, 1\) m at 50°'),
-        ('fixed', [pose(1, 0, 350), pose(1, 0, -10), OVER], (0j, 1j), 'poses 1 and 2', 'at 350°'),
-        ('moving', [START, RAISED, OVER], (1j, 1j), 'A and B', 'are the same place'),
-        ('fixed', [START, RAISED, OVER], (2 + 0j, 2 + 0j), 'O2 and O4', 'are the same place'),
-        ('moving', ON_A_LINE, (1j, 0j), 'B', 'on a line at 45°.* its fixed pivot .* a slider'),
-        ('moving', SLIDING, (1j, 0j), 'A', 'on a line at 0°'),
-        ('fixed', SLIDING, (1j, 0j), 'O2', 'seen from the coupler.* on a line at 175°'),
-        ('moving', ABOUT, (0j, 1j), 'A', 'turns about it in all three'),
-        ('fixed', ABOUT, (1j, 0j), 'O4', 'turns about it in all three'),
-        (
-            'moving',
-            ABOUT,
-            (1j, 2 + 0j),
-            'A and B',
-            'the same fixed pivot.* the ground would have no',
-        ),
-        (
-            'fixed',
-            ABOUT,
-            (1j, 2 + 0j),
-            'O2 and O4',
-            'the same moving pivot.* the coupler would have',
-        ),
-        ('moving', [START, OVER, ABOUT[1]], (1j, 0j), 'B', 'the pole of poses 1 and 3'),
-        ('fixed', [OVER, START, ABOUT[1]], (0j, 1j), 'O2', 'the pole of poses 2 and 3'),
-        (
-            'fixed',
-            [pose(1, 0, 0), pose(0, 1, 90), OVER],
-            (1j, OFF_THE_POLE),
-            'O4',
-            'the pole of poses 1 and 2',
-        ),
-        (
-            'moving',
-            [pose(1, 0, 0), pose(0, 1, 90), OVER],
-            (1j, -1 + 1e-14j),
-            'B',
-            'so near a pole that not a digit of its fixed pivot',
-        ),
-    ],
-)
+@pytest.mark.parametrize(('way', 'poses', 'pivots', 'where', 'reason'), [
+    ('moving', [START, RAISED], (0j, 1j), 'poses', '2 were given'),
+    (
+        'moving', [START, RAISED, pose(0, nan, 0)], (0j, 1j), 'pose 3',
+        r'\(0.0, nan\), 0.0 is not a pose',
+    ),
+    ('fixed', [START, pose(0, 0, inf), OVER], (0j, 1j), 'pose 2', 'inf is not a pose'),
+    ('fixed', [START, RAISED, OVER], (0j, complex(inf, 0)), 'O4', r'\(inf, 0.0\) is no place'),
+    ('moving', [START, RAISED, OVER], (nan + 0j, 0j), 'A', 'no place'),
+    ('moving', [OVER, START, OVER], (0j, 1j), 'poses 1 and 3', r'the same, \(2, 1\) m at 50°'),
+    ('fixed', [pose(1, 0, 350), pose(1, 0, -10), OVER], (0j, 1j), 'poses 1 and 2', 'at 350°'),
+    ('moving', [START, RAISED, OVER], (1j, 1j), 'A and B', 'are the same place'),
+    ('fixed', [START, RAISED, OVER], (2 + 0j, 2 + 0j), 'O2 and O4', 'are the same place'),
+    ('moving', ON_A_LINE, (1j, 0j), 'B', 'on a line at 45°.* its fixed pivot .* a slider'),
+    ('moving', SLIDING, (1j, 0j), 'A', 'on a line at 0°'),
+    ('fixed', SLIDING, (1j, 0j), 'O2', 'seen from the coupler.* on a line at 175°'),
+    ('moving', ABOUT, (0j, 1j), 'A', 'turns about it in all three'),
+    ('fixed', ABOUT, (1j, 0j), 'O4', 'turns about it in all three'),
+    ('moving', ABOUT, (1j, 2 + 0j), 'A and B', 'the same fixed pivot.* the ground would have no'),
+    ('fixed', ABOUT, (1j, 2 + 0j), 'O2 and O4', 'the same moving pivot.* the coupler would have'),
+    ('moving', [START, OVER, ABOUT[1]], (1j, 0j), 'B', 'the pole of poses 1 and 3'),
+    ('fixed', [OVER, START, ABOUT[1]], (0j, 1j), 'O2', 'the pole of poses 2 and 3'),
+    (
+        'fixed', [pose(1, 0, 0), pose(0, 1, 90), OVER], (1j, OFF_THE_POLE), 'O4',
+        'the pole of poses 1 and 2',
+    ),
+    (
+        'moving', [pose(1, 0, 0), pose(0, 1, 90), OVER], (1j, -1 + 1e-14j), 'B',
+        'so near a pole that not a digit of its fixed pivot',
+    ),
+])  # fmt: skip
 def test_what_does_not_exist_is_told(way, poses, pivots, where, reason):
     design = from_moving_pivots if way == 'moving' else from_fixed_pivots
     with pytest.raises(SynthesisError, match=reason) as caught:

@@ -15,8 +15,6 @@
 
 """Path generation: linkages are found again from their curves, and published problems solved."""
 
-from __future__ import annotations
-
 from cmath import phase, rect
 from dataclasses import replace
 from math import inf, nan, pi, radians, sqrt, tau
@@ -35,7 +33,6 @@ import yaml
 from .by_hand import on, transmission
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
-
 FEW = 20_000
 """Four-bars to draw: enough for these, and quick; two chunks of the study."""
 
@@ -103,13 +100,10 @@ HALF = np.linspace(80.0, 280.0, 21)
         ('hoeken', HALF, False, False),  # its straight line, which other linkages nearly draw too
     ],
 )
-def test_a_linkage_is_found_again_from_its_curve(
-    name: str, degrees: np.ndarray[Any, Any], closed: bool, timed: bool
-) -> None:
+def test_a_linkage_is_found_again_from_its_curve(name, degrees, closed, timed):
     timing = tuple(float(angle) for angle in np.radians(degrees)) if timed else None
     task = PathTask(curve(name, degrees), closed, timing)
     found = generate_path(task, seed=1, count=FEW).found
-
     assert found[0].rms < 1e-9 * task.size
     exact = [result for result in found if result.rms < 1e-9 * task.size]
     shapes = [np.array(result.design.four_bar.lengths) for result in exact]
@@ -166,9 +160,7 @@ ON_A_LINE = (0.50 + 1.06j, -0.83 - 0.27j, -0.34 + 0.22j, -0.13 + 0.43j, 0.22 + 0
         (ON_A_LINE, False, 1e-13),
     ],
 )
-def test_published_points_are_passed(
-    points: tuple[complex, ...], closed: bool, error: float
-) -> None:
+def test_published_points_are_passed(points, closed, error):
     task = PathTask(points, closed)
     best = generate_path(task, seed=1, count=FEW).found[0]
     assert max(distances(best)) < error * task.size
@@ -204,9 +196,7 @@ THIRTIES = tuple(radians(30.0 * i) for i in range(1, 6))
 @pytest.mark.parametrize(
     ('points', 'closed', 'timing'), [(EGG, True, TWENTIES), (ARC, False, THIRTIES)]
 )
-def test_timing_is_kept(
-    points: tuple[complex, ...], closed: bool, timing: tuple[float, ...], zero_free: bool
-) -> None:
+def test_timing_is_kept(points, closed, timing, zero_free):
     task = PathTask(points, closed, timing, zero_free)
     for result in generate_path(task, seed=1, count=FEW).found:
         assert tuple(wanted.crank for wanted in result.design.wanted) == timing
@@ -218,13 +208,13 @@ def test_timing_is_kept(
         )
 
 
-def test_five_points_with_timing_are_passed_exactly() -> None:
+def test_five_points_with_timing_are_passed_exactly():
     # As many equations as unknowns: pivots, three more lengths than the crank's, P, and the zero.
     best = generate_path(PathTask(ARC, False, THIRTIES), seed=1, count=FEW).found[0]
     assert max(distances(best)) < 1e-13
 
 
-def test_no_linkage_near_the_best_one_is_better() -> None:
+def test_no_linkage_near_the_best_one_is_better():
     task = PathTask(EGG, True, TWENTIES)
     best = generate_path(task, seed=1, count=FEW).found[0]
     four_bar = best.design.four_bar
@@ -252,7 +242,7 @@ def test_no_linkage_near_the_best_one_is_better() -> None:
     assert sqrt(2.0 * again.cost / len(EGG)) == pytest.approx(best.rms, rel=1e-6)
 
 
-def test_results_are_sorted_distinct_and_within_the_box() -> None:
+def test_results_are_sorted_distinct_and_within_the_box():
     task = PathTask(EGG, True, links=(0.3, 2.0))
     found = generate_path(task, seed=1, count=FEW, keep=5).found
     assert len(found) == 5
@@ -277,20 +267,20 @@ def alike(one: Design, other: Design) -> bool:
     return first.side == second.side and max(apart) < 0.01 * max(first.lengths)
 
 
-def test_more_points_than_are_searched_for_count_too() -> None:
+def test_more_points_than_are_searched_for_count_too():
     task = PathTask(curve('four_bar', np.linspace(20.0, 200.0, 200)))
     best = generate_path(task, seed=1, count=FEW).found[0]
     assert len(best.design.wanted) == 200
     assert max(distances(best)) < 1e-6 * task.size
 
 
-def test_an_open_path_may_be_asked_for_a_crank_that_turns_fully() -> None:
+def test_an_open_path_may_be_asked_for_a_crank_that_turns_fully():
     task = PathTask(ARC, full_turn=True)
     for result in generate_path(task, seed=1, count=FEW).found:
         assert_in_order(result.design, 1)
 
 
-def test_what_is_refused_comes_apart() -> None:
+def test_what_is_refused_comes_apart():
     task = PathTask(EGG, True, TWENTIES)
 
     def left(design: Design) -> bool:
@@ -307,7 +297,7 @@ def test_what_is_refused_comes_apart() -> None:
     assert none.refused == every.found[:2]
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_other_ones() -> None:
+def test_the_same_seed_gives_the_same_bytes_and_another_other_ones():
     told: list[tuple[int, int]] = []
     task = PathTask(ON_A_LINE)
     first = generate_path(task, seed=3, count=FEW, progress=lambda *done: told.append(done))
@@ -318,7 +308,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_other_ones() -> None:
 
 
 @pytest.mark.parametrize(('size', 'at'), [(1e-3, 5.0 - 7.0j), (1e6, 1e6 + 0j), (1e-12, 0j)])
-def test_size_and_place_of_a_path_do_not_matter(size: float, at: complex) -> None:
+def test_size_and_place_of_a_path_do_not_matter(size, at):
     points = tuple(size * point + at for point in ON_TWO_CIRCLES)
     best = generate_path(PathTask(points), seed=1, count=FEW).found[0]
     assert max(distances(best)) < 1e-12 * size + 1e-15 * abs(at)
@@ -336,58 +326,46 @@ NEITHER = (
 )
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'line'),
-    [
-        ({'points': (0j, 1j)}, 'path: 2 points; give three at least'),
-        ({'points': (0j, 1j, 1j)}, 'points 2 and 3: both at (0, 1); leave one out'),
-        ({'points': (0j, 1j, complex(inf, 0.0))}, 'point 3: (inf, 0) is no place; correct it'),
-        ({'points': (0j, 1j, complex(0.0, nan))}, 'point 3: (0, nan) is no place; correct it'),
-        (
-            {'points': (*HOOK, 0j), 'closed': True},
-            'point 4: is the first one again; leave it out: a closed path returns by itself',
-        ),
-        (
-            {'points': HOOK, 'timing': (0.0, 0.1)},
-            'timing: 2 crank angles for 3 points; give one for each',
-        ),
-        (
-            {'points': HOOK, 'timing': (0.0, 0.2, 0.1)},
-            NEITHER,
-        ),
-        (
-            {'points': HOOK, 'timing': (0.0, nan, 0.1)},
-            NEITHER,
-        ),
-        (
-            {'points': HOOK, 'timing': (0.0, 1.0, 2.5 * pi)},
-            'timing: the crank travels 450 degrees; the points must be within one turn',
-        ),
-        (
-            {'points': HOOK, 'timing': (0.0, -1.0, -inf)},
-            'timing: the crank travels inf degrees; the points must be within one turn',
-        ),
-        (
-            {'points': HOOK, 'timing': (0.0, 1.0, tau), 'closed': True},
-            WHOLE,
-        ),
-        (
-            {'points': HOOK, 'timing': UP, 'links': (2.0, 1.0)},
-            'links: from 2 to 1 of the path; say e.g. 0.2 to 4',
-        ),
-        (
-            {'points': (-1e308 - 1e308j, 0j, 1e308 + 1e308j)},
-            'path: its size is beyond a double; use another unit',
-        ),
-    ],
-)
-def test_what_is_no_path_is_said_in_one_line(arguments: dict[str, Any], line: str) -> None:
+@pytest.mark.parametrize(('arguments', 'line'), [
+    ({'points': (0j, 1j)}, 'path: 2 points; give three at least'),
+    ({'points': (0j, 1j, 1j)}, 'points 2 and 3: both at (0, 1); leave one out'),
+    ({'points': (0j, 1j, complex(inf, 0.0))}, 'point 3: (inf, 0) is no place; correct it'),
+    ({'points': (0j, 1j, complex(0.0, nan))}, 'point 3: (0, nan) is no place; correct it'),
+    (
+        {'points': (*HOOK, 0j), 'closed': True},
+        'point 4: is the first one again; leave it out: a closed path returns by itself',
+    ),
+    (
+        {'points': HOOK, 'timing': (0.0, 0.1)},
+        'timing: 2 crank angles for 3 points; give one for each',
+    ),
+    ({'points': HOOK, 'timing': (0.0, 0.2, 0.1)}, NEITHER),
+    ({'points': HOOK, 'timing': (0.0, nan, 0.1)}, NEITHER),
+    (
+        {'points': HOOK, 'timing': (0.0, 1.0, 2.5 * pi)},
+        'timing: the crank travels 450 degrees; the points must be within one turn',
+    ),
+    (
+        {'points': HOOK, 'timing': (0.0, -1.0, -inf)},
+        'timing: the crank travels inf degrees; the points must be within one turn',
+    ),
+    ({'points': HOOK, 'timing': (0.0, 1.0, tau), 'closed': True}, WHOLE),
+    (
+        {'points': HOOK, 'timing': UP, 'links': (2.0, 1.0)},
+        'links: from 2 to 1 of the path; say e.g. 0.2 to 4',
+    ),
+    (
+        {'points': (-1e308 - 1e308j, 0j, 1e308 + 1e308j)},
+        'path: its size is beyond a double; use another unit',
+    ),
+])  # fmt: skip
+def test_what_is_no_path_is_said_in_one_line(arguments, line):
     with pytest.raises(SynthesisError) as caught:
         PathTask(**arguments)
     assert str(caught.value) == line
 
 
-def test_points_out_of_reach_are_said() -> None:
+def test_points_out_of_reach_are_said():
     task = PathTask(EGG, True, TWENTIES, links=(0.01, 0.02))
     with pytest.raises(SynthesisError, match=r'links of 0\.01 to 0\.02 times its size reaches'):
         generate_path(task, seed=1, count=FEW)

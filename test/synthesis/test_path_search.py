@@ -14,8 +14,6 @@
 
 """Where path generation begins: coupler curves and starts from them."""
 
-from __future__ import annotations
-
 from cmath import rect
 from math import inf, pi, tan
 import pickle
@@ -23,7 +21,6 @@ from typing import Any
 
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from linkage_ros.synthesis.design import Assembly
 from linkage_ros.synthesis.path.curves import (
     Aim,
     along,
@@ -45,13 +42,8 @@ from .by_hand import Lengths, on, pins, transmission
 
 
 POINTS = np.array([0.1 + 0.2j, 0.3 + 0.3j, 0.4 - 0.1j, 0.1 - 0.4j, -0.4 - 0.2j, -0.5 + 0.2j])
-
-
 TIMING = np.arange(6) * pi / 3.0
-
-
 COUNT = 400
-
 
 AIMS = {
     'timed': (Aim(POINTS, TIMING, True, True, 0.05, 20.0), True),
@@ -73,7 +65,7 @@ def drawn(aim: Aim, closed: bool) -> tuple[Any, np.ndarray[Any, Any], np.ndarray
 
 
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
-def test_a_start_is_what_its_score_says_and_closes(aim: Aim, closed: bool) -> None:
+def test_a_start_is_what_its_score_says_and_closes(aim, closed):
     problem, candidates, scores = drawn(aim, closed)
     starts = problem.starts(candidates)
     assert allowed(starts, aim).all()
@@ -90,7 +82,7 @@ def test_a_start_is_what_its_score_says_and_closes(aim: Aim, closed: bool) -> No
 
 
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
-def test_it_is_laid_on_as_well_as_can_be(aim: Aim, closed: bool) -> None:
+def test_it_is_laid_on_as_well_as_can_be(aim, closed):
     """Neither pivot, ground direction, size nor traced point can be better, one at a time."""
     problem, candidates, scores = drawn(aim, closed)
     starts = problem.starts(candidates)
@@ -118,7 +110,7 @@ def test_it_is_laid_on_as_well_as_can_be(aim: Aim, closed: bool) -> None:
         assert scores[start] == pytest.approx(left, rel=1e-6, abs=1e-9)
 
 
-def test_what_would_need_links_outside_of_the_box_has_no_score() -> None:
+def test_what_would_need_links_outside_of_the_box_has_no_score():
     aim = Aim(POINTS, TIMING, True, True, 0.2, 1.5)
     problem = problem_of(aim, True)
     candidates = problem.sample(np.random.default_rng(7), COUNT)
@@ -129,7 +121,7 @@ def test_what_would_need_links_outside_of_the_box_has_no_score() -> None:
 
 
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
-def test_a_problem_goes_to_another_process_and_scores_the_same(aim: Aim, closed: bool) -> None:
+def test_a_problem_goes_to_another_process_and_scores_the_same(aim, closed):
     problem, candidates, scores = drawn(aim, closed)
     again = pickle.loads(pickle.dumps(problem))
     assert (again.score(candidates) == scores).all()
@@ -139,7 +131,7 @@ def test_a_problem_goes_to_another_process_and_scores_the_same(aim: Aim, closed:
 
 @pytest.mark.parametrize('guard', [0.0, 1e-3])
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
-def test_steps_keep_what_was_asked_for(aim: Aim, closed: bool, guard: float) -> None:
+def test_steps_keep_what_was_asked_for(aim, closed, guard):
     problem, candidates, scores = drawn(aim, closed)
     fitted, squares = improve(problem.starts(candidates), aim, 20, guard)
     assert allowed(fitted, aim).all()
@@ -160,12 +152,10 @@ def test_steps_keep_what_was_asked_for(aim: Aim, closed: bool, guard: float) -> 
 
 length = st.floats(0.2, 4.0)
 
-
 # If the crank's pin can meet the rocker's pivot, no circle determines the other pin.
 lengths_of_any = st.tuples(length, length, length, length).filter(
     lambda lengths: abs(lengths[0] - lengths[3]) > 1e-3
 )
-
 
 angle = st.floats(-7.0, 7.0)
 
@@ -175,9 +165,7 @@ def row(lengths: Lengths, at: complex, ground: float, point: complex) -> np.ndar
 
 
 @given(lengths_of_any, angle, st.sampled_from(('left', 'right')), angle)
-def test_the_traced_point_is_where_circles_put_it(
-    lengths: Lengths, direction: float, side: Assembly, ground: float
-) -> None:
+def test_the_traced_point_is_where_circles_put_it(lengths, direction, side, ground):
     assume(pins(lengths, direction) is not None)
     assume(transmission(lengths, direction) > 0.01)
     near, far = rect(lengths[0], direction), on(side, lengths, direction)
@@ -190,7 +178,6 @@ def test_the_traced_point_is_where_circles_put_it(
 
 GENERATOR = np.random.default_rng(5)
 
-
 ROWS = np.column_stack(
     (
         GENERATOR.normal(size=(4, 3)),
@@ -199,18 +186,13 @@ ROWS = np.column_stack(
     )
 )
 
-
 ANGLES = GENERATOR.uniform(0.0, 6.0, (4, 5))
-
-
 SIDE = np.array((1.0, -1.0, 1.0, -1.0))
-
-
 STEP = 1e-6
 
 
 @pytest.mark.parametrize('column', range(len(COLUMNS)), ids=COLUMNS)
-def test_derivatives_by_dimensions_are_those_of_differences(column: int) -> None:
+def test_derivatives_by_dimensions_are_those_of_differences(column):
     aside = np.zeros(len(COLUMNS))
     aside[column] = STEP
     places = [slopes(ROWS + sign * aside, ANGLES, SIDE).places for sign in (1.0, -1.0)]
@@ -221,7 +203,7 @@ def test_derivatives_by_dimensions_are_those_of_differences(column: int) -> None
     assert np.abs((folded[0] - folded[1]) / (2.0 * STEP) - by_fold).max() < 1e-8
 
 
-def test_derivatives_by_the_crank_are_those_of_differences() -> None:
+def test_derivatives_by_the_crank_are_those_of_differences():
     places = [slopes(ROWS, ANGLES + by, SIDE).places for by in (STEP, -STEP)]
     folded = [folds(ROWS, ANGLES + by)[0] for by in (STEP, -STEP)]
     by_place = slopes(ROWS, ANGLES, SIDE).by_angle
@@ -231,7 +213,7 @@ def test_derivatives_by_the_crank_are_those_of_differences() -> None:
 
 
 @given(lengths_of_any, angle)
-def test_a_fold_is_told_by_the_transmission_angle(lengths: Lengths, direction: float) -> None:
+def test_a_fold_is_told_by_the_transmission_angle(lengths, direction):
     assume(pins(lengths, direction) is not None)
     acute = transmission(lengths, direction)
     assume(acute > 0.01)
@@ -240,9 +222,7 @@ def test_a_fold_is_told_by_the_transmission_angle(lengths: Lengths, direction: f
 
 
 @given(lengths_of_any, angle, st.floats(0.0, 6.2))
-def test_a_linkage_closes_if_it_does_at_every_angle_on_the_way(
-    lengths: Lengths, low: float, travel: float
-) -> None:
+def test_a_linkage_closes_if_it_does_at_every_angle_on_the_way(lengths, low, travel):
     closed = bool(closes(row(lengths, 0j, 0.0, 0j), np.array([low]), np.array([low + travel]))[0])
     # The ground line's directions are where the diagonal is shortest and longest.
     turns = [i * pi for i in range(-10, 10) if low <= i * pi <= low + travel]
@@ -254,7 +234,7 @@ def test_a_linkage_closes_if_it_does_at_every_angle_on_the_way(
         assert not all(found) or min(folded) < 1e-3
 
 
-def test_places_along_a_curve_are_found_by_the_length_of_its_chords() -> None:
+def test_places_along_a_curve_are_found_by_the_length_of_its_chords():
     curves = np.array([[0j, 3.0, 3.0 + 1.0j], [0j, 1.0j, 4.0j]])
     way = along(curves)
     assert way == pytest.approx(np.array([[0.0, 0.75, 1.0], [0.0, 0.25, 1.0]]))

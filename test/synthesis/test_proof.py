@@ -14,8 +14,6 @@
 
 """Designs are proved by the closure, and held against what a user needs."""
 
-from __future__ import annotations
-
 from cmath import phase, rect
 from dataclasses import replace
 from math import inf, log, nan, pi, radians, sqrt
@@ -41,18 +39,17 @@ THREE_PAIRS = Design(
     tuple(Wanted(radians(t), radians(p)) for t, p in ((25, 30), (35, 40), (50, 60))),
 )
 
-
 CRANK_ROCKER = (2.0, 7.0, 9.0, 6.0)
 
 
-def test_the_exact_design_of_the_text_meets_two_positions_left_and_one_right() -> None:
+def test_the_exact_design_of_the_text_meets_two_positions_left_and_one_right():
     met = prove(THREE_PAIRS)
     assert [one.side for one in met] == ['left', 'left', 'right']
     assert all(one.status is Status.CLOSED for one in met)
     assert max(abs(one.angle) for one in met) < 1e-13
 
 
-def test_the_links_as_printed_in_the_text_miss_its_angles() -> None:
+def test_the_links_as_printed_in_the_text_miss_its_angles():
     """Of four-digit cosines: a = 5.598, b = 0.176, c = 4.88. Here by circles, with 40 digits."""
     met = prove(THREE_PAIRS._replace(four_bar=FourBar.of_lengths(5.598, 0.176, 4.88, 1.0)))
     with mp.workdps(40):
@@ -70,7 +67,7 @@ def test_the_links_as_printed_in_the_text_miss_its_angles() -> None:
             assert abs(best) > mpf('0.001')
 
 
-def test_an_error_is_what_the_linkage_has_over_what_was_asked() -> None:
+def test_an_error_is_what_the_linkage_has_over_what_was_asked():
     exact = design(CRANK_ROCKER, [(40.0, 'left'), (90.0, 'left')])
     asked = (
         exact.wanted[0]._replace(rocker=exact.wanted[0].rocker - 0.25),
@@ -80,14 +77,14 @@ def test_an_error_is_what_the_linkage_has_over_what_was_asked() -> None:
     assert [one.angle for one in met] == pytest.approx([0.25, -0.001])
 
 
-def test_whole_turns_make_no_error() -> None:
+def test_whole_turns_make_no_error():
     exact = design(CRANK_ROCKER, [(40.0, 'left')])
     turned = Wanted(exact.wanted[0].crank - 4 * pi, exact.wanted[0].rocker + 6 * pi)
     (met,) = prove(exact._replace(wanted=(turned,)))
     assert met.angle == pytest.approx(0.0, abs=1e-14)
 
 
-def test_coupler_angles_and_places_are_proved() -> None:
+def test_coupler_angles_and_places_are_proved():
     """The coupler carries P at 3 + 1i of a frame whose x axis is at 20° to A→B."""
     a, b, c, d = CRANK_ROCKER
     tilt = rect(1.0, radians(20.0))
@@ -101,14 +98,13 @@ def test_coupler_angles_and_places_are_proved() -> None:
     met = prove(Design(four_bar, tuple(wanted)))
     assert [one.side for one in met] == ['right', 'right']
     assert all(abs(one.angle) < 1e-14 and one.distance < 1e-14 for one in met)
-
     off = [w._replace(coupler=w.coupler + 0.5, place=w.place + 0.3 - 0.4j) for w in wanted]
     for one in prove(Design(four_bar, tuple(off))):
         assert one.angle == pytest.approx(-0.5)
         assert one.distance == pytest.approx(0.5)
 
 
-def test_the_worse_of_rocker_and_coupler_is_told() -> None:
+def test_the_worse_of_rocker_and_coupler_is_told():
     exact = design(CRANK_ROCKER, [(40.0, 'left')]).wanted[0]
     coupler = phase(on('left', CRANK_ROCKER, exact.crank) - rect(2.0, exact.crank))
     asked = Wanted(exact.crank, exact.rocker + 0.01, coupler - 0.02)
@@ -116,7 +112,7 @@ def test_the_worse_of_rocker_and_coupler_is_told() -> None:
     assert met.angle == pytest.approx(0.02)
 
 
-def test_a_position_that_cannot_be_assembled_is_open_by_a_gap() -> None:
+def test_a_position_that_cannot_be_assembled_is_open_by_a_gap():
     """With the crank outwards A is 9 m from O4, and the links reach 3."""
     four_bar = FourBar.of_lengths(4.0, 2.0, 1.0, 5.0)
     (met,) = prove(Design(four_bar, (Wanted(pi, 0.0),)))
@@ -126,7 +122,7 @@ def test_a_position_that_cannot_be_assembled_is_open_by_a_gap() -> None:
 
 
 @pytest.mark.parametrize('off', [-3e-16, 0.0, 3e-16, 1e-14])
-def test_a_position_at_a_toggle_is_met_whatever_rounding_does_to_it(off: float) -> None:
+def test_a_position_at_a_toggle_is_met_whatever_rounding_does_to_it(off):
     """3, 4 and 5: at a right angle of the crank coupler and rocker are stretched."""
     four_bar = FourBar.of_lengths(3.0, 2.0 - off, 3.0, 4.0)
     for side in ('left', 'right'):
@@ -137,13 +133,13 @@ def test_a_position_at_a_toggle_is_met_whatever_rounding_does_to_it(off: float) 
         assert abs(met.angle) < 1e-6
 
 
-def test_beyond_a_toggle_by_more_than_rounding_it_is_open() -> None:
+def test_beyond_a_toggle_by_more_than_rounding_it_is_open():
     four_bar = FourBar.of_lengths(3.0, 2.0 - 1e-6, 3.0, 4.0)
     (met,) = prove(Design(four_bar, (Wanted(0.5 * pi, phase(3j - 4)),)))
     assert met.status is Status.OPEN
 
 
-def test_where_nothing_but_the_crank_is_asked_for_the_own_assembly_does() -> None:
+def test_where_nothing_but_the_crank_is_asked_for_the_own_assembly_does():
     for side in ('left', 'right'):
         four_bar = FourBar.of_lengths(*CRANK_ROCKER, side=side)
         assert [one.side for one in prove(Design(four_bar, (Wanted(1.0), Wanted(2.0))))] == [
@@ -152,7 +148,7 @@ def test_where_nothing_but_the_crank_is_asked_for_the_own_assembly_does() -> Non
         ]
 
 
-def test_a_place_that_both_assemblies_reach_is_met_on_the_own_one() -> None:
+def test_a_place_that_both_assemblies_reach_is_met_on_the_own_one():
     """A point traced 0.1 nm beside the crank's pin is the same on both, for all that matters."""
     beside = 1e-10
     lengths, direction = (2.0, 7.0, 9.0, 6.0), radians(40.0)
@@ -176,15 +172,13 @@ def test_a_place_that_both_assemblies_reach_is_met_on_the_own_one() -> None:
     ],
 )
 @pytest.mark.parametrize('given', ['left', 'right'])
-def test_a_design_is_put_on_the_assembly_that_meets_most(
-    sides: list, best: str, given: str
-) -> None:
+def test_a_design_is_put_on_the_assembly_that_meets_most(sides, best, given):
     angles = (40.0, 100.0, 250.0)
     found = assembled(design(CRANK_ROCKER, list(zip(angles, sides)), side=given))  # noqa: B905
     assert found.four_bar.side == best
 
 
-def test_a_position_at_a_toggle_has_no_vote() -> None:
+def test_a_position_at_a_toggle_has_no_vote():
     lengths = (3.0, 2.0, 3.0, 4.0)
     toggle = Wanted(0.5 * pi, phase(3j - 4))
     elsewhere = design(lengths, [(50.0, 'right')])
@@ -193,7 +187,7 @@ def test_a_position_at_a_toggle_has_no_vote() -> None:
     assert [one.side for one in prove(found)] == ['right', 'right']
 
 
-def test_of_a_design_that_only_comes_near_small_errors_do_not_name_the_assembly() -> None:
+def test_of_a_design_that_only_comes_near_small_errors_do_not_name_the_assembly():
     """Near the toggle at 90° both assemblies are a little off, and the other one less so."""
     lengths = (3.0, 2.0, 3.0, 4.0)
     left, right = (phase(on(side, lengths, radians(89.99)) - 4.0) for side in ('left', 'right'))
@@ -204,7 +198,7 @@ def test_of_a_design_that_only_comes_near_small_errors_do_not_name_the_assembly(
     assert met.side == 'left'
 
 
-def test_random_designs_in_odd_frames_are_met_where_they_were_made() -> None:
+def test_random_designs_in_odd_frames_are_met_where_they_were_made():
     rng = random.Random(5)
     for _ in range(200):
         lengths = (*(rng.uniform(1.0, 3.0) for _ in range(3)), 2.0)
@@ -242,7 +236,6 @@ FOUR_BARS = {
     'change-point double rocker': (5.0, 2.0, 4.0, 3.0),
 }
 
-
 WORDS = {
     'crank-rocker': {'crank-rocker', 'change-point crank-rocker'},
     'rocker-crank': {'rocker-crank'},
@@ -268,7 +261,7 @@ def closing(lengths: Lengths) -> float:
 
 @pytest.mark.parametrize('word', WORDS)
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_a_word_stands_for_kinds_of_four_bars(word: str, name: str) -> None:
+def test_a_word_stands_for_kinds_of_four_bars(word, name):
     lengths = FOUR_BARS[name]
     found = assess(design(lengths, [(closing(lengths), 'left')]))
     needs = Needs(word)
@@ -295,13 +288,13 @@ def test_a_word_stands_for_kinds_of_four_bars(word: str, name: str) -> None:
         ),
     ],
 )
-def test_an_unknown_word_is_refused(word: str, remedy: str) -> None:
+def test_an_unknown_word_is_refused(word, remedy):
     with pytest.raises(SynthesisError) as caught:
         Needs(word).check()
     assert str(caught.value) == f'{word}: is no kind of four-bar; {remedy}'
 
 
-def test_misses_say_what_was_found_and_what_was_wanted() -> None:
+def test_misses_say_what_was_found_and_what_was_wanted():
     """At 60° on a ground of 6, s² = 28: cos μ = (49 + 81 − 28)/126, so that μ = 35.95°."""
     found = assess(design((2.0, 7.0, 9.0, 6.0), [(60.0, 'left')]))
     assert misses(found, Needs('double-crank', radians(40.0), 4.0)) == (
@@ -313,7 +306,7 @@ def test_misses_say_what_was_found_and_what_was_wanted() -> None:
     assert misses(found, Needs()) == ()
 
 
-def test_the_distance_grows_with_what_is_missing() -> None:
+def test_the_distance_grows_with_what_is_missing():
     found = assess(design((2.0, 7.0, 9.0, 6.0), [(60.0, 'left')]))
     angle = found.transmission
     assert distance(found, Needs(transmission=2.0 * angle)) == pytest.approx(0.5)
@@ -326,7 +319,7 @@ def test_the_distance_grows_with_what_is_missing() -> None:
     assert by_wish[0] == 0.0 < by_wish[1]
 
 
-def test_a_defect_is_farther_than_any_number() -> None:
+def test_a_defect_is_farther_than_any_number():
     found = assess(THREE_PAIRS)
     assert misses(found, Needs(usable=True)) == ('branch defect',)
     assert misses(found, Needs(usable=False)) == ()
@@ -335,13 +328,13 @@ def test_a_defect_is_farther_than_any_number() -> None:
     assert distance(found, wishes._replace(link_ratio=inf)) > distance(sound, wishes)
 
 
-def test_links_that_never_close_are_of_no_kind() -> None:
+def test_links_that_never_close_are_of_no_kind():
     found = assess(Design(FourBar.of_lengths(1.0, 1.0, 1.0, 4.0), (Wanted(1.0, 2.0),)))
     for word in WORDS:
         assert misses(found, Needs(word)) == (f'a {found.kind.name}, no {word}',)
 
 
-def test_many_at_once_are_as_far_as_each_alone() -> None:
+def test_many_at_once_are_as_far_as_each_alone():
     rng = random.Random(3)
     lengths, angles, found = [], [], []
     while len(found) < 300:
@@ -372,11 +365,11 @@ def _closes(lengths: Lengths, angle: float) -> bool:
     [
         (Needs(transmission=-0.1), r'^transmission angle: -5\.7'),
         (Needs(transmission=1.6), r'^transmission angle: 91\.'),
-        (Needs(transmission=nan), '^transmission angle: nan° is none'),
-        (Needs(link_ratio=0.99), r'^link ratio: 0\.99 is none'),
-        (Needs(link_ratio=nan), '^link ratio: nan is none'),
+        (Needs(transmission=nan), '^transmission angle: nan° is not in'),
+        (Needs(link_ratio=0.99), r'^link ratio: 0\.99 is not a ratio'),
+        (Needs(link_ratio=nan), '^link ratio: nan is not a ratio'),
     ],
 )
-def test_what_cannot_be_needed_is_refused(needs: Needs, said: str) -> None:
+def test_what_cannot_be_needed_is_refused(needs, said):
     with pytest.raises(SynthesisError, match=said):
         needs.check()

@@ -14,9 +14,6 @@
 
 """Studies: the best of all candidates, whoever works them out."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import dataclass
 import sys
 import tracemalloc
@@ -30,8 +27,6 @@ import pytest
 
 
 CAST = 3 * CHUNK + 7
-
-
 """Candidates, of which the last chunk has only some."""
 
 
@@ -152,9 +147,7 @@ def test_any_number_of_workers_finds_the_same():
     ('library', 'asked', 'extra'),
     [('scipy', scipy_optimize, 'design'), ('distributed', distributed, 'dask')],
 )
-def test_what_is_missing_is_told_with_what_installs_it(
-    library: str, asked: Callable[[], object], extra: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_missing_is_told_with_what_installs_it(library, asked, extra, monkeypatch):
     # None stands for a module that is not there.
     monkeypatch.setitem(sys.modules, library, None)
     monkeypatch.delitem(sys.modules, 'scipy.optimize', raising=False)
@@ -163,6 +156,6 @@ def test_what_is_missing_is_told_with_what_installs_it(
     assert str(caught.value) == f"{library}: is not installed; pip install 'linkage_ros[{extra}]'"
 
 
-def test_what_is_there_is_returned() -> None:
+def test_what_is_there_is_returned():
     optimize = pytest.importorskip('scipy.optimize')
     assert scipy_optimize() is optimize

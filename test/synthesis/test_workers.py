@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What can be wrong with a Dask scheduler and its workers is survived, or told in one line."""
+"""A fault of a Dask scheduler or of its workers is survived, or told in one line."""
 
 import os
 from pathlib import Path

@@ -15,8 +15,6 @@
 
 """A reader of bags in JavaScript, with npm's MCAP and ROS 2 packages, and what it has to find."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.register_assert_rewrite(f'{__name__}.agreement')

@@ -14,13 +14,11 @@
 
 
 """
-What the foreign reader finds in a bag, held against our reader, rclpy, rosbags and metadata.yaml.
+The foreign reader agrees with our reader, rclpy, rosbags and metadata.yaml.
 
 Messages are compared as bytes and as what is in them; what is in them is worked out three times:
 by npm's packages and by rosbags from the definitions in the bag, by rclpy from its own.
 """
-
-from __future__ import annotations
 
 from array import array
 import base64
@@ -37,8 +35,8 @@ import subprocess
 from typing import Any
 import warnings
 
+from linkage_ros.bag.metadata import DISCARDED
 from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.bag.recording_stats import LET_GO
 from linkage_ros.bag.topic import CHANNELS_FILE
 import numpy as np
 import pytest
@@ -55,7 +53,6 @@ from ...node_packages import (
 )
 
 _SCRIPT = Path(__file__).with_name('read.cjs')
-
 Record = dict[str, Any]
 
 
@@ -151,7 +148,7 @@ def _messages(records: Sequence[Record]) -> list[Record]:
 def _ours(bag: Bag) -> Iterator[Record]:
     """Yield the messages that our reader finds, as the foreign one prints them."""
     # Of a ring the files that are gone have had the first numbers.
-    gone = json.loads(bag.custom.get(LET_GO, '{}'))
+    gone = json.loads(bag.custom.get(DISCARDED, '{}'))
     sequences = {topic.name: gone.get(topic.name, 0) for topic in bag.topics}
     kinds = {topic.name: topic.type for topic in bag.topics}
     with AnyReader([bag.path]) as rosbags:
@@ -185,7 +182,6 @@ def _assert_described(bag: Bag, information: dict[str, Any], records: Sequence[R
     found = {each['name']: base64.b64decode(each['base64']) for each in attachments}
     found.pop(CHANNELS_FILE, None)  # What is recovered is finished, and needs none.
     assert found == bag.attachments
-
     schemas = {schema['id']: schema for schema in of_kind(records, 'schema')}
     channels = of_kind(records, 'channel')
     assert [topic['topic_metadata'] for topic in information['topics_with_message_count']] == [
@@ -204,7 +200,6 @@ def _assert_described(bag: Bag, information: dict[str, Any], records: Sequence[R
         assert schema['encoding'] == 'ros2msg'
         assert set(channel['metadata']) == {'offered_qos_profiles', 'topic_type_hash'}
         assert channel['metadata']['topic_type_hash'] == _hash_of(schema)
-
     messages = of_kind(records, 'message')
     (statistics,) = of_kind(records, 'statistics')
     assert statistics['messageCount'] == str(len(messages))

@@ -15,8 +15,6 @@
 
 """Where there is no rclpy, the definitions of messages are missing, and nothing is collected."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 import pytest

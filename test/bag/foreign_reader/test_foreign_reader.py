@@ -19,8 +19,6 @@ Bags as a reader in another language sees them: npm's @mcap/core and its ROS 2 p
 Of every kind of bag it reads every message, and finds in it what our reader, rclpy and rosbags do.
 """
 
-from __future__ import annotations
-
 from itertools import islice
 from math import inf, nan
 from pathlib import Path
@@ -30,8 +28,8 @@ from textwrap import dedent
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from linkage_ros.bag.metadata import UNFINISHED_DATA
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recording_stats import UNFINISHED_DATA
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.main import main
@@ -265,7 +263,6 @@ def test_a_killed_bag_before_and_after_its_recovery(
     # What a kill leaves is what the system has been given by then.
     shutil.copytree(tmp_path / 'run', tmp_path / 'killed')
     writer.close()
-
     killed = read_bag(tmp_path / 'killed', allow_truncated=True)
     assert killed.truncated
     ours = [str(message.log_time) for message in killed.messages()]
@@ -274,7 +271,6 @@ def test_a_killed_bag_before_and_after_its_recovery(
     assert [m['logTime'] for records in files for m in of_kind(records, 'message')] == ours
     whole = [end['whole'] for records in files for end in of_kind(records, 'end')]
     assert whole == [True] * (len(files) - 1) + [False]
-
     assert main(['recover', str(tmp_path / 'killed')]) in {0, 3}
     recovered = assert_agreement(tmp_path / 'killed_recovered')
     assert [str(message.log_time) for message in recovered.messages()] == ours

@@ -14,8 +14,6 @@
 
 """Sources of linkages, built and run over many states, beside what the plain steps say."""
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Sequence
 import ctypes
@@ -42,7 +40,6 @@ needs = {
 }
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Werror', '-ffp-contract=off')
 NUMBERS = list(STATUSES)
-
 COUNT = int(os.environ.get('LINKAGE_STATES', '1500'))
 """States of each linkage; `make compiled` takes 100,000."""
 
@@ -64,11 +61,7 @@ def subject(closure: Closure, derivatives: int = 2, joints: Sequence[str] = ()) 
 
 
 def states(closure: Closure, count: int, seed: str, start: State = ()) -> list[State]:
-    """
-    Return states over the range of a linkage and beyond, its limits and the floats beside them.
-
-    A third of several inputs, or of one that is said to start there, lie near the start.
-    """
+    """Return states over a range and beyond, at its limits, and near the start."""
     rng = random.Random(seed)
     near = start or (closure.linkage.pose.inputs if closure.linkage.pose else ())
     spans, special = [], []

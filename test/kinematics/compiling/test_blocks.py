@@ -14,8 +14,6 @@
 
 """Compiled linkages in Python and in numpy: their bits, and what they ask."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import inf, nan, nextafter, pi
@@ -62,14 +60,14 @@ def passes(function: BlockFunction) -> int:
     return function.source.count('out=')
 
 
-def test_a_condition_that_bounds_settle_is_not_asked() -> None:
+def test_a_condition_that_bounds_settle_is_not_asked():
     tape = Tape()
     sine = sin(tape.given('q0', 0.3))
     assert written(sine.operation, (sine * sine + 0.5 > 0.4).operation).masks == 0
     assert written(sine.operation, (sine * sine + 0.5 > 0.6).operation).masks > 0
 
 
-def test_constants_are_drawn_together_and_nothing_is_worked_out_of_0() -> None:
+def test_constants_are_drawn_together_and_nothing_is_worked_out_of_0():
     tape = Tape()
     x, rate = tape.given('q0', 0.3), tape.given('w0', 1.25)
     function = written((2.0 * (3.0 * x) / 4.0).operation)
@@ -80,13 +78,13 @@ def test_constants_are_drawn_together_and_nothing_is_worked_out_of_0() -> None:
 
 
 @pytest.mark.parametrize('constant', [0.5, np.float64(0.5), -0.0, inf, -inf, nan, 3])
-def test_every_constant_is_written_as_it_is(constant: float) -> None:
+def test_every_constant_is_written_as_it_is(constant):
     found = values_of(written(constant), np.zeros(4))
     np.testing.assert_array_equal(found, np.full(4, constant))
     assert np.signbit(found).all() == np.signbit(constant)
 
 
-def test_a_row_is_used_again_when_nobody_needs_what_is_in_it() -> None:
+def test_a_row_is_used_again_when_nobody_needs_what_is_in_it():
     tape = Tape()
     total = x = tape.given('q0', 0.3)
     for k in range(30):
@@ -98,14 +96,8 @@ def test_a_row_is_used_again_when_nobody_needs_what_is_in_it() -> None:
 
 
 LINKAGES = sorted((Path(__file__).parents[3] / 'config' / 'linkages').glob('*.yaml'))
-
-
 ITERATED = {'class_3'}
-
-
 STATES = 10_000
-
-
 """Of a linkage of the gallery; one that is iterated takes a hundred times as long for each."""
 
 
@@ -136,7 +128,7 @@ def answered(call: Any, *numbers: float) -> str:
 
 
 @pytest.mark.parametrize('name', [path.stem for path in LINKAGES])
-def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name: str) -> None:
+def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name):
     closure = closure_of(name)
     compiled = Compiled(closure, 2)
     closed = left = 0
@@ -151,7 +143,7 @@ def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name: str) -> Non
 
 
 @pytest.mark.parametrize('family', FAMILIES)
-def test_random_linkages_of_every_topology_have_them(family: str) -> None:
+def test_random_linkages_of_every_topology_have_them(family):
     seen = set()
     for number in range(3):
         rng = random.Random(f'{family}/{number}')
@@ -175,7 +167,7 @@ SPECIAL = (0.0, -0.0, pi, -pi, 2 * pi, 0.5 * pi, -0.5 * pi, nextafter(pi, 4.0), 
 
 
 @pytest.mark.parametrize('name', [path.stem for path in LINKAGES if path.stem not in ITERATED])
-def test_toggles_change_points_and_huge_angles_have_them(name: str) -> None:
+def test_toggles_change_points_and_huge_angles_have_them(name):
     closure = closure_of(name)
     driven = len(closure.linkage.inputs)
     compiled = Compiled(closure, 2)
@@ -189,7 +181,7 @@ def test_toggles_change_points_and_huge_angles_have_them(name: str) -> None:
 
 @pytest.mark.parametrize('wrong', [nan, inf, -inf])
 @pytest.mark.parametrize('place', range(3))
-def test_what_is_not_finite_is_answered_by_the_plain_steps(wrong: float, place: int) -> None:
+def test_what_is_not_finite_is_answered_by_the_plain_steps(wrong, place):
     compiled = Compiled(closure_of('four_bar'), 2)
     numbers = [1.0, 2.0, 3.0]
     numbers[place] = wrong
@@ -197,7 +189,7 @@ def test_what_is_not_finite_is_answered_by_the_plain_steps(wrong: float, place: 
     assert answered(compiled, *numbers) == answered(compiled.plain, *numbers)
 
 
-def test_beyond_a_limit_the_plain_steps_say_so() -> None:
+def test_beyond_a_limit_the_plain_steps_say_so():
     closure = closure_of('four_bar')
     joint = next(iter(closure.linkage.joints))
     at = closure.position(1.0).joints[0]
@@ -220,7 +212,7 @@ def operations(text: str) -> int:
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'andrews_squeezer', 'slider_crank'])
-def test_what_is_not_asked_for_is_not_in_the_line(name: str) -> None:
+def test_what_is_not_asked_for_is_not_in_the_line(name):
     closure = closure_of(name)
 
     def last(motion: Motion) -> list[list[float]]:
@@ -234,7 +226,7 @@ def test_what_is_not_asked_for_is_not_in_the_line(name: str) -> None:
     assert 'a0' not in source(closure, 1)
 
 
-def test_the_direction_of_one_joint_is_one_arc_tangent_more_than_none() -> None:
+def test_the_direction_of_one_joint_is_one_arc_tangent_more_than_none():
     closure = closure_of('four_bar')
     counts = [
         source(closure, 0, lambda motion, n=n: [motion.position.joints[:n]]).count('atan2(')
@@ -244,7 +236,7 @@ def test_the_direction_of_one_joint_is_one_arc_tangent_more_than_none() -> None:
     assert counts == [0, 2, 3]
 
 
-def test_simplified_operations_keep_their_bits() -> None:
+def test_simplified_operations_keep_their_bits():
     def done(x: float, y: float) -> list[float]:
         return [
             x + 0.0, 0.0 + x, x - 0.0, 0.0 - x, x * 1.0, 1.0 * x, x / 1.0, -1.0 * x, 0.0 - (-x),
@@ -262,13 +254,13 @@ def test_simplified_operations_keep_their_bits() -> None:
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'watt_1', 'excavator_bucket'])
-def test_the_equation_of_motion_is_that_of_the_plain_steps(name: str) -> None:
+def test_the_equation_of_motion_is_that_of_the_plain_steps(name):
     closure = closure_of(name)
     mechanics = Mechanics(closure, Loads(gravity=(0.5, -9.81), drive_inertia=1e-4))
     for value, *_ in states(closure, 500):
         assert repr(mechanics.equation(value)) == repr(mechanics.terms(closure.position(value)))
 
 
-def test_a_function_that_decides_has_no_straight_line() -> None:
+def test_a_function_that_decides_has_no_straight_line():
     with pytest.raises(ValueError, match='decides'):
         straight(lambda x: [x if x > 0.0 else -x], (1.0,))

@@ -14,8 +14,6 @@
 
 """A linkage in C says what the plain steps say, to the last bit, and compiles in silence."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, nan, pi
 from pathlib import Path
@@ -45,7 +43,6 @@ from ..test_gallery import closure_of, KINDS
 
 GALLERY = [name for name, kinds in KINDS.items() if kinds != 'iterated']
 DYADS = [family for family in FAMILIES if not family.startswith('class III')]
-
 pytestmark = needs['C99']
 
 
@@ -62,19 +59,19 @@ def told_of(
 
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
-def test_a_linkage_of_the_gallery_says_what_the_steps_say(name: str, tmp_path: Path) -> None:
+def test_a_linkage_of_the_gallery_says_what_the_steps_say(name, tmp_path):
     told = told_of(closure_of(name), tmp_path, COUNT, name)
     assert sum(one.status == 'CLOSED' for one in told) > COUNT / 2
 
 
 @pytest.mark.parametrize('family', DYADS)
-def test_any_topology_says_what_the_steps_say(family: str, tmp_path: Path) -> None:
+def test_any_topology_says_what_the_steps_say(family, tmp_path):
     topology = FAMILIES[family].make(random.Random(family))
     told = told_of(Closure(topology.linkage), tmp_path, 300, family, topology.start)
     assert sum(one.status == 'CLOSED' for one in told) > 30
 
 
-def test_a_change_point_has_the_values_of_the_motion_that_passes(tmp_path: Path) -> None:
+def test_a_change_point_has_the_values_of_the_motion_that_passes(tmp_path):
     for name in ('parallelogram', 'peaucellier'):
         closure = closure_of(name)
         given = [(i * pi, 1.5, 0.5) for i in range(-4, 5)]
@@ -83,7 +80,7 @@ def test_a_change_point_has_the_values_of_the_motion_that_passes(tmp_path: Path)
         assert name != 'parallelogram' or {one.status for one in told} == {'CHANGE_POINT'}
 
 
-def test_behind_a_toggle_nobody_looks(tmp_path: Path) -> None:
+def test_behind_a_toggle_nobody_looks(tmp_path):
     rocker = closure_of('double_rocker')
     links = {name: dict(points) for name, points in rocker.linkage.links.items()}
     links['ground']['O6'] = (0.15, -0.3)
@@ -121,13 +118,13 @@ def limited(**limits: tuple[float, float]) -> Closure:
         {'rocker_joint': (1.5 + 4.0 * pi, 1.9 + 4.0 * pi), 'crank_joint': (-9.0, 2.5)},
     ],
 )
-def test_beyond_limits_there_are_values_and_the_status_says_so(limits, tmp_path: Path) -> None:
+def test_beyond_limits_there_are_values_and_the_status_says_so(limits, tmp_path):
     told = told_of(limited(**limits), tmp_path, 400, 'limited')
     assert {'CLOSED', 'LIMITED'} <= {one.status for one in told}
     assert all(len(one.values) == 6 for one in told if one.status == 'LIMITED')
 
 
-def test_limits_hold_of_joints_that_are_not_asked_for(tmp_path: Path) -> None:
+def test_limits_hold_of_joints_that_are_not_asked_for(tmp_path):
     closure = limited(rocker_joint=(1.5, 1.9))
     given = states(closure, 300, 'limited')
     told = run_c(subject(closure, 0, ['coupler_joint']), given, tmp_path)
@@ -135,7 +132,7 @@ def test_limits_hold_of_joints_that_are_not_asked_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('derivatives', [0, 1, 2])
-def test_what_is_not_asked_for_is_not_in_the_code(derivatives: int, tmp_path: Path) -> None:
+def test_what_is_not_asked_for_is_not_in_the_code(derivatives, tmp_path):
     closure = closure_of('jansen_leg')
     joint = list(closure.linkage.joints)[1]
     asked, whole = subject(closure, derivatives, [joint]), subject(closure)
@@ -151,7 +148,7 @@ def test_what_is_not_asked_for_is_not_in_the_code(derivatives: int, tmp_path: Pa
 
 @pytest.mark.parametrize('odd', [nan, inf, -inf])
 @pytest.mark.parametrize('place', [0, 1, 2])
-def test_what_is_not_finite_is_indeterminate(odd: float, place: int, tmp_path: Path) -> None:
+def test_what_is_not_finite_is_indeterminate(odd, place, tmp_path):
     state = [1.0, 1.0, 1.0]
     state[place] = odd
     assert run_c(subject(closure_of('four_bar')), [tuple(state)], tmp_path) == [
@@ -162,7 +159,7 @@ def test_what_is_not_finite_is_indeterminate(odd: float, place: int, tmp_path: P
 @pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
 @pytest.mark.parametrize('header', [False, True])
 @pytest.mark.parametrize('name', GALLERY)
-def test_it_compiles_without_a_warning(name, header, kind, tmp_path: Path) -> None:
+def test_it_compiles_without_a_warning(name, header, kind, tmp_path):
     text = source(subject(closure_of(name)), C('linkage', header=header))
     file = tmp_path / 'linkage.c'
     # A header may be included twice.
@@ -172,14 +169,14 @@ def test_it_compiles_without_a_warning(name, header, kind, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
-def test_headers_of_one_linkage_go_together(kind: str, tmp_path: Path) -> None:
+def test_headers_of_one_linkage_go_together(kind, tmp_path):
     closure = closure_of('four_bar')
     texts = [source(subject(closure, i), C('four_bar', header=True)) for i in range(3)]
     (tmp_path / 'all.c').write_text('\n'.join(texts))
     build([*COMPILERS[kind], '-Wno-unused-function', '-c'], tmp_path / 'all.c', tmp_path / 'all.o')
 
 
-def test_links_that_are_iterated_are_refused() -> None:
+def test_links_that_are_iterated_are_refused():
     closure = closure_of('class_3')
     with pytest.raises(DefinitionError, match='links: some are only solved by iteration'):
         source(subject(closure), C('linkage', header=False))

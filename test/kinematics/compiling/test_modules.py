@@ -14,8 +14,6 @@
 
 """A linkage as a module of Python, and of JavaScript, says what the plain steps say."""
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Callable, Sequence
 import json
@@ -39,7 +37,6 @@ _ULPS = 4
 
 _MANY = 1024
 _DIGITS = 1e-9
-
 CURVED = ('sin', 'cos', 'atan2')
 """Functions of which a language has its own last digits."""
 
@@ -61,21 +58,21 @@ def told_by(solve: Solve, state: State) -> Told:
 
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
-def test_python_has_the_bits_of_the_steps(name: str) -> None:
+def test_python_has_the_bits_of_the_steps(name):
     closure = closure_of(name)
     solve = python_of(subject(closure))['motion']
     for state in states(closure, COUNT, name):
         assert told_by(solve, state) == plain(closure, state), state
 
 
-def test_python_needs_nothing_but_math() -> None:
+def test_python_needs_nothing_but_math():
     text = source(subject(closure_of('jansen_leg')), PythonModule(2))
     imports = [line for line in text.splitlines() if 'import ' in line]
     assert imports == ['from math import atan2, copysign, cos, inf, isfinite, sin, sqrt']
 
 
 @pytest.mark.parametrize('derivatives', [0, 1, 2])
-def test_python_takes_and_gives_what_is_asked_for(derivatives: int) -> None:
+def test_python_takes_and_gives_what_is_asked_for(derivatives):
     closure = closure_of('four_bar')
     solve = python_of(subject(closure, derivatives, ['rocker_joint']))[FUNCTIONS[derivatives]]
     given = ((0.3,), (2.0,), (0.5,))
@@ -84,7 +81,7 @@ def test_python_takes_and_gives_what_is_asked_for(derivatives: int) -> None:
     assert (NUMBERS[status], *groups) == ('CLOSED', *((v,) for v in steps[: 1 + derivatives]))
 
 
-def test_python_tells_of_limits() -> None:
+def test_python_tells_of_limits():
     closure = limited(rocker_joint=(1.5, 1.9))
     solve = python_of(subject(closure))['motion']
     told = [told_by(solve, state) for state in states(closure, 300, 'limited')]
@@ -186,14 +183,14 @@ def off(what: Subject, told: Sequence[Told], given: Sequence[State]) -> float:
 @needs['JavaScript']
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
-def test_javascript_is_as_near_as_its_functions(name: str, tmp_path: Path) -> None:
+def test_javascript_is_as_near_as_its_functions(name, tmp_path):
     what = subject(closure_of(name))
     given = states(what.closure, COUNT // 5, name)
     assert off(what, run_javascript(what, given, tmp_path), given) <= _ULPS
 
 
 @needs['JavaScript']
-def test_javascript_tells_of_limits(tmp_path: Path) -> None:
+def test_javascript_tells_of_limits(tmp_path):
     what = subject(limited(rocker_joint=(1.5 + 4.0 * math.pi, 1.9 + 4.0 * math.pi)))
     given = states(what.closure, 300, 'limited')
     told = run_javascript(what, given, tmp_path)

@@ -14,8 +14,6 @@
 
 """Linkage files on which the kinematics once failed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from linkage_ros.files.linkage_file import read_linkage

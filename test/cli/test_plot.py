@@ -1,0 +1,119 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``linkage plot``: joints over the crank, continuous, with units and names at their ends."""
+
+from math import remainder, tau
+from pathlib import Path
+
+from linkage_ros.cli import plot as command
+from linkage_ros.cli.plot import curves
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
+from linkage_ros.resources import shipped
+import numpy as np
+import pytest
+
+from .recorded import answer, Recorded, scene_file
+
+pytest.importorskip('matplotlib')
+
+
+def closure_of(name: str) -> Closure:
+    return Closure(read_linkage(read_yaml(str(shipped(f'linkages/{name}.yaml')))[0]))
+
+
+def pieces(curve):
+    """Return x and y of each line that a curve consists of."""
+    x, y = np.array(curve.x), np.array(curve.y)
+    breaks = np.flatnonzero(np.isnan(x))
+    return [
+        (own[~np.isnan(own)], values[~np.isnan(values)])
+        for own, values in zip(np.split(x, breaks), np.split(y, breaks), strict=True)
+    ]
+
+
+@pytest.mark.parametrize('wrapped', [False, True], ids=['continuous', 'wrapped'])
+@pytest.mark.parametrize('way', [1.0, -1.0], ids=['onward', 'backward'])
+def test_angles_are_continuous_over_a_turn_in_whichever_turn_they_were_recorded(way, wrapped):
+    closure = closure_of('four_bar')
+    cranks = [(1.0 + way * 0.03 * row,) for row in range(700)]
+    positions = [closure.position(*crank).joints for crank in cranks]
+    if wrapped:
+        positions = [tuple(remainder(value, tau) for value in each) for each in positions]
+    joints, rates = curves(closure.linkage, cranks, positions, [()] * len(cranks))
+    assert [joint.name for joint in joints] == ['coupler_joint', 'rocker_joint']
+    assert rates == []
+    for joint in joints:
+        # Over the same angle of the crank there is one value, in all turns.
+        known = {}
+        for x, y in pieces(joint):
+            assert np.abs(np.diff(y)).max(initial=0.0) < 0.1
+            for angle, value in zip(x, y, strict=True):
+                known.setdefault(round(angle, 1), []).append(value)
+        assert max(max(values) - min(values) for values in known.values()) < 0.2
+        place = list(closure.linkage.joints).index(joint.name)
+        for x, y in pieces(joint):
+            ideal = [closure.position(angle).joints[place] for angle in x]
+            assert np.exp(1j * y) == pytest.approx(np.exp(1j * np.array(ideal)))
+        assert joint.x[-1] == np.nanmax(joint.x)
+
+
+def test_a_crank_that_swings_is_drawn_over_its_range():
+    closure = closure_of('double_rocker')
+    reach = InputSweep(closure, usual_inputs(closure)).widest_range
+    middle, half = (reach.lowest + reach.highest) / 2, 0.45 * (reach.highest - reach.lowest)
+    cranks = [(middle + half * np.sin(0.1 * row) + tau,) for row in range(200)]
+    positions = [closure.position(*crank).joints for crank in cranks]
+    rates = [(1.0,) * len(positions[0])] * 199 + [()]
+    joints, joint_rates = curves(closure.linkage, cranks, positions, rates)
+    assert len(joint_rates) == len(joints)
+    for joint in (*joints, *joint_rates):
+        assert np.nanmin(joint.x) == pytest.approx(middle - half, abs=0.01)
+        assert np.nanmax(joint.x) == pytest.approx(middle + half, abs=0.01)
+
+
+def test_a_stuck_joint_stays_at_one_angle_within_a_turn():
+    closure = closure_of('four_bar')
+    cranks = [(0.01 * row,) for row in range(628)]
+    positions = [(-3.0, 1.0)] * 628
+    joints, _ = curves(closure.linkage, cranks, positions, [()] * 628)
+    for joint in joints:
+        (values,) = (y for _, y in pieces(joint) if len(y))
+        assert np.ptp(values) == 0.0
+
+
+def test_a_reading_that_is_no_number_hides_itself_only():
+    closure = closure_of('four_bar')
+    cranks = [(0.01 * row,) for row in range(100)]
+    positions = [closure.position(*crank).joints for crank in cranks]
+    positions[50] = (np.nan, np.nan)
+    joints, _ = curves(closure.linkage, cranks, positions, [()] * len(cranks))
+    for joint in joints:
+        assert np.isfinite(joint.y).sum() == 99
+
+
+def test_axes_name_quantities_and_units(tmp_path: Path) -> None:
+    scene = scene_file(tmp_path, 'effects: {velocity: {}}\n')
+    bag = Recorded(
+        tmp_path / 'bag', scene, lambda row: {'crank_joint': (1.0 + 0.007 * row, 7.0)}
+    ).run(300)
+    assert answer(command, bag, '-o', tmp_path / 'x.svg') == 0
+    text = (tmp_path / 'x.svg').read_text()
+    for label in ('joint angle [°]', 'rate of joint angle [°/s]', 'crank_joint [°]'):
+        assert f'<!-- {label} -->' in text
+    # At the end of its position and at that of its rate.
+    assert text.count('<!-- rocker_joint -->') == 2

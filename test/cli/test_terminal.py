@@ -1,0 +1,117 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tables and progress: folded to the width of a terminal, whole in a pipe."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+
+from linkage_ros.cli import terminal
+from linkage_ros.cli.terminal import folded, progress, show, Table, text
+import pytest
+
+from .conftest import on_terminal
+
+LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
+
+
+def words(tables: list[Table]) -> list[str]:
+    return sorted(' '.join(map(text, tables)).split())
+
+
+def test_a_table_that_fits_stays_as_it_is():
+    table = Table('title', ['a', '>b'], [['x', '1']])
+    assert folded(table, 80) == [table]
+
+
+def test_a_long_cell_is_wrapped_at_spaces_beside_the_other_cells_of_its_row():
+    table = Table('', ('', ''), [['one', 'some words that are too many'], ['two', 'x']])
+    (part,) = folded(table, 30)
+    assert text(part).splitlines() == [
+        'one  some words that are',
+        '     too many',
+        'two  x',
+    ]
+
+
+def test_many_columns_become_blocks_that_each_begin_with_the_first_column():
+    heads = ['>crank [°]', *(f'>joint_{i} [°]' for i in range(8))]
+    rows = [[f'{row}.5', *(f'{row}{i}.123456' for i in range(8))] for row in range(3)]
+    parts = folded(Table('title', heads, rows), 50)
+    assert len(parts) > 1
+    assert [part.title for part in parts] == ['title', *[''] * (len(parts) - 1)]
+    for part in parts:
+        assert [row[0] for row in part.rows] == ['0.5', '1.5', '2.5']
+        assert max(map(len, text(part).splitlines())) <= 50
+    columns = [column for part in parts for column in part.columns[1:]]
+    assert [column.replace('\n', ' ') for column in columns] == heads[1:]
+
+
+def test_no_word_is_broken():
+    path = '/a/path/that/is/longer/than/the/terminal.yaml'
+    table = Table(path, ['a', '>b c'], [[path, '1 2'], ['x', path]])
+    parts = folded(table, 20)
+    assert set(words(parts)) == set(words([table]))
+
+
+@pytest.mark.parametrize('columns', [60, 80, 120])
+def test_no_line_of_a_wide_table_is_wider_than_the_terminal(tmp_path, columns):
+    shown = on_terminal(
+        tmp_path,
+        *('solve', str(LINKAGES / 'jansen_leg.yaml'), '--steps', '2', '--rate', '60'),
+        columns=columns,
+    )
+    lines = re.sub('\x1b\\[[0-9;]*m', '', shown).splitlines()
+    assert max(map(len, lines)) <= columns
+    assert sum('crank_joint' in line for line in lines) > 1
+
+
+def test_in_a_pipe_each_row_is_one_line(capsys):
+    show(Table('', ['a', 'b'], [['x ' * 200, 'y ' * 200], ['1', '2']]))
+    assert len(capsys.readouterr().out.splitlines()) == 3
+
+
+class Clock:
+    """A clock that a test sets, in [s]."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch) -> Clock:
+    made = Clock()
+    monkeypatch.setattr(terminal, 'monotonic', made)
+    return made
+
+
+def test_a_short_task_tells_no_progress_in_a_pipe(capsys, clock):
+    with progress('parts') as advance:
+        clock.now = 1.9
+        advance(1, 2)
+    assert capsys.readouterr().err == ''
+
+
+def test_a_long_task_tells_its_progress_and_its_end_in_a_pipe(capsys, clock):
+    with progress('parts') as advance:
+        for clock.now in (1.0, 2.0, 3.0, 31.0, 32.0):
+            advance(int(clock.now), 40)
+        clock.now = 40.0
+    assert capsys.readouterr().err.splitlines() == [
+        'parts: 2 of 40', 'parts: 32 of 40', 'parts: ended after 40.0 s',
+    ]  # fmt: skip

@@ -1,0 +1,264 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A moving picture shows each link where the closure, or the recorded run, has it."""
+
+from itertools import pairwise
+from math import cos, hypot, isnan, radians
+from pathlib import Path
+import re
+from xml.etree import ElementTree as ET
+
+from linkage_ros.cli.main import main
+from linkage_ros.drawing.animation import animate, check_kind, range_motion, RATE
+from linkage_ros.drawing.figure import view
+from linkage_ros.drawing.shapes import link_frames
+from linkage_ros.errors import LinkageError
+from linkage_ros.files.linkage_file import load
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.report.run import Window
+from linkage_ros.report.run_motion import run_motion
+import numpy as np
+import pytest
+
+from ..browser.chromium import browser
+from ..browser.opened import opened
+from ..report.runs import but, read, recorded
+
+image = pytest.importorskip('PIL.Image')
+pytest.importorskip('matplotlib')
+
+SOME = ('four_bar', 'slider_crank', 'double_rocker', 'class_3', 'excavator_bucket')
+
+
+def moved(name, seconds=1.0):
+    closure = load(name)
+    shown = view(closure, usual_inputs(closure))
+    return range_motion(shown, name, seconds)
+
+
+@pytest.mark.parametrize('name', SOME)
+def test_links_are_where_the_closure_has_them(name):
+    motion = moved(name)
+    closure = motion.view.closure
+    assert len(motion.x) == RATE
+    for x, frames in zip(motion.x, motion.frames, strict=True):
+        found = link_frames(closure, closure.position(x))
+        for link, (px, py, angle) in zip(motion.links, frames, strict=True):
+            assert hypot(px - found[link].place.real, py - found[link].place.imag) < 1e-12
+            assert cos(angle - found[link].angle) == pytest.approx(1.0)
+
+
+def test_a_range_with_ends_is_shown_there_and_back():
+    motion = moved('double_rocker')
+    low, high = motion.view.interval.lowest, motion.view.interval.highest
+    assert motion.x[0] == low
+    assert motion.x[RATE // 2] == pytest.approx(high)
+    assert motion.x[1:] == pytest.approx(motion.x[:0:-1])
+
+
+def rules(file):
+    """Return the keyframes of an SVG by their name: percentages, and what holds at each."""
+    text = file.read_text('utf-8')
+    return {
+        name: {float(at): dict(part.split(':') for part in held.split(';')) for at, held in keys}
+        for name, keys in (
+            (name, re.findall(r'([\d.]+)%\{([^}]*)\}', body))
+            for name, body in re.findall(r'@keyframes (\w+) \{((?:[^{}]*\{[^{}]*\})*)\}', text)
+        )
+    }
+
+
+def placed(transform):
+    """Return what ``translate(…px,…px) rotate(…deg)`` says, in [px] and [rad]."""
+    x, y, turn = re.fullmatch(
+        r'translate\((.+?)(?:px)?[, ](.+?)(?:px)?\)(?: rotate\((.+?)(?:deg)?\))?', transform
+    ).groups()
+    return float(x), float(y), radians(float(turn or 0.0))
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'slider_crank'])
+def test_keyframes_of_an_svg_put_links_where_the_closure_has_them(tmp_path, name):
+    motion = moved(name, 2.0)
+    file = tmp_path / 'x.svg'
+    animate(motion, file)
+    found = rules(file)
+    made = link_frames(motion.view.closure, motion.view.position)
+    # Pixels per metre, from the farthest places of the first link that changes its place.
+    scales = set()
+    for number, link in enumerate(motion.links):
+        keys = found[f'link{number}']
+        assert len(keys) == RATE + 1
+        places = []
+        for at, held in keys.items():
+            x, y, angle = motion.frames[round(at / 100.0 * len(motion.x)) % len(motion.x), number]
+            px, py, turn = placed(held['transform'])
+            # The SVG's y axis points down, so that its angles are clockwise.
+            assert cos(-turn - (angle - made[link].angle)) == pytest.approx(1.0, abs=1e-6)
+            places.append((complex(x, y), complex(px, -py)))
+        for (one, p), (other, q) in pairwise(places):
+            if abs(other - one) > 1e-3:
+                scales.add(complex((q - p) / (other - one)))
+    scale = np.mean(list(scales))
+    assert abs(scale.imag) < 1e-2 * scale.real
+    assert max(abs(each - scale) for each in scales) < 0.02 * abs(scale)
+
+
+def test_reduced_motion_shows_the_first_picture(tmp_path):
+    motion = moved('double_rocker')  # begins at an end of its range, not at the pose of its shapes
+    file = tmp_path / 'x.svg'
+    animate(motion, file)
+    found = rules(file)
+    groups = [
+        group
+        for group in ET.parse(file).iter('{http://www.w3.org/2000/svg}g')
+        if group.get('class', '').startswith('moving')
+    ]
+    assert len(groups) > 5
+    for group in groups:
+        first = found[group.get('class').split()[1]][0.0]['transform']
+        assert placed(group.get('transform')) == pytest.approx(placed(first), abs=1e-3)
+
+
+def test_a_gif_shows_a_turn_in_its_time_and_is_small(tmp_path):
+    file = tmp_path / 'x.gif'
+    done = []
+    animate(moved('jansen_leg', 2.0), file, lambda i, of: done.append((i, of)))
+    assert done == [(i + 1, 2 * RATE) for i in range(2 * RATE)]
+    with image.open(file) as picture:
+        assert picture.n_frames == 2 * RATE
+        assert picture.info['duration'] == 1000 / RATE
+        assert picture.info['loop'] == 0  # for ever
+        assert picture.convert('RGB').getpixel((0, 0)) == (255, 255, 255)
+    assert file.stat().st_size < 150_000 * 2.0
+
+
+# A run of a four-bar at 1 kHz, whose crank turns at 7 rad/s; ticks 400 to 699 never were.
+
+
+@pytest.fixture(scope='module')
+def gapped(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('gapped')
+    return recorded(
+        folder, moments=but(1000, lambda tick, moment: None if 400 <= tick < 700 else moment)
+    )
+
+
+def test_links_of_a_run_are_where_their_recorded_joints_put_them(gapped):
+    found = read(gapped)
+    motion = run_motion(found, 'run', 1.0)
+    crank = motion.links.index('crank')
+    rocker = motion.links.index('rocker')
+    for time, frames, values in zip(motion.x, motion.frames, motion.values, strict=True):
+        if 0.399 < time < 0.7:
+            continue
+        angle = 0.007 * round(1000.0 * time)
+        position = found.linkages[0].closure.position(angle)
+        assert cos(frames[crank, 2] - angle) > cos(0.0071)  # at most a tick away
+        assert cos(frames[rocker, 2] - values[1]) == pytest.approx(1.0)
+        assert cos(values[1] - position.joints[1]) > cos(0.02)
+
+
+def test_a_gap_hides_the_linkage_and_interrupts_the_curves(gapped, tmp_path):
+    motion = run_motion(read(gapped), 'run', 1.0)
+    within = (motion.x > 0.41) & (motion.x < 0.69)
+    assert within.any()
+    assert np.isnan(motion.frames[within]).all()
+    assert np.isnan(motion.values[within]).all()
+    assert np.isfinite(motion.frames[~within & (motion.x < 0.39)]).all()
+    for joint in motion.joints:
+        gaps = [x for x, y in zip(joint.x, joint.y, strict=True) if isnan(y)]
+        assert len(gaps) == 1
+        assert 0.398 < gaps[0] < 0.401
+    file = tmp_path / 'x.svg'
+    animate(motion, file)
+    assert 'nan' not in file.read_text('utf-8')
+    held = rules(file)['link0']
+    hidden = {at for at, each in held.items() if each['visibility'] == 'hidden'}
+    assert {39.0 < at < 71.0 for at in hidden} == {True}
+    # It does not fly from the last pose before the gap to the first one after it.
+    before, after = max(at for at in held if at < 40.0), max(hidden)
+    assert held[before]['animation-timing-function'] == 'step-end'
+    assert held[after]['animation-timing-function'] == 'step-end'
+
+
+def test_a_part_of_a_run_begins_and_ends_as_named(gapped):
+    motion = run_motion(read(gapped, Window(100_000_000, 300_000_000)), 'run', None)
+    assert motion.x[0] == pytest.approx(0.1, abs=2e-3)
+    assert motion.x[-1] == pytest.approx(0.3, abs=0.02)
+    assert motion.title == 'run, 0.2 times as fast'  # the shortest picture takes a second
+
+
+def test_a_part_without_joint_states_is_refused(gapped):
+    with pytest.raises(LinkageError, match='holds no joint states in this part'):
+        run_motion(read(gapped, Window(450_000_000, 600_000_000)), 'run', 1.0)
+
+
+@pytest.mark.parametrize('seconds', ['0', '-1', '31', 'nan'])
+def test_a_time_out_of_bounds_is_told_with_them(tmp_path, monkeypatch, capsys, seconds):
+    monkeypatch.chdir(tmp_path)
+    assert main(['animate', 'four_bar', '--seconds', seconds]) == 2
+    assert f'seconds: {seconds} is not between 0.1 and 30 s' in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_of_another_kind_is_refused_before_anything_is_read(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(['animate', 'no_such_bag.mcap', '-o', 'x.png']) == 2
+    said = capsys.readouterr().err
+    assert said == (
+        "linkage animate: x.png: ends in '.png'; name a file that ends in .gif or .mp4 or .svg\n"
+    )
+
+
+def test_without_ffmpeg_an_mp4_is_refused(monkeypatch):
+    monkeypatch.setenv('PATH', '')
+    with pytest.raises(LinkageError, match='ffmpeg: is not installed; apt install ffmpeg'):
+        check_kind(Path('x.mp4'))
+
+
+@pytest.mark.parametrize('kind', ['gif', 'svg'])
+def test_an_interrupted_picture_leaves_the_old_file(tmp_path, kind):
+    file = tmp_path / f'x.{kind}'
+    file.write_text('old')
+
+    def interrupt(_done, _of):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        animate(moved('four_bar'), file, interrupt)
+    assert file.read_text() == 'old'
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_an_svg_moves_in_a_browser_without_an_error(tmp_path):
+    file = tmp_path / 'x.svg'
+    animate(moved('four_bar', 2.0), file)
+    with browser() as started, opened(started, file, width=400) as seen:
+        assert (
+            seen.page.evaluate(
+                """() => {
+                  document.getAnimations().forEach(a => { a.pause(); a.currentTime = 0 });
+                  return document.getAnimations().length }"""
+            )
+            > 5
+        )
+        at = """time => {
+          document.getAnimations().forEach(a => { a.currentTime = time });
+          return [...document.querySelectorAll('.moving')].map(
+            part => { const box = part.getBoundingClientRect(); return [box.x, box.y] }) }"""
+        first, half = (np.array(seen.page.evaluate(at, time)) for time in (0.0, 1000.0))
+        assert (np.abs(half - first).max(axis=1) > 1.0).sum() > 5
+        assert seen.said == []
+        assert len(seen.asked) == 1

@@ -1,0 +1,211 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The picture of a linkage can be read: names, units, curves and the mark of its pose."""
+
+from itertools import combinations, pairwise
+from math import radians
+from pathlib import Path
+import re
+from typing import Any
+
+from linkage_ros.cli.main import main
+from linkage_ros.drawing import figure as drawing
+from linkage_ros.drawing.figure import picture, view
+from linkage_ros.drawing.painting import degree_step
+from linkage_ros.errors import FileError
+from linkage_ros.files.assemblies import assemblies
+from linkage_ros.files.linkage_file import load
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.resources import linkage_names
+import pytest
+
+pytest.importorskip('matplotlib')
+
+_APART = 3.5
+"""Smallest distance between two names, in pixels."""
+
+
+def drawn(name: str, inputs: tuple[float, ...] = ()) -> Any:
+    """Draw a linkage with names; return the figure instead of storing it."""
+    closure = load(name)
+    kept = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(drawing, 'save', lambda figure, _file: kept.append(figure))
+        shown = view(closure, inputs or usual_inputs(closure))
+        picture(shown, name, Path('never.png'), names=True)
+    (figure,) = kept
+    figure.draw_without_rendering()
+    return figure
+
+
+def box(text: Any) -> tuple[str, Any]:
+    """Return a text and its box in pixels."""
+    return text.get_text(), text.get_window_extent()
+
+
+def nearer(written: list[tuple[str, Any]], apart: float) -> list[tuple[str, str]]:
+    """Return the pairs of texts that are less than so many pixels apart."""
+    return [
+        (one, other)
+        for (one, a), (other, b) in combinations(written, 2)
+        if max(a.x0, b.x0) - min(a.x1, b.x1) < apart and max(a.y0, b.y0) - min(a.y1, b.y1) < apart
+    ]
+
+
+@pytest.mark.parametrize('name', linkage_names())
+def test_names_are_apart_and_all_texts_are_within_the_picture(name):
+    figure = drawn(name)
+    names = [box(text) for text in figure.axes[0].texts]
+    assert {*load(name).linkage.links} - {'ground'} <= {text for text, _ in names}
+    assert nearer(names, _APART) == []
+    others = [
+        box(text)
+        for axes in figure.axes
+        for text in (axes._left_title, axes.xaxis.label, axes.yaxis.label, *axes.texts)
+        if text.get_text()
+    ]
+    assert nearer(others, 0.0) == []
+    low, high = figure.bbox.min, figure.bbox.max
+    assert [text for text, b in others if (b.min < low).any() or (b.max > high).any()] == []
+
+
+@pytest.mark.parametrize(
+    ('name', 'at', 'mark', 'title', 'ends'),
+    [
+        ('four_bar', 40.0, 40.0, 'four_bar, crank_joint 40°', (0.0, 360.0)),
+        ('four_bar', 999.0, 279.0, 'four_bar, crank_joint 999° (279° on the axis)', (0.0, 360.0)),
+        ('double_rocker', 400.0, 40.0, 'left_rocker_joint 400° (40° on the axis)', (36.87, 101.5)),
+        ('double_rocker', -320.0, 40.0, '-320° (40° on the axis)', (36.87, 101.5)),
+    ],
+)
+def test_the_mark_of_a_pose_turns_away_is_in_the_range(name, at, mark, title, ends):
+    figure = drawn(name, (radians(at),))
+    plane, joints = figure.axes
+    assert title in plane.get_title(loc='left')
+    dotted = next(line for line in joints.lines if line.get_linestyle() == ':')
+    assert dotted.get_xdata()[0] == pytest.approx(mark)
+    assert joints.get_xlim() == pytest.approx(ends, abs=0.1)
+
+
+def test_a_pose_beyond_the_limits_does_not_stretch_the_axis(tmp_path):
+    file = tmp_path / 'limited.yaml'
+    file.write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, input: {limits: [0.5, 1.5]}}\n')
+    plane, joints = drawn(str(file), (2.5,)).axes
+    assert '(limited: ' in plane.get_title(loc='left')
+    assert joints.get_xlim() == pytest.approx((28.65, 85.94), abs=0.01)
+
+
+def test_lengths_below_a_metre_are_in_millimetres():
+    plane = drawn('four_bar').axes[0]
+    assert plane.get_xlabel() == 'x [mm]'
+    assert drawn('windscreen_wiper').axes[0].get_xlabel() == 'x [m]'
+    slide = drawn('elliptic_trammel').axes[-1]
+    assert slide.get_xlabel() == 'trammel_slide [mm]'
+    assert slide.xaxis.get_major_formatter()(-0.1) == '−100'
+
+
+@pytest.mark.parametrize('name', ['jansen_leg', 'slider_crank'])
+def test_curves_have_no_jumps_and_their_names_in_their_colours(name):
+    joints = drawn(name).axes[1]
+    names = {text.get_text(): text.get_color() for text in joints.texts}
+    for line in joints.lines:
+        if line.get_linestyle() == '-':
+            y = line.get_ydata()
+            assert max(abs(b - a) for a, b in pairwise(y)) < 10.0
+            assert names[line.get_label()] == line.get_color()
+
+
+WITHOUT_SIDES = """\
+links:
+  ground:  {O2: [0, 0], O4: [0.100, 0]}
+  crank:   {O2: [0, 0], A: [0.040, 0]}
+  coupler: {A: [0, 0], B: [0.120, 0], C: [0.100, 0.050]}
+  rocker:  {O4: [0, 0], B: [0.080, 0]}
+  arm:     {C: [0, 0], D: [0.150, 0]}
+  foot:    {O4: [0, 0], D: [0.200, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+joints: {rocker_joint: {parent: ground, child: rocker}}
+"""
+
+
+def test_sides_that_a_file_leaves_out_are_chosen(tmp_path):
+    file = tmp_path / 'x.yaml'
+    file.write_text(WITHOUT_SIDES)
+    sides = 'left', 'right'
+    assert [*assemblies(file)] == [
+        f'assembly: {{B: {one}, D: {other}}}' for one in sides for other in sides
+    ]
+    file.write_text(f'{WITHOUT_SIDES}assembly: {{B: right}}\n')
+    assert [*assemblies(file)] == [f'assembly: {{B: right, D: {other}}}' for other in sides]
+    file.write_text(f'{WITHOUT_SIDES}assembly: {{B: right, D: left}}\n')
+    assert len(assemblies(file)) == 4
+
+
+def test_a_shorthand_gets_its_own_text(tmp_path):
+    file = tmp_path / 'x.yaml'
+    file.write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
+    found = assemblies(file)
+    assert [*found] == ['assembly: left', 'assembly: right']
+    assert found['assembly: right'].linkage.assembly == {'B': 'right'}
+
+
+def test_each_assembly_closes_on_its_sides():
+    for closure in assemblies('jansen_leg').values():
+        position = closure.position(*usual_inputs(closure))
+        points = closure.points(position)
+        a, b, c = points['crank', 'A'], points['ground', 'B'], points['upper_rod', 'C']
+        side = ((b - a).conjugate() * (c - a)).imag
+        assert (side > 0.0) == (closure.linkage.assembly['C'] == 'left')
+
+
+def test_choices_that_close_nowhere_are_left_out():
+    sides = 'left', 'right'
+    found = [f'assembly: {{B: left, D: {other}}}' for other in sides]
+    assert [*assemblies('stephenson_3')] == found
+
+
+@pytest.mark.parametrize('name', ['class_3', 'scotch_yoke'])
+def test_a_linkage_without_sides_is_told(name):
+    with pytest.raises(FileError, match='no dyad of this linkage has two assemblies'):
+        assemblies(name)
+
+
+def test_a_file_that_closes_in_no_assembly_is_told_as_always(tmp_path):
+    file = tmp_path / 'x.yaml'
+    file.write_text(WITHOUT_SIDES.replace('0.080', '0.380'))
+    with pytest.raises(FileError, match='close at no value of the input'):
+        assemblies(file)
+
+
+def test_the_picture_of_assemblies_has_the_line_for_the_file(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path('x.yaml').write_text(WITHOUT_SIDES)
+    assert main(['draw', 'x.yaml', '--assemblies', '-o', 'x.svg']) == 0
+    assert capsys.readouterr().out == 'x.svg\n'
+    titles = re.findall('<!-- (.*?) -->', Path('x.svg').read_text('utf-8'), re.DOTALL)
+    lines = [title.partition('\n')[0] for title in titles if title.startswith('assembly')]
+    assert lines[0] == 'assembly: {B: left, D: left}'
+    assert len(lines) == 4
+    for line in lines:
+        Path('y.yaml').write_text(f'{WITHOUT_SIDES}{line}\n')
+        load('y.yaml')
+
+
+@pytest.mark.parametrize(
+    ('high', 'step'),
+    [(7.0, 1.0), (200.0, 30.0), (360.0, 60.0), (1440.0, 180.0), (36000.0, 4680.0)],
+)
+def test_an_axis_of_many_turns_has_as_few_numbers(high, step):
+    assert degree_step((0.0, high)) == step

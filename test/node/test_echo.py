@@ -1,0 +1,134 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`linkage echo` as its user types it: messages as YAML, their rate, and its words in silence."""
+
+from array import array
+import re
+import signal
+import subprocess
+import sys
+
+from linkage_ros.cli.echo import as_yaml, rate_text
+from linkage_ros.messages.joint_values import JOINT_STATE
+import pytest
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+import yaml
+
+from .graph import PATIENCE
+from ..support import commands
+
+TEXT = 'std_msgs/msg/String'
+
+
+@pytest.fixture
+def say(graph):
+    """Return a function that publishes a message 50 times a second."""
+
+    def say(topic, message):
+        publisher = graph.publisher(type(message), topic)
+        graph.node.create_timer(0.02, lambda: publisher.publish(message))
+
+    return say
+
+
+@pytest.fixture
+def echo(graph, tmp_path):
+    """Return a function that runs ``linkage echo`` on the graph of the test."""
+
+    def echo(*arguments):
+        return commands.linkage(
+            tmp_path, 'echo', *arguments, timeout=PATIENCE, ROS_DOMAIN_ID=str(graph.domain)
+        )
+
+    return echo
+
+
+def test_joint_states_are_printed_as_yaml_with_their_units(say, echo):
+    say('/joint_states', JointState(name=['a', 'b'], position=[0.5, -1.25], velocity=[2.0, 0.0]))
+    answer = echo('--count', '2')
+    assert answer.returncode == 0, answer.stderr
+    first, second, rest = answer.stdout.split('---\n')
+    assert rest == ''
+    for document in (first, second):
+        message = yaml.safe_load(document)
+        assert message['name'] == ['a', 'b']
+        assert message['position'] == [0.5, -1.25]
+        assert message['effort'] == []
+    assert 'position: [0.5, -1.25]  # rad or m\n' in first
+    assert 'velocity: [2.0, 0.0]  # rad/s or m/s\n' in first
+    assert re.fullmatch(
+        r'linkage echo: /joint_states: 2 messages, [\d.]+ Hz, period [\d.]+ to [\d.]+ ms\n',
+        answer.stderr,
+    )
+
+
+def test_the_rate_is_printed_instead_of_messages(say, echo):
+    say('/words', String(data='x'))
+    answer = echo('words', '--rate', '--seconds', '3')
+    assert answer.returncode == 0, answer.stderr
+    lines = answer.stdout.splitlines()
+    assert lines
+    for line in lines:
+        assert re.fullmatch(r'/words: [\d.]+ Hz, period [\d.]+ to [\d.]+ ms', line)
+
+
+def test_in_silence_the_nearest_topic_is_named(say, echo):
+    say('/joint_states', JointState())
+    answer = echo('/joint_stats', '--seconds', '3')
+    assert (answer.returncode, answer.stdout) == (1, '')
+    assert answer.stderr == (
+        'linkage echo: /joint_stats: no message for 2 s (0 publishers); '
+        "did you mean '/joint_states'?\n"
+    )
+
+
+def test_in_silence_the_topics_that_exist_are_listed(say, echo, graph):
+    graph.publisher(String, '/silent')
+    say('/words', String(data='x'))
+    answer = echo('/silent', '--seconds', '4')
+    assert answer.returncode == 1
+    assert '/silent: no message for 2 s (1 publishers); topics: ' in answer.stderr
+    assert '/words' in answer.stderr
+
+
+def test_a_signal_ends_it_with_0(graph, tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'linkage_ros.cli.main', 'echo', '/nothing'],
+        env=commands.environment(tmp_path) | {'ROS_DOMAIN_ID': str(graph.domain)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        # It has begun when it reports the silence.
+        assert '/nothing: no message for 2 s' in process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
+    assert (process.returncode, out, err) == (0, '', '')
+
+
+def test_a_long_field_is_cut():
+    shown = yaml.safe_load(as_yaml(String(data='x' * 5000), TEXT))
+    assert len(shown['data']) <= 1000
+    long = JointState(position=array('d', range(1000)))
+    shown = yaml.safe_load(as_yaml(long, JOINT_STATE))
+    assert shown['position'] == [*range(128), '… and 872 more']
+
+
+def test_the_rate_is_that_of_the_arrivals():
+    assert rate_text([0.0, 0.1, 0.3, 0.4]) == '7.5 Hz, period 100.00 to 200.00 ms'

@@ -1,0 +1,100 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The programs of the nodes: help, unknown parameters, keys of the scene that are set."""
+
+import re
+import subprocess
+import sys
+
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.node.demo_nodes import CrankSource, PDController
+from linkage_ros.node.parameters import LINKAGE_NODE
+from linkage_ros.scene.load import SCENE_FILE
+import pytest
+
+from ..support.commands import environment
+
+PROGRAMS = {
+    'linkage_node': LINKAGE_NODE,
+    'crank_source': CrankSource.PARAMETERS,
+    'pd_controller': PDController.PARAMETERS,
+}
+MAIN = 'import sys; from linkage_ros.node.{} import main; sys.exit(main())'
+
+
+def program(folder, name, *arguments, before=''):
+    return subprocess.run(
+        [sys.executable, '-c', before + MAIN.format(name), *arguments],
+        env=environment(folder),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize('name', PROGRAMS)
+def test_help_tells_every_parameter_and_starts_no_node(tmp_path, name):
+    answer = program(tmp_path, name, '--help', '--ros-args', '-p', 'rate:=3.0')
+    assert (answer.returncode, answer.stderr) == (0, '')
+    assert answer.stdout.startswith(f'usage: ros2 run linkage_ros {name} ')
+    text = ' '.join(answer.stdout.split())
+    for parameter in PROGRAMS[name]:
+        assert f' {parameter.name} {parameter.meaning}' in text
+    assert max(map(len, answer.stdout.splitlines())) <= 96
+
+
+@pytest.mark.parametrize('name', PROGRAMS)
+def test_without_ros_each_program_says_in_a_line_how_to_get_it(tmp_path, name):
+    answer = program(
+        tmp_path, name, '--help', before='import sys; sys.modules["rcl_interfaces"] = None; '
+    )
+    assert (answer.returncode, answer.stdout) == (2, '')
+    assert answer.stderr.startswith(f'{name}: rcl_interfaces: is not installed; source the setup')
+    assert answer.stderr.count('\n') == 1
+
+
+@pytest.mark.parametrize('name', ['crank_source', 'pd_controller'])
+def test_a_demo_node_warns_once_of_an_unknown_parameter(tmp_path, name):
+    answer = program(tmp_path, name, *('--ros-args', '-p', 'secnds:=9.0', '-p', 'seconds:=0.1'))
+    assert answer.returncode == 0
+    (line,) = [line for line in answer.stderr.splitlines() if 'WARN' in line]
+    assert line.endswith("parameter secnds: unknown, and without effect; did you mean 'seconds'?")
+
+
+def test_the_node_warns_once_of_each_unknown_parameter_and_runs(start, write_scene):
+    node = start(
+        write_scene('warned', 'rate: 100'),
+        *('-p', 'scnee:=x', '-p', 'warn.condtioning:=0.1', '-p', 'use_sim_time:=false'),
+        *('-p', 'qos_overrides./joint_states.publisher.depth:=1'),
+    )
+    assert node.end() == 0
+    warned = re.findall(r'parameter (\S+): unknown.*did you mean (\S+)\?', node.log)
+    assert sorted(warned) == [
+        ('scnee', "'scene'"),
+        ('warn.condtioning', "'warn.conditioning'"),
+    ]
+
+
+def test_a_bag_holds_the_scene_with_the_keys_that_were_set(start, write_scene, folder):
+    node = start(
+        write_scene('set', "rate: 100\nrecord: {name: set, directory: '.'}"),
+        *('-p', "set:=['rate=50', 'drive.topic.max_age=0.1']"),
+        *('-p', f'runs_directory:={folder}'),
+    )
+    assert node.end() == 0
+    scene = read_bag(folder / 'set').attachments[SCENE_FILE].decode()
+    assert 'rate: 50\n' in scene
+    assert 'max_age: 0.1\n' in scene

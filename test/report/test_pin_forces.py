@@ -1,0 +1,117 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Forces in pins that were recorded are plotted, and what is zero throughout is not."""
+
+from linkage_ros.messages.joint_values import MessageValues, PlanarWrenchWriter, WRENCHES
+from linkage_ros.report.data import plots, zero_plots
+from linkage_ros.report.html import ReportHeader, run_html
+from linkage_ros.report.pin_forces import LATER_PINS, PinForces
+from linkage_ros.report.run import Window
+from linkage_ros.resources import shipped
+import numpy as np
+import pytest
+
+from .runs import BEGIN, but, curve, read, recorded
+
+SCENE = """\
+drive: {constant_rate: {rate: 7.0}}
+effects: {velocity: {}, effort: {}, pin_forces: {}}
+"""
+FORCES = '/extra_0'
+PINS = ('O2', 'A', 'B', 'cylinder')
+
+
+@pytest.fixture(scope='module')
+def press(tmp_path_factory):
+    """Return the bag of a slider-crank with the masses of its links."""
+    linkage = shipped('linkages/slider_crank.yaml').read_text()
+    moments = but(200, lambda _tick, moment: moment._replace(messages=()))
+    return recorded(tmp_path_factory.mktemp('press'), SCENE, moments, linkage)
+
+
+def test_the_magnitude_of_each_recorded_force_is_plotted(press):
+    reader = MessageValues(WRENCHES)
+    messages = [reader.read(each.data) for each in press.messages() if each.topic == FORCES]
+    assert len(messages) == 200
+    assert messages[0].names == PINS
+    wrenches = np.array([each.numbers for each in messages]).reshape(-1, len(PINS), 3)
+    found = read(press)
+    for place, name in enumerate(PINS):
+        _, told = curve(found, name, 'force')
+        assert told == pytest.approx(np.hypot(wrenches[:, place, 0], wrenches[:, place, 1]))
+    (plot,) = (each for each in plots(found) if each['key'] == 'pin_forces')
+    assert [each['name'] for each in plot['curves']] == [*PINS]
+    assert plot['unit'] == 'N'
+
+
+def test_plots_of_zeros_are_named_instead(press):
+    found = read(press)
+    # Only the crank is driven: the effort of the sliding joint is zero.
+    assert zero_plots(found) == ['Forces']
+    assert 'efforts_m' not in [each['key'] for each in plots(found)]
+    assert 'efforts_rad' in [each['key'] for each in plots(found)]
+    page = run_html(found, ReportHeader('t', [], [], []))
+    assert 'Zero throughout, so not plotted: Forces.' in page
+
+
+def collected(*messages):
+    """Return what is collected of messages, each with its time in [ns]."""
+    forces = PinForces(FORCES, Window())
+    for time, message in messages:
+        forces.add(np.array([time]), [message])
+    return forces
+
+
+def test_of_several_linkages_each_has_its_own_topic(tmp_path):
+    scene = f"""
+linkages:
+- {{name: left, linkage: l.yaml, {SCENE.replace(chr(10), ', ')}}}
+- {{name: right, linkage: l.yaml, {SCENE.replace(chr(10), ', ')}}}
+"""
+    linkage = shipped('linkages/slider_crank.yaml').read_text()
+    moments = but(20, lambda _tick, moment: moment._replace(messages=()))
+    found = read(recorded(tmp_path, scene, moments, linkage))
+    (plot,) = (each for each in plots(found) if each['key'] == 'pin_forces')
+    assert [each['name'] for each in plot['curves']] == [
+        f'{side}_{pin}' for side in ('left', 'right') for pin in PINS
+    ]
+    assert curve(found, 'right_A', 'force') == curve(found, 'left_A', 'force')
+
+
+def test_moments_have_a_curve_where_there_are_any():
+    write = PlanarWrenchWriter(['pin', 'slider']).write
+    curves = collected(*((time, write(BEGIN, [(3.0, 4.0, 0.0), (0.0, 1.0, -2.0)]))
+                         for time in range(5))).curves()  # fmt: skip
+    assert [(column.name, column.quantity, column.unit) for column in curves.columns] == [
+        ('pin', 'force', 'N'), ('slider', 'force', 'N'), ('slider', 'moment', 'N·m'),
+    ]  # fmt: skip
+    assert curves.intervals.first.tolist() == [[5.0, 1.0, -2.0]] * 5
+
+
+def test_messages_of_two_linkages_at_one_time_are_one_row():
+    left, right = (PlanarWrenchWriter([name]).write(BEGIN, [(1.0, 0.0, 0.0)]) for name in 'ab')
+    forces = PinForces(FORCES, Window())
+    forces.add(np.array([5, 9, 3, 5]), [left, left, right, right])
+    curves = forces.curves()
+    assert curves.intervals.begins.tolist() == [3, 5, 9]
+    np.testing.assert_equal(curves.intervals.first, [[np.nan, 1.0], [1.0, 1.0], [1.0, np.nan]])
+
+
+def test_other_messages_are_counted_and_left_out():
+    good = PlanarWrenchWriter(['a']).write(BEGIN, [(1.0, 0.0, 0.0)])
+    other = PlanarWrenchWriter(['b']).write(BEGIN, [(1.0, 0.0, 0.0)])
+    forces = collected((1, b'no message'), (2, good), (3, other))
+    assert forces.left_out == {'malformed message': 1, LATER_PINS: 1}
+    assert forces.curves().rows == 2

@@ -1,0 +1,101 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Values that look like those of another unit get a note, and nothing is refused."""
+
+from linkage_ros.cli.main import main
+from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.notes import scene_notes
+import pytest
+
+from .files import CONFIG
+
+FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
+SINE = 'drive: {sine: {amplitude: 45, frequency: 1}}\n'
+
+# Linkage, rest of the scene, and the notes without the folder.
+NOTES = {
+    'degrees': (
+        FOUR_BAR,
+        SINE,
+        [
+            (
+                'scene.yaml:2: drive.sine.amplitude: 45 rad is more than a turn; '
+                'if it is in degrees, write angles: degrees'
+            )
+        ],
+    ),
+    'degrees that are named': (FOUR_BAR, f'{SINE}angles: degrees', []),
+    'a slide of many metres': (
+        (CONFIG / 'linkages' / 'scotch_yoke.yaml').read_text(),
+        'drive: {sine: {amplitude: 0.5, frequency: 1}}',
+        [],
+    ),
+    'gravity in metres': (
+        FOUR_BAR,
+        'units: mm\nloads: {gravity: [0, -9.81]}',
+        [
+            (
+                'scene.yaml:3: loads.gravity: [0, -9.81] mm/s² is hardly any; '
+                'write it in the unit of the file: 9.81 [m/s²] is 9810 [mm/s²]'
+            )
+        ],
+    ),
+}
+
+
+def folder_with(tmp_path, linkage, scene):
+    (tmp_path / 'linkage.yaml').write_text(linkage)
+    (tmp_path / 'scene.yaml').write_text(f'linkage: linkage.yaml\n{scene}')
+    return tmp_path
+
+
+@pytest.mark.parametrize('kind', NOTES)
+def test_a_scene_is_noted(tmp_path, kind):
+    linkage, scene, notes = NOTES[kind]
+    file = folder_with(tmp_path, linkage, scene) / 'scene.yaml'
+    assert [str(note) for note in scene_notes(load_scene(file))] == [
+        f'{tmp_path}/{note}' for note in notes
+    ]
+
+
+LINKAGE = """
+links:
+  ground:  {O2: [0, 0], O4: [120, 0]}
+  crank:   {O2: [0, 0], A: [0.04, 0]}
+  coupler: {A: [0, 0], B: [120.01, 0]}
+  rocker:  {O4: [0, 0], B: [0.08, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {B: left}
+joints: {rocker_joint: {parent: ground, child: rocker}}
+"""
+
+
+def test_a_link_of_another_unit_is_noted_by_check_and_scene(tmp_path, capsys):
+    folder = folder_with(tmp_path, LINKAGE, SINE.replace('45', '0.5'))
+    for command, name in (('check', 'linkage'), ('scene', 'scene')):
+        assert main([command, str(folder / f'{name}.yaml')]) == 0
+        place = f'{folder}/linkage.yaml' + (':5' if command == 'scene' else '')
+        assert capsys.readouterr().err == (
+            f"linkage {command}: note: {place}: links.coupler: is 3000 times as long as 'crank'; "
+            'write all lengths in metres, or all in millimetres with units: mm\n'
+        )
+
+
+@pytest.mark.parametrize('kind', ['linkages', 'scenes'])
+def test_no_shipped_file_is_noted(kind):
+    files = sorted((CONFIG / kind).glob('*.yaml'))
+    assert files
+    for file in files:
+        assert not list(scene_notes(load_scene(file)))
