@@ -56,6 +56,11 @@ _SECONDS = 10.0
 
 _AFTERWARDS = 3.0
 """How long a demo runs on after the last fault, in [s]."""
+
+_PATIENCE = 20.0
+"""How long the demo's duration waits for the first joint states, in [s]: a busy machine takes
+seconds to start the process beside it."""
+
 EXAMPLE = 'linkage demo fault_drill --seconds 10'
 
 
@@ -95,7 +100,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if scene.faults:
         print(f'faults    {listed(map(_fault, scene.faults, scene.faults.values()), "; ")}')
     with heeded(), _beside(scene, arguments.seconds):
-        code, bag = run_scene(str(file), arguments, stop)
+        code, bag = run_scene(str(file), arguments, stop, patience=_PATIENCE)
     if bag is not None:
         picture = Path(f'{bag}.png')
         try:
@@ -137,7 +142,8 @@ def _command(member: SceneLinkage, seconds: float) -> list[str]:
         return []
     module, *parameters = _BESIDE[drive]
     # A time limit, so that it ends by itself even if this process is killed.
-    parameters += [f'joint:={member.inputs[0]}', f'seconds:={seconds + 10.0:.1f}']
+    limit = seconds + _PATIENCE + 10.0
+    parameters += [f'joint:={member.inputs[0]}', f'seconds:={limit:.1f}']
     pairs = [part for parameter in parameters for part in ('-p', parameter)]
     return [sys.executable, '-m', module, '--ros-args', *pairs]
 

@@ -303,9 +303,14 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 def run_scene(
-    scene: str, arguments: argparse.Namespace, stop: Event, ros: Sequence[str] = ()
+    scene: str,
+    arguments: argparse.Namespace,
+    stop: Event,
+    ros: Sequence[str] = (),
+    *,
+    patience: float = 0.0,
 ) -> tuple[int, Path | None]:
-    """Run a scene; return the exit code and the bag."""
+    """Run a scene, see `run_linkage_node`; return the exit code and the bag."""
     bags: list[Path] = []
 
     def at_end(node: LinkageNode) -> None:
@@ -322,6 +327,7 @@ def run_scene(
                 **({'set': arguments.set} if arguments.set else {}),  # rclpy: no empty list
             },
             seconds=arguments.seconds,
+            patience=patience,
             view=Display(plain=arguments.plain, angles=arguments.angles),
             at_end=at_end,
         )

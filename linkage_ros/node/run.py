@@ -63,6 +63,7 @@ def run_linkage_node(
     overrides: Mapping[str, Any] | None = None,
     *,
     seconds: float = inf,
+    patience: float = 0.0,
     view: View | None = None,
     at_end: Callable[[LinkageNode], None] | None = None,
 ) -> int:
@@ -78,7 +79,9 @@ def run_linkage_node(
     overrides
         Parameters of the node, in addition to those of the command line.
     seconds
-        Duration of the run, in [s].
+        Duration of the run from its first tick, in [s].
+    patience
+        How long the duration waits at most for the first joint states, in [s].
     view
         Displays the run.
     at_end
@@ -112,7 +115,7 @@ def run_linkage_node(
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
-        code = _spin(node, executor, stop, monotonic() + seconds, view)
+        code = _spin(node, executor, stop, seconds, patience, view)
         if code == EXIT_OK and at_end is not None:
             at_end(node)
         if node.recording.failure or (node.loop is not None and node.loop.failure):
@@ -130,7 +133,8 @@ def _spin(
     node: LinkageNode,
     executor: SingleThreadedExecutor,
     stop: Event,
-    deadline: float,
+    seconds: float,
+    patience: float,
     view: View | None,
 ) -> int:
     """Start the node, unless told otherwise, and run it to its end."""
@@ -146,7 +150,7 @@ def _spin(
         if autostart and node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
             return EXIT_INCOMPLETE
         gc.freeze()  # includes the objects built for the ticks
-        return _attend(node, executor, stop, deadline, view)
+        return _attend(node, executor, stop, seconds, patience, view)
 
 
 @contextmanager
@@ -172,7 +176,8 @@ def _attend(
     node: LinkageNode,
     executor: SingleThreadedExecutor,
     stop: Event,
-    deadline: float,
+    seconds: float,
+    patience: float,
     view: View | None,
 ) -> int:
     """Spin until the end, and end the run of the node."""
@@ -181,7 +186,14 @@ def _attend(
     ended = Event()
     serving = Thread(target=_serve, args=(node, executor, ended), name='executor', daemon=True)
     serving.start()
-    while not stop.wait(_LOOK) and monotonic() < deadline and serving.is_alive():
+    begin = monotonic()
+    waits_until, end = begin + patience, begin + seconds
+    while not stop.wait(_LOOK) and serving.is_alive():
+        now = monotonic()
+        if now < waits_until and node.loop is not None and not node.loop.counts.published:
+            end = now + seconds
+        if now >= end:
+            break
         gc.collect()
         if view is not None:
             view.show(node)
