@@ -69,6 +69,8 @@ DESIGN = ['scipy>=1.11,<2']
 # Export of bags as Parquet; CSV needs no package. From 26 on pyarrow refuses numpy 1.x, which
 # Ubuntu 24.04 has, but does not declare it to pip.
 EXPORT = ['pyarrow>=14,<26']
+# `linkage view`: a server for this machine, edits that keep a file's comments, DXF files.
+VIEW = ['aiohttp>=3.9,<4', 'ezdxf>=1.1,<2', 'plotly>=6,<8', 'ruamel.yaml>=0.18,<1']
 # Completion of the command line in bash, zsh and fish.
 COMPLETION = ['argcomplete>=3.1,<4']
 # For studies on several machines.
@@ -99,6 +101,7 @@ TEST = [
     *COMPLETION,
     *DASK,
     *EXPORT,
+    *VIEW,
 ]
 # Other implementations, to compare the speed. Pinocchio (pin) also checks robot models.
 BENCH = ['pylinkage[numba]>=1.3,<1.4; python_version >= "3.11"', 'casadi', 'pin']
@@ -145,6 +148,7 @@ setup(
         f'{NAME}.pages': ['*.css', '*.js'],
         f'{NAME}.accuracy.page': ['*.css', '*.js'],
         f'{NAME}.report': ['*.css', '*.js'],
+        f'{NAME}.view': ['*.css', '*.js'],
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
@@ -165,6 +169,7 @@ setup(
         'docs': DOCS,
         'export': EXPORT,
         'test': TEST,
+        'view': VIEW,
         'dev': [
             *(*DEMO, *REPORT, *DESIGN, *DASK, *DOCS, *EXPORT, *TEST, *BENCH, *STYLE, *COLCON),
             *RELEASE,

@@ -26,7 +26,7 @@ from packaging.utils import canonicalize_name
 import pytest
 
 PYTHONS = ('3.10', '3.11', '3.12')
-USED_AT_RUN_TIME = ('', 'ros', 'report', 'design', 'dask', 'export', 'completion')
+USED_AT_RUN_TIME = ('', 'ros', 'report', 'design', 'dask', 'export', 'completion', 'view')
 HARD = {'numpy', 'mcap', 'pyyaml'}
 
 
