@@ -189,6 +189,7 @@ def _show_node(arguments: argparse.Namespace, stop: Event) -> int:
 
 def _serve(arguments: argparse.Namespace, stop: Event, name: str, page: Any, *routes: Any) -> int:
     from linkage_ros.view.server import serve
+    from linkage_ros.view.worker import report as report_line
 
     def ready(address: str) -> None:
         print(clean(f'{name}: {address}'), flush=True)
@@ -197,7 +198,7 @@ def _serve(arguments: argparse.Namespace, stop: Event, name: str, page: Any, *ro
             Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
     with heeded():
-        serve(page, routes, stop, ready, port=arguments.port)
+        serve(page, routes, stop, ready, report_line, port=arguments.port)
     print('linkage view: ended')
     return 0
 

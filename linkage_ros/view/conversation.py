@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable
 from itertools import count
 import json
 
@@ -26,7 +25,7 @@ from aiohttp import web, WSMsgType
 from linkage_ros.errors import LinkageError
 from linkage_ros.view.requests import encoded, failed, read_request, Request, RequestError
 from linkage_ros.view.sensors import SceneFiles
-from linkage_ros.view.server import Server, SERVER
+from linkage_ros.view.server import Server, SERVER_KEY
 from linkage_ros.view.user_file import UserFile
 from linkage_ros.view.worker import Worker
 
@@ -66,7 +65,7 @@ class Conversation:
 
     def add(self, app: web.Application) -> None:
         """Add the WebSocket ``ws`` to the application of a server."""
-        server = app[SERVER]
+        server = app[SERVER_KEY]
 
         async def handle(request: web.Request) -> web.WebSocketResponse:
             async with server.socket(request) as socket:

@@ -24,10 +24,9 @@ from __future__ import annotations
 from base64 import b64encode
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 import json
 from math import isfinite
-import sys
 from typing import Any, NamedTuple, NoReturn
 
 from linkage_ros.drawing.shapes import link_frames
@@ -55,8 +54,9 @@ LARGEST = 1_000_000
 """Most bytes of a message."""
 
 _MOST_POSES = 1000
-_MOST_PAGES = 8
-"""Pages whose sensors are kept; a page that comes back begins again."""
+
+_MOST_SENSORS = 8
+"""Pages whose sensors are kept."""
 
 _LONGEST_NAME = 80
 
@@ -121,8 +121,8 @@ def read_request(message: str) -> Request:
     if type(number) not in (int, float) or not abs(number) <= 2**53:
         raise RequestError('has no id', 'send a number as id')
     do = content.get('do')
-    if not isinstance(do, str) or do not in ANSWERED:
-        raise RequestError(f'asks for {quoted(do)}', f'ask for one of {listed(ANSWERED)}', number)
+    if not isinstance(do, str) or do not in _ANSWERS:
+        raise RequestError(f'asks for {quoted(do)}', f'ask for {listed(_ANSWERS)}', number)
     return Request(number, do, content)
 
 
@@ -140,12 +140,15 @@ class Answers:
         Name of the linkage with which the server was opened.
     scene
         The scene with which it was opened; None for a linkage.
+    report
+        Called with the line of each defect of this package.
 
     """
 
-    def __init__(self, name: str, scene: SceneFiles | None = None) -> None:
+    def __init__(self, name: str, scene: SceneFiles | None, report: Callable[[str], Any]) -> None:
         self._name = name
         self._scene = scene
+        self._report = report
         self._sensors: OrderedDict[int, Sensors] = OrderedDict()
 
     def answer(self, page: int, request: Request) -> str:
@@ -163,104 +166,156 @@ class Answers:
         -------
         answer : str
             With ``ok``, or with ``error``: its text, one line; the key in the file; and the pin or
-            the link that it concerns. A defect of this package is an error too, and is printed.
+            the link that it concerns. A defect of this package is such an error too.
 
         """
-        text = request.content.get('text')
+        asked = _Asked(request.content, self._name, partial(self._sensors_of, page))
         try:
-            found = _ANSWERS[request.do](self, page, request.content)
-            return _json({'id': request.id, 'ok': found})
+            return _json({'id': request.id, 'ok': _ANSWERS[request.do](asked)})
         except LinkageError as error:
-            return failed(request.id, error, text)
-        except Exception as error:  # noqa: BLE001 (a page must not end its server)
-            return failed(request.id, defect(request.do, error))
+            return failed(request.id, error, request.content.get('text'))
+        except Exception as error:  # noqa: BLE001 (a request must not end its server)
+            found = defect(request.do, error)
+            self._report(str(found))
+            return failed(request.id, found)
 
-    def _model(self, _page: int, content: Mapping[str, Any]) -> dict[str, Any]:
-        return model(_text(content), self._named(content), whole=_flag(content, 'whole'))
-
-    def _edit(self, _page: int, content: Mapping[str, Any]) -> dict[str, Any]:
-        edit = content.get('edit')
-        if not isinstance(edit, dict):
-            raise _wrong('edit', edit, 'an object')
-        name = self._named(content)
-        text, inputs = edited(_text(content), edit)
-        found = model(text, name, whole=_flag(content, 'whole'))
-        for given, value in zip(found['inputs'], inputs, strict=False):
-            given['value'] = value
-        return found
-
-    def _open(self, _page: int, content: Mapping[str, Any]) -> dict[str, Any]:
-        name = content.get('name')
-        names = linkage_names()
-        if not isinstance(name, str) or name not in names:
-            remedy = did_you_mean(str(name), names, f'name one of {listed(names)}')
-            raise LinkageError('name', f'{quoted(name)} is no shipped linkage', remedy)
-        text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
-        return model(text, name, whole=True)
-
-    def _names(self, _page: int, _content: Mapping[str, Any]) -> dict[str, Any]:
-        return {'linkages': linkage_names()}
-
-    def _save(self, _page: int, content: Mapping[str, Any]) -> dict[str, Any]:
-        """Check that a text is a linkage; then the server saves it."""
-        closure_of(_text(content), self._named(content))
-        return {}
-
-    def _export(self, _page: int, content: Mapping[str, Any]) -> dict[str, Any]:
-        kind, name = content.get('kind'), self._named(content)
-        text = _text(content)
-        closure = closure_of(text, name)
-        exported = export(str(kind), closure, text, name, _inputs(content, closure))
-        data = b64encode(exported.data).decode()
-        return {'name': exported.name, 'type': exported.type, 'data': data}
-
-    def _poses(self, _page: int, content: Mapping[str, Any]) -> dict[str, Any]:
-        closure = closure_of(_text(content), self._named(content))
-        asked = content.get('inputs')
-        if not isinstance(asked, list) or len(asked) > _MOST_POSES:
-            raise _wrong('inputs', asked, f'a list of at most {_MOST_POSES} lists of numbers')
-        count = len(closure.linkage.inputs)
-        return {'poses': [_pose(closure, _numbers('inputs', one, count)) for one in asked]}
-
-    def _read(self, page: int, content: Mapping[str, Any]) -> dict[str, Any]:
+    def _sensors_of(self, page: int, text: str | None) -> Sensors:
+        """Return the sensors of a page; new ones if it has changed the linkage."""
         if self._scene is None:
             raise LinkageError('read', 'a linkage has no sensors', 'open a scene')
-        text = content.get('text')
-        text = None if text is None else _text(content)
         sensors = self._sensors.pop(page, None)
         if sensors is None or sensors.text != text:
             sensors = Sensors(self._scene, text)
         self._sensors[page] = sensors
-        while len(self._sensors) > _MOST_PAGES:
+        if len(self._sensors) > _MOST_SENSORS:
             self._sensors.popitem(last=False)
-        (t,) = _numbers('t', [content.get('t')], 1)
-        inputs, rates = (
-            _numbers(key, content.get(key), sensors.count) for key in ('inputs', 'rates')
-        )
-        return sensors.read(t, inputs, rates)
+        return sensors
 
-    def _named(self, content: Mapping[str, Any]) -> str:
+
+class _Asked(NamedTuple):
+    """
+    What a request holds.
+
+    Attributes
+    ----------
+    content
+        The message.
+    opened
+        Name of the linkage with which the server was opened.
+    sensors
+        Returns the sensors of the page, for the text of a linkage.
+
+    """
+
+    content: Mapping[str, Any]
+    opened: str
+    sensors: Callable[[str | None], Sensors]
+
+    @property
+    def text(self) -> str:
+        """Return the text of the linkage."""
+        text = self.content.get('text')
+        if not isinstance(text, str):
+            raise _wrong('text', text, 'the text of a linkage file')
+        encoded(text, self.name)
+        return text
+
+    @property
+    def name(self) -> str:
         """Return the name of the linkage: it names files, and the place of errors."""
-        name = content.get('name', self._name)
+        name = self.content.get('name', self.opened)
         if not isinstance(name, str) or not 0 < len(name) <= _LONGEST_NAME or '/' in name:
             raise _wrong('name', name, f'a name of at most {_LONGEST_NAME} letters')
         return clean(name)
 
+    @property
+    def whole(self) -> bool:
+        """Return whether the slower parts of a model are asked for."""
+        whole = self.content.get('whole', False)
+        if not isinstance(whole, bool):
+            raise _wrong('whole', whole, 'true or false')
+        return whole
 
-_Answer = Callable[[Answers, int, Mapping[str, Any]], dict[str, Any]]
+    @property
+    def closure(self) -> Closure:
+        """Return the linkage."""
+        return closure_of(self.text, self.name)
 
-_ANSWERS: dict[str, _Answer] = {
-    'model': Answers._model,
-    'edit': Answers._edit,
-    'open': Answers._open,
-    'names': Answers._names,
-    'save': Answers._save,
-    'export': Answers._export,
-    'poses': Answers._poses,
-    'read': Answers._read,
+    def numbers(self, key: str, count: int) -> tuple[float, ...]:
+        """Return a list of so many numbers."""
+        return _numbers(key, self.content.get(key), count)
+
+
+def _model(asked: _Asked) -> dict[str, Any]:
+    return model(asked.text, asked.name, whole=asked.whole)
+
+
+def _edit(asked: _Asked) -> dict[str, Any]:
+    edit = asked.content.get('edit')
+    if not isinstance(edit, dict):
+        raise _wrong('edit', edit, 'an object')
+    text, inputs = edited(asked.text, edit)
+    found = model(text, asked.name, whole=asked.whole)
+    for given, value in zip(found['inputs'], inputs, strict=False):
+        given['value'] = value
+    return found
+
+
+def _open(asked: _Asked) -> dict[str, Any]:
+    name, names = asked.content.get('name'), linkage_names()
+    if not isinstance(name, str) or name not in names:
+        remedy = did_you_mean(str(name), names, f'name one of {listed(names)}')
+        raise LinkageError('name', f'{quoted(name)} is no shipped linkage', remedy)
+    return model(shipped(f'linkages/{name}.yaml').read_text('utf-8'), name, whole=True)
+
+
+def _names(_asked: _Asked) -> dict[str, Any]:
+    return {'linkages': linkage_names()}
+
+
+def _save(asked: _Asked) -> dict[str, Any]:
+    """Check that a text is a linkage; the server then saves it."""
+    if asked.name != asked.opened:
+        reason = f'{quoted(asked.name)} is not the file with which this page was opened'
+        raise LinkageError('save', reason, 'download the linkage')
+    read_closure(parse_yaml(encoded(asked.text, asked.name), asked.name), asked.name)
+    return {}
+
+
+def _export(asked: _Asked) -> dict[str, Any]:
+    closure = asked.closure
+    given = asked.content.get('inputs')
+    inputs = None if given is None else asked.numbers('inputs', len(closure.linkage.inputs))
+    found = export(str(asked.content.get('kind')), closure, asked.text, asked.name, inputs)
+    return {'name': found.name, 'type': found.type, 'data': b64encode(found.data).decode()}
+
+
+def _poses(asked: _Asked) -> dict[str, Any]:
+    closure, poses = asked.closure, asked.content.get('inputs')
+    if not isinstance(poses, list) or len(poses) > _MOST_POSES:
+        raise _wrong('inputs', poses, f'a list of at most {_MOST_POSES} lists of numbers')
+    count = len(closure.linkage.inputs)
+    return {'poses': [_pose(closure, _numbers('inputs', inputs, count)) for inputs in poses]}
+
+
+def _read(asked: _Asked) -> dict[str, Any]:
+    sensors = asked.sensors(asked.text if 'text' in asked.content else None)
+    (t,) = _numbers('t', [asked.content.get('t')], 1)
+    return sensors.read(
+        t, asked.numbers('inputs', sensors.count), asked.numbers('rates', sensors.count)
+    )
+
+
+_ANSWERS: dict[str, Callable[[_Asked], dict[str, Any]]] = {
+    'model': _model,
+    'edit': _edit,
+    'open': _open,
+    'names': _names,
+    'save': _save,
+    'export': _export,
+    'poses': _poses,
+    'read': _read,
 }
-
-ANSWERED = tuple(_ANSWERS)
 """What a page can ask for."""
 
 
@@ -322,14 +377,9 @@ def _pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
 
 
 def defect(where: str, error: BaseException) -> LinkageError:
-    """Return a defect of this package as an error of one line, and print it."""
-    line = LinkageError(
-        where,
-        f'failed by {type(error).__name__} ({shortened(str(error), 300)})',
-        'please report it with the linkage file',
-    )
-    print(f'linkage view: {line}', file=sys.stderr, flush=True)
-    return line
+    """Return a defect of this package as an error of one line."""
+    reason = f'failed by {type(error).__name__} ({shortened(str(error), 300)})'
+    return LinkageError(where, reason, 'please report it with the linkage file')
 
 
 def failed(number: float | None, error: LinkageError, text: Any = None) -> str:
@@ -353,27 +403,6 @@ def failed(number: float | None, error: LinkageError, text: Any = None) -> str:
 
 def _json(answer: Any) -> str:
     return json.dumps(answer, allow_nan=False, separators=(',', ':'))
-
-
-def _text(content: Mapping[str, Any]) -> str:
-    text = content.get('text')
-    if not isinstance(text, str):
-        raise _wrong('text', text, 'the text of a linkage file')
-    return text
-
-
-def _flag(content: Mapping[str, Any], key: str) -> bool:
-    value = content.get(key, False)
-    if not isinstance(value, bool):
-        raise _wrong(key, value, 'true or false')
-    return value
-
-
-def _inputs(content: Mapping[str, Any], closure: Closure) -> tuple[float, ...] | None:
-    """Return the inputs of the pose at hand; None if the request names none."""
-    if content.get('inputs') is None:
-        return None
-    return _numbers('inputs', content['inputs'], len(closure.linkage.inputs))
 
 
 def _numbers(key: str, values: Any, count: int) -> tuple[float, ...]:

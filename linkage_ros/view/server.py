@@ -24,18 +24,17 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from errno import EACCES, EADDRINUSE
 from hmac import compare_digest
 import logging
 from secrets import token_urlsafe
-import sys
 from threading import Event
 from typing import Any
 
 from aiohttp import web
-from linkage_ros.errors import clean, LinkageError
+from linkage_ros.errors import LinkageError
 from linkage_ros.view.requests import defect, LARGEST
 
 HOST = '127.0.0.1'
@@ -53,7 +52,7 @@ _HEARTBEAT = 20.0
 """Time between two pings, in [s]; a page that does not answer one has gone."""
 
 Route = Callable[[web.Application], None]
-"""Adds routes to the application below the token, which has its server as ``app[SERVER]``."""
+"""Adds routes to the application below the token, which has its server as ``app[SERVER_KEY]``."""
 
 
 def serve(
@@ -61,6 +60,7 @@ def serve(
     routes: Sequence[Route],
     stop: Event,
     ready: Callable[[str], Any],
+    report: Callable[[str], Any],
     *,
     port: int = 0,
 ) -> None:
@@ -69,7 +69,7 @@ def serve(
 
     Parameters
     ----------
-    page, routes
+    page, routes, report
         As for `Server`.
     stop
         Set by a signal.
@@ -84,12 +84,10 @@ def serve(
         The port is taken.
 
     """
-    asyncio.run(_serve(Server(page, routes), stop, ready, port))
+    asyncio.run(_serve(Server(page, routes, report), stop, ready, port))
 
 
 async def _serve(server: Server, stop: Event, ready: Callable[[str], Any], port: int) -> None:
-    loop = asyncio.get_running_loop()
-    loop.set_exception_handler(_report)
     await server.start(port)
     try:
         ready(server.address)
@@ -97,12 +95,6 @@ async def _serve(server: Server, stop: Event, ready: Callable[[str], Any], port:
             await asyncio.sleep(0.1)
     finally:
         await server.end()
-
-
-def _report(_loop: Any, context: Mapping[str, Any]) -> None:
-    error = context.get('exception')
-    if error is not None and not isinstance(error, OSError):  # a page that has gone is no defect
-        defect('linkage view', error)
 
 
 class Server:
@@ -115,6 +107,8 @@ class Server:
         Returns the page; called in a thread, whenever a browser asks for it.
     routes
         What is served beside it.
+    report
+        Called with one line where something is refused for the first time, and with each defect.
 
     Attributes
     ----------
@@ -125,9 +119,12 @@ class Server:
 
     """
 
-    def __init__(self, page: Callable[[], str], routes: Sequence[Route] = ()) -> None:
+    def __init__(
+        self, page: Callable[[], str], routes: Sequence[Route], report: Callable[[str], Any]
+    ) -> None:
         self._page = page
         self._routes = routes
+        self._report = report
         self._token = token_urlsafe(24)
         self.address = ''
         self.refused: Counter[str] = Counter()
@@ -146,7 +143,7 @@ class Server:
 
         """
         within = web.Application()
-        within[SERVER] = self
+        within[SERVER_KEY] = self
         within.router.add_get('/', self._answer_page)
         for add in self._routes:
             add(within)
@@ -154,7 +151,8 @@ class Server:
         app.on_response_prepare.append(self._add_headers)
         app.add_subapp(f'/{self._token}', within)
         # What is no HTTP is answered with an error; a log would only repeat it.
-        silent = logging.Logger('linkage view', logging.CRITICAL + 1)
+        silent = logging.getLogger(__name__)
+        silent.setLevel(logging.CRITICAL + 1)
         self._runner = web.AppRunner(
             app, access_log=None, logger=silent, shutdown_timeout=_GOODBYE
         )
@@ -188,7 +186,7 @@ class Server:
         """Count something that is refused; say so the first time."""
         self.refused[what] += 1
         if self.refused[what] == 1:
-            print(clean(f'linkage view: refused {what}'), file=sys.stderr, flush=True)
+            self._report(f'refused {what}')
 
     @asynccontextmanager
     async def socket(self, request: web.Request) -> AsyncIterator[web.WebSocketResponse]:
@@ -234,7 +232,9 @@ class Server:
         except LinkageError as error:
             return web.Response(status=500, text=f'{error}\n')
         except Exception as error:  # noqa: BLE001 (a page must not end its server)
-            return web.Response(status=500, text=f'{defect("linkage view", error)}\n')
+            found = defect('linkage view', error)
+            self._report(str(found))
+            return web.Response(status=500, text=f'{found}\n')
         return response
 
     def _refused(self, status: int, what: str) -> web.Response:
@@ -261,4 +261,4 @@ class Server:
         return web.Response(body=body, content_type='text/html', charset='utf-8')
 
 
-SERVER = web.AppKey('server', Server)
+SERVER_KEY = web.AppKey('server', Server)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The user's linkage file behind a page: read again when it changes, saved when nobody else has."""
+"""The user's linkage file behind a page, which saves it unless someone else has changed it."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ import sys
 from typing import BinaryIO
 import warnings
 
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import clean, LinkageError
 from linkage_ros.view.requests import Answers, read_request
 from linkage_ros.view.sensors import SceneFiles
 
@@ -153,7 +153,7 @@ def main() -> None:
     if opening is None:
         return
     name, scene, longest = json.loads(opening[1])
-    given = Answers(name, None if scene is None else SceneFiles(*scene))
+    given = Answers(name, None if scene is None else SceneFiles(*scene), report)
     while (frame := _frame(asked)) is not None:
         # The alarm ends this process, if nobody else does.
         signal.setitimer(signal.ITIMER_REAL, longest + _SPARE)
@@ -165,6 +165,12 @@ def main() -> None:
             answers.flush()
         except BrokenPipeError:
             return
+
+
+def report(line: str) -> None:
+    """Write a line to the terminal of the server."""
+    sys.stderr.write(f'linkage view: {clean(line)}\n')
+    sys.stderr.flush()
 
 
 def _frame(stream: BinaryIO) -> tuple[int, str] | None:
