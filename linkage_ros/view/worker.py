@@ -57,13 +57,24 @@ class Worker:
     longest
         Time limit of a request, in [s].
 
+    Attributes
+    ----------
+    longest
+        As given.
+
     """
 
     def __init__(self, name: str, scene: SceneFiles | None, longest: float) -> None:
         self._opening = json.dumps([name, scene, longest]).encode()
-        self._longest = longest
+        self.longest = longest
         self._one = asyncio.Lock()
         self._process: asyncio.subprocess.Process | None = None
+        self._ended = False
+
+    @property
+    def pid(self) -> int:
+        """Return the id of the process; 0 before it is started."""
+        return 0 if self._process is None else self._process.pid
 
     async def start(self) -> None:
         """Start the process before it is needed."""
@@ -92,10 +103,10 @@ class Worker:
         async with self._one:
             answered = False
             try:
-                answer = await asyncio.wait_for(self._exchange(page, message), self._longest)
+                answer = await asyncio.wait_for(self._exchange(page, message), self.longest)
                 answered = True
             except asyncio.TimeoutError:
-                reason, remedy = f'took longer than {self._longest:g} s', 'make it smaller'
+                reason, remedy = f'took longer than {self.longest:g} s', 'make it smaller'
                 raise LinkageError(do, reason, remedy) from None
             except (asyncio.IncompleteReadError, OSError):
                 reason, remedy = 'ended the process that computes it', 'please report it'
@@ -106,11 +117,15 @@ class Worker:
             return answer
 
     async def end(self) -> None:
-        """End the process."""
+        """End the process, whatever it computes."""
+        self._ended = True
+        self._kill()
         async with self._one:
             await self._end()
 
     async def _started(self) -> asyncio.subprocess.Process:
+        if self._ended:
+            raise LinkageError('linkage view', 'has ended', 'start it again')
         if self._process is None:
             self._process = await asyncio.create_subprocess_exec(
                 *(sys.executable, '-m', __name__),
@@ -136,12 +151,16 @@ class Worker:
         (length,) = _ANSWERED.unpack(await process.stdout.readexactly(_ANSWERED.size))
         return (await process.stdout.readexactly(length)).decode()
 
-    async def _end(self) -> None:
-        process, self._process = self._process, None
-        if process is not None:
+    def _kill(self) -> None:
+        if self._process is not None:
             with suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
+                self._process.kill()
+
+    async def _end(self) -> None:
+        self._kill()
+        if self._process is not None:
+            await self._process.wait()
+            self._process = None
 
 
 def main() -> None:
