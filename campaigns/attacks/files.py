@@ -180,6 +180,7 @@ _FILE = 'scenes/x.yaml'
 COMMANDS = {
     'check': [_FILE],
     'solve': [_FILE, '--steps', '8', '--rate', '1', '--points'],
+    'view': [_FILE, '-o', 'x.html'],
     'draw': [_FILE, '-o', 'x.svg'],
     'animate': [_FILE, '-o', 'x.gif', '--seconds', '0.2'],
     'compile': [_FILE, '-o', 'x.c'],
@@ -193,7 +194,7 @@ COMMANDS = {
 }
 """Arguments of each command."""
 
-_SCENE = ('scene', 'cost', 'urdf', 'mjcf', 'accuracy', 'replay', 'run')
+_SCENE = ('view', 'scene', 'cost', 'urdf', 'mjcf', 'accuracy', 'replay', 'run')
 _TABLES = {
     'pairs': b'crank,rocker\n0,0\n30,17\n60,38\n',
     'path': b'0.1;0.2\n0.15;0.25\n0.2;0.2\n0.15;0.1\n0.12;0.1\n',

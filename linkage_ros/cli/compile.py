@@ -23,9 +23,7 @@ any; its head says what it takes and gives.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
-import re
 from threading import Event
 
 from linkage_ros.cli.arguments import add_file, add_output
@@ -34,20 +32,9 @@ from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.c import C
-from linkage_ros.kinematics.compiling.javascript import JavaScript
-from linkage_ros.kinematics.compiling.python_module import PythonModule
-from linkage_ros.kinematics.compiling.source import Language, source, Subject
+from linkage_ros.kinematics.compiling.languages import C_NAME, c_name, LANGUAGES
+from linkage_ros.kinematics.compiling.source import source, Subject
 from linkage_ros.resources import named_file
-
-LANGUAGES: dict[str, Callable[[Subject], Language]] = {
-    '.c': lambda subject: C(subject.name, header=False),
-    '.h': lambda subject: C(subject.name, header=True),
-    '.js': lambda _: JavaScript(),
-    '.py': lambda subject: PythonModule(subject.derivatives),
-}
-"""The languages, by file suffix."""
-
 
 EXAMPLE = 'linkage compile four_bar -o four_bar.c'
 
@@ -94,8 +81,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 def _name(file: Path, typed: str | None) -> str:
     """Return an identifier: the typed one, or one made from the file's name."""
-    name = re.sub('[^0-9A-Za-z]+', '_', file.stem).strip('_') if typed is None else typed
-    if not re.fullmatch('[A-Za-z][0-9A-Za-z_]*', name):
+    name = c_name(file.stem) if typed is None else typed
+    if not C_NAME.fullmatch(name):
         where, wrong = (str(file), file.stem) if typed is None else ('--name', typed)
         raise LinkageError(
             where, f'{quoted(wrong)} makes no name in C', 'write one, as --name four_bar'

@@ -54,6 +54,7 @@ COMMANDS = {
     'gallery': 'list the linkages and scenes that come with the package; print or copy one',
     'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
+    'view': 'show a linkage in the browser, to drag, drive and edit it; a scene, a node or a bag',
     'draw': 'draw a linkage, and its joints over its range',
     'animate': 'animate a linkage over its range, or a part of a run: GIF, MP4 or SVG',
     'compile': 'write a linkage as source in C, JavaScript or Python that needs nothing else',

@@ -63,14 +63,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Write the page."""
     file = arguments.output or beside(arguments.bag, '.html')
-    _check(file)
+    check_page(file)
     window = window_of(arguments.since, arguments.until)
+    write_page(file, report(arguments.bag, window, stop, trust_effects=arguments.trust_effects))
+    return 0
+
+
+def write_page(file: Path, page: str) -> None:
+    """Write a page, and say how large it is."""
     # Undecodable bytes, of a file name for example, are written as escapes.
-    page = report(arguments.bag, window, stop, trust_effects=arguments.trust_effects)
     data = page.encode('utf-8', 'backslashreplace')
     atomic_write(file, data)
     print(f'{file}: {len(data) / 1e6:.1f} MB')
-    return 0
 
 
 def report(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool = False) -> str:
@@ -172,8 +176,8 @@ def _warnings(
         yield f'The part begins after the end of the run, at {seconds_text(found.end)} s.'
 
 
-def _check(file: Path) -> None:
-    """Raise if the page could not be written, before the bag is read."""
+def check_page(file: Path) -> None:
+    """Raise if a page could not be written, before it is made."""
     check_installed('plotly')
     # `Path.is_dir` raises for a name that is too long.
     if os.path.isdir(file):  # noqa: PTH112

@@ -170,7 +170,7 @@ def test_a_name_that_is_nearly_right_is_told(name: str) -> None:
 # Metavars and outputs.
 
 
-METAVARS = {'BAG', 'FILE', 'FILE|BAG', 'NAME', 'SCENE', 'SHELL', 'TOPIC', 'URDF'}
+METAVARS = {'BAG', 'FILE', 'FILE|BAG', 'FILE|SCENE|BAG', 'NAME', 'SCENE', 'SHELL', 'TOPIC', 'URDF'}
 """How arguments without an option are called, in all commands."""
 
 

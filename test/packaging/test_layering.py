@@ -39,6 +39,7 @@ HEIGHTS = (
     ('replay',),
     ('cost', 'accuracy'),
     ('report',),
+    ('view',),
     ('node', 'cli'),
     ('__main__',),
 )

@@ -1,0 +1,150 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Files that a page offers for download: the linkage itself, pictures, parts, source."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from linkage_ros.drawing.animation import animate, range_motion
+from linkage_ros.drawing.figure import picture, View, view
+from linkage_ros.errors import did_you_mean, LinkageError, listed, quoted
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.languages import c_name, LANGUAGES
+from linkage_ros.kinematics.compiling.source import source, Subject
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+
+_SECONDS = 4.0
+"""How long an animation shows the range, in [s]."""
+
+_DERIVATIVES = 2
+
+
+class Export(NamedTuple):
+    """
+    A file to download.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    type
+        Its media type.
+    data
+        Its content.
+
+    """
+
+    name: str
+    type: str
+    data: bytes
+
+
+class _Linkage(NamedTuple):
+    closure: Closure
+    text: str
+    name: str
+    inputs: tuple[float, ...]
+
+    @property
+    def view(self) -> View:
+        return view(self.closure, self.inputs)
+
+
+def export(
+    kind: str, closure: Closure, text: str, name: str, inputs: Sequence[float] | None = None
+) -> Export:
+    """
+    Return a linkage as a file.
+
+    Parameters
+    ----------
+    kind
+        One of `KINDS`.
+    closure, text
+        The linkage, and its file as text.
+    name
+        Name of the file without suffix.
+    inputs
+        The pose to draw, in [rad] or [m]; None for the usual one.
+
+    Raises
+    ------
+    LinkageError
+        There is no such kind; the linkage is open in that pose, or cannot be compiled; a library
+        is missing.
+
+    """
+    if kind not in KINDS:
+        remedy = did_you_mean(kind, KINDS, f'ask for one of {listed(KINDS)}')
+        raise LinkageError('kind', f'{quoted(kind)} cannot be written', remedy)
+    media_type, write = KINDS[kind]
+    shown = usual_inputs(closure) if inputs is None else tuple(inputs)
+    data = write(_Linkage(closure, text, name, shown))
+    return Export(f'{name}.{kind}', media_type, data)
+
+
+def _yaml(linkage: _Linkage) -> bytes:
+    return linkage.text.encode()
+
+
+def _svg(linkage: _Linkage) -> bytes:
+    return _written('svg', lambda file: picture(linkage.view, linkage.name, file))
+
+
+def _gif(linkage: _Linkage) -> bytes:
+    motion = range_motion(linkage.view, linkage.name, _SECONDS)
+    return _written('gif', lambda file: animate(motion, file))
+
+
+def _dxf(linkage: _Linkage) -> bytes:
+    from linkage_ros.drawing.dxf import links_dxf  # local import: ezdxf is slow to load
+
+    return links_dxf(linkage.closure)
+
+
+def _compiled(suffix: str) -> Callable[[_Linkage], bytes]:
+    def write(linkage: _Linkage) -> bytes:
+        closure, name = linkage.closure, linkage.name
+        in_c = (c_name(name) or 'linkage') if suffix in ('.c', '.h') else name
+        joints = tuple(closure.linkage.joints)
+        subject = Subject(closure, in_c, f'{name}.yaml', _DERIVATIVES, joints)
+        return source(subject, LANGUAGES[suffix](subject)).encode()
+
+    return write
+
+
+def _written(kind: str, write: Callable[[Path], None]) -> bytes:
+    """Return what is written to a file."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / f'picture.{kind}'
+        write(file)
+        return file.read_bytes()
+
+
+KINDS: dict[str, tuple[str, Callable[[_Linkage], bytes]]] = {
+    'yaml': ('application/yaml', _yaml),
+    'svg': ('image/svg+xml', _svg),
+    'gif': ('image/gif', _gif),
+    'dxf': ('image/vnd.dxf', _dxf),
+    'c': ('text/x-c', _compiled('.c')),
+    'h': ('text/x-c', _compiled('.h')),
+    'js': ('text/javascript', _compiled('.js')),
+    'py': ('text/x-python', _compiled('.py')),
+}
+"""Media type and writer of each kind of file, which is also the file's suffix."""

@@ -1,0 +1,419 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a page asks its server for, and the answers.
+
+A request is a JSON object with an ``id``, the name of what is to be done, ``do``, and the text of
+the linkage: no document is held here, so undo, several pages and a lost connection need no care.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, partial
+import json
+from math import isfinite
+from typing import Any, NamedTuple, NoReturn
+
+from linkage_ros.drawing.shapes import link_frames
+from linkage_ros.errors import (
+    clean,
+    did_you_mean,
+    FileError,
+    LinkageError,
+    listed,
+    quoted,
+    shortened,
+)
+from linkage_ros.files.linkage_file import FARTHEST, read_closure
+from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.source import STATUSES
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.resources import linkage_names, shipped
+from linkage_ros.view.edit import edited, pin_of
+from linkage_ros.view.exports import export
+from linkage_ros.view.model import model
+from linkage_ros.view.sensors import SceneFiles, Sensors
+
+LARGEST = 1_000_000
+"""Most bytes of a message."""
+
+_MOST_POSES = 1000
+
+_MOST_SENSORS = 8
+"""Pages whose sensors are kept."""
+
+_LONGEST_NAME = 80
+
+_STATUSES = {name: number for number, name in enumerate(STATUSES)}
+
+
+class Request(NamedTuple):
+    """
+    A request of a page.
+
+    Attributes
+    ----------
+    id
+        Its number, which the answer repeats; None if it has none.
+    do
+        What is to be done.
+    content
+        The whole message.
+
+    """
+
+    id: float | None
+    do: str
+    content: Mapping[str, Any]
+
+
+class RequestError(LinkageError):
+    """
+    A message that is no request.
+
+    Attributes
+    ----------
+    id
+        The number of the request, as far as it can be read.
+
+    """
+
+    def __init__(self, reason: str, remedy: str, number: float | None = None) -> None:
+        super().__init__('message', reason, remedy)
+        self.id = number
+
+
+def read_request(message: str) -> Request:
+    """
+    Read a message of a page.
+
+    Raises
+    ------
+    RequestError
+        It is too large, no JSON, or no request.
+
+    """
+    if len(message) > LARGEST or len(message.encode('utf-8', 'surrogatepass')) > LARGEST:
+        raise RequestError(f'is larger than {LARGEST} bytes', 'send a smaller linkage')
+    try:
+        content = json.loads(message, parse_constant=_not_a_number)
+    except (ValueError, RecursionError):
+        raise RequestError('is not JSON', 'send an object with id and do') from None
+    if not isinstance(content, dict):
+        raise RequestError('is no object', 'send an object with id and do')
+    number = content.get('id')
+    if type(number) not in (int, float) or not abs(number) <= 2**53:
+        raise RequestError('has no id', 'send a number as id')
+    do = content.get('do')
+    if not isinstance(do, str) or do not in _ANSWERS:
+        raise RequestError(f'asks for {quoted(do)}', f'ask for {listed(_ANSWERS)}', number)
+    return Request(number, do, content)
+
+
+def _not_a_number(text: str) -> NoReturn:
+    raise ValueError(f'{text} is not JSON')
+
+
+class Answers:
+    """
+    Answers the requests of all pages of a server.
+
+    Parameters
+    ----------
+    name
+        Name of the linkage with which the server was opened.
+    scene
+        The scene with which it was opened; None for a linkage.
+    report
+        Called with the line of each defect of this package.
+
+    """
+
+    def __init__(self, name: str, scene: SceneFiles | None, report: Callable[[str], Any]) -> None:
+        self._name = name
+        self._scene = scene
+        self._report = report
+        self._sensors: OrderedDict[int, Sensors] = OrderedDict()
+
+    def answer(self, page: int, request: Request) -> str:
+        """
+        Return the answer to a request, as JSON.
+
+        Parameters
+        ----------
+        page
+            Number of the page that asks.
+        request
+            The request.
+
+        Returns
+        -------
+        answer : str
+            With ``ok``, or with ``error``: its text, one line; the key in the file; and the pin or
+            the link that it concerns. A defect of this package is such an error too.
+
+        """
+        asked = _Asked(request.content, self._name, partial(self._sensors_of, page))
+        try:
+            return _json({'id': request.id, 'ok': _ANSWERS[request.do](asked)})
+        except LinkageError as error:
+            return failed(request.id, error, request.content.get('text'))
+        except Exception as error:  # noqa: BLE001 (a request must not end its server)
+            found = defect(request.do, error)
+            self._report(str(found))
+            return failed(request.id, found)
+
+    def _sensors_of(self, page: int, text: str | None) -> Sensors:
+        """Return the sensors of a page; new ones if it has changed the linkage."""
+        if self._scene is None:
+            raise LinkageError('read', 'a linkage has no sensors', 'open a scene')
+        sensors = self._sensors.pop(page, None)
+        if sensors is None or sensors.text != text:
+            sensors = Sensors(self._scene, text)
+        self._sensors[page] = sensors
+        if len(self._sensors) > _MOST_SENSORS:
+            self._sensors.popitem(last=False)
+        return sensors
+
+
+class _Asked(NamedTuple):
+    """
+    What a request holds.
+
+    Attributes
+    ----------
+    content
+        The message.
+    opened
+        Name of the linkage with which the server was opened.
+    sensors
+        Returns the sensors of the page, for the text of a linkage.
+
+    """
+
+    content: Mapping[str, Any]
+    opened: str
+    sensors: Callable[[str | None], Sensors]
+
+    @property
+    def text(self) -> str:
+        """Return the text of the linkage."""
+        text = self.content.get('text')
+        if not isinstance(text, str):
+            raise _wrong('text', text, 'the text of a linkage file')
+        encoded(text, self.name)
+        return text
+
+    @property
+    def name(self) -> str:
+        """Return the name of the linkage: it names files, and the place of errors."""
+        name = self.content.get('name', self.opened)
+        if not isinstance(name, str) or not 0 < len(name) <= _LONGEST_NAME or '/' in name:
+            raise _wrong('name', name, f'a name of at most {_LONGEST_NAME} letters')
+        return clean(name)
+
+    @property
+    def whole(self) -> bool:
+        """Return whether the slower parts of a model are asked for."""
+        whole = self.content.get('whole', False)
+        if not isinstance(whole, bool):
+            raise _wrong('whole', whole, 'true or false')
+        return whole
+
+    @property
+    def closure(self) -> Closure:
+        """Return the linkage."""
+        return closure_of(self.text, self.name)
+
+    def numbers(self, key: str, count: int) -> tuple[float, ...]:
+        """Return a list of so many numbers."""
+        return _numbers(key, self.content.get(key), count)
+
+
+def _model(asked: _Asked) -> dict[str, Any]:
+    return model(asked.text, asked.name, whole=asked.whole)
+
+
+def _edit(asked: _Asked) -> dict[str, Any]:
+    edit = asked.content.get('edit')
+    if not isinstance(edit, dict):
+        raise _wrong('edit', edit, 'an object')
+    text, inputs = edited(asked.text, edit)
+    found = model(text, asked.name, whole=asked.whole)
+    for given, value in zip(found['inputs'], inputs, strict=False):
+        given['value'] = value
+    return found
+
+
+def _open(asked: _Asked) -> dict[str, Any]:
+    name, names = asked.content.get('name'), linkage_names()
+    if not isinstance(name, str) or name not in names:
+        remedy = did_you_mean(str(name), names, f'name one of {listed(names)}')
+        raise LinkageError('name', f'{quoted(name)} is no shipped linkage', remedy)
+    return model(shipped(f'linkages/{name}.yaml').read_text('utf-8'), name, whole=True)
+
+
+def _names(_asked: _Asked) -> dict[str, Any]:
+    return {'linkages': linkage_names()}
+
+
+def _save(asked: _Asked) -> dict[str, Any]:
+    """Check that a text is a linkage; the server then saves it."""
+    if asked.name != asked.opened:
+        reason = f'{quoted(asked.name)} is not the file with which this page was opened'
+        raise LinkageError('save', reason, 'download the linkage')
+    read_closure(parse_yaml(encoded(asked.text, asked.name), asked.name), asked.name)
+    return {}
+
+
+def _export(asked: _Asked) -> dict[str, Any]:
+    closure = asked.closure
+    given = asked.content.get('inputs')
+    inputs = None if given is None else asked.numbers('inputs', len(closure.linkage.inputs))
+    found = export(str(asked.content.get('kind')), closure, asked.text, asked.name, inputs)
+    return {'name': found.name, 'type': found.type, 'data': b64encode(found.data).decode()}
+
+
+def _poses(asked: _Asked) -> dict[str, Any]:
+    closure, poses = asked.closure, asked.content.get('inputs')
+    if not isinstance(poses, list) or len(poses) > _MOST_POSES:
+        raise _wrong('inputs', poses, f'a list of at most {_MOST_POSES} lists of numbers')
+    count = len(closure.linkage.inputs)
+    return {'poses': [_pose(closure, _numbers('inputs', inputs, count)) for inputs in poses]}
+
+
+def _read(asked: _Asked) -> dict[str, Any]:
+    sensors = asked.sensors(asked.text if 'text' in asked.content else None)
+    (t,) = _numbers('t', [asked.content.get('t')], 1)
+    return sensors.read(
+        t, asked.numbers('inputs', sensors.count), asked.numbers('rates', sensors.count)
+    )
+
+
+_ANSWERS: dict[str, Callable[[_Asked], dict[str, Any]]] = {
+    'model': _model,
+    'edit': _edit,
+    'open': _open,
+    'names': _names,
+    'save': _save,
+    'export': _export,
+    'poses': _poses,
+    'read': _read,
+}
+"""What a page can ask for."""
+
+
+@lru_cache(maxsize=4)
+def closure_of(text: str, name: str) -> Closure:
+    """
+    Return the closure of a linkage file's text.
+
+    Raises
+    ------
+    FileError
+        As `linkage_ros.load`.
+
+    """
+    return read_closure(parse_yaml(encoded(text, name), name), name)
+
+
+def encoded(text: str, name: str) -> bytes:
+    """
+    Return the bytes of a file's text.
+
+    Raises
+    ------
+    FileError
+        It holds half of a surrogate pair, which UTF-8 has not.
+
+    """
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        reason = f'is not Unicode text (character {error.start})'
+        raise FileError(name, '', reason, 'remove the character') from None
+
+
+def _pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
+    """Return a pose as the program of a model gives it; rates are those of a first input at 1."""
+    position = closure.position(*inputs)
+    found: dict[str, Any] = {
+        'status': _STATUSES[position.status.name],
+        'joints': list(position.joints),
+        'rates': [],
+        'accelerations': [],
+        'frames': [],
+        'frameRates': [],
+    }
+    if not position.joints:
+        return found
+    for link, frame in link_frames(closure, position).items():
+        if link != GROUND:
+            found['frames'] += [frame.place.real, frame.place.imag, frame.angle]
+    if position.status.has_rates:
+        rest = [0.0] * (len(inputs) - 1)
+        velocity = closure.velocity(position, 1.0, *rest)
+        acceleration = closure.acceleration(position, velocity, 0.0, *rest)
+        rates, accelerations = list(velocity.joints), list(acceleration.joints)
+        if all(map(isfinite, [*rates, *accelerations])):
+            found |= {'rates': rates, 'accelerations': accelerations}
+    return found
+
+
+def defect(where: str, error: BaseException) -> LinkageError:
+    """Return a defect of this package as an error of one line."""
+    reason = f'failed by {type(error).__name__} ({shortened(str(error), 300)})'
+    return LinkageError(where, reason, 'please report it with the linkage file')
+
+
+def failed(number: float | None, error: LinkageError, text: Any = None) -> str:
+    """
+    Return the answer to a request that failed, as JSON.
+
+    Parameters
+    ----------
+    number
+        The number of the request; None if it has none.
+    error
+        Why it failed.
+    text
+        The text of the linkage, in which a pin is sought that the error concerns.
+
+    """
+    where = error.key if isinstance(error, FileError) else error.where
+    pin = pin_of(error, text) if isinstance(text, str) else None
+    return _json({'id': number, 'error': {'text': str(error), 'where': where, 'pin': pin}})
+
+
+def _json(answer: Any) -> str:
+    return json.dumps(answer, allow_nan=False, separators=(',', ':'))
+
+
+def _numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
+    if (
+        not isinstance(values, list)
+        or len(values) != count
+        or not all(type(value) in (int, float) and abs(value) <= FARTHEST for value in values)
+    ):
+        raise _wrong(key, values, 'a number' if count == 1 else f'{count} numbers')
+    return tuple(map(float, values))
+
+
+def _wrong(key: str, value: Any, expected: str) -> LinkageError:
+    return LinkageError(key, f'{quoted(value)} is not valid', f'send {expected}')

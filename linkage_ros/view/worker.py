@@ -1,0 +1,206 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A process that answers requests, so that the server itself always answers at once.
+
+A process can be ended at any moment, a thread cannot: a request that takes too long ends its
+process, and the next request starts another one. A frame on the standard input of a process is
+the number of a page and the length of the message, 4 bytes each, then the message; on its standard
+output the length of the answer, then the answer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+import json
+import os
+from pathlib import Path
+import signal
+import struct
+import sys
+from typing import BinaryIO
+import warnings
+
+from linkage_ros.errors import clean, LinkageError
+from linkage_ros.view.requests import Answers, read_request
+from linkage_ros.view.sensors import SceneFiles
+
+_ASKED, _ANSWERED = struct.Struct('>II'), struct.Struct('>I')
+
+_SPARE = 5.0
+"""Time after its limit, in [s], at which a process ends by itself, if its server has gone."""
+
+
+class Worker:
+    """
+    Answers requests in a process of its own, one after the other.
+
+    Parameters
+    ----------
+    name
+        Name of the linkage with which the server was opened.
+    scene
+        The scene with which it was opened; None for a linkage.
+    longest
+        Time limit of a request, in [s].
+
+    Attributes
+    ----------
+    longest
+        As given.
+
+    """
+
+    def __init__(self, name: str, scene: SceneFiles | None, longest: float) -> None:
+        self._opening = json.dumps([name, scene, longest]).encode()
+        self.longest = longest
+        self._one = asyncio.Lock()
+        self._process: asyncio.subprocess.Process | None = None
+        self._ended = False
+
+    @property
+    def pid(self) -> int:
+        """Return the id of the process; 0 before it is started."""
+        return 0 if self._process is None else self._process.pid
+
+    async def start(self) -> None:
+        """Start the process before it is needed."""
+        async with self._one:
+            await self._started()
+
+    async def ask(self, page: int, do: str, message: str) -> str:
+        """
+        Return the answer to a request, as JSON.
+
+        Parameters
+        ----------
+        page
+            Number of the page that asks.
+        do
+            What it asks for.
+        message
+            Its message.
+
+        Raises
+        ------
+        LinkageError
+            There is no answer in time, or the process ended.
+
+        """
+        async with self._one:
+            answered = False
+            try:
+                answer = await asyncio.wait_for(self._exchange(page, message), self.longest)
+                answered = True
+            except asyncio.TimeoutError:
+                reason, remedy = f'took longer than {self.longest:g} s', 'make it smaller'
+                raise LinkageError(do, reason, remedy) from None
+            except (asyncio.IncompleteReadError, OSError):
+                reason, remedy = 'ended the process that computes it', 'please report it'
+                raise LinkageError(do, reason, remedy) from None
+            finally:
+                if not answered:
+                    await self._end()
+            return answer
+
+    async def end(self) -> None:
+        """End the process, whatever it computes."""
+        self._ended = True
+        self._kill()
+        async with self._one:
+            await self._end()
+
+    async def _started(self) -> asyncio.subprocess.Process:
+        if self._ended:
+            raise LinkageError('linkage view', 'has ended', 'start it again')
+        if self._process is None:
+            self._process = await asyncio.create_subprocess_exec(
+                *(sys.executable, '-m', __name__),
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+                # It imports the same package, and the user's own effects, as this process.
+                cwd=Path(__file__).parents[2],
+                env=os.environ | {'PYTHONPATH': os.pathsep.join(map(os.path.abspath, sys.path))},
+                # Ctrl-C is for the server, which then ends this process.
+                start_new_session=True,
+            )
+            assert self._process.stdin is not None
+            self._process.stdin.write(_ASKED.pack(0, len(self._opening)) + self._opening)
+        return self._process
+
+    async def _exchange(self, page: int, message: str) -> str:
+        process = await self._started()
+        assert process.stdin is not None
+        assert process.stdout is not None
+        data = message.encode()
+        process.stdin.write(_ASKED.pack(page, len(data)) + data)
+        await process.stdin.drain()
+        (length,) = _ANSWERED.unpack(await process.stdout.readexactly(_ANSWERED.size))
+        return (await process.stdout.readexactly(length)).decode()
+
+    def _kill(self) -> None:
+        if self._process is not None:
+            with suppress(ProcessLookupError):
+                self._process.kill()
+
+    async def _end(self) -> None:
+        self._kill()
+        if self._process is not None:
+            await self._process.wait()
+            self._process = None
+
+
+def main() -> None:
+    """Answer the frames on standard input until it ends."""
+    warnings.simplefilter('ignore')  # the page shows what matters
+    asked, answers = sys.stdin.buffer, os.fdopen(os.dup(1), 'wb')
+    os.dup2(2, 1)  # nothing that a library prints gets between the frames
+    opening = _frame(asked)
+    if opening is None:
+        return
+    name, scene, longest = json.loads(opening[1])
+    given = Answers(name, None if scene is None else SceneFiles(*scene), report)
+    while (frame := _frame(asked)) is not None:
+        # The alarm ends this process, if nobody else does.
+        signal.setitimer(signal.ITIMER_REAL, longest + _SPARE)
+        page, message = frame
+        answer = given.answer(page, read_request(message)).encode()
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        try:
+            answers.write(_ANSWERED.pack(len(answer)) + answer)
+            answers.flush()
+        except BrokenPipeError:
+            return
+
+
+def report(line: str) -> None:
+    """Write a line to the terminal of the server."""
+    sys.stderr.write(f'linkage view: {clean(line)}\n')
+    sys.stderr.flush()
+
+
+def _frame(stream: BinaryIO) -> tuple[int, str] | None:
+    """Return the number of a page and its message; None where the server has gone."""
+    head = stream.read(_ASKED.size)
+    if len(head) < _ASKED.size:
+        return None
+    page, length = _ASKED.unpack(head)
+    message = stream.read(length)
+    return (page, message.decode()) if len(message) == length else None
+
+
+if __name__ == '__main__':
+    main()
