@@ -117,7 +117,7 @@ def read_request(message: str) -> Request:
         raise RequestError('is not JSON', 'send an object with id and do') from None
     if not isinstance(content, dict):
         raise RequestError('is no object', 'send an object with id and do')
-    number = content.get('id')
+    number: Any = content.get('id')
     if type(number) not in (int, float) or not abs(number) <= 2**53:
         raise RequestError('has no id', 'send a number as id')
     do = content.get('do')

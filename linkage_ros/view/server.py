@@ -215,7 +215,7 @@ class Server:
         """Answer only what comes from the page itself."""
         own = [[f'http://{host}'] for host in self._hosts]
         # Browsers name the origin of every WebSocket, but not that of every page.
-        unnamed = [] if 'Upgrade' in request.headers else [[]]
+        unnamed: list[list[str]] = [] if 'Upgrade' in request.headers else [[]]
         if request.headers.getall('Host', []) not in [[host] for host in self._hosts]:
             return self._refused(403, 'a request that names another host')
         if request.headers.getall('Origin', []) not in own + unnamed:
@@ -252,6 +252,7 @@ class Server:
         response.headers['Content-Security-Policy'] = policy
         response.headers['X-Content-Type-Options'] = 'nosniff'
         response.headers['X-Frame-Options'] = 'DENY'
+        response.headers['Cross-Origin-Resource-Policy'] = 'same-origin'
         response.headers['Referrer-Policy'] = 'no-referrer'
         response.headers['Cache-Control'] = 'no-store'
 

@@ -42,6 +42,7 @@ PARSE = 'linkage_ros.files.yaml_file:parse_yaml'
 READS = {
     'check': (['four.yaml'], PARSE),
     'solve': (['four.yaml', '-o', 'x.csv'], PARSE),
+    'view': (['four.yaml', '-o', 'x.html'], PARSE),
     'draw': (['four.yaml', '-o', 'x.png'], PARSE),
     'animate': (['four.yaml', '-o', 'x.gif'], PARSE),
     'compile': (['four.yaml', '-o', 'x.c'], PARSE),
@@ -59,6 +60,7 @@ READS = {
 COMPUTE = (
     'check',
     'solve',
+    'view',
     'draw',
     'animate',
     'compile',

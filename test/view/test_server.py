@@ -110,6 +110,7 @@ def test_a_page_may_load_and_reach_nothing_but_its_own_server(server: Served) ->
     for line in (
         'X-Content-Type-Options: nosniff',
         'X-Frame-Options: DENY',
+        'Cross-Origin-Resource-Policy: same-origin',
         'Referrer-Policy: no-referrer',
         'Cache-Control: no-store',
     ):

@@ -1,0 +1,134 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Files to download open in the programs of others, and hold the linkage."""
+
+from __future__ import annotations
+
+from base64 import b64decode
+from io import BytesIO
+import json
+from pathlib import Path
+import shutil
+import subprocess
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import linkage_ros as lr
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.resources import shipped
+from linkage_ros.view.exports import export, KINDS
+from linkage_ros.view.requests import Answers, read_request
+import pytest
+
+NAMES = ('four_bar', 'slider_crank', 'five_bar')
+
+
+def exported(kind: str, name: str, inputs: list[float] | None = None) -> bytes:
+    """Return a file as a page gets it."""
+    text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
+    content = {'id': 1, 'do': 'export', 'kind': kind, 'text': text, 'name': name}
+    request = read_request(json.dumps(content | ({'inputs': inputs} if inputs else {})))
+    answer = json.loads(Answers('mine', None, pytest.fail).answer(1, request))
+    assert answer['ok']['name'] == f'{name}.{kind}'
+    assert answer['ok']['type'] == KINDS[kind][0]
+    return b64decode(answer['ok']['data'])
+
+
+def inputs_of(closure: Closure) -> list[float]:
+    return [1.2] * len(closure.linkage.inputs)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_yaml_is_the_text_itself(name: str) -> None:
+    assert exported('yaml', name) == shipped(f'linkages/{name}.yaml').read_bytes()
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_svg_is_xml_and_shows_the_pose(name: str) -> None:
+    one, other = (
+        exported('svg', name, [value] * len(lr.load(name).linkage.inputs)) for value in (1.0, 1.2)
+    )
+    for picture in (one, other):
+        assert ET.fromstring(picture).tag == '{http://www.w3.org/2000/svg}svg'
+    assert one != other
+
+
+def test_gif_moves() -> None:
+    from PIL import Image
+
+    picture = Image.open(BytesIO(exported('gif', 'four_bar')))
+    assert picture.format == 'GIF'
+    assert picture.n_frames > 20
+
+
+@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.skipif(shutil.which('cc') is None, reason='needs cc')
+def test_c_compiles_as_strictly_as_can_be(name: str, tmp_path: Path) -> None:
+    for kind in ('c', 'h'):
+        file = tmp_path / f'x.{kind}'
+        file.write_bytes(exported(kind, name))
+        strict = ['-std=c99', '-Wall', '-Wextra', '-Werror', '-Wno-unused-function']
+        subprocess.run(['cc', *strict, '-x', 'c', '-fsyntax-only', file], check=True, timeout=60)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_python_gives_the_joints_of_the_closure(name: str) -> None:
+    closure = lr.load(name)
+    given = inputs_of(closure)
+    rest = [0.0] * len(given)
+    found: dict[str, Any] = {}
+    exec(exported('py', name).decode(), found)
+    _, joints, *_ = found['motion'](given, rest, rest)
+    assert list(joints) == pytest.approx(list(closure.position(*given).joints), abs=1e-12)
+
+
+@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.skipif(shutil.which('node') is None, reason='needs node')
+def test_javascript_gives_the_joints_of_the_closure(name: str, tmp_path: Path) -> None:
+    closure = lr.load(name)
+    given = inputs_of(closure)
+    (tmp_path / 'it.mjs').write_bytes(exported('js', name))
+    zeros = json.dumps([0.0] * len(given))
+    (tmp_path / 'run.mjs').write_text(
+        "import { motion } from './it.mjs';\n"
+        f'console.log(JSON.stringify(motion({json.dumps(given)}, {zeros}, {zeros})));\n'
+    )
+    done = subprocess.run(
+        ['node', tmp_path / 'run.mjs'], capture_output=True, check=True, timeout=60
+    )
+    joints = json.loads(done.stdout)['joints']
+    assert joints == pytest.approx(list(closure.position(*given).joints), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('kind', 'inputs', 'line'),
+    [
+        ('exe', None, "kind: 'exe' cannot be written; ask for one of yaml, "),
+        ('gifs', None, "kind: 'gifs' cannot be written; did you mean 'gif'?"),
+        ('../x', None, "kind: '../x' cannot be written; "),
+    ],
+)
+def test_other_kinds_are_refused(kind: str, inputs: Any, line: str) -> None:
+    with pytest.raises(LinkageError) as refused:
+        export(kind, lr.load('four_bar'), '', 'four_bar', inputs)
+    assert str(refused.value).startswith(line)
+
+
+def test_a_linkage_that_is_iterated_has_no_source_and_the_error_says_so() -> None:
+    text = shipped('linkages/class_3.yaml').read_text('utf-8')
+    request = read_request(json.dumps({'id': 1, 'do': 'export', 'kind': 'c', 'text': text}))
+    answer = json.loads(Answers('class_3', None, pytest.fail).answer(1, request))
+    assert 'compile' in answer['error']['text']

@@ -1,0 +1,208 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a request means, without a socket."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import linkage_ros as lr
+from linkage_ros.drawing.shapes import link_frames
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.resources import shipped
+from linkage_ros.view import requests
+from linkage_ros.view.requests import Answers, LARGEST, read_request, RequestError
+import pytest
+
+from .test_server import FOUR_BAR, LONGER
+
+
+def asked(do: str, answers: Answers | None = None, **content: Any) -> dict[str, Any]:
+    """Return the answer to a request."""
+    reported: list[str] = []
+    request = read_request(json.dumps({'id': 7, 'do': do, **content}))
+    answer = (answers or Answers('mine', None, reported.append)).answer(1, request)
+    assert not reported
+    found: dict[str, Any] = json.loads(answer, parse_constant=pytest.fail)
+    assert found.pop('id') == 7
+    return found
+
+
+def ok(do: str, **content: Any) -> dict[str, Any]:
+    found = asked(do, **content)
+    assert 'ok' in found, found
+    answer: dict[str, Any] = found['ok']
+    return answer
+
+
+def error(do: str, **content: Any) -> str:
+    """Return the line of an answer that is an error."""
+    text = str(asked(do, **content)['error']['text'])
+    assert '\n' not in text
+    return text
+
+
+# Messages.
+
+
+@pytest.mark.parametrize(
+    ('message', 'line'),
+    [
+        ('', 'is not JSON'),
+        ('{', 'is not JSON'),
+        ('[' * 100_000, 'is not JSON'),
+        ('{"id": NaN, "do": "names"}', 'is not JSON'),
+        ('{"id": 1, "do": "names", "x": ' + '9' * 10_000 + '}', 'is not JSON'),
+        ('[]', 'is no object'),
+        ('"names"', 'is no object'),
+        ('{"do": "names"}', 'has no id'),
+        ('{"id": "1", "do": "names"}', 'has no id'),
+        ('{"id": true, "do": "names"}', 'has no id'),
+        ('{"id": 1e300, "do": "names"}', 'has no id'),
+        ('{"id": 1}', 'asks for None'),
+        ('{"id": 1, "do": "eval"}', "asks for 'eval'"),
+        ('{"id": 1, "do": ["names"]}', "asks for ['names']"),
+        (json.dumps({'id': 1, 'do': 'names', 'x': 'x' * LARGEST}), 'is larger than 1000000 bytes'),
+        (json.dumps({'id': 1, 'x': 'é' * (LARGEST // 2)}, ensure_ascii=False), 'is larger than'),
+    ],
+)
+def test_what_is_no_request_is_refused(message: str, line: str) -> None:
+    with pytest.raises(RequestError) as refused:
+        read_request(message)
+    assert str(refused.value).startswith(f'message: {line}')
+    assert len(str(refused.value)) < 300
+
+
+def test_the_number_of_a_request_that_is_unknown_is_answered() -> None:
+    with pytest.raises(RequestError) as refused:
+        read_request('{"id": 12, "do": "dance"}')
+    assert refused.value.id == 12
+
+
+# Answers.
+
+
+def test_the_model_of_a_text_has_this_text_and_its_name() -> None:
+    found = ok('model', text=FOUR_BAR, whole=True)
+    assert (found['name'], found['text']) == ('mine', FOUR_BAR)
+    assert ok('model', text=FOUR_BAR, name='other')['name'] == 'other'
+
+
+def test_an_edit_is_answered_with_the_model_of_the_edited_text() -> None:
+    found = ok('edit', text=FOUR_BAR, edit=LONGER)
+    assert found['text'] == FOUR_BAR.replace('0.040', '0.041')
+
+
+def test_a_shipped_linkage_is_opened_by_its_name() -> None:
+    names = ok('names')['linkages']
+    assert names == lr.linkage_names()
+    found = ok('open', name='jansen_leg')
+    assert found['name'] == 'jansen_leg'
+    assert found['text'] == shipped('linkages/jansen_leg.yaml').read_text('utf-8')
+
+
+@pytest.mark.parametrize('name', ['jansen_legs', '../scenes/demo', '/etc/passwd', '', None, 3, []])
+def test_nothing_but_a_shipped_linkage_is_opened(name: Any) -> None:
+    assert 'is no shipped linkage; ' in error('open', name=name)
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'class_3', 'elliptic_trammel', 'five_bar'])
+def test_poses_are_those_of_the_closure(name: str) -> None:
+    text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
+    closure: Closure = lr.load(name)
+    pose = closure.linkage.pose
+    first = list(pose.inputs) if pose else [1.0] * len(closure.linkage.inputs)
+    inputs = [first, [value + 0.05 for value in first], [1e6] * len(first)]
+    poses = ok('poses', text=text, inputs=inputs)['poses']
+    for given, found in zip(inputs, poses, strict=True):
+        position = closure.position(*given)
+        assert found['joints'] == list(position.joints)
+        if not position.joints:
+            assert not any((found['rates'], found['frames']))
+            assert found['status'] != 0
+            continue
+        velocity = closure.velocity(position, 1.0, *[0.0] * (len(first) - 1))
+        assert found['rates'] == list(velocity.joints)
+        frames = link_frames(closure, position)
+        moving = [frame for link, frame in frames.items() if link != 'ground']
+        assert found['frames'] == [
+            value
+            for frame in moving
+            for value in (frame.place.real, frame.place.imag, frame.angle)
+        ]
+        assert found['status'] == 0
+
+
+@pytest.mark.parametrize(
+    'inputs',
+    [None, 1, [1.0], [['1']], [[None]], [[True]], [[1.0, 2.0]], [[]], [[1e300]], [[0.0]] * 1001],
+)
+def test_poses_at_what_are_no_inputs_are_refused(inputs: Any) -> None:
+    assert error('poses', text=FOUR_BAR, inputs=inputs).startswith('inputs: ')
+
+
+@pytest.mark.parametrize(
+    ('content', 'where'),
+    [
+        ({}, 'text'),
+        ({'text': 1}, 'text'),
+        ({'text': FOUR_BAR, 'whole': 1}, 'whole'),
+        ({'text': FOUR_BAR, 'name': ''}, 'name'),
+        ({'text': FOUR_BAR, 'name': '../x'}, 'name'),
+        ({'text': FOUR_BAR, 'name': 'x' * 81}, 'name'),
+        ({'text': FOUR_BAR, 'name': 1}, 'name'),
+        ({'text': '\ud800'}, ''),
+        ({'text': 'links: 1'}, 'links'),
+        ({'text': '&a [*a]'}, ''),
+        ({'text': '[' * 1000}, ''),
+    ],
+)
+def test_an_error_names_its_key(content: dict[str, Any], where: str) -> None:
+    found = asked('model', **content)['error']
+    assert found['where'] == where
+    assert '\n' not in found['text']
+
+
+def test_only_the_file_with_which_the_page_was_opened_is_saved() -> None:
+    assert ok('save', text=FOUR_BAR) == {}
+    line = error('save', text=FOUR_BAR, name='jansen_leg')
+    assert line.startswith("save: 'jansen_leg' is not the file with which this page was opened; ")
+    assert error('save', text='links: 1').startswith('mine:1: links: 1 is not a mapping')
+
+
+def test_a_linkage_has_no_sensors() -> None:
+    assert error('read', t=0, inputs=[0], rates=[0]) == (
+        'read: a linkage has no sensors; open a scene'
+    )
+
+
+def test_a_defect_is_one_line_on_the_page_and_one_in_the_report(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(*_: Any, **__: Any) -> None:
+        raise ZeroDivisionError('float\ndivision')
+
+    monkeypatch.setattr(requests, 'model', fails)
+    reported: list[str] = []
+    answers = Answers('mine', None, reported.append)
+    request = read_request(json.dumps({'id': 7, 'do': 'model', 'text': FOUR_BAR}))
+    found = json.loads(answers.answer(1, request))
+    line = (
+        'model: failed by ZeroDivisionError (float division); '
+        'please report it with the linkage file'
+    )
+    assert found == {'id': 7, 'error': {'text': line, 'where': 'model', 'pin': None}}
+    assert reported == [line]
