@@ -42,7 +42,7 @@ from bench.ticks import (
     TickPlan,
     with_parameters,
 )
-from linkage_ros.processes import Graph, MeasurementError
+from linkage_ros.processes import Graph, MeasurementError, private_domain
 
 SLOW, FAST = 1000.0, 10_000.0
 
@@ -81,7 +81,7 @@ def main() -> int:
         with TemporaryDirectory(prefix='linkage_ros_bench_') as name:
             folder = Path(name)
             # Below 102, so that the ports stay below the kernel's ephemeral ones.
-            graph = Graph(2 + os.getpid() % 100, folder)
+            graph = Graph(private_domain(), folder)
             if 'c' in wanted:
                 plan = _LATENCY_QUICK if arguments.quick else _LATENCY
                 tables.append(measure_latency(graph, folder, plan))

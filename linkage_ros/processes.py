@@ -22,8 +22,11 @@ process keeps running.
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, ExitStack
+import fcntl
+from functools import cache
 import json
 import os
 from pathlib import Path
@@ -31,8 +34,11 @@ import select
 import signal
 import subprocess
 import sys
+from tempfile import gettempdir
 import time
 from typing import Any
+
+from linkage_ros.errors import LinkageError
 
 _PATIENCE = 15.0
 """Time limit for an answer of a process, in [s]."""
@@ -51,9 +57,54 @@ _BOUNDED = (
 """Runs Python with the arguments after the first, for at most that many seconds."""
 
 
+_DOMAINS = range(1, 102)
+"""ROS domains whose ports are safe on every operating system."""
+
+
+@contextmanager
+def held_domain() -> Iterator[int]:
+    """
+    Hold a ROS domain that no other process of this machine holds.
+
+    Raises
+    ------
+    LinkageError
+        If all are held.
+
+    """
+    # From a place of its own, since other programs take the first ones.
+    first = os.getpid() % len(_DOMAINS)
+    for domain in (*_DOMAINS[first:], *_DOMAINS[:first]):
+        with _lock(domain) as held:
+            if held:
+                yield domain
+                return
+    raise LinkageError(
+        'ROS_DOMAIN_ID', f'{len(_DOMAINS)} graphs run on this machine', 'end some of them'
+    )
+
+
+@contextmanager
+def _lock(domain: int) -> Iterator[bool]:
+    """Lock the file of a domain; tell whether it could be locked."""
+    with ExitStack() as opened:
+        try:
+            file = opened.enter_context(
+                Path(gettempdir(), f'linkage_ros_domain_{domain}').open('w')
+            )
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:  # held by another process, or another user's
+            yield False
+        else:
+            yield True
+
+
+@cache
 def private_domain() -> int:
-    """Return a domain id for this process; its ports are safe on every operating system."""
-    return 1 + os.getpid() % 101
+    """Return the ROS domain that this process holds until its end, see `held_domain`."""
+    held = ExitStack()
+    atexit.register(held.close)
+    return held.enter_context(held_domain())
 
 
 class MeasurementError(Exception):

@@ -29,7 +29,6 @@ from collections import Counter
 from collections.abc import Callable
 import json
 from math import inf, nan
-import os
 from pathlib import Path
 from random import Random
 import re
@@ -42,7 +41,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from linkage_ros.files.linkage_file import load
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter
-from linkage_ros.processes import Graph, MeasurementError
+from linkage_ros.processes import Graph, MeasurementError, private_domain
 from linkage_ros.resources import shipped
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import (
@@ -194,7 +193,7 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
         linkage = shipped('linkages/four_bar.yaml')
         (folder / 'attacked.yaml').write_text(_SCENE.format(linkage=linkage))
         # Below 102, so that the ports stay below the kernel's ephemeral ones.
-        graph = Graph(2 + os.getpid() % 100, folder, longest=round(seconds) + 200)
+        graph = Graph(private_domain(), folder, longest=round(seconds) + 200)
         node_arguments = (
             *('--ros-args', '-p', f'scene:={folder / "attacked.yaml"}'),
             *('-p', f'runs_directory:={folder}', '-p', 'diagnostics_period:=0.5'),

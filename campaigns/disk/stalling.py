@@ -34,7 +34,7 @@ from campaigns.endurance.memory import Counts, counts_of
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.errors import BagError
-from linkage_ros.processes import Graph, MeasurementError
+from linkage_ros.processes import Graph, MeasurementError, private_domain
 
 _FREEZE, _THAW = 0xC0045877, 0xC0045878
 _DISK = Disk('ext4, 256 MiB', 'ext4', 256)
@@ -168,7 +168,7 @@ def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
         _SCENE.format(linkage=_LINKAGE, rate=plan.rate, folder=folder, queue=plan.queue)
     )
     # Below 102, so that the ports stay below the kernel's ephemeral ones.
-    graph = Graph(2 + os.getpid() % 100, work, longest=round(plan.seconds) + 60)
+    graph = Graph(private_domain(), work, longest=round(plan.seconds) + 60)
     arguments = ['--ros-args', '-p', f'scene:={scene}']
     module = 'linkage_ros.node.linkage_node'
     if file:

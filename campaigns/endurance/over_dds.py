@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 import json
-import os
 from pathlib import Path
 import subprocess
 import sys
@@ -31,7 +30,7 @@ from campaigns.campaign import progress_lines
 from campaigns.endurance.accelerated import SCENES
 from campaigns.endurance.memory import Counts, counts_of, shortcomings, Usage, usage
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.processes import Graph, MeasurementError
+from linkage_ros.processes import Graph, MeasurementError, private_domain
 from rosbags.typesys import get_typestore, Stores
 
 _CRANK_RATE = 500
@@ -82,7 +81,7 @@ def run(minutes: float) -> DdsRun:
         folder = Path(name)
         scene = _scene(folder, max(min(60.0, 6.0 * minutes), 1.0))
         # Below 102, so that the ports stay below the kernel's ephemeral ones.
-        graph = Graph(2 + os.getpid() % 100, folder, longest=round(60.0 * minutes) + 120)
+        graph = Graph(private_domain(), folder, longest=round(60.0 * minutes) + 120)
         done = DdsRun(minutes)
         try:
             _record(graph, scene, folder / 'bag', done)

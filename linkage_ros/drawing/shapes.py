@@ -169,30 +169,10 @@ class LinkFrame(NamedTuple):
 
 
 def link_frames(closure: Closure, position: Position) -> dict[str, LinkFrame]:
-    """
-    Return the frames of the links, and of the blocks of sliders that are not links.
-
-    Such a block has its frame at the slider's point, with the angle of the link it slides along.
-    """
-    points, angles = closure.points(position), closure.link_angles(position)
-    frames = {}
-    for link, named in closure.linkage.links.items():
-        point, (x, y) = next(iter(named.items()))
-        angle = angles[link]
-        frames[link] = LinkFrame(points[link, point] - complex(x, y) * rect(1.0, angle), angle)
-    for block, along, point in blocks(closure):
-        frames[block] = LinkFrame(points[block, point], angles[along])
-    return frames
-
-
-def blocks(closure: Closure) -> list[tuple[str, str, str]]:
-    """Return the blocks that are not links: name, link they slide along, the slider's point."""
-    links = closure.linkage.links
-    return [
-        (block, slider.along, slider.point)
-        for name, slider in closure.linkage.sliders.items()
-        if (block := closure.structure.blocks[name]) not in links
-    ]
+    """Return the frames of the links, and of the blocks of sliders that are not links."""
+    frames = closure.link_frames
+    moving = zip(frames.links, frames.at(position), strict=True)
+    return {GROUND: LinkFrame(0j, 0.0)} | {link: LinkFrame(*frame) for link, frame in moving}
 
 
 def driven_links(closure: Closure) -> set[str]:

@@ -22,6 +22,7 @@ from os import PathLike
 
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.files.linkage_file import closable, written_linkage
+from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.plan import assembly_sides
@@ -56,6 +57,11 @@ def assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
     """
     file = named_file(linkage, 'linkages')
     content, _ = read_yaml(file)
+    return closures(content, file.stem)
+
+
+def closures(content: Section, name: str) -> dict[str, Closure]:
+    """Return the closures of a linkage file by name, as `assemblies` does."""
     written, shorthand = written_linkage(content)
     try:
         sides = assembly_sides(assur_groups(written))
@@ -77,7 +83,7 @@ def assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
         text = ', '.join(chosen if shorthand else (f'{k}: {v}' for k, v in assembly.items()))
         text = f'assembly: {text if shorthand else f"{{{text}}}"}'
         try:
-            found[text] = closable(content, one, file.stem, shorthand)
+            found[text] = closable(content, one, name, shorthand)
         except FileError as error:
             errors.append(error)
     if not found:

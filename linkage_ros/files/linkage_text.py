@@ -75,7 +75,7 @@ def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
 
     """
     lines = list(_comment(comment))
-    for key, value in _content(linkage).items():
+    for key, value in content_of(linkage).items():
         lines += _entry(key, value, '', in_rows=key in _IN_ROWS)
     return '\n'.join(lines) + '\n'
 
@@ -119,7 +119,7 @@ _IN_ROWS = ('links', 'sliders', 'joints', 'masses')
 """Keys whose parts have a line each, even if short."""
 
 
-def _content(linkage: Linkage) -> dict[str, Content]:
+def content_of(linkage: Linkage) -> dict[str, Content]:
     """Return the content of the file in its order, without optional entries that are empty."""
     inputs: list[Content] = [_input(given) for given in linkage.inputs]
     content: dict[str, Content] = {

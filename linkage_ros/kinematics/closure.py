@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.compiling.linkage import Compiled
     from linkage_ros.kinematics.compiling.solve import Solver
     from linkage_ros.kinematics.compiling.trace import Wanted
+    from linkage_ros.kinematics.link_frames import LinkFrames
     from linkage_ros.kinematics.point_tracker import PointTracker
     from numpy.typing import ArrayLike
 
@@ -383,6 +384,15 @@ class Closure:
         )
 
         return PointTracker(self._known, points)
+
+    @cached_property
+    def link_frames(self) -> LinkFrames:
+        """The frames of the links and blocks that move."""
+        from linkage_ros.kinematics.link_frames import (
+            LinkFrames,  # local import: only drawings need it
+        )
+
+        return LinkFrames(self)
 
     def link_angles(self, position: Position) -> dict[str, float]:
         """Return the angle of every link to the ground, in [rad], not wrapped."""

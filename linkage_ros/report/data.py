@@ -32,24 +32,18 @@ instead.
 from __future__ import annotations
 
 from base64 import b64encode
-from cmath import rect
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing.curves import traced_carriers
-from linkage_ros.drawing.figure import all_places, symbol_size, View, view
-from linkage_ros.drawing.painting import COLOURS, corners, FACES, INK, outline
+from linkage_ros.drawing.drawing_data import drawn_in_frames
+from linkage_ros.drawing.figure import view
+from linkage_ros.drawing.painting import COLOURS, FACES, INK
 from linkage_ros.drawing.shapes import (
-    blocks,
-    carried_shapes,
-    Circle,
     link_frames,
-    LinkFrame,
-    Segment,
-    Shape,
 )
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.link_frames import blocks
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
@@ -123,9 +117,9 @@ def poses(
         found, reason = _by_joints(grow(linkage, names), prefix, known), ''
     except DefinitionError as error:
         found, reason = _by_closing(closure, [known[name] for name in inputs]), error.reason
-    for block, along, point in blocks(closure):
-        link = next(link for link, named in linkage.links.items() if point in named)
-        found.setdefault(block, (_at(found, link, linkage.links[link][point]), found[along][1]))
+    for block in blocks(closure):
+        place = _at(found, block.link, linkage.links[block.link][block.point])
+        found.setdefault(block.name, (place, found[block.along][1]))
     links = tuple(link for link in found if link != GROUND)
     count = len(next(iter(values.values()), np.empty(0)))
     frames = np.full((count, len(links), 3), np.nan)
@@ -166,7 +160,7 @@ def _by_joints(tree: Tree, prefix: str, values: Mapping[str, Numbers]) -> _Found
 
 
 def _by_closing(closure: Closure, inputs: Sequence[Numbers]) -> _Found:
-    links = (*closure.linkage.links, *(block for block, _, _ in blocks(closure)))
+    links = (*closure.linkage.links, *(block.name for block in blocks(closure)))
     count = len(inputs[0])
     found = {link: (np.full(count, np.nan + 0j), np.full(count, np.nan + 0j)) for link in links}
     for i, given in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
@@ -424,61 +418,3 @@ def facts_of_thinning(run: Run) -> Iterator[str]:
         yield f'every one of {", ".join(titles)}'
     if run.frames is not None and run.frames.step > 1:
         yield f'of the moving picture one joint state of every {run.frames.step:,}'
-
-
-_DIGITS = 6
-"""Significant digits of places: a thousandth of a pixel."""
-
-
-def drawn_in_frames(shown: View) -> dict[str, Any]:
-    """
-    Return the drawing of a linkage as JSON data; lengths are in [m].
-
-    ``shapes`` come in the order in which they are painted. Each has the ``link`` of its frame, its
-    ``role`` (see `linkage_ros.drawing.shapes`), and ``points``, x and y in turn: of a circle its
-    centre, with a ``radius``; of a segment its ends; of an area its corners, with ``closed``.
-    ``frame`` is the lower left and upper right corner of the drawing, ``size`` half the width of a
-    bar, ``paths`` the curves of the traced points over the range of the input.
-    """
-    size = symbol_size(shown)
-    frames = link_frames(shown.closure, shown.position)
-    drawn = carried_shapes(shown.closure, shown.position, size, shown.sweep.travels)
-    reached = [*all_places(shown), *(p for _, shape in drawn for p in outline(shape))]
-    low, high = corners(reached)
-    margin = 2.0 * size * (1 + 1j)
-    return {
-        'size': _short(size),
-        'frame': _flat([low - margin, high + margin]),
-        'shapes': [_shape(link, shape, frames) for link, shape in drawn],
-        'paths': {name: _flat(path) for name, path in shown.sweep.paths.items()}
-        if len(shown.closure.linkage.inputs) == 1
-        else {},
-        'traced': [
-            {'point': name, 'link': link, 'at': list(shown.closure.linkage.links[link][name])}
-            for name, link in traced_carriers(shown.closure.linkage).items()
-        ],
-    }
-
-
-def _shape(link: str, shape: Shape, frames: Mapping[str, LinkFrame]) -> dict[str, Any]:
-    # The frame of the ground is that of the drawing.
-    frame = LinkFrame(0j, 0.0) if link == GROUND else frames[link]
-    back = rect(1.0, -frame.angle)
-
-    def within(places: Sequence[complex]) -> list[float]:
-        return _flat([(place - frame.place) * back for place in places])
-
-    data: dict[str, Any] = {'link': link, 'role': shape.role, 'name': shape.name}
-    if isinstance(shape, Circle):
-        return {**data, 'points': within([shape.centre]), 'radius': _short(shape.radius)}
-    if isinstance(shape, Segment):
-        return {**data, 'points': within([shape.start, shape.end])}
-    return {**data, 'points': within(shape.corners), 'closed': True}
-
-
-def _flat(places: Sequence[complex]) -> list[float]:
-    return [_short(value) for place in places for value in (place.real, place.imag)]
-
-
-def _short(value: float) -> float:
-    return float(f'{value:.{_DIGITS}g}')

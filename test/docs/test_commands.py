@@ -24,6 +24,7 @@ import shutil
 import subprocess
 import sys
 
+from linkage_ros.processes import private_domain
 import pytest
 
 from .blocks import Block, blocks, COMMANDS, commands, missing, PAGES, ROOT
@@ -64,7 +65,7 @@ def environment(folder: Path) -> dict[str, str]:
         'PATH': f'{HERE}{os.pathsep}{clean["PATH"]}',
         'HOME': str(folder.parent),
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'ROS_DOMAIN_ID': str(1 + (os.getpid() + 50) % 101),
+        'ROS_DOMAIN_ID': str(private_domain()),
         'ROS_LOG_DIR': str(folder.parent / 'log'),
         'RCUTILS_COLORIZED_OUTPUT': '0',
         'MPLBACKEND': 'agg',

@@ -26,7 +26,9 @@ LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 if find_spec('rclpy') is None:
     collect_ignore_glob = ['test_*.py']
 else:
-    from .graph import Graph, NodeProcess, own_domain
+    from linkage_ros.processes import held_domain
+
+    from .graph import Graph, NodeProcess
 
     # Read when the middleware is loaded; without it, discovery leaves the machine.
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
@@ -40,8 +42,8 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope='module')
 def domain():
-    """Return a ROS domain that nobody else is on."""
-    with own_domain() as domain:
+    """Return a ROS domain that no other process is on."""
+    with held_domain() as domain:
         yield domain
 
 

@@ -19,18 +19,15 @@ The tests' own end of a ROS graph, in plain rclpy, and nodes as real processes.
 Nothing of the package is used here: what a node says is seen as any other program would see it.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-import fcntl
+from collections.abc import Callable, Sequence
 import os
 from pathlib import Path
 import signal
 import subprocess
 import sys
-from tempfile import gettempdir
 from threading import Event, Thread
 import time
-from typing import Any, IO
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import rclpy
@@ -52,32 +49,6 @@ def wait_for(condition: Callable[[], Any], what: str, patience: float = PATIENCE
         assert time.monotonic() < end, f'waited {patience} s in vain for {what}'
         time.sleep(0.01)
     return value
-
-
-@contextmanager
-def own_domain() -> Iterator[int]:
-    """Hold a domain that no other run of the tests on this machine uses."""
-    numbers = ((os.getpid() + number) % 101 + 1 for number in range(101))
-    for domain, lock in ((number, _lock(number)) for number in numbers):
-        if lock is not None:
-            with lock:
-                yield domain
-            return
-    raise RuntimeError('every ROS domain is taken by another run of the tests')
-
-
-def _lock(domain: int) -> IO[str] | None:
-    path = Path(gettempdir(), f'linkage_ros_tests_domain_{domain}')
-    try:
-        lock = path.open('w')
-    except OSError:  # another user's
-        return None
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        lock.close()
-        return None
-    return lock
 
 
 def crank(

@@ -26,12 +26,11 @@ import re
 from xml.etree import ElementTree as ET
 
 from linkage_ros.node.node import LinkageNode
+from linkage_ros.processes import held_domain
 import pytest
 import rclpy
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
-
-from .graph import own_domain
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / 'config' / 'scenes').glob('*.yaml'))
@@ -66,7 +65,7 @@ def graph_of():
 
         def graph_of(scene):
             # One domain for each: a namesake that has just ended stays in the graph for a while.
-            domain = domains.enter_context(own_domain())
+            domain = domains.enter_context(held_domain())
             context = rclpy.Context()
             rclpy.init(context=context, domain_id=domain)
             overrides = [Parameter('scene', value=str(scene))]

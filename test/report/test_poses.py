@@ -28,7 +28,8 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.report.data import drawn_in_frames, page_data, poses
+from linkage_ros.drawing.drawing_data import drawn_in_frames
+from linkage_ros.report.data import page_data, poses
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 import numpy as np

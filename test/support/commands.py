@@ -42,6 +42,7 @@ import time
 
 import linkage_ros
 from linkage_ros.cli.main import main
+from linkage_ros.processes import private_domain
 
 # What commands import only where they need it.
 LIBRARIES = (
@@ -66,7 +67,7 @@ def environment(folder: Path) -> dict[str, str]:
     """Return what a process of the tests sees; `linkage demo` chooses its own ROS domain."""
     return os.environ | {
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'ROS_DOMAIN_ID': str(1 + os.getpid() % 101),
+        'ROS_DOMAIN_ID': str(private_domain()),
         'ROS_LOG_DIR': str(folder),
         'RCUTILS_COLORIZED_OUTPUT': '0',
     }

@@ -40,8 +40,24 @@ function copysign(size, sign) {
 """
 
 
+_FOR_A_PAGE = ('joints', 'rates', 'accelerations', 'frames', 'frameRates')
+"""What the function of a page returns beside its status."""
+
+
 class JavaScript(Language):
-    """JavaScript as an ECMAScript 2015 module."""
+    """
+    JavaScript as an ECMAScript 2015 module.
+
+    Parameters
+    ----------
+    for_page
+        Whether a page of this package runs it: it exports nothing, and returns frames too.
+
+    """
+
+    def __init__(self, *, for_page: bool = False) -> None:
+        self._export = '' if for_page else 'export '
+        self._names = _FOR_A_PAGE if for_page else RETURNED
 
     functions: ClassVar[dict[str, str]] = {
         '**': 'Math.pow',
@@ -61,20 +77,22 @@ class JavaScript(Language):
     def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
         arrays = (
             f', {name}: [{", ".join(group)}]'
-            for name, group in zip(RETURNED, groups, strict=False)
+            for name, group in zip(self._names, groups, strict=False)
         )
         return [f'return {{status: {status}{"".join(arrays)}}};']
 
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
-        given, returned = (names[: 1 + subject.derivatives] for names in (GIVEN, RETURNED))
+        given = GIVEN[: 1 + subject.derivatives]
+        returned = self._names if subject.frames else self._names[: 1 + subject.derivatives]
         empty = ', '.join(f'{name}: []' for name in returned)
         comment = (f' * {line.replace("*/", "* /")}'.rstrip() for line in (*head, *_NOTES))
         statuses = (f'    {status}: {number},' for number, status in enumerate(STATUSES))
         name = self.function(subject.derivatives)
         lines = [
-            '/*', *comment, ' */', '', 'export const Status = Object.freeze({', *statuses, '});',
+            '/*', *comment, ' */', '',
+            f'{self._export}const Status = Object.freeze({{', *statuses, '});',
             '', 'function nothing(status) {', f'    return {{status, {empty}}};', '}',
             *(_COPYSIGN.splitlines() if any('copysign(' in line for line in body) else ()), '',
-            f'export function {name}({", ".join(given)}) {{', *body, '}',
+            f'{self._export}function {name}({", ".join(given)}) {{', *body, '}',
         ]  # fmt: skip
         return '\n'.join([*lines, ''])

@@ -89,6 +89,9 @@ class Subject(NamedTuple):
         0: positions; 1: velocities too; 2: accelerations too.
     joints
         The requested published joints.
+    frames
+        Whether the frames of links and their rates are wanted too; for JavaScript of a page, with
+        two derivatives.
 
     """
 
@@ -97,6 +100,7 @@ class Subject(NamedTuple):
     file: str
     derivatives: int
     joints: tuple[str, ...]
+    frames: bool = False
 
 
 class Language(ABC):
@@ -191,12 +195,23 @@ def source(subject: Subject, language: Language) -> str:
 
     def wanted(motion: Motion) -> list[list[float]]:
         groups = [[part.joints[i] for i in asked] for part in motion if part is not None]
+        if subject.frames:
+            groups += frames(closure, motion)
         return [*groups, [motion.position.joints[i] for i in bounded]]
 
     compiled = program(closure, subject.derivatives, wanted)
     body = _Body(subject, language, compiled)
     head = _head(subject, language.function(subject.derivatives))
     return language.whole(subject, list(head), body.lines())
+
+
+def frames(closure: Closure, motion: Motion) -> list[list[Any]]:
+    """Return x, y and angle of the frame of each link that moves, and their rates if known."""
+    of = closure.link_frames
+    groups = [of.at(motion.position)]
+    if motion.velocity is not None:
+        groups.append(of.rates(motion.position, motion.velocity))
+    return [[n for place, turn in each for n in (place.real, place.imag, turn)] for each in groups]
 
 
 class _Body:

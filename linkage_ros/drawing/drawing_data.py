@@ -1,0 +1,90 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A drawing as data for pages: shapes in the frames of the links that carry them."""
+
+from __future__ import annotations
+
+from cmath import rect
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from linkage_ros.drawing.curves import traced_carriers
+from linkage_ros.drawing.figure import all_places, symbol_size, View
+from linkage_ros.drawing.painting import corners, outline
+from linkage_ros.drawing.shapes import (
+    carried_shapes,
+    Circle,
+    link_frames,
+    LinkFrame,
+    Segment,
+    Shape,
+)
+
+_DIGITS = 6
+"""Significant digits of places: a thousandth of a pixel."""
+
+
+def drawn_in_frames(shown: View) -> dict[str, Any]:
+    """
+    Return the drawing of a linkage as JSON data; lengths are in [m].
+
+    ``shapes`` come in the order in which they are painted. Each has the ``link`` of its frame, its
+    ``role`` (see `linkage_ros.drawing.shapes`), and ``points``, x and y in turn: of a circle its
+    centre, with a ``radius``; of a segment its ends; of an area its corners, with ``closed``.
+    ``frame`` is the lower left and upper right corner of the drawing, ``size`` half the width of a
+    bar, ``paths`` the curves of the traced points over the range of the input.
+    """
+    size = symbol_size(shown)
+    frames = link_frames(shown.closure, shown.position)
+    drawn = carried_shapes(shown.closure, shown.position, size, shown.sweep.travels)
+    reached = [*all_places(shown), *(p for _, shape in drawn for p in outline(shape))]
+    low, high = corners(reached)
+    margin = 2.0 * size * (1 + 1j)
+    return {
+        'size': _short(size),
+        'frame': _flat([low - margin, high + margin]),
+        'shapes': [_shape(link, shape, frames) for link, shape in drawn],
+        'paths': {name: _flat(path) for name, path in shown.sweep.paths.items()}
+        if len(shown.closure.linkage.inputs) == 1
+        else {},
+        'traced': [
+            {'point': name, 'link': link, 'at': list(shown.closure.linkage.links[link][name])}
+            for name, link in traced_carriers(shown.closure.linkage).items()
+        ],
+    }
+
+
+def _shape(link: str, shape: Shape, frames: Mapping[str, LinkFrame]) -> dict[str, Any]:
+    frame = frames[link]
+    back = rect(1.0, -frame.angle)
+
+    def within(places: Sequence[complex]) -> list[float]:
+        return _flat([(place - frame.place) * back for place in places])
+
+    data: dict[str, Any] = {'link': link, 'role': shape.role, 'name': shape.name}
+    if isinstance(shape, Circle):
+        return {**data, 'points': within([shape.centre]), 'radius': _short(shape.radius)}
+    if isinstance(shape, Segment):
+        return {**data, 'points': within([shape.start, shape.end])}
+    return {**data, 'points': within(shape.corners), 'closed': True}
+
+
+def _flat(places: Sequence[complex]) -> list[float]:
+    return [_short(value) for place in places for value in (place.real, place.imag)]
+
+
+def _short(value: float) -> float:
+    return float(f'{value:.{_DIGITS}g}')

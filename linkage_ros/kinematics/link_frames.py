@@ -1,0 +1,96 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Position and rate of the frame of each link, of numbers and of symbols alike."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TYPE_CHECKING
+
+from linkage_ros.kinematics.linkage import GROUND
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics.results import Position, Velocity
+
+
+class Block(NamedTuple):
+    """The block of a slider: its name, the link along which it slides, its point and whose."""
+
+    name: str
+    along: str
+    point: str
+    link: str
+
+
+class LinkFrames:
+    """
+    The frames of the links that move, and of the blocks of sliders that are not links.
+
+    Such a block has its frame at the slider's point, with the angle of the link it slides along.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+
+    Attributes
+    ----------
+    links
+        Names of the links and blocks, in the order of the frames.
+
+    """
+
+    def __init__(self, closure: Closure) -> None:
+        carriers = {link: (link, 0j, link) for link in closure.linkage.links if link != GROUND} | {
+            block.name: (
+                block.link,
+                complex(*closure.linkage.links[block.link][block.point]),
+                block.along,
+            )
+            for block in blocks(closure)
+        }
+        self.links = tuple(carriers)
+        self._tracker = closure.point_tracker([(link, at) for link, at, _ in carriers.values()])
+        self._angles = [closure.angles[turning] for _, _, turning in carriers.values()]
+
+    def at(self, position: Position) -> list[tuple[Any, Any]]:
+        """Return the origin of each frame, as x + iy in [m], and its angle, in [rad]."""
+        places = self._tracker.places(position)
+        x = position.state.coordinates
+        return [
+            (places[index], x[angle.coordinate] + angle.constant)
+            for index, angle in zip(self._tracker.indices, self._angles, strict=True)
+        ]
+
+    def rates(self, position: Position, velocity: Velocity) -> list[tuple[Any, Any]]:
+        """Return the velocity of each origin, in [m/s], and the rate of the angle, in [rad/s]."""
+        places = self._tracker.places(position)
+        velocities = self._tracker.velocities(position, velocity, places)
+        v = velocity.state.coordinates
+        return [
+            (velocities[index], v[angle.coordinate])
+            for index, angle in zip(self._tracker.indices, self._angles, strict=True)
+        ]
+
+
+def blocks(closure: Closure) -> list[Block]:
+    """Return the blocks that are not links."""
+    links = closure.linkage.links
+    carriers = {point: link for link, points in reversed(links.items()) for point in points}
+    return [
+        Block(block, slider.along, slider.point, carriers[slider.point])
+        for name, slider in closure.linkage.sliders.items()
+        if (block := closure.structure.blocks[name]) not in links
+    ]

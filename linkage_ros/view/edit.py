@@ -1,0 +1,439 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a hand on the page changes: a pin that is dragged, a length that is typed, another input.
+
+Each edit makes a new linkage of the old one; `files.linkage_rewriting` writes it into the text.
+A link whose first point is the origin of its frame, and whose second lies on its x axis, keeps
+that form: when one of the two is moved, its frame turns with them, and its centre of mass keeps
+its share of the length. A pin in a slot moves along the slot.
+"""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import islice, product
+from math import copysign, floor, isfinite, log10, tau
+from typing import Any, NamedTuple
+
+from linkage_ros.errors import (
+    DefinitionError,
+    did_you_mean,
+    FileError,
+    LinkageError,
+    listed,
+    quoted,
+)
+from linkage_ros.files.linkage_file import FARTHEST, written_linkage
+from linkage_ros.files.linkage_rewriting import rewritten
+from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage, RevoluteJoint
+from linkage_ros.kinematics.plan import assembly_sides
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.kinematics.topology import assur_groups
+
+_NAME = 'the page'
+_ROUNDED = 1e-10
+"""Coordinates are written so finely, relative to the linkage's size."""
+
+_SAME = 1e-6
+"""Pins are in the same place if they are so near, relative to the linkage's size."""
+
+_MOST_ASSEMBLIES = 64
+"""Most assemblies among which the one of the pose is sought."""
+
+
+class Edited(NamedTuple):
+    """The text after an edit, and the inputs at which the linkage is as it was shown."""
+
+    text: str
+    inputs: tuple[float, ...]
+
+
+class _Shown(NamedTuple):
+    """The linkage before the edit, in the pose that the page shows."""
+
+    closure: Closure
+    inputs: tuple[float, ...]
+    frames: dict[str, tuple[complex, float]]
+    pins: dict[str, complex]
+
+
+class _Change(NamedTuple):
+    """A changed linkage, and where its pins and inputs are now; pins as before if None."""
+
+    linkage: Linkage
+    pins: dict[str, complex] | None = None
+    inputs: tuple[float, ...] | None = None
+
+
+def edited(text: str, edit: Mapping[str, Any], name: str = _NAME) -> Edited:
+    """
+    Return the text of a linkage file after an edit; whether it still closes, its model tells.
+
+    Parameters
+    ----------
+    text
+        The text before.
+    edit
+        One kind with its values, such as ``{'side': {'B': 'right'}}``; and ``inputs``, at which
+        the page shows the linkage. Places and lengths are in [m], angles in [rad].
+    name
+        Name of the file, for errors.
+
+    Raises
+    ------
+    FileError
+        If the text is not that of a linkage.
+    LinkageError
+        If there is no such edit, or it does not fit to the linkage.
+
+    """
+    kind = next((key for key in edit if key in _KINDS), None)
+    if kind is None:
+        raise LinkageError('edit', f'{quoted(dict(edit))} is no edit', f'send {listed(_KINDS)}')
+    written, _ = written_linkage(parse_yaml(text.encode(), name))
+    closure = Closure(written)
+    shown = _shown(closure, edit.get('inputs'))
+    change = _KINDS[kind](shown, edit)
+    pins, inputs = change.pins or shown.pins, change.inputs or shown.inputs
+    linkage = change.linkage
+    if kind in ('pin', 'input'):
+        linkage = _in_pose(linkage, inputs, pins, closure.scale)
+    return Edited(rewritten(text, name, linkage), inputs)
+
+
+def pin_of(error: LinkageError, text: str) -> str | None:
+    """Return the pin, slider or link that an error concerns; None if it names none."""
+    try:
+        written, _ = written_linkage(parse_yaml(text.encode(), _NAME))
+    except LinkageError:
+        return None
+    names = {*carriers(written.links), *written.sliders, *written.links}
+    where = error.key if isinstance(error, FileError) else error.where
+    return next((part for part in reversed(str(where).split('.')) if part in names), None)
+
+
+def _shown(closure: Closure, given: Any) -> _Shown:
+    count = len(closure.linkage.inputs)
+    inputs = usual_inputs(closure) if given is None else _numbers('inputs', given, count)
+    position = closure.position(*inputs)
+    if not position.status.has_pose:
+        inputs = usual_inputs(closure)
+        position = closure.position(*inputs)
+    frames: dict[str, tuple[complex, float]] = {GROUND: (0j, 0.0)}
+    found = closure.link_frames
+    frames |= dict(zip(found.links, found.at(position), strict=True))
+    points = closure.points(position)
+    return _Shown(closure, inputs, frames, {point: place for (_, point), place in points.items()})
+
+
+def _move_pin(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+    """Move a pin in the world; all others stay where they are."""
+    linkage = shown.closure.linkage
+    pin = _named('pin', edit['pin'], shown.pins)
+    to = complex(*_numbers('to', edit.get('to'), 2))
+    snap = edit.get('snap') or 0.0
+    if snap:
+        (snap,) = _numbers('snap', [snap], 1)
+        to = complex(*(snap * round(part / snap) for part in (to.real, to.imag)))
+    for name, slider in linkage.sliders.items():
+        if slider.point == pin and _stands(linkage, name):
+            to = _on_line(shown, name, to)
+    pins = {**shown.pins, pin: to}
+    links, masses = dict(linkage.links), dict(linkage.masses)
+    moved_blocks = {slider.block for slider in linkage.sliders.values() if slider.point == pin}
+    turned: dict[str, float] = {}
+    for link, points in linkage.links.items():
+        if pin not in points or link in moved_blocks:
+            continue
+        place, angle = shown.frames[link]
+        frame = _own_frame(linkage, link, pin)
+        if frame:
+            one, other = (pins[name] for name in frame)
+            if one == other:
+                reason = f'{frame[0]} and {frame[1]} of {link} would be in one place'
+                raise LinkageError(pin, reason, 'move it elsewhere')
+            # The turn nearest to the old one: an input keeps its whole turns.
+            new = angle + (phase(other - one) - angle + tau / 2) % tau - tau / 2
+            turned[link] = new - angle
+            if link in masses:
+                longer = abs(other - one) / points[frame[1]][0]
+                x, y = masses[link].center
+                centre = (_rounded(shown, x * longer), y)
+                masses[link] = replace(masses[link], center=centre)
+            place, angle = one, new
+        links[link] = {
+            name: at
+            if not frame and name != pin
+            else _on_axis(_local(shown, pins[name], place, angle), name, frame)
+            for name, at in points.items()
+        }
+    inputs = [
+        _slide(shown, given.slider, pins, value)
+        if given.slider
+        else value + turned.get(given.child, 0.0) - turned.get(given.parent, 0.0)
+        for given, value in zip(linkage.inputs, shown.inputs, strict=True)
+    ]
+    changed = replace(linkage, links=links, masses=masses)
+    if linkage.pose is not None:
+        changed = replace(changed, pose=replace(linkage.pose, inputs=tuple(inputs), points={
+            name: (pins[name].real, pins[name].imag) for name in linkage.pose.points
+        }))  # fmt: skip
+    return _Change(changed, pins, tuple(inputs))
+
+
+def _own_frame(linkage: Linkage, link: str, pin: str) -> tuple[str, str] | None:
+    """Return the two points that make the frame of a link, if the pin is one of them."""
+    points = list(linkage.links[link])
+    if link == GROUND or len(points) < 2:
+        return None
+    if any(link in (slider.along, slider.block) for slider in linkage.sliders.values()):
+        return None  # its frame also has the line of a slider
+    one, other = points[:2]
+    (x, y), (u, v) = linkage.links[link][one], linkage.links[link][other]
+    return (one, other) if x == y == v == 0.0 < u and pin in (one, other) else None
+
+
+def _on_axis(
+    at: tuple[float, float], name: str, frame: tuple[str, str] | None
+) -> tuple[float, float]:
+    """Return a place without rounding errors: the points that make the frame lie on its axis."""
+    if frame is None or name not in frame:
+        return at
+    return (0.0, 0.0) if name == frame[0] else (at[0], 0.0)
+
+
+def _local(shown: _Shown, to: complex, place: complex, angle: float) -> tuple[float, float]:
+    """Return a place in the frame of a link, rounded."""
+    at = (to - place) * rect(1.0, -angle)
+    return _rounded(shown, at.real), _rounded(shown, at.imag)
+
+
+def _rounded(shown: _Shown, value: float) -> float:
+    return round(value, -floor(log10(shown.closure.scale * _ROUNDED)))
+
+
+def _stands(linkage: Linkage, name: str) -> bool:
+    """Return whether the line of a slider stands where it is, whatever its point does."""
+    along = linkage.sliders[name].along
+    pins = carriers(linkage.links)
+    return along == GROUND or sum(len(pins[point]) > 1 for point in linkage.links[along]) > 1
+
+
+def _on_line(shown: _Shown, name: str, to: complex) -> complex:
+    """Return the nearest place on the line of a slider."""
+    slider = shown.closure.linkage.sliders[name]
+    way = slider.unit * rect(1.0, shown.frames[slider.along][1])
+    through = shown.pins[slider.through]
+    return through + way * ((to - through) * way.conjugate()).real
+
+
+def _slide(shown: _Shown, name: str, pins: Mapping[str, complex], before: float) -> float:
+    """Return the slide of a driven slider, of which an end may have moved."""
+    slider = shown.closure.linkage.sliders[name]
+    between = pins[slider.point] - pins[slider.through]
+    if not _stands(shown.closure.linkage, name):
+        return copysign(abs(between), before)  # the line follows its point
+    way = slider.unit * rect(1.0, shown.frames[slider.along][1])
+    return (between * way.conjugate()).real
+
+
+def _length(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+    """Move a point of a link along the line to another one, so that they are so far apart."""
+    given = _mapping('length', edit)
+    linkage = shown.closure.linkage
+    link, points = _link(linkage, given)
+    one, other = (_named(key, given.get(key), points) for key in ('from', 'to'))
+    (length,) = _numbers('value', [given.get('value')], 1)
+    start, end = complex(*points[one]), complex(*points[other])
+    if length <= 0.0 or start == end:
+        raise LinkageError(
+            f'links.{link}.{other}', f'{length:g} m is no length', 'type one above 0'
+        )
+    to = start + (end - start) * (length / abs(end - start))
+    return _placed(shown, link, other, (to.real, to.imag))
+
+
+def _place(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+    given = _mapping('place', edit)
+    link, points = _link(shown.closure.linkage, given)
+    point = _named('point', given.get('point'), points)
+    x, y = _numbers('at', given.get('at'), 2)
+    return _placed(shown, link, point, (x, y))
+
+
+def _placed(shown: _Shown, link: str, point: str, at: tuple[float, float]) -> _Change:
+    linkage = shown.closure.linkage
+    links = {**linkage.links, link: {**linkage.links[link], point: at}}
+    return _Change(replace(linkage, links=links))
+
+
+def _trace(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+    given = _mapping('trace', edit)
+    linkage = shown.closure.linkage
+    link, points = _link(linkage, given)
+    x, y = _numbers('at', given.get('at'), 2)
+    taken = {*carriers(linkage.links), *linkage.sliders, *linkage.links}
+    free = (f'P{number or ""}' for number in range(len(taken) + 1))
+    name = given.get('name', next(name for name in free if name not in taken))
+    if not isinstance(name, str) or name in taken:
+        raise LinkageError('name', f'{quoted(name)} is taken, or no name', 'send another name')
+    points = {**points, name: (_rounded(shown, x), _rounded(shown, y))}
+    links = {**linkage.links, link: points}
+    return _Change(replace(linkage, links=links, traced=(*linkage.traced, name)))
+
+
+def _untrace(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+    """Trace a point no more; one that nothing else needs goes."""
+    linkage = shown.closure.linkage
+    name = _named('untrace', edit['untrace'], linkage.traced)
+    carried = carriers(linkage.links)[name]
+    links = dict(linkage.links)
+    needed = {end for s in linkage.sliders.values() for end in (s.point, s.through)}
+    if len(carried) == 1 and name not in needed and len(links[carried[0]]) > 2:
+        (link,) = carried
+        links[link] = {point: at for point, at in links[link].items() if point != name}
+    traced = tuple(point for point in linkage.traced if point != name)
+    return _Change(replace(linkage, links=links, traced=traced))
+
+
+def _input(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+    """Drive another link on the ground; the joint that it had is published no more."""
+    given = _mapping('input', edit)
+    linkage = shown.closure.linkage
+    link, points = _link(linkage, given)
+    if len(linkage.inputs) != 1:
+        raise LinkageError('input', 'this linkage has several', 'change them in the file')
+    (old,) = linkage.inputs
+    if link == GROUND or not {*points} & {*linkage.links[GROUND]}:
+        raise LinkageError(link, 'has no pin on the ground', 'choose a link that has one')
+    if old.slider or old.parent != GROUND:
+        raise LinkageError('input', f'{old.joint} is no crank on the ground', 'change the file')
+    if link == old.child:
+        return _Change(linkage)
+    joints = {
+        name: joint
+        for name, joint in linkage.joints.items()
+        if not (isinstance(joint, RevoluteJoint) and (joint.parent, joint.child) == (GROUND, link))
+    }
+    name = next((name for name in linkage.joints if name not in joints), f'{link}_joint')
+    joints = {old.joint: RevoluteJoint(GROUND, old.child, old.limits), **joints}
+    limits = next((linkage.joints[n].limits for n in linkage.joints if n == name), None)
+    driven = replace(old, joint=name, child=link)
+    if limits is not None:
+        driven = replace(driven, limits=limits)
+    inputs = (shown.frames[link][1],)
+    changed = replace(linkage, inputs=(driven,), joints=joints)
+    if linkage.pose is not None:
+        changed = replace(changed, pose=replace(linkage.pose, inputs=inputs))
+    return _Change(changed, inputs=inputs)
+
+
+def _side(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+    linkage = shown.closure.linkage
+    possible = assembly_sides(shown.closure.structure)
+    given = _mapping('side', edit)
+    for key, side in given.items():
+        _named('side', key, possible)
+        if side not in possible[key]:
+            remedy = f'choose {" or ".join(possible[key])}'
+            raise LinkageError(f'assembly.{key}', f'{quoted(side)} is no side of it', remedy)
+    return _Change(replace(linkage, assembly={**linkage.assembly, **given}))
+
+
+_KINDS: dict[str, Callable[[_Shown, Mapping[str, Any]], _Change]] = {
+    'pin': _move_pin,
+    'length': _length,
+    'place': _place,
+    'trace': _trace,
+    'untrace': _untrace,
+    'input': _input,
+    'side': _side,
+}
+
+
+def _in_pose(
+    linkage: Linkage, inputs: tuple[float, ...], pins: Mapping[str, complex], scale: float
+) -> Linkage:
+    """Return a linkage in the assembly in which its pins are where they are shown."""
+    try:
+        sides = assembly_sides(assur_groups(linkage))
+    except DefinitionError:  # the check of the text tells it with its place
+        return linkage
+    written = {name: side for name, side in linkage.assembly.items() if name in sides}
+    # First the assembly that is written.
+    own = [sorted(sides[name], key=lambda side, name=name: side != written.get(name))
+           for name in sides]  # fmt: skip
+    best, nearest = replace(linkage, assembly=written), float('inf')
+    for chosen in islice(product(*own), _MOST_ASSEMBLIES):
+        one = replace(linkage, assembly=dict(zip(sides, chosen, strict=True)))
+        try:
+            closure = Closure(one)
+            position = closure.position(*inputs)
+            points = closure.points(position) if position.status.has_pose else {}
+        except DefinitionError:
+            continue
+        if not points:
+            continue
+        far = max(abs(place - pins[point]) for (_, point), place in points.items())
+        if far < nearest:
+            best, nearest = one, far
+        if far < _SAME * scale:
+            break
+    return best
+
+
+def _mapping(key: str, edit: Mapping[str, Any]) -> Mapping[str, Any]:
+    given = edit[key]
+    if not isinstance(given, dict):
+        raise LinkageError(key, f'{quoted(given)} is no object', 'send an object')
+    return given
+
+
+def _link(
+    linkage: Linkage, given: Mapping[str, Any]
+) -> tuple[str, Mapping[str, tuple[float, float]]]:
+    link = _named('link', given.get('link'), linkage.links)
+    return link, linkage.links[link]
+
+
+def _named(key: str, name: Any, names: Any) -> str:
+    if not isinstance(name, str) or name not in names:
+        raise LinkageError(
+            key,
+            f'{quoted(name)} is not there',
+            did_you_mean(str(name), list(names), f'send one of {listed(names)}'),
+        )
+    return name
+
+
+def _numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
+    if (
+        not isinstance(values, list | tuple)
+        or len(values) != count
+        or not all(
+            isinstance(value, int | float)
+            and not isinstance(value, bool)
+            and isfinite(value)
+            and abs(value) <= FARTHEST
+            for value in values
+        )
+    ):
+        raise LinkageError(key, f'{quoted(values)} is not {count} numbers', 'send finite ones')
+    return tuple(map(float, values))

@@ -1,0 +1,236 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The model of a linkage: all that the page of `linkage view` needs of it, as JSON holds it.
+
+The page moves it by the program: JavaScript that `kinematics.compiling` writes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from math import degrees, dist, inf, isfinite, radians
+from typing import Any
+
+from linkage_ros.drawing.drawing_data import drawn_in_frames
+from linkage_ros.drawing.figure import view
+from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.files.assemblies import closures
+from linkage_ros.files.linkage_file import closable, written_linkage
+from linkage_ros.files.units import Units
+from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.javascript import JavaScript
+from linkage_ros.kinematics.compiling.source import source, Subject
+from linkage_ros.kinematics.linkage import carriers, GROUND
+from linkage_ros.kinematics.plan import assembly_sides
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
+from linkage_ros.scene.notes import linkage_notes
+
+_SAMPLES = 180
+"""Number of inputs at which transmission angle and margin are told."""
+
+_MOST_GHOSTS = 7
+"""Most other assemblies."""
+
+_MOST_PAIRS = 3
+"""Points of a link of which every two have a length; of more, those from the first one."""
+
+_POOR = radians(30.0)
+"""Transmission angle below which a page warns; textbooks ask for 30 to 45°."""
+
+
+def model(text: str, name: str, *, whole: bool = True) -> dict[str, Any]:
+    """
+    Return the model of a linkage file.
+
+    Parameters
+    ----------
+    text
+        The file's text.
+    name
+        Its name, for errors and as a title.
+    whole
+        Whether what takes longer is wanted too: other assemblies, ranges, quality, warnings.
+
+    Raises
+    ------
+    FileError
+        If the text is not that of a linkage which closes.
+
+    """
+    content = parse_yaml(text.encode(), name)
+    written, shorthand = written_linkage(content)
+    closure = closable(content, written, name, shorthand)
+    try:
+        found = _model(closure, name, text, content.units)
+        if whole:
+            found['others'] = _others(closure, content)
+            found |= _analysis(closure)
+    except DefinitionError as error:
+        raise content.located(error) from None
+    return found
+
+
+def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
+    """Return the model of a linkage without a file, whose other assemblies are not told."""
+    return _model(closure, name or closure.name, '', Units()) | {
+        'others': [],
+        **_analysis(closure),
+    }
+
+
+def _model(closure: Closure, name: str, text: str, units: Units) -> dict[str, Any]:
+    linkage = closure.linkage
+    inputs = usual_inputs(closure)
+    carried = carriers(linkage.links)
+    sides = assembly_sides(closure.structure)
+    return {
+        'name': name,
+        'text': text,
+        'inputs': [
+            {
+                'name': given.joint,
+                'unit': given.unit,
+                'low': _finite(given.limits.low),
+                'high': _finite(given.limits.high),
+                'value': value,
+            }
+            for given, value in zip(linkage.inputs, inputs, strict=True)
+        ],
+        'joints': [
+            {'name': joint, 'unit': 'rad' if turning else 'm'}
+            for joint, turning in zip(closure.joint_names, closure.turning, strict=True)
+        ],
+        'links': list(closure.link_frames.links),
+        'program': program_of(closure),
+        'drawn': drawn_in_frames(view(closure, inputs)),
+        'pins': [
+            {
+                'name': pin,
+                'links': links,
+                'link': links[0],
+                'at': list(linkage.links[links[0]][pin]),
+                'ground': GROUND in links,
+            }
+            for pin, links in carried.items()
+        ],
+        'sliders': [
+            {
+                'name': slider,
+                'along': its.along,
+                'through': list(linkage.links[its.along][its.through]),
+                'direction': list(its.direction),
+                'point': its.point,
+            }
+            for slider, its in linkage.sliders.items()
+        ],
+        'lengths': list(_lengths(closure)),
+        'unit': {'length': units.length, 'factor': units.read(1.0, 'm')},
+        'choices': {
+            key: {'now': linkage.assembly.get(key), 'sides': list(of)} for key, of in sides.items()
+        },
+        'inputs_possible': [
+            link
+            for link, points in linkage.links.items()
+            if link != GROUND and {*points} & {*linkage.links.get(GROUND, {})}
+        ],
+    }
+
+
+def program_of(closure: Closure) -> str | None:
+    """Return the program of a linkage; None if it is solved by iteration."""
+    subject = Subject(closure, closure.name, closure.name, 2, closure.joint_names, frames=True)
+    try:
+        return source(subject, JavaScript(for_page=True))
+    except DefinitionError:
+        return None
+
+
+def _lengths(closure: Closure) -> Iterator[dict[str, Any]]:
+    """Yield the distances of points of a link, those that a file gives by coordinates."""
+    for link, points in closure.linkage.links.items():
+        pairs = list(combinations(points, 2))
+        if len(points) > _MOST_PAIRS:
+            pairs = [(one, other) for one, other in pairs if one == next(iter(points))]
+        for one, other in pairs:
+            yield {
+                'key': f'{link} {one}–{other}',
+                'link': link,
+                'from': one,
+                'to': other,
+                'value': dist(points[one], points[other]),
+            }
+
+
+def _others(closure: Closure, content: Any) -> list[dict[str, Any]]:
+    """Return the other assemblies in which the linkage closes."""
+    try:
+        found = closures(content, closure.name)
+    except FileError:  # it has none, or too many to choose from
+        return []
+    own = closure.linkage.assembly
+    others = [(text, other) for text, other in found.items() if other.linkage.assembly != own]
+    return [{'text': text, 'program': program_of(other)} for text, other in others[:_MOST_GHOSTS]]
+
+
+def _analysis(closure: Closure) -> dict[str, Any]:
+    """Return ranges, toggles, quality over the first input, and warnings."""
+    way = InputSweep(closure, usual_inputs(closure))
+    values: list[float] = []
+    for interval in way.ranges:
+        # Its ends are toggles as a rule, where a curve is steepest.
+        count = max(2, _SAMPLES // len(way.ranges))
+        step = (interval.highest - interval.lowest) / (count - 1)
+        values += [interval.lowest + step * i for i in range(count - 1)] + [interval.highest]
+    margins = [_margin(closure, way, value) for value in values]
+    angles, conditioning = ([_finite(each[i]) for each in margins] for i in (0, 1))
+    return {
+        'ranges': [[interval.lowest, interval.highest] for interval in way.ranges],
+        'toggles': [
+            each.value for each in closure.singular_inputs if each.status is Status.TOGGLE
+        ],
+        'quality': {'input': values, 'transmission_angle': angles, 'margin': conditioning},
+        'warnings': list(_warnings(closure, [each for each in angles if each is not None])),
+    }
+
+
+def _margin(closure: Closure, way: InputSweep, value: float) -> tuple[float, float]:
+    """Return transmission angle and conditioning at an input; infinite if they are unknown."""
+    position = way.position(value)
+    if not position.joints:
+        return inf, inf
+    margin = closure.singularity_margin(position)
+    if margin.group < 0:
+        return inf, inf
+    return margin.transmission_angle, margin.conditioning
+
+
+def _warnings(closure: Closure, angles: list[float]) -> Iterator[str]:
+    for note in linkage_notes(closure.linkage):
+        yield str(note)
+    if angles and min(angles) < _POOR:
+        yield f'transmission angle down to {round(degrees(min(angles)), 2):g}°'
+    passed = [each for each in closure.singular_inputs if each.status is not Status.TOGGLE]
+    if passed:
+        kinds = ' and '.join(dict.fromkeys(each.status.value for each in passed))
+        yield f'{kinds} at {len(passed)} input{"s" if len(passed) > 1 else ""}'
+
+
+def _finite(value: float) -> float | None:
+    """Return a number that JSON can hold; None for one that is not finite."""
+    return value if isfinite(value) else None
