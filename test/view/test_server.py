@@ -46,10 +46,10 @@ from ..support.commands import environment, linkage
 FOUR_BAR = """\
 # A crank-rocker.
 links:
-  ground:  {O2: [0, 0], O4: [0.100, 0]}
-  crank:   {O2: [0, 0], A: [0.040, 0]}   # the motor turns it
+  ground: {O2: [0, 0], O4: [0.100, 0]}
+  crank: {O2: [0, 0], A: [0.040, 0]}   # the motor turns it
   coupler: {A: [0, 0], B: [0.120, 0]}
-  rocker:  {O4: [0, 0], B: [0.080, 0]}
+  rocker: {O4: [0, 0], B: [0.080, 0]}
 input: {joint: crank_joint, parent: ground, child: crank}
 assembly: {B: left}
 joints:
