@@ -124,7 +124,8 @@ def _linkage(named: str) -> _Linkage:
     path = Path(scene.members[0].linkage_content.file)
     first = next(text for name, text in scene.files.items() if name != SCENE_FILE)
     texts = {name: text.decode() for name, text in scene.files.items()}
-    return _Linkage(path.stem, path, first, (scene.name, texts, os.path.abspath(scene.folder)))  # noqa: PTH100
+    folder = str(Path(scene.folder).absolute())
+    return _Linkage(path.stem, path, first, (scene.name, texts, folder))
 
 
 def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from errno import EACCES, EADDRINUSE
 from hmac import compare_digest
@@ -88,6 +88,7 @@ def serve(
 
 
 async def _serve(server: Server, stop: Event, ready: Callable[[str], Any], port: int) -> None:
+    asyncio.get_running_loop().set_exception_handler(server.failed)
     await server.start(port)
     try:
         ready(server.address)
@@ -187,6 +188,14 @@ class Server:
         self.refused[what] += 1
         if self.refused[what] == 1:
             self._report(f'refused {what}')
+
+    def failed(self, _loop: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
+        """Report in one line what fails beside a request; asyncio would print a traceback."""
+        error = context.get('exception')
+        if isinstance(error, OSError):
+            self.refuse(f'a connection ({error.strerror})')
+        elif error is not None:
+            self._report(str(defect('linkage view', error)))
 
     @asynccontextmanager
     async def socket(self, request: web.Request) -> AsyncIterator[web.WebSocketResponse]:
