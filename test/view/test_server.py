@@ -19,14 +19,17 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 from contextlib import ExitStack
+from itertools import pairwise
 import json
 import os
 from pathlib import Path
 import random
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+import time
 from typing import Any
 from urllib.parse import urlsplit
 from urllib.request import urlopen
@@ -55,8 +58,8 @@ assembly: {B: left}
 joints:
   rocker_joint: {parent: ground, child: rocker}
 """
+EXAMPLES = Path(__file__).parents[2] / 'examples'
 LONGER = {'length': {'link': 'crank', 'from': 'O2', 'to': 'A', 'value': 0.041}}
-SHORTER = {'length': {'link': 'crank', 'from': 'O2', 'to': 'A', 'value': 0.040}}
 
 
 @pytest.fixture(scope='module')
@@ -542,6 +545,44 @@ def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -
     assert (process.returncode, out, err) == (0, 'linkage view: ended\n', '')
     assert workers
     assert not any(Path(f'/proc/{worker}').exists() for worker in workers)
+
+
+def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
+    """The scene has an effect of the user's own, from the folder of the command."""
+    (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
+    (tmp_path / 'scene.yaml').write_text(
+        'linkage: mine.yaml\nrate: 60\neffects: {mine.dead_zone: {width: 0.05}}\n'
+    )
+    shutil.copytree(EXAMPLES / 'mine', tmp_path / 'mine')
+    process, address = start(tmp_path, 'scene.yaml')
+
+    async def run() -> None:
+        async with opened(address) as page:
+            reads = [
+                ok(await page.ask('read', t=n / 60, inputs=[0.02 * n], rates=[1.2]))['read']
+                for n in range(60)
+            ]
+            changes = [b != a for a, b in pairwise(read['rocker_joint'] for read in reads)]
+            assert 0 < sum(changes) < len(changes)
+            assert ok(await page.ask('save', text=FOUR_BAR)) == {'file': 'mine.yaml'}
+
+    try:
+        asyncio.run(run())
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=30.0)[1] == ''
+
+
+def test_a_server_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
+    process, _ = start(tmp_path, 'four_bar')
+    workers = children(process.pid)
+    assert workers
+    process.kill()
+    process.communicate(timeout=30.0)
+    until = time.monotonic() + 30.0
+    while any(Path(f'/proc/{worker}').exists() for worker in workers):
+        assert time.monotonic() < until
+        time.sleep(0.05)
 
 
 def test_a_page_that_is_loaded_again_shows_the_file_as_it_is_now(tmp_path: Path) -> None:
