@@ -302,7 +302,7 @@ class LiveBridge:
         while not self._ending.is_set():
             try:
                 self._executor.spin_once(timeout_sec=0.1)
-            except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
+            except Exception as error:  # noqa: BLE001, PERF203 (rcl's have no base class)
                 # A message of the graph must not end the page.
                 self._trouble = f'{type(error).__name__}: {shortened(clean(str(error)), 200)}'
                 self._ending.wait(0.01)
@@ -417,7 +417,7 @@ class LiveBridge:
         rates = joints.rates or (nan,) * len(names)
         values = dict(zip(names, joints.angles, strict=True))
         inputs = self._inputs_at(joints.stamp)
-        known = {name: nan for name in run.shown.joints} | values
+        known = dict.fromkeys(run.shown.joints, nan) | values
         known |= dict(zip(run.shown.inputs, inputs, strict=True))
         return {
             't': joints.stamp * 1e-9,
