@@ -33,7 +33,7 @@ import webbrowser
 
 from linkage_ros.cli.arguments import add_output
 from linkage_ros.cli.report import check_page, report, write_page
-from linkage_ros.errors import check_installed, clean, LinkageError
+from linkage_ros.errors import check_installed, clean, LinkageError, missing_packages_reported
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.report.run import Window
@@ -187,7 +187,21 @@ def _show_node(arguments: argparse.Namespace, stop: Event) -> int:
         raise LinkageError('--node', 'shows a node, not a file', f'leave {arguments.file} out')
     if arguments.output:
         raise LinkageError('-o', 'cannot hold a node that runs', 'leave it out')
-    raise LinkageError('--node', 'is not there yet', 'name a file')
+    with missing_packages_reported():
+        from linkage_ros.node.live_bridge import LiveBridge
+    from linkage_ros.view.live import add_live, live_page
+
+    bridge = LiveBridge(arguments.node)
+    try:
+        return _serve(
+            arguments,
+            stop,
+            bridge.name,
+            lambda: live_page(bridge),
+            lambda app: add_live(app, bridge),
+        )
+    finally:
+        bridge.end()
 
 
 def _serve(arguments: argparse.Namespace, stop: Event, name: str, page: Any, *routes: Any) -> int:

@@ -41,7 +41,15 @@ Parts = Sequence[tuple[str, str]]
 """Files of one page: each with its package and its name."""
 
 
-def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts: Parts) -> str:
+def document(
+    title: str,
+    body: Iterable[str],
+    data: Any,
+    styles: Parts,
+    scripts: Parts,
+    *,
+    policy: str = POLICY,
+) -> str:
     """
     Return a page.
 
@@ -55,6 +63,8 @@ def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts:
         Data of the script, as JSON holds them; numbers are finite.
     styles, scripts
         Files of this page beside those of all pages, in their order.
+    policy
+        Content policy; a page with a server must be allowed to ask it.
 
     Raises
     ------
@@ -68,7 +78,7 @@ def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts:
             '<html lang="en">',
             '<head>',
             '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             '<meta name="color-scheme" content="light dark">',
             # Without an icon, a browser asks the server for one.
