@@ -451,6 +451,7 @@ def test_a_file_that_was_changed_by_another_program_is_not_overwritten(
 ) -> None:
     async def run() -> None:
         async with opened(server.address) as page:
+            ok(await page.ask('names'))
             file.write_text(f'{FOUR_BAR}# by hand\n')
             error = (await page.ask('save', text=FOUR_BAR))['error']['text']
         assert error == (
@@ -467,6 +468,7 @@ def test_of_two_pages_the_second_does_not_overwrite_what_the_first_saved(
 ) -> None:
     async def run() -> None:
         async with opened(server.address) as one, opened(server.address) as other:
+            ok(await other.ask('names'))
             ok(await one.ask('save', text=f'{FOUR_BAR}# one\n'))
             assert 'error' in await other.ask('save', text=f'{FOUR_BAR}# other\n')
             ok(await one.ask('save', text=f'{FOUR_BAR}# one again\n'))
