@@ -29,13 +29,17 @@ import signal
 import socket
 import subprocess
 import sys
+from threading import Event
 import time
 from typing import Any
+from urllib.error import HTTPError
 from urllib.parse import urlsplit
 from urllib.request import urlopen
 
 import aiohttp
+from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
+from linkage_ros.report.run import Window
 from linkage_ros.view.conversation import Conversation
 from linkage_ros.view.requests import LARGEST
 from linkage_ros.view.server import MOST_PAGES
@@ -44,6 +48,7 @@ from linkage_ros.view.worker import Worker
 import pytest
 
 from .served import asked, opened, Page, Served, served
+from ..cli.recorded import Recorded, scene_file
 from ..support.commands import environment, linkage
 
 FOUR_BAR = """\
@@ -631,13 +636,30 @@ def test_more_connections_than_files_are_said_in_one_line_and_survived(tmp_path:
 
 def test_a_page_is_written_to_a_file(tmp_path: Path) -> None:
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
-    for named in ('mine.yaml', 'jansen_leg'):
-        answer = linkage(tmp_path, 'view', named, '-o', 'page.html')
-        assert (answer.returncode, answer.stderr) == (0, '')
-        assert answer.stdout.startswith('page.html: ')
-        page = (tmp_path / 'page.html').read_text('utf-8')
-        assert '"mode":"still"' in page
-        assert 'http-equiv="Content-Security-Policy"' in page
+    answer = linkage(tmp_path, 'view', 'mine.yaml', '-o', 'page.html')
+    assert (answer.returncode, answer.stderr) == (0, '')
+    assert answer.stdout.startswith('page.html: ')
+    page = (tmp_path / 'page.html').read_text('utf-8')
+    assert '"mode":"still"' in page
+    assert 'http-equiv="Content-Security-Policy"' in page
+
+
+def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
+    scene = scene_file(tmp_path, 'rate: 100\n')
+    Recorded(tmp_path / 'bag', scene, lambda tick: {'crank_joint': (0.01 * tick, 1.0)}).run(50)
+    expected = report(tmp_path / 'bag', Window(), Event()).encode()
+    answer = linkage(tmp_path, 'view', 'bag', '-o', 'view.html')
+    assert (answer.returncode, answer.stderr) == (0, '')
+    assert (tmp_path / 'view.html').read_bytes() == expected
+    process, address = start(tmp_path, 'bag')
+    try:
+        with urlopen(address, timeout=60.0) as page:
+            assert page.read() == expected
+        with pytest.raises(HTTPError, match='404'):
+            urlopen(f'{address}ws', timeout=60.0)
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30.0)
 
 
 @pytest.mark.parametrize(
