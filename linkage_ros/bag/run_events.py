@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 import json
 import re
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.bag.metadata import counts_in
 from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
@@ -128,7 +128,19 @@ class RunAccount(NamedTuple):
     seed: int = 0
 
 
-def run_account(bag: Bag) -> RunAccount:
+class StoredRun(Protocol):
+    """Holds the files of a run's scene: a bag, or a node's message."""
+
+    @property
+    def path(self) -> Any:
+        """Return the origin of the files, for error messages."""
+
+    @property
+    def attachments(self) -> Mapping[str, bytes]:
+        """Return the files by name."""
+
+
+def run_account(bag: StoredRun) -> RunAccount:
     """
     Return the run's account in its bag.
 
@@ -193,7 +205,7 @@ def _are_names(values: Any) -> bool:
     )
 
 
-def raw_account(bag: Bag) -> dict[str, Any]:
+def raw_account(bag: StoredRun) -> dict[str, Any]:
     """Return the run's account as stored in its bag; empty if it is damaged."""
     try:
         text = bag.attachments[RUN_FILE]

@@ -33,9 +33,9 @@ import webbrowser
 
 from linkage_ros.cli.arguments import add_output
 from linkage_ros.cli.report import check_page, report, write_page
-from linkage_ros.errors import check_installed, clean, LinkageError
+from linkage_ros.errors import check_installed, clean, LinkageError, missing_packages_reported
 from linkage_ros.files.linkage_file import read_closure
-from linkage_ros.files.yaml_file import parse_yaml, read_yaml
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.report.run import Window
 from linkage_ros.resources import linkage_names, named_file, scene_names
 from linkage_ros.scene.load import kind_of, load_scene, SCENE_FILE
@@ -160,17 +160,19 @@ class _Pages:
         self._page = ''
 
     def __call__(self) -> str:
+        """Return the page."""
         from linkage_ros.view.model import model
         from linkage_ros.view.page import page
 
         data = self._shown.data
-        if self._file is not None and self._page:
+        if self._page and self._file is not None:
             try:
-                data = self._file.read()
-                read_closure(parse_yaml(data, str(self._shown.path)))
+                content, data = read_yaml(self._shown.path)
+                if data != self._data:
+                    read_closure(content)
             except LinkageError as error:
                 print(f'linkage view: {error}; the page shows it as it was', file=sys.stderr)
-                data = self._data
+                return self._page
         if data != self._data:
             found = model(data.decode(), self._shown.name)
             scene = self._shown.scene[0] if self._shown.scene else None
@@ -185,7 +187,21 @@ def _show_node(arguments: argparse.Namespace, stop: Event) -> int:
         raise LinkageError('--node', 'shows a node, not a file', f'leave {arguments.file} out')
     if arguments.output:
         raise LinkageError('-o', 'cannot hold a node that runs', 'leave it out')
-    raise LinkageError('--node', 'is not there yet', 'name a file')
+    with missing_packages_reported():
+        from linkage_ros.node.live_bridge import LiveBridge
+    from linkage_ros.view.live import add_live, live_page
+
+    bridge = LiveBridge(arguments.node)
+    try:
+        return _serve(
+            arguments,
+            stop,
+            bridge.name,
+            lambda: live_page(bridge),
+            lambda app: add_live(app, bridge),
+        )
+    finally:
+        bridge.end()
 
 
 def _serve(arguments: argparse.Namespace, stop: Event, name: str, page: Any, *routes: Any) -> int:

@@ -202,6 +202,7 @@ class LinkageNode(LifecycleNode):
                 _ = closure.singular_inputs
             if scene.robot_description:
                 self._scene_topics.describe(scene, pipeline)
+            self._scene_topics.announce(scene, pipeline, self._joint_states.topic_name)
         except LinkageError as error:
             self._scene_topics.disconnect()
             self.failure = error

@@ -25,7 +25,7 @@ import json
 from os.path import lexists
 from pathlib import Path
 import platform
-from typing import cast
+from typing import Any, cast
 
 from linkage_ros import __version__
 from linkage_ros.bag.bag_file import compression_type
@@ -249,12 +249,36 @@ class RunRecording:
 def _attachments(
     scene: Scene, topics: Sequence[tuple[str, Topic]], begun: str, lines: Sequence[LinkagePipeline]
 ) -> dict[str, tuple[str, bytes]]:
-    named = {key: topic.name for key, topic in topics if key != EXTRA}
+    named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
+    named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
+    return {
+        name: ('application/json' if name == RUN_FILE else 'application/yaml', data)
+        for name, data in scene_files(scene, named, begun, lines).items()
+    }
+
+
+def scene_files(
+    scene: Scene, topics: Mapping[str, Any], begun: str, lines: Sequence[LinkagePipeline]
+) -> dict[str, bytes]:
+    """
+    Return a scene as files: its own, and the run's account of itself.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    topics
+        Names of the topics, by their keys in the account.
+    begun
+        Beginning of the bag.
+    lines
+        Pipelines of the linkages.
+
+    """
     run = {
         'scene': scene.name,
         'scene_folder': str(Path(scene.folder).resolve()),
-        **named,
-        'extra_topics': [topic.name for key, topic in topics if key == EXTRA],
+        **topics,
         BEGUN: begun,
         SEED: scene.seed,
         # A replay must use the same solver.
@@ -264,10 +288,7 @@ def _attachments(
         'python': platform.python_version(),
         'machine': platform.machine(),
     }
-    return {
-        **{name: ('application/yaml', data) for name, data in scene.files.items()},
-        RUN_FILE: ('application/json', json.dumps(run).encode()),
-    }
+    return {**scene.files, RUN_FILE: json.dumps(run).encode()}
 
 
 def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:

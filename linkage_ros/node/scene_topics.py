@@ -24,10 +24,10 @@ from typing import Any, TYPE_CHECKING
 from linkage_ros.bag.topic import Topic
 from linkage_ros.messages.single_values import text_message
 from linkage_ros.node.bag_topics import bag_topic, message_type
-from linkage_ros.node.run_recording import DESCRIPTION, EXTRA
+from linkage_ros.node.run_recording import DESCRIPTION, EXTRA, scene_files
 from linkage_ros.node.tick_loop import RecordedTopics, Take
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.replay.replay import change_text
+from linkage_ros.replay.replay import announced_text, change_text
 from linkage_ros.scene.scene import Scene
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
@@ -42,6 +42,8 @@ from std_srvs.srv import SetBool
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Change
 
+SCENE_TOPIC = '~/scene'
+
 CRANK_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Sensor data QoS with a deeper queue: even at a slow tick every sample gets into the bag."""
 
@@ -51,7 +53,10 @@ OUTPUT_QOS = QoSProfile(depth=10)
 _DESCRIPTION_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """As robot_state_publisher and RViz expect of a robot model, whenever they start."""
 
-_CHANGES_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+SCENE_QOS = _DESCRIPTION_QOS
+"""A page that is opened later has to know the linkage."""
+
+CHANGES_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """A late subscriber has to know which faults are on."""
 
 Inject = Callable[[str, SetBool.Request, SetBool.Response], SetBool.Response]
@@ -78,6 +83,7 @@ class SceneTopics:
         self._description: Publisher | None = None
         self.description = b''
         """Serialized message with the robot model; empty if the scene asks for none."""
+        self._announced: Publisher | None = None
         self._injectors: list[Any] = []
         self.extras: list[Publisher] = []
         """Publishers of the pipeline's auxiliary topics."""
@@ -118,7 +124,7 @@ class SceneTopics:
             )
         if pipeline.injection is not None:
             self._changes = node.create_publisher(
-                message_type('std_msgs/msg/String', 'faults'), '~/faults', _CHANGES_QOS
+                message_type('std_msgs/msg/String', 'faults'), '~/faults', CHANGES_QOS
             )
             for name, fault in pipeline.injection.faults.items():
                 self._kinds[name] = fault.kind
@@ -146,9 +152,33 @@ class SceneTopics:
         self.description = text_message(model)
         self._description.publish(self.description)
 
+    def announce(self, scene: Scene, pipeline: Pipeline, joint_states: str) -> None:
+        """
+        Publish the files of the scene, once, with transient-local durability.
+
+        A page on another machine so knows the linkage, the names of its topics, and its faults.
+
+        Parameters
+        ----------
+        scene, pipeline
+            The scene and what is built of it.
+        joint_states
+            Resolved name of the topic with the joint states.
+
+        """
+        topics = {'joint_states_topic': joint_states}
+        if self.crank is not None:
+            topics['crank_topic'] = self.crank_topic
+        if self._changes is not None:
+            topics['faults_topic'] = self._changes.topic_name
+        text_type = message_type('std_msgs/msg/String', '~/scene')
+        self._announced = self._node.create_publisher(text_type, SCENE_TOPIC, SCENE_QOS)
+        files = scene_files(scene, topics, '', pipeline.lines)
+        self._announced.publish(text_message(announced_text(files)))
+
     def disconnect(self) -> None:
         """Remove all topics and services."""
-        for publisher in (*self.extras, self._changes, self._description):
+        for publisher in (*self.extras, self._changes, self._description, self._announced):
             if publisher is not None:
                 self._node.destroy_publisher(publisher)
         for service in self._injectors:
@@ -156,7 +186,7 @@ class SceneTopics:
         if self.crank is not None:
             self._node.destroy_subscription(self.crank)
         self.extras, self._injectors, self._kinds = [], [], {}
-        self._changes = self._description = self.crank = None
+        self._changes = self._description = self._announced = self.crank = None
         self.description = b''
 
     @property
@@ -194,7 +224,7 @@ class SceneTopics:
             qos = publishers[0].qos_profile if publishers else CRANK_QOS
             topics[handles.crank] = 'crank_topic', bag_topic(self.crank_topic, JointState, qos)
         if handles.faults is not None and (changes := self._changes) is not None:
-            described = bag_topic(changes.topic_name, changes.msg_type, _CHANGES_QOS)
+            described = bag_topic(changes.topic_name, changes.msg_type, CHANGES_QOS)
             topics[handles.faults] = 'faults_topic', described
         # Recorded for the replay only; not published on the graph.
         time_type = message_type('builtin_interfaces/msg/Time', 'record')

@@ -64,7 +64,7 @@ def document(
     styles, scripts
         Files of this page beside those of all pages, in their order.
     policy
-        What the browser may load, and run.
+        Content policy; a page with a server must be allowed to ask it.
 
     Raises
     ------

@@ -25,7 +25,7 @@ may have caused them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import json
 import platform
 from typing import NamedTuple, TYPE_CHECKING
@@ -37,6 +37,7 @@ from linkage_ros.bag.run_events import (
     Reset,
     run_account,
     SampleEvent,
+    StoredRun,
     TickEvent,
     VERSIONS,
 )
@@ -49,6 +50,10 @@ from linkage_ros.scene.scene import Scene
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Change, Injection
+
+
+_LONGEST_ANNOUNCED = 16 * 2**20
+"""Greatest size of a message with the files of a scene [bytes]; usually some kilobytes."""
 
 
 class ReplayedTick(NamedTuple):
@@ -75,7 +80,7 @@ class ReplayedTick(NamedTuple):
 
 
 def recorded_scene(
-    bag: Bag, *, trust_effects: bool = False, settings: Sequence[str] = ()
+    bag: StoredRun, *, trust_effects: bool = False, settings: Sequence[str] = ()
 ) -> Scene:
     """
     Return the scene stored in a bag.
@@ -83,7 +88,7 @@ def recorded_scene(
     Parameters
     ----------
     bag
-        The bag.
+        The bag, or an `AnnouncedScene`.
     trust_effects
         As for `parse_scene`: the bag may come from an untrusted source.
     settings
@@ -119,6 +124,51 @@ def recorded_scene(
         run.seed,
         trust_effects=trust_effects,
         settings=settings,
+    )
+
+
+class AnnouncedScene(NamedTuple):
+    """
+    The files of a running node's scene, as its message holds them.
+
+    Attributes
+    ----------
+    path
+        Name of the topic, for error messages.
+    attachments
+        The files by name, as a bag of the run has them.
+
+    """
+
+    path: str
+    attachments: dict[str, bytes]
+
+
+def announced_text(files: Mapping[str, bytes]) -> str:
+    """Return the files of a scene as the text that a node publishes."""
+    return json.dumps({name: data.decode() for name, data in files.items()})
+
+
+def read_announced(message: bytes, topic: str) -> AnnouncedScene:
+    """
+    Read the message of a node that holds the files of its scene.
+
+    Raises
+    ------
+    ValueError
+        The message has another content.
+
+    """
+    if len(message) > _LONGEST_ANNOUNCED:
+        raise ValueError('too long')
+    try:
+        content = json.loads(text_of(message))
+    except RecursionError:
+        raise ValueError('too deep') from None
+    if not isinstance(content, dict) or not all(isinstance(of, str) for of in content.values()):
+        raise ValueError('not the files of a scene')
+    return AnnouncedScene(
+        topic, {name: text.encode('utf-8', 'replace') for name, text in content.items()}
     )
 
 

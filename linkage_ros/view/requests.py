@@ -172,7 +172,7 @@ class Answers:
         try:
             return _json({'id': request.number, 'ok': _ANSWERS[request.do](asked)})
         except LinkageError as error:
-            return failed(request.number, error, request.content.get('text'))
+            return failed(request.number, error, request.content)
         except Exception as error:  # noqa: BLE001 (a request must not end its server)
             found = defect(request.do, error)
             self._report(str(found))
@@ -389,7 +389,9 @@ def defect(where: str, error: BaseException) -> LinkageError:
     return LinkageError(where, reason, 'please report it with the linkage file')
 
 
-def failed(number: float | None, error: LinkageError, text: Any = None) -> str:
+def failed(
+    number: float | None, error: LinkageError, content: Mapping[str, Any] | None = None
+) -> str:
     """
     Return the answer to a request that failed, as JSON.
 
@@ -399,15 +401,26 @@ def failed(number: float | None, error: LinkageError, text: Any = None) -> str:
         The number of the request; None if it has none.
     error
         Why it failed.
-    text
-        The text of the linkage, in which a pin is sought that the error concerns.
+    content
+        The request; the answer then has the pin or the link that the error concerns.
 
     """
     where = error.key if isinstance(error, FileError) else error.where
-    pin = None
-    if isinstance(text, str):
-        pin = pin_of(error, text.encode(errors='ignore').decode())
+    pin = None if content is None else _pin(error, content)
     return _json({'id': number, 'error': {'text': str(error), 'where': where, 'pin': pin}})
+
+
+def _pin(error: LinkageError, content: Mapping[str, Any]) -> str | None:
+    """Return the pin or the link that an error concerns: one that it names, or the edited one."""
+    text = content.get('text')
+    # A text may hold half of a surrogate pair, which may be the error.
+    named = pin_of(error, text.encode(errors='ignore').decode()) if isinstance(text, str) else None
+    edit = content.get('edit')
+    if named is not None or not isinstance(edit, dict):
+        return named
+    places = [edit, *(value for value in edit.values() if isinstance(value, dict))]
+    found = (place.get(key) for place in places for key in ('pin', 'to', 'point', 'link'))
+    return next((pin for pin in found if isinstance(pin, str)), None)
 
 
 def _json(answer: Any) -> str:

@@ -167,7 +167,8 @@ class Server:
             remedy = 'name another one, or leave --port out'
             raise LinkageError(f'--port {port}', reason, remedy) from None
         port = self._runner.addresses[0][1]
-        self._hosts = (f'{HOST}:{port}', f'localhost:{port}')
+        # At port 80 a browser leaves the port out.
+        self._hosts = tuple(f'{host}:{port}'.removesuffix(':80') for host in (HOST, 'localhost'))
         self.address = f'http://{HOST}:{port}/{self._token}/'
 
     async def end(self) -> None:

@@ -188,6 +188,22 @@ def test_an_error_names_its_key(content: dict[str, Any], where: str) -> None:
     assert '\n' not in found['text']
 
 
+@pytest.mark.parametrize(
+    ('edit', 'pin'),
+    [
+        ({'length': {'link': 'rocker', 'from': 'O4', 'to': 'B', 'value': 0.5}}, 'B'),
+        ({'place': {'link': 'rocker', 'point': 'B', 'at': [0.5, 0.0]}}, 'B'),
+        ({'pin': 'nowhere', 'to': [0.0, 0.0]}, 'nowhere'),
+        ({'input': {'link': 'coupler'}}, 'coupler'),
+        ({}, None),
+        ({'pin': ['B']}, None),
+        ({'length': 7}, None),
+    ],
+)
+def test_the_error_of_an_edit_names_its_pin(edit: dict[str, Any], pin: str | None) -> None:
+    assert asked('edit', text=FOUR_BAR, edit=edit)['error']['pin'] == pin
+
+
 def test_only_the_file_with_which_the_page_was_opened_is_saved() -> None:
     assert ok('save', text=FOUR_BAR) == {}
     line = error('save', text=FOUR_BAR, name='jansen_leg')

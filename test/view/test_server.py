@@ -19,20 +19,27 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 from contextlib import ExitStack
+from itertools import pairwise
 import json
 import os
 from pathlib import Path
 import random
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+from threading import Event
+import time
 from typing import Any
+from urllib.error import HTTPError
 from urllib.parse import urlsplit
 from urllib.request import urlopen
 
 import aiohttp
+from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
+from linkage_ros.report.run import Window
 from linkage_ros.view.conversation import Conversation
 from linkage_ros.view.requests import LARGEST
 from linkage_ros.view.server import MOST_PAGES
@@ -41,6 +48,7 @@ from linkage_ros.view.worker import Worker
 import pytest
 
 from .served import asked, opened, Page, Served, served
+from ..cli.recorded import Recorded, scene_file
 from ..support.commands import environment, linkage
 
 FOUR_BAR = """\
@@ -55,8 +63,8 @@ assembly: {B: left}
 joints:
   rocker_joint: {parent: ground, child: rocker}
 """
+EXAMPLES = Path(__file__).parents[2] / 'examples'
 LONGER = {'length': {'link': 'crank', 'from': 'O2', 'to': 'A', 'value': 0.041}}
-SHORTER = {'length': {'link': 'crank', 'from': 'O2', 'to': 'A', 'value': 0.040}}
 
 
 @pytest.fixture(scope='module')
@@ -448,6 +456,7 @@ def test_a_file_that_was_changed_by_another_program_is_not_overwritten(
 ) -> None:
     async def run() -> None:
         async with opened(server.address) as page:
+            ok(await page.ask('names'))
             file.write_text(f'{FOUR_BAR}# by hand\n')
             error = (await page.ask('save', text=FOUR_BAR))['error']['text']
         assert error == (
@@ -464,6 +473,7 @@ def test_of_two_pages_the_second_does_not_overwrite_what_the_first_saved(
 ) -> None:
     async def run() -> None:
         async with opened(server.address) as one, opened(server.address) as other:
+            ok(await other.ask('names'))
             ok(await one.ask('save', text=f'{FOUR_BAR}# one\n'))
             assert 'error' in await other.ask('save', text=f'{FOUR_BAR}# other\n')
             ok(await one.ask('save', text=f'{FOUR_BAR}# one again\n'))
@@ -544,6 +554,44 @@ def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -
     assert not any(Path(f'/proc/{worker}').exists() for worker in workers)
 
 
+def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
+    """The scene has an effect of the user's own, from the folder of the command."""
+    (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
+    (tmp_path / 'scene.yaml').write_text(
+        'linkage: mine.yaml\nrate: 60\neffects: {mine.dead_zone: {width: 0.05}}\n'
+    )
+    shutil.copytree(EXAMPLES / 'mine', tmp_path / 'mine')
+    process, address = start(tmp_path, 'scene.yaml')
+
+    async def run() -> None:
+        async with opened(address) as page:
+            reads = [
+                ok(await page.ask('read', t=n / 60, inputs=[0.02 * n], rates=[1.2]))['read']
+                for n in range(60)
+            ]
+            changes = [b != a for a, b in pairwise(read['rocker_joint'] for read in reads)]
+            assert 0 < sum(changes) < len(changes)
+            assert ok(await page.ask('save', text=FOUR_BAR)) == {'file': 'mine.yaml'}
+
+    try:
+        asyncio.run(run())
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=30.0)[1] == ''
+
+
+def test_a_server_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
+    process, _ = start(tmp_path, 'four_bar')
+    workers = children(process.pid)
+    assert workers
+    process.kill()
+    process.communicate(timeout=30.0)
+    until = time.monotonic() + 30.0
+    while any(Path(f'/proc/{worker}').exists() for worker in workers):
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
 def test_a_page_that_is_loaded_again_shows_the_file_as_it_is_now(tmp_path: Path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text(FOUR_BAR)
@@ -588,13 +636,30 @@ def test_more_connections_than_files_are_said_in_one_line_and_survived(tmp_path:
 
 def test_a_page_is_written_to_a_file(tmp_path: Path) -> None:
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
-    for named in ('mine.yaml', 'jansen_leg'):
-        answer = linkage(tmp_path, 'view', named, '-o', 'page.html')
-        assert (answer.returncode, answer.stderr) == (0, '')
-        assert answer.stdout.startswith('page.html: ')
-        page = (tmp_path / 'page.html').read_text('utf-8')
-        assert '"mode":"still"' in page
-        assert 'http-equiv="Content-Security-Policy"' in page
+    answer = linkage(tmp_path, 'view', 'mine.yaml', '-o', 'page.html')
+    assert (answer.returncode, answer.stderr) == (0, '')
+    assert answer.stdout.startswith('page.html: ')
+    page = (tmp_path / 'page.html').read_text('utf-8')
+    assert '"mode":"still"' in page
+    assert 'http-equiv="Content-Security-Policy"' in page
+
+
+def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
+    scene = scene_file(tmp_path, 'rate: 100\n')
+    Recorded(tmp_path / 'bag', scene, lambda tick: {'crank_joint': (0.01 * tick, 1.0)}).run(50)
+    expected = report(tmp_path / 'bag', Window(), Event()).encode()
+    answer = linkage(tmp_path, 'view', 'bag', '-o', 'view.html')
+    assert (answer.returncode, answer.stderr) == (0, '')
+    assert (tmp_path / 'view.html').read_bytes() == expected
+    process, address = start(tmp_path, 'bag')
+    try:
+        with urlopen(address, timeout=60.0) as page:
+            assert page.read() == expected
+        with pytest.raises(HTTPError, match='404'):
+            urlopen(f'{address}ws', timeout=60.0)
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30.0)
 
 
 @pytest.mark.parametrize(

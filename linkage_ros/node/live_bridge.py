@@ -1,0 +1,727 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The pages' end of a graph: follows a running linkage node, and does what a page asks of it.
+
+It subscribes with best effort and a short queue, so a node does not wait for it; it takes what it
+shows of that queue 60 times a second, however fast the node ticks. The poses come from the
+published joints, as in the report, and not from the inputs by the program of `linkage compile`:
+the page shows what the node has published, with its noise, play and faults.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from functools import partial
+import json
+from math import inf, isfinite, nan
+import os
+from queue import Empty, SimpleQueue
+from threading import Event, Lock, Thread
+from time import monotonic, sleep, time_ns
+from typing import Any, NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from lifecycle_msgs.srv import GetState
+from linkage_ros.bag.run_events import run_account
+from linkage_ros.errors import clean, did_you_mean, LinkageError, listed, quoted, shortened
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.messages.joint_state import CrankSample, JointStateReader, JointStateWriter
+from linkage_ros.messages.layout import MalformedError, NANOSECONDS
+from linkage_ros.node.real_time import leave_out_shared_memory
+from linkage_ros.node.scene_topics import (
+    CHANGES_QOS,
+    never_called,
+    SCENE_QOS,
+    SCENE_TOPIC,
+    TakenByTick,
+)
+from linkage_ros.replay.replay import read_announced, read_change, recorded_scene
+from linkage_ros.report.data import poses
+from linkage_ros.scene.scene import Scene, SceneLinkage
+from linkage_ros.signals import bounded_end
+from linkage_ros.view.hand_crank import HandCrank, HELD
+from linkage_ros.view.live import KINDS
+from linkage_ros.view.model import model_of
+import numpy as np
+import rclpy
+from rclpy.clock import Clock, ClockType
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+_STATES_PERIOD = 1.0 / 60.0
+_HAND_PERIOD = 0.01
+"""Time between two messages while a hand turns the crank, in [s]."""
+
+_LOOK = 0.25
+"""Time between two looks at whether the node is there, in [s]."""
+
+_NODE_PERIOD = 1.0
+"""Most time between two messages about the node, in [s]."""
+
+_SILENT, _GONE = 0.75, 1.75
+"""Times without any message after which a node is asked for its state, and taken for gone [s]."""
+
+_SETTLED = 1.0
+"""How long the graph is watched for a second node once it has a first one, in [s]."""
+
+_LONGEST_LEAD = 0.25
+"""Most time by which a crank sample is carried to the time of the joints, in [s]."""
+
+_SERVICE_PATIENCE, _SNAPSHOT_PATIENCE = 5.0, 80.0
+"""Time limits of the node's answers, in [s]."""
+
+_FARTHEST = 1e6
+"""Greatest angle, slide or effort that a page may ask for."""
+
+_NEWEST_QOS = QoSProfile(depth=4, reliability=ReliabilityPolicy.BEST_EFFORT)
+_HAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class _Run(NamedTuple):
+    """
+    What is known of the node's scene.
+
+    Attributes
+    ----------
+    scene
+        The scene.
+    shown
+        Its first linkage, which is drawn.
+    closure
+        The closure of that one.
+    turned
+        The linkage whose crank or effort comes from a topic; None if there is none.
+    crank_topic
+        That topic; '' for none.
+    links
+        Links of the model, in its order.
+
+    """
+
+    scene: Scene
+    shown: SceneLinkage
+    closure: Closure
+    turned: SceneLinkage | None
+    crank_topic: str
+    links: tuple[str, ...]
+
+
+class LiveBridge:
+    """
+    Follows a linkage node, on a thread of its own.
+
+    Parameters
+    ----------
+    name
+        Name of the node; '' for the only one on the graph.
+    patience
+        How long the node and its scene are waited for, in [s].
+    domain
+        ROS domain; None for the one of the environment.
+
+    Attributes
+    ----------
+    name
+        Full name of the node.
+
+    Raises
+    ------
+    LinkageError
+        There is no such node, or there are several to choose from.
+
+    """
+
+    def __init__(
+        self, name: str = '', *, patience: float = 10.0, domain: int | None = None
+    ) -> None:
+        leave_out_shared_memory()
+        self._context = rclpy.Context()
+        rclpy.init(
+            context=self._context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        self._executor = SingleThreadedExecutor(context=self._context)
+        without = Parameter('start_type_description_service', value=False)  # rclpy frees it twice
+        self._node = Node(
+            f'linkage_view_{os.getpid()}',
+            context=self._context,
+            use_global_arguments=False,
+            parameter_overrides=[without],
+        )
+        self._executor.add_node(self._node)
+        self._ending = Event()
+        self._thread: Thread | None = None
+        self._lock = Lock()
+        self._newest: dict[str, tuple[int, str]] = dict.fromkeys(KINDS, (0, ''))
+        self._listeners: list[Callable[[], None]] = []
+        self._asked: SimpleQueue[tuple[Mapping[str, Any], Future[str]]] = SimpleQueue()
+        self._waiting: list[tuple[float, Any, Any, Future[str]]] = []
+        self._clients: dict[str, Any] = {}
+        self._run: _Run | None = None
+        self._trouble = ''
+        self._faults: dict[str, bool] = {}
+        self._followed: list[Any] = []
+        self._statuses: list[DiagnosticStatus] = []
+        self._lifecycle = ''
+        self._asked_state: tuple[float, Any] | None = None
+        self._heard = -inf
+        self._there = False
+        self._told = -inf
+        self._joints: CrankSample | None = None
+        self._cranks: CrankSample | None = None
+        self._hand = HandCrank(())
+        self._hand_publisher: Any = None
+        self._hand_timer: Any = None
+        self._effort: tuple[float, float] = (0.0, -inf)
+        self.name = ''
+        try:
+            self.name = self._find(name, patience)
+            self._begin(patience)
+        except BaseException:
+            self.end()
+            raise
+        self._thread = Thread(target=self._spin, name='bridge', daemon=True)
+        self._thread.start()
+
+    # For the pages; called on any thread.
+
+    def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
+        """Call a function whenever there is news; return one that ends this."""
+        with self._lock:
+            self._listeners = [*self._listeners, heard]
+
+        def end() -> None:
+            with self._lock:
+                self._listeners = [each for each in self._listeners if each is not heard]
+
+        return end
+
+    def newest(self, kind: str) -> tuple[int, str]:
+        """Return the number and the JSON of the newest message of a kind; 0 and '' for none."""
+        return self._newest[kind]
+
+    def ask(self, content: Mapping[str, Any]) -> Future[str]:
+        """Ask for something; the future has what the answer says, one line."""
+        future: Future[str] = Future()
+        self._asked.put((content, future))
+        with suppress(Exception):  # the bridge has ended
+            self._news.trigger()
+        return future
+
+    def end(self) -> None:
+        """Leave the graph."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join()
+        with bounded_end():
+            self._executor.shutdown()
+            self._node.destroy_node()
+            rclpy.try_shutdown(context=self._context)
+
+    # The beginning.
+
+    def _find(self, name: str, patience: float) -> str:
+        """Return the full name of the node to follow."""
+        wanted = f'/{name.lstrip("/")}' if name else ''
+        until, settled = monotonic() + patience, inf
+        names: list[str] = []
+        while monotonic() < min(until, settled):
+            names = self._announcing()
+            if wanted in names:
+                return wanted
+            if names and not wanted:
+                settled = min(settled, monotonic() + _SETTLED)
+            sleep(0.05)
+        if len(names) == 1 and not wanted:
+            return names[0]
+        if wanted:
+            remedy = did_you_mean(wanted, names, _remedy(names))
+            raise LinkageError(f'--node {name}', 'is no linkage node on this graph', remedy)
+        reason = f'there are {len(names)} linkage nodes' if names else 'there is no linkage node'
+        raise LinkageError('--node', f'{reason} on this graph', _remedy(names))
+
+    def _announcing(self) -> list[str]:
+        """Return the full names of the nodes that publish a scene."""
+        ending = SCENE_TOPIC.removeprefix('~')
+        names = set()
+        for topic, types in self._node.get_topic_names_and_types():
+            if topic.endswith(ending) and types == ['std_msgs/msg/String']:
+                for info in self._node.get_publishers_info_by_topic(topic):
+                    name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+                    if name + ending == topic:
+                        names.add(name)
+        return sorted(names)
+
+    def _begin(self, patience: float) -> None:
+        """Subscribe, and wait for the scene."""
+        node = self._node
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._news = node.create_guard_condition(self._answer_asked)
+        topic = self.name + SCENE_TOPIC.removeprefix('~')
+        node.create_subscription(String, topic, self._on_scene, SCENE_QOS, raw=True)
+        node.create_subscription(
+            DiagnosticArray,
+            '/diagnostics',
+            self._on_diagnostics,
+            QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT),
+        )
+        until = monotonic() + patience
+        while self._run is None and not self._trouble and monotonic() < until:
+            self._executor.spin_once(timeout_sec=0.1)
+        if self._run is None:
+            reason = self._trouble or 'has not sent its scene'
+            remedy = 'run the same version of linkage_ros here and there'
+            raise LinkageError(self.name, reason, remedy)
+        node.create_timer(_STATES_PERIOD, self._take_states, clock=self._steady)
+        node.create_timer(_LOOK, self._look, clock=self._steady)
+
+    def _spin(self) -> None:
+        while not self._ending.is_set():
+            try:
+                self._executor.spin_once(timeout_sec=0.1)
+            except Exception as error:  # noqa: BLE001, PERF203 (rcl's have no base class)
+                # A message of the graph must not end the page.
+                self._trouble = f'{type(error).__name__}: {shortened(clean(str(error)), 200)}'
+                self._ending.wait(0.01)
+
+    # What the node says.
+
+    def _on_scene(self, message: bytes) -> None:
+        """Learn the scene: at the beginning, and whenever the node is configured anew."""
+        try:
+            announced = read_announced(message, f'{self.name}/scene')
+            scene = recorded_scene(announced)
+            topics = run_account(announced)
+            shown = scene.members[0]
+            closure = Closure(shown.linkage)
+            model = model_of(closure, scene.name)
+        except LinkageError as error:
+            self._trouble = f'has a scene that cannot be read ({clean(str(error))})'
+        except (ValueError, MalformedError) as error:
+            self._trouble = f'has a scene that cannot be read ({quoted(str(error))})'
+        else:
+            self._trouble = ''
+            turned = next((each for each in scene.members if each.drive[0] in _TURNED), None)
+            self._run = _Run(
+                scene,
+                shown,
+                closure,
+                turned if topics.crank_topic else None,
+                topics.crank_topic,
+                tuple(model['links']),
+            )
+            self._follow(self._run, topics.joint_states_topic, topics.faults_topic)
+            self._say('model', {'model': {**model, 'live': _live_model(self._run)}})
+            self._heard = monotonic()
+        self._told = -inf
+
+    def _follow(self, run: _Run, joint_states: str, faults: str) -> None:
+        """Subscribe to the topics of a run, and forget those of the run before."""
+        node = self._node
+        for subscription in self._followed:
+            node.destroy_subscription(subscription)
+        if self._hand_publisher is not None:
+            node.destroy_timer(self._hand_timer)
+            node.destroy_publisher(self._hand_publisher)
+            self._hand_publisher = None
+        self._joints = self._cranks = None
+        self._effort = 0.0, -inf
+        self._faults = dict.fromkeys(run.scene.faults, False)
+        self._followed = []
+        # Taken by a timer, so that a fast node costs this process nothing.
+        self._joint_states = self._subscribe(JointState, joint_states)
+        self._read_joints = JointStateReader(run.scene.joints)
+        self._read_inputs = JointStateReader(run.shown.inputs)
+        self._crank_states = None
+        if run.crank_topic and run.crank_topic != joint_states:
+            self._crank_states = self._subscribe(JointState, run.crank_topic)
+        if faults:
+            # Latched: what began before comes now.
+            self._followed.append(
+                node.create_subscription(String, faults, self._on_fault, CHANGES_QOS, raw=True)
+            )
+        if run.turned is not None:
+            inputs = run.turned.linkage.inputs
+            bounds = [(given.limits.low, given.limits.high) for given in inputs]
+            self._hand = HandCrank(
+                [
+                    given.unit == 'rad' and not isfinite(low) and not isfinite(high)
+                    for given, (low, high) in zip(inputs, bounds, strict=True)
+                ]
+            )
+
+    def _subscribe(self, kind: Any, topic: str) -> Any:
+        subscription = self._node.create_subscription(
+            kind, topic, never_called, _NEWEST_QOS, callback_group=TakenByTick()
+        )
+        self._followed.append(subscription)
+        return subscription
+
+    def _on_fault(self, message: bytes) -> None:
+        with suppress(ValueError):
+            name, on = read_change(message)
+            if name in self._faults:
+                self._faults[name] = on
+                self._tell_node()
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        own = [each for each in message.status if each.name.startswith(f'{self.name}: ')]
+        if own:
+            self._statuses, self._heard = own, monotonic()
+            self._lifecycle = ''
+            self._tell_node()
+
+    def _take_states(self) -> None:
+        """Take the newest joint states and crank, and tell them."""
+        run = self._run
+        assert run is not None
+        joints = None
+        for message in _all(self._joint_states):
+            # Other nodes may publish on the same topic, or the crank comes by it.
+            read = self._read_joints.read(message)
+            joints = read if isinstance(read, CrankSample) else joints
+            inputs = self._read_inputs.read(message)
+            self._cranks = inputs if isinstance(inputs, CrankSample) else self._cranks
+        for message in _all(self._crank_states):
+            inputs = self._read_inputs.read(message)
+            self._cranks = inputs if isinstance(inputs, CrankSample) else self._cranks
+        if joints is not None:
+            self._joints, self._heard = joints, monotonic()
+            self._say('state', {'state': self._state(run, joints)})
+
+    def _state(self, run: _Run, joints: CrankSample) -> dict[str, Any]:
+        names = run.scene.joints
+        rates = joints.rates or (nan,) * len(names)
+        values = dict(zip(names, joints.angles, strict=True))
+        inputs = self._inputs_at(joints.stamp)
+        known = dict.fromkeys(run.shown.joints, nan) | values
+        known |= dict(zip(run.shown.inputs, inputs, strict=True))
+        return {
+            't': joints.stamp * 1e-9,
+            'age': (time_ns() - joints.stamp) * 1e-9,
+            'inputs': [_finite(value) for value in inputs],
+            'joints': {
+                name: [_finite(value), _finite(rate)]
+                for name, value, rate in zip(names, joints.angles, rates, strict=True)
+            },
+            'frames': _frames(run, known),
+        }
+
+    def _inputs_at(self, stamp: int) -> list[float]:
+        """Return the inputs at the time of the joints; NaN where they are unknown."""
+        assert self._run is not None
+        if self._cranks is None:
+            return [nan] * len(self._run.shown.inputs)
+        lead = (stamp - self._cranks.stamp) * 1e-9
+        rates = self._cranks.rates
+        if rates is None or abs(lead) > _LONGEST_LEAD:
+            return list(self._cranks.angles)
+        return [
+            angle + rate * lead for angle, rate in zip(self._cranks.angles, rates, strict=True)
+        ]
+
+    def _look(self) -> None:
+        """Find out whether the node is there, and give up what it does not answer."""
+        now = monotonic()
+        for entry in self._waiting.copy():
+            until, client, called, answer = entry
+            if now > until:
+                client.remove_pending_request(called)
+                self._waiting.remove(entry)
+                answer.set_result(f'{self.name} does not answer')
+        if self._asked_state is not None and now > self._asked_state[0]:
+            self._client(GetState, 'get_state').remove_pending_request(self._asked_state[1])
+            self._asked_state = None
+        if now - self._heard > _SILENT and self._asked_state is None:
+            client = self._client(GetState, 'get_state')
+            if client.service_is_ready():
+                called = client.call_async(GetState.Request())
+                called.add_done_callback(self._on_lifecycle)
+                self._asked_state = now + 2 * _SILENT, called
+        there = now - self._heard <= _GONE
+        if there != self._there or now - self._told >= _NODE_PERIOD:
+            self._there = there
+            self._tell_node()
+
+    def _on_lifecycle(self, called: Any) -> None:
+        self._asked_state = None
+        if called.exception() is None and called.result() is not None:
+            self._heard = monotonic()
+            self._lifecycle = str(called.result().current_state.label)
+
+    def _tell_node(self) -> None:
+        """Tell how the node is."""
+        run = self._run
+        if run is None:
+            return
+        self._told = monotonic()
+        values = {
+            _task(status): {pair.key: pair.value for pair in status.values}
+            for status in self._statuses
+        }
+        tick, recording = values.get('tick', {}), values.get('recording', {})
+        troubles = [[2, f'the node {self._trouble}']] if self._trouble else []
+        self._say(
+            'node',
+            {
+                'node': {
+                    'name': self.name,
+                    'there': self._there,
+                    'state': self._lifecycle,
+                    'ticks': tick.get('Actual frequency (Hz)', ''),
+                    'late': tick.get('Late by more than a period', ''),
+                    'lost': tick.get('Lost ticks', ''),
+                    'lateness': [
+                        tick.get(f'Lateness {each} (us)', '') for each in ('p50', 'p99', 'max')
+                    ],
+                    'diagnostics': troubles
+                    + [
+                        [status.level[0], f'{_task(status)}: {status.message}']
+                        for status in self._statuses
+                    ],
+                    'faults': self._faults,
+                    'memory': any(key.startswith('In memory') for key in recording),
+                    'recording': any(key.startswith('Recorded: ') for key in recording),
+                    'drive': (run.turned or run.shown).drive[0],
+                }
+            },
+        )
+
+    def _say(self, kind: str, content: dict[str, Any]) -> None:
+        number, _ = self._newest[kind]
+        self._newest[kind] = number + 1, json.dumps(content, allow_nan=False)
+        for heard in self._listeners:
+            heard()
+
+    # What the pages ask for.
+
+    def _answer_asked(self) -> None:
+        while True:
+            try:
+                content, future = self._asked.get_nowait()
+            except Empty:
+                return
+            try:
+                self._do(content, future)
+            except LinkageError as error:
+                future.set_result(str(error))
+
+    def _do(self, content: Mapping[str, Any], future: Future[str]) -> None:
+        """Do what a page asks for; the answer may come later."""
+        do = content['do']
+        if do == 'fault':
+            name = content.get('name')
+            if name not in self._faults:
+                raise LinkageError(
+                    'fault', f'{quoted(name)} is not in the scene', _any_of(self._faults)
+                )
+            request = SetBool.Request(data=_flag(content))
+            self._call(SetBool, f'inject/{name}', request, future)
+        elif do == 'record':
+            service = 'start_recording' if _flag(content) else 'stop_recording'
+            self._call(Trigger, service, Trigger.Request(), future)
+        elif do in _PLAIN:
+            self._call(Trigger, do, Trigger.Request(), future)
+        elif do == 'crank':
+            future.set_result(self._turn(content))
+        elif do == 'effort':
+            future.set_result(self._push(content))
+        else:
+            raise LinkageError('do', f'{quoted(do)} is not known', _any_of(_REQUESTS))
+
+    def _call(self, kind: Any, service: str, request: Any, future: Future[str]) -> None:
+        client = self._client(kind, service)
+        if not self._there or not client.service_is_ready():
+            raise LinkageError(
+                f'{self.name}/{service}', 'does not answer', 'see whether the node runs'
+            )
+        patience = _SNAPSHOT_PATIENCE if service == 'snapshot' else _SERVICE_PATIENCE
+        called = client.call_async(request)
+        entry = (monotonic() + patience, client, called, future)
+        self._waiting.append(entry)
+        called.add_done_callback(partial(self._on_answer, entry))
+
+    def _on_answer(self, entry: tuple[float, Any, Any, Future[str]], called: Any) -> None:
+        if entry not in self._waiting:
+            return
+        self._waiting.remove(entry)
+        failed = called.exception()
+        entry[3].set_result(str(failed) if failed else str(called.result().message))
+
+    def _client(self, kind: Any, service: str) -> Any:
+        if service not in self._clients:
+            self._clients[service] = self._node.create_client(kind, f'{self.name}/{service}')
+        return self._clients[service]
+
+    def _turn(self, content: Mapping[str, Any]) -> str:
+        run, target = self._turnable('topic', 'crank'), _number(content, 'angle')
+        assert run.turned is not None
+        number = content.get('input', 0)
+        if type(number) is not int or not 0 <= number < len(run.turned.inputs):
+            count = len(run.turned.inputs)
+            raise LinkageError('input', f'{quoted(number)} is none', f'name one of {count}')
+        at = [0.0] * len(run.turned.inputs)
+        if self._cranks is not None and run.turned is run.shown:
+            at = list(self._cranks.angles)
+        else:
+            at[number] = target
+        self._hand.turn(number, target, at, monotonic())
+        self._hold(run)
+        return f'{listed(run.turned.inputs)} on {run.crank_topic}, by hand'
+
+    def _push(self, content: Mapping[str, Any]) -> str:
+        run = self._turnable('torque', 'effort')
+        self._effort = _number(content, 'value'), monotonic()
+        self._hold(run)
+        return f'effort {self._effort[0]:g} on {run.crank_topic}'
+
+    def _turnable(self, drive: str, what: str) -> _Run:
+        run = self._run
+        assert run is not None
+        if run.turned is None or run.turned.drive[0] != drive:
+            own = (run.turned or run.shown).drive[0]
+            remedy = f'run a scene with the drive {drive}'
+            raise LinkageError(what, f'is not taken by the drive {own}', remedy)
+        return run
+
+    def _hold(self, run: _Run) -> None:
+        """Publish from now on, as long as a hand holds the crank."""
+        assert run.turned is not None
+        if self._hand_publisher is None:
+            self._hand_publisher = self._node.create_publisher(
+                JointState, run.crank_topic, _HAND_QOS
+            )
+            self._hand_timer = self._node.create_timer(
+                _HAND_PERIOD, self._publish_hand, clock=self._steady
+            )
+            self._write_crank = JointStateWriter(run.turned.inputs).write
+        if self._hand_timer.is_canceled():
+            self._hand_timer.reset()
+
+    def _publish_hand(self) -> None:
+        assert self._run is not None
+        assert self._run.turned is not None
+        now, stamp = monotonic(), time_ns()
+        if (followed := self._hand.follow(now)) is not None:
+            message = self._write_crank(stamp, *followed)
+            self._hand_publisher.handle.publish_raw(message)
+        elif now - self._effort[1] <= HELD:
+            command = JointState(name=list(self._run.turned.inputs[:1]))
+            command.effort = [self._effort[0]]
+            command.header.stamp.sec, command.header.stamp.nanosec = divmod(stamp, NANOSECONDS)
+            self._hand_publisher.publish(command)
+        else:
+            self._hand_timer.cancel()
+
+
+_TURNED = ('topic', 'torque')
+"""Drives that listen to a topic."""
+
+_PLAIN = ('snapshot', 'reset')
+"""Requests that are services without an argument."""
+
+_REQUESTS = ('fault', 'record', *_PLAIN, 'crank', 'effort')
+
+
+def _live_model(run: _Run) -> dict[str, Any]:
+    """Return what a page shows of a scene beside the model of its first linkage."""
+    closure = run.closure
+    cranks = []
+    for given in closure.linkage.inputs:
+        # A crank on the ground is turned by the mouse about its pin.
+        points = closure.linkage.links.get(given.child, {})
+        ground = closure.linkage.links[GROUND]
+        pivots = [ground[name] for name in points if name in ground]
+        turns = given.unit == 'rad' and given.parent == GROUND and pivots
+        cranks.append(list(pivots[0]) if turns else None)
+    return {
+        'joints': [
+            [name, 'rad' if turning else 'm']
+            for member in run.scene.members
+            for name, turning in zip(member.joints, member.closure.turning, strict=True)
+        ],
+        'inputs': list(run.shown.inputs),
+        'pivots': cranks,
+        'turned': run.turned is run.shown,
+        'drive': (run.turned or run.shown).drive[0],
+        'linkages': len(run.scene.members),
+    }
+
+
+def _frames(run: _Run, known: Mapping[str, float]) -> list[float] | None:
+    """Return place and angle of the frame of each link; None if they are unknown."""
+    values = {name: np.array([value]) for name, value in known.items()}
+    found = poses(run.closure, run.shown.prefix, values, run.shown.inputs)
+    if not set(run.links) <= set(found.links):
+        return None
+    order = [found.links.index(link) for link in run.links]
+    frames = found.frames[0][order]
+    return frames.ravel().tolist() if np.isfinite(frames).all() else None
+
+
+def _all(subscription: Any) -> list[bytes]:
+    """Take the waiting messages of a subscription."""
+    if subscription is None:
+        return []
+    taken = []
+    while len(taken) < _NEWEST_QOS.depth:
+        found = subscription.handle.take_message(JointState, True)
+        if found is None:
+            break
+        taken.append(found[0])
+    return taken
+
+
+def _task(status: DiagnosticStatus) -> str:
+    return str(status.name.partition(': ')[2])
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _number(content: Mapping[str, Any], key: str) -> float:
+    value = content.get(key)
+    if type(value) not in (int, float) or not abs(value) <= _FARTHEST:
+        raise LinkageError(key, f'{quoted(value)} is not valid', 'send a number')
+    return float(value)
+
+
+def _flag(content: Mapping[str, Any]) -> bool:
+    on = content.get('on')
+    if not isinstance(on, bool):
+        raise LinkageError('on', f'{quoted(on)} is not valid', 'send true or false')
+    return on
+
+
+def _any_of(names: Sequence[str] | Mapping[str, Any]) -> str:
+    return f'there are: {listed(names)}' if names else 'there is none'
+
+
+def _remedy(names: Sequence[str]) -> str:
+    if names:
+        return f'name one of them: {listed(names)}'
+    return 'start one, in the same ROS_DOMAIN_ID (linkage run says it)'
