@@ -22,6 +22,7 @@ const View = (() => {
   let drawnAt = 0;
   let curvesDue = null;
   let wholeDue = null;
+  let settling = 0; // requests for a whole model
   let dragged = null; // { pin, inputs }: the drag that is under way
   let grip = 0; // angle between the hand and the crank it turns
 
@@ -213,13 +214,16 @@ const View = (() => {
         askForWhole();
         return;
       }
+      wholeDue = null;
       const { text } = history.now;
+      settling += 1;
       try {
         const model = await Talk.ask('model', { text, whole: true });
         if (text === history.now.text && !dragged) show(model, linkage.inputs);
       } catch (error) {
         said(error);
       }
+      settling -= 1;
     }, WHOLE_AFTER);
   }
 
@@ -597,7 +601,8 @@ const View = (() => {
     /** Return what tests and other scripts of this page look at. */
     state: () => ({
       inputs: linkage.inputs, ...linkage.now, text: linkage.model.text, model: linkage.model,
-      closed: linkage.closed, there, busy: Boolean(dragged), wrong: board.wrong,
+      closed: linkage.closed, there, wrong: board.wrong,
+      busy: Boolean(dragged || wholeDue || settling),
     }),
     get board() { return board; },
     get linkage() { return linkage; },

@@ -259,6 +259,7 @@ def test_points_inputs_and_sides_are_chosen_by_clicking(browser: Any, tmp_path: 
         page.get_by_label('trace P no more').click()
         page.wait_for_function("() => View.state().text.includes('traced: [P1]')")
         page.check('input[value=input]')
+        page.wait_for_function(QUIET)
         page.mouse.click(*middle(page, 'O4', 'B', 0.7))
         page.wait_for_function("() => View.state().text.includes('input: {joint: rocker_joint')")
         agrees(page)
