@@ -254,7 +254,7 @@ const View = (() => {
     if (!dragged) dragged = { text: history.now.text, inputs: [...linkage.inputs], last: null };
     const snap = Number(named('snap').value) * linkage.model.unit.factor;
     send({
-      edit: { pin, to: [x, y], inputs: dragged.inputs, snap }, inputs: dragged.inputs, whole: false,
+      edit: { pin, to: [seen(x), seen(y)], inputs: dragged.inputs, snap }, inputs: dragged.inputs, whole: false,
     });
   }
 
@@ -403,6 +403,13 @@ const View = (() => {
     setInput(0, whole ? value : Math.min(Math.max(value, low), high));
   }
 
+  /** Return a length as finely as an eye can point. */
+  function seen(value) {
+    const [left, , right] = linkage.reach;
+    const fine = 10 ** Math.floor(Math.log10((right - left) / 2000));
+    return Number((fine * Math.round(value / fine)).toPrecision(9));
+  }
+
   const act = {
     mayEdit,
     tool: () => document.querySelector('input[name=tool]:checked')?.value ?? 'turn',
@@ -412,7 +419,7 @@ const View = (() => {
     ended,
     pointed(link, place) {
       if (act.tool() === 'input') edit({ input: { link } });
-      else edit({ trace: { link, at: linkage.within(link, place) } });
+      else edit({ trace: { link, at: linkage.within(link, place).map(seen) } });
     },
     choose(name) {
       board.chosen = name;
