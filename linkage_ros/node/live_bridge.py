@@ -28,7 +28,7 @@ from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
 import json
-from math import inf, isfinite, nan
+from math import dist, inf, isfinite, nan
 import os
 from queue import Empty, SimpleQueue
 from threading import Event, Lock, Thread
@@ -649,14 +649,17 @@ _REQUESTS = ('fault', 'record', *_PLAIN, 'crank', 'effort')
 def _live_model(run: _Run) -> dict[str, Any]:
     """Return what a page shows of a scene beside the model of its first linkage."""
     closure = run.closure
-    cranks = []
+    cranks: list[list[float] | None] = []
     for given in closure.linkage.inputs:
         # A crank on the ground is turned by the mouse about its pin.
         points = closure.linkage.links.get(given.child, {})
         ground = closure.linkage.links[GROUND]
-        pivots = [ground[name] for name in points if name in ground]
-        turns = given.unit == 'rad' and given.parent == GROUND and pivots
-        cranks.append(list(pivots[0]) if turns else None)
+        pivots = [name for name in points if name in ground]
+        if given.unit != 'rad' or given.parent != GROUND or not pivots:
+            cranks.append(None)
+            continue
+        reach = max(dist(point, points[pivots[0]]) for point in points.values())
+        cranks.append([*ground[pivots[0]], reach])
     return {
         'joints': [
             [name, 'rad' if turning else 'm']
@@ -664,7 +667,7 @@ def _live_model(run: _Run) -> dict[str, Any]:
             for name, turning in zip(member.joints, member.closure.turning, strict=True)
         ],
         'inputs': list(run.shown.inputs),
-        'pivots': cranks,
+        'cranks': cranks,
         'turned': run.turned is run.shown,
         'drive': (run.turned or run.shown).drive[0],
         'linkages': len(run.scene.members),

@@ -90,6 +90,17 @@ const Picture = (() => {
     }
   }
 
+  /** Return the colours of the links, for the paper of the page. */
+  function ink() {
+    const { faces } = Page.data;
+    const roles = [...Object.keys(faces), 'slot', 'pin'];
+    const own = Page.colours(...roles.map((role) => `dark-${role}`));
+    const found = { slot: '#ffffff', pin: '#ffffff', ...faces, faint: own.faint };
+    if (!Page.isDark()) return found;
+    for (const role of roles) found[role] = own[`dark-${role}`] || found[role];
+    return found;
+  }
+
   const lineWidths = { rail: 1.6, hatch: 0.9, slot: 2.6 };
 
   class Canvas {
@@ -131,7 +142,7 @@ const Picture = (() => {
         this.drawShape(pen, shape, number);
       }
       if (there && this.traces) this.drawTraced(pen, number);
-      if (!there) this.say(pen, 'no pose was recorded here');
+      if (!there) this.say(pen, this.linkage.withoutPose ?? 'no pose was recorded here');
       this.drawScale(pen);
       return there;
     }
@@ -253,5 +264,5 @@ const Picture = (() => {
     }
   }
 
-  return { Linkage, Canvas };
+  return { Linkage, Canvas, ink };
 })();
