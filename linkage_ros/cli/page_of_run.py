@@ -12,12 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The page of a run: `linkage view --node` in a process of its own, which ends with the run."""
+"""
+The page of a run: `linkage view --node` in a process of its own, which ends with the run.
+
+As a program, this module is that process. It ends by SIGTERM as soon as its standard input is
+closed: that happens even where the run is killed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 import os
+import signal
 import subprocess
 import sys
 from threading import Thread
@@ -61,8 +67,8 @@ class PageOfRun:
     def __init__(self, node: str, say: Callable[[str], None]) -> None:
         self._say: Callable[[str], None] | None = say
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'linkage_ros', 'view', '--node', node],
-            stdin=subprocess.DEVNULL,
+            [sys.executable, '-m', __name__, node],
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -75,6 +81,8 @@ class PageOfRun:
         """End the process."""
         self._say = None
         self._process.terminate()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
         try:
             self._process.wait(_PATIENCE)
         except subprocess.TimeoutExpired:
@@ -88,3 +96,16 @@ class PageOfRun:
             for line in lines:
                 if (say := self._say) is not None:
                     say(line.rstrip('\n'))
+
+
+def _end_with_the_run() -> None:
+    while os.read(sys.stdin.fileno(), 1):  # with no lock, which the end of Python would wait for
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+if __name__ == '__main__':
+    from linkage_ros.cli.main import main
+
+    Thread(target=_end_with_the_run, daemon=True).start()
+    sys.exit(main(['view', '--node', *sys.argv[1:]]))

@@ -96,6 +96,9 @@ _SERVICE_PATIENCE, _SNAPSHOT_PATIENCE = 5.0, 80.0
 _FARTHEST = 1e6
 """Greatest angle, slide or effort that a page may ask for."""
 
+_USUAL_EFFORT = 1.0
+"""Range of the slider for an effort that has no limit, in [N·m] or [N]."""
+
 _NEWEST_QOS = QoSProfile(depth=4, reliability=ReliabilityPolicy.BEST_EFFORT)
 _HAND_QOS = QoSProfile(depth=1)
 """Reliable, for any subscriber; only the newest crank matters."""
@@ -700,8 +703,15 @@ def _live_model(run: _Run) -> dict[str, Any]:
         'cranks': cranks,
         'turned': run.turned is run.shown,
         'drive': (run.turned or run.shown).drive[0],
+        'effort': _range_of_effort(closure),
         'linkages': len(run.scene.members),
     }
+
+
+def _range_of_effort(closure: Closure) -> float:
+    """Return the greatest effort of a slider, in [N·m] or [N]; a greater one can be typed."""
+    limit = closure.linkage.inputs[0].limits.effort
+    return limit if isfinite(limit) else _USUAL_EFFORT
 
 
 def _frames(run: _Run, known: Mapping[str, float]) -> list[float] | None:

@@ -103,7 +103,7 @@ const Live = (() => {
     canvas.fit(Picture.ink());
     at('title').textContent = `${model.name}: ${Page.data.node}`;
     const more = model.live.linkages - 1;
-    at('more').textContent = more ? `The scene has ${more} more, which ${more > 1 ? 'are' : 'is'} not drawn.` : '';
+    at('more').textContent = more ? `The scene has ${more} more ${more > 1 ? 'linkages, which are' : 'linkage, which is'} not drawn.` : '';
     at('joints').replaceChildren(...model.live.joints.map(([name]) => element(
       'tr', {}, element('th', { scope: 'row', textContent: name }),
       element('td', { className: 'number' }), element('td', { className: 'number' }),
@@ -269,7 +269,7 @@ const Live = (() => {
     } else if (live.drive === 'torque') {
       const unit = model.inputs[0].unit === 'rad' ? 'N·m' : 'N';
       hands = [new Hand(`effort [${unit}]`, {
-        low: -10, high: 10, step: 0.05, factor: 1, speak: (value) => send({ do: 'effort', value }),
+        low: -live.effort, high: live.effort, step: live.effort / 200, factor: 1, speak: (value) => send({ do: 'effort', value }),
       })];
     }
     const note = element('p', { className: 'note' });
