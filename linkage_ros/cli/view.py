@@ -35,7 +35,7 @@ from linkage_ros.cli.arguments import add_output
 from linkage_ros.cli.report import check_page, report, write_page
 from linkage_ros.errors import check_installed, clean, LinkageError, missing_packages_reported
 from linkage_ros.files.linkage_file import read_closure
-from linkage_ros.files.yaml_file import parse_yaml, read_yaml
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.report.run import Window
 from linkage_ros.resources import linkage_names, named_file, scene_names
 from linkage_ros.scene.load import kind_of, load_scene, SCENE_FILE
@@ -124,7 +124,8 @@ def _linkage(named: str) -> _Linkage:
     path = Path(scene.members[0].linkage_content.file)
     first = next(text for name, text in scene.files.items() if name != SCENE_FILE)
     texts = {name: text.decode() for name, text in scene.files.items()}
-    return _Linkage(path.stem, path, first, (scene.name, texts, os.path.abspath(scene.folder)))  # noqa: PTH100
+    folder = str(Path(scene.folder).absolute())
+    return _Linkage(path.stem, path, first, (scene.name, texts, folder))
 
 
 def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
@@ -159,17 +160,19 @@ class _Pages:
         self._page = ''
 
     def __call__(self) -> str:
+        """Return the page."""
         from linkage_ros.view.model import model
         from linkage_ros.view.page import page
 
         data = self._shown.data
-        if self._file is not None and self._page:
+        if self._page and self._file is not None:
             try:
-                data = self._file.read()
-                read_closure(parse_yaml(data, str(self._shown.path)))
+                content, data = read_yaml(self._shown.path)
+                if data != self._data:
+                    read_closure(content)
             except LinkageError as error:
                 print(f'linkage view: {error}; the page shows it as it was', file=sys.stderr)
-                data = self._data
+                return self._page
         if data != self._data:
             found = model(data.decode(), self._shown.name)
             scene = self._shown.scene[0] if self._shown.scene else None

@@ -148,7 +148,8 @@ for _tag, _pattern, _first in (
     )
 
 
-_LARGEST_FILE = 1_000_000
+LARGEST_FILE = 1_000_000
+"""Most bytes of a file."""
 
 
 def read_yaml(file: str | Path) -> tuple[Section, bytes]:
@@ -169,7 +170,7 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
 
     """
     try:
-        data = read_regular(file, _LARGEST_FILE)
+        data = read_regular(file, LARGEST_FILE)
     except OSError as error:
         raise FileError(
             file, '', f'cannot be read ({error.strerror})', 'name a file that can be read'
@@ -196,8 +197,8 @@ def parse_yaml(data: bytes, file: str) -> Section:
         As in `read_yaml`.
 
     """
-    if len(data) > _LARGEST_FILE:
-        raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'name a YAML file')
+    if len(data) > LARGEST_FILE:
+        raise FileError(file, '', f'is larger than {LARGEST_FILE} bytes', 'name a YAML file')
     try:
         text = data.decode('utf-8')
     except UnicodeDecodeError as error:

@@ -95,7 +95,7 @@ class Conversation:
                 return await self._save(page, request, message)
             return await worker.ask(page.number, request.do, message)
         except LinkageError as error:
-            return failed(request.id, error)
+            return failed(request.number, error)
 
     async def _save(self, page: _Page, request: Request, message: str) -> str:
         if self._file is None:
@@ -106,7 +106,7 @@ class Conversation:
         name = self._file.path.name
         data = encoded(request.content['text'], name)
         page.state = await asyncio.to_thread(self._file.save, data, page.state)
-        return json.dumps({'id': request.id, 'ok': {'file': name}})
+        return json.dumps({'id': request.number, 'ok': {'file': name}})
 
 
 class _Page:
@@ -143,7 +143,7 @@ class _Page:
                 dropped = queue.put(request, message.data)
             except RequestError as error:
                 self._server.refuse('a message that is no request')
-                await self._socket.send_str(failed(error.id, error))
+                await self._socket.send_str(failed(error.number, error))
                 continue
             for number in dropped:
                 await self._socket.send_str(json.dumps({'id': number, 'dropped': True}))
@@ -159,7 +159,7 @@ class _Queue:
         self._waiting: deque[tuple[Request, str]] = deque()
         self._task: asyncio.Task[None] | None = None
 
-    def put(self, request: Request, message: str) -> list[float | None]:
+    def put(self, request: Request, message: str) -> list[float]:
         """
         Put a request at the end; return the numbers of those that it replaces.
 
@@ -175,11 +175,11 @@ class _Queue:
             self._waiting.remove(old)
         if len(self._waiting) >= _MOST_WAITING:
             reason, remedy = f'comes while {_MOST_WAITING} others wait', 'wait for their answers'
-            raise RequestError(reason, remedy, request.id)
+            raise RequestError(reason, remedy, request.number)
         self._waiting.append((request, message))
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._answer())
-        return [old.id for old, _ in replaced]
+        return [old.number for old, _ in replaced]
 
     async def _answer(self) -> None:
         while self._waiting and not self._socket.closed:

@@ -43,15 +43,15 @@ class Export(NamedTuple):
     ----------
     name
         Its name.
-    type
-        Its media type.
+    media_type
+        Its type, for the browser.
     data
         Its content.
 
     """
 
     name: str
-    type: str
+    media_type: str
     data: bytes
 
 

@@ -25,11 +25,11 @@ from base64 import b64encode
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, partial
+from itertools import chain
 import json
 from math import isfinite
 from typing import Any, NamedTuple, NoReturn
 
-from linkage_ros.drawing.shapes import link_frames
 from linkage_ros.errors import (
     clean,
     did_you_mean,
@@ -43,7 +43,6 @@ from linkage_ros.files.linkage_file import FARTHEST, read_closure
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.source import STATUSES
-from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.resources import linkage_names, shipped
 from linkage_ros.view.edit import edited, pin_of
 from linkage_ros.view.exports import export
@@ -69,8 +68,8 @@ class Request(NamedTuple):
 
     Attributes
     ----------
-    id
-        Its number, which the answer repeats; None if it has none.
+    number
+        The ``id``, which the answer repeats.
     do
         What is to be done.
     content
@@ -78,7 +77,7 @@ class Request(NamedTuple):
 
     """
 
-    id: float | None
+    number: float
     do: str
     content: Mapping[str, Any]
 
@@ -89,14 +88,14 @@ class RequestError(LinkageError):
 
     Attributes
     ----------
-    id
-        The number of the request, as far as it can be read.
+    number
+        The ``id``, as far as it can be read.
 
     """
 
     def __init__(self, reason: str, remedy: str, number: float | None = None) -> None:
         super().__init__('message', reason, remedy)
-        self.id = number
+        self.number = number
 
 
 def read_request(message: str) -> Request:
@@ -171,13 +170,13 @@ class Answers:
         """
         asked = _Asked(request.content, self._name, partial(self._sensors_of, page))
         try:
-            return _json({'id': request.id, 'ok': _ANSWERS[request.do](asked)})
+            return _json({'id': request.number, 'ok': _ANSWERS[request.do](asked)})
         except LinkageError as error:
-            return failed(request.id, error, request.content.get('text'))
+            return failed(request.number, error, request.content)
         except Exception as error:  # noqa: BLE001 (a request must not end its server)
             found = defect(request.do, error)
             self._report(str(found))
-            return failed(request.id, found)
+            return failed(request.number, found)
 
     def _sensors_of(self, page: int, text: str | None) -> Sensors:
         """Return the sensors of a page; new ones if it has changed the linkage."""
@@ -254,7 +253,7 @@ def _edit(asked: _Asked) -> dict[str, Any]:
     edit = asked.content.get('edit')
     if not isinstance(edit, dict):
         raise _wrong('edit', edit, 'an object')
-    text, inputs = edited(asked.text, edit)
+    text, inputs = edited(asked.text, edit, asked.name)
     found = model(text, asked.name, whole=asked.whole)
     for given, value in zip(found['inputs'], inputs, strict=False):
         given['value'] = value
@@ -287,7 +286,7 @@ def _export(asked: _Asked) -> dict[str, Any]:
     given = asked.content.get('inputs')
     inputs = None if given is None else asked.numbers('inputs', len(closure.linkage.inputs))
     found = export(str(asked.content.get('kind')), closure, asked.text, asked.name, inputs)
-    return {'name': found.name, 'type': found.type, 'data': b64encode(found.data).decode()}
+    return {'name': found.name, 'type': found.media_type, 'data': b64encode(found.data).decode()}
 
 
 def _poses(asked: _Asked) -> dict[str, Any]:
@@ -363,17 +362,25 @@ def _pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
     }
     if not position.joints:
         return found
-    for link, frame in link_frames(closure, position).items():
-        if link != GROUND:
-            found['frames'] += [frame.place.real, frame.place.imag, frame.angle]
+    frames = closure.link_frames
+    found['frames'] = _flat(frames.at(position))
     if position.status.has_rates:
         rest = [0.0] * (len(inputs) - 1)
         velocity = closure.velocity(position, 1.0, *rest)
         acceleration = closure.acceleration(position, velocity, 0.0, *rest)
-        rates, accelerations = list(velocity.joints), list(acceleration.joints)
-        if all(map(isfinite, [*rates, *accelerations])):
-            found |= {'rates': rates, 'accelerations': accelerations}
+        motion = {
+            'rates': list(velocity.joints),
+            'accelerations': list(acceleration.joints),
+            'frameRates': _flat(frames.rates(position, velocity)),
+        }
+        # Beside a toggle they may be larger than a number can be.
+        if all(map(isfinite, chain(*motion.values()))):
+            found |= motion
     return found
+
+
+def _flat(frames: Sequence[tuple[complex, float]]) -> list[float]:
+    return [value for place, angle in frames for value in (place.real, place.imag, angle)]
 
 
 def defect(where: str, error: BaseException) -> LinkageError:
@@ -382,7 +389,9 @@ def defect(where: str, error: BaseException) -> LinkageError:
     return LinkageError(where, reason, 'please report it with the linkage file')
 
 
-def failed(number: float | None, error: LinkageError, text: Any = None) -> str:
+def failed(
+    number: float | None, error: LinkageError, content: Mapping[str, Any] | None = None
+) -> str:
     """
     Return the answer to a request that failed, as JSON.
 
@@ -392,13 +401,26 @@ def failed(number: float | None, error: LinkageError, text: Any = None) -> str:
         The number of the request; None if it has none.
     error
         Why it failed.
-    text
-        The text of the linkage, in which a pin is sought that the error concerns.
+    content
+        The request; the answer then has the pin or the link that the error concerns.
 
     """
     where = error.key if isinstance(error, FileError) else error.where
-    pin = pin_of(error, text) if isinstance(text, str) else None
+    pin = None if content is None else _pin(error, content)
     return _json({'id': number, 'error': {'text': str(error), 'where': where, 'pin': pin}})
+
+
+def _pin(error: LinkageError, content: Mapping[str, Any]) -> str | None:
+    """Return the pin or the link that an error concerns: one that it names, or the edited one."""
+    text = content.get('text')
+    # A text may hold half of a surrogate pair, which may be the error.
+    named = pin_of(error, text.encode(errors='ignore').decode()) if isinstance(text, str) else None
+    edit = content.get('edit')
+    if named is not None or not isinstance(edit, dict):
+        return named
+    places = [edit, *(value for value in edit.values() if isinstance(value, dict))]
+    found = (place.get(key) for place in places for key in ('pin', 'to', 'point', 'link'))
+    return next((pin for pin in found if isinstance(pin, str)), None)
 
 
 def _json(answer: Any) -> str:

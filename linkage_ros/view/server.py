@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from errno import EACCES, EADDRINUSE
 from hmac import compare_digest
@@ -88,6 +88,7 @@ def serve(
 
 
 async def _serve(server: Server, stop: Event, ready: Callable[[str], Any], port: int) -> None:
+    asyncio.get_running_loop().set_exception_handler(server.failed)
     await server.start(port)
     try:
         ready(server.address)
@@ -166,7 +167,8 @@ class Server:
             remedy = 'name another one, or leave --port out'
             raise LinkageError(f'--port {port}', reason, remedy) from None
         port = self._runner.addresses[0][1]
-        self._hosts = (f'{HOST}:{port}', f'localhost:{port}')
+        # At port 80 a browser leaves the port out.
+        self._hosts = tuple(f'{host}:{port}'.removesuffix(':80') for host in (HOST, 'localhost'))
         self.address = f'http://{HOST}:{port}/{self._token}/'
 
     async def end(self) -> None:
@@ -188,6 +190,14 @@ class Server:
         if self.refused[what] == 1:
             self._report(f'refused {what}')
 
+    def failed(self, _loop: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
+        """Report in one line what fails beside a request; asyncio would print a traceback."""
+        error = context.get('exception')
+        if isinstance(error, OSError):
+            self.refuse(f'a connection ({error.strerror})')
+        elif error is not None:
+            self._report(str(defect('linkage view', error)))
+
     @asynccontextmanager
     async def socket(self, request: web.Request) -> AsyncIterator[web.WebSocketResponse]:
         """Open the WebSocket of a page; it is closed at once if too many pages have one."""
@@ -195,12 +205,12 @@ class Server:
             timeout=_GOODBYE, heartbeat=_HEARTBEAT, max_msg_size=4 * LARGEST, compress=False
         )
         await socket.prepare(request)
-        if list(self._sockets.values()).count(request.path) >= MOST_PAGES:
+        if await self._has_place(request.path):
+            self._sockets[socket] = request.path
+        else:
             self.refuse('a page too many')
             message = f'{MOST_PAGES} pages are open; close one'.encode()
             await socket.close(code=TRY_LATER, message=message)
-        else:
-            self._sockets[socket] = request.path
         try:
             yield socket
         except ConnectionError:  # the page has gone
@@ -209,6 +219,14 @@ class Server:
             self._sockets.pop(socket, None)
             if socket.exception() is not None:
                 self.refuse('what is no WebSocket message')
+
+    async def _has_place(self, path: str) -> bool:
+        """Return whether one more page may be open, if need be after one that is being closed."""
+        for _ in range(20):
+            if list(self._sockets.values()).count(path) < MOST_PAGES:
+                return True
+            await asyncio.sleep(_GOODBYE / 20)
+        return False
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:

@@ -21,8 +21,8 @@ import os
 from pathlib import Path
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.file_access import atomic_write
-from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.files.file_access import atomic_write, read_regular
+from linkage_ros.files.yaml_file import LARGEST_FILE
 
 _REMEDY = 'download this version, or load the page again to go on from the file'
 
@@ -46,23 +46,11 @@ class UserFile:
         """Return whether the user may write it."""
         return os.access(self.path, os.W_OK)
 
-    def read(self) -> bytes:
-        """
-        Return its content.
-
-        Raises
-        ------
-        FileError
-            As `read_yaml`.
-
-        """
-        return read_yaml(self.path)[1]
-
     def state(self) -> str:
         """Return what tells its content from another one; '' if it cannot be read."""
         try:
-            return digest(self.read())
-        except LinkageError:
+            return digest(read_regular(self.path, LARGEST_FILE))
+        except (OSError, ValueError):
             return ''
 
     def save(self, data: bytes, known: str) -> str:

@@ -22,6 +22,7 @@ from typing import Any
 import linkage_ros as lr
 from linkage_ros.drawing.shapes import link_frames
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.results import Position
 from linkage_ros.resources import shipped
 from linkage_ros.view import requests
 from linkage_ros.view.requests import Answers, LARGEST, read_request, RequestError
@@ -89,7 +90,7 @@ def test_what_is_no_request_is_refused(message: str, line: str) -> None:
 def test_the_number_of_a_request_that_is_unknown_is_answered() -> None:
     with pytest.raises(RequestError) as refused:
         read_request('{"id": 12, "do": "dance"}')
-    assert refused.value.id == 12
+    assert refused.value.number == 12
 
 
 # Answers.
@@ -119,6 +120,14 @@ def test_nothing_but_a_shipped_linkage_is_opened(name: Any) -> None:
     assert 'is no shipped linkage; ' in error('open', name=name)
 
 
+def frames_of(closure: Closure, position: Position) -> list[tuple[float, float, float]]:
+    return [
+        (frame.place.real, frame.place.imag, frame.angle)
+        for link, frame in link_frames(closure, position).items()
+        if link != 'ground'
+    ]
+
+
 @pytest.mark.parametrize('name', ['four_bar', 'class_3', 'elliptic_trammel', 'five_bar'])
 def test_poses_are_those_of_the_closure(name: str) -> None:
     text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
@@ -131,18 +140,21 @@ def test_poses_are_those_of_the_closure(name: str) -> None:
         position = closure.position(*given)
         assert found['joints'] == list(position.joints)
         if not position.joints:
-            assert not any((found['rates'], found['frames']))
+            assert not any((found['rates'], found['frames'], found['frameRates']))
             assert found['status'] != 0
             continue
         velocity = closure.velocity(position, 1.0, *[0.0] * (len(first) - 1))
         assert found['rates'] == list(velocity.joints)
-        frames = link_frames(closure, position)
-        moving = [frame for link, frame in frames.items() if link != 'ground']
-        assert found['frames'] == [
-            value
-            for frame in moving
-            for value in (frame.place.real, frame.place.imag, frame.angle)
+        frames = frames_of(closure, position)
+        assert found['frames'] == [value for frame in frames for value in frame]
+        step = 1e-6
+        later = closure.position(given[0] + step, *given[1:])
+        moved = [
+            (value - before) / step
+            for one, other in zip(frames_of(closure, later), frames, strict=True)
+            for value, before in zip(one, other, strict=True)
         ]
+        assert found['frameRates'] == pytest.approx(moved, abs=1e-3)
         assert found['status'] == 0
 
 
@@ -174,6 +186,22 @@ def test_an_error_names_its_key(content: dict[str, Any], where: str) -> None:
     found = asked('model', **content)['error']
     assert found['where'] == where
     assert '\n' not in found['text']
+
+
+@pytest.mark.parametrize(
+    ('edit', 'pin'),
+    [
+        ({'length': {'link': 'rocker', 'from': 'O4', 'to': 'B', 'value': 0.5}}, 'B'),
+        ({'place': {'link': 'rocker', 'point': 'B', 'at': [0.5, 0.0]}}, 'B'),
+        ({'pin': 'nowhere', 'to': [0.0, 0.0]}, 'nowhere'),
+        ({'input': {'link': 'coupler'}}, 'coupler'),
+        ({}, None),
+        ({'pin': ['B']}, None),
+        ({'length': 7}, None),
+    ],
+)
+def test_the_error_of_an_edit_names_its_pin(edit: dict[str, Any], pin: str | None) -> None:
+    assert asked('edit', text=FOUR_BAR, edit=edit)['error']['pin'] == pin
 
 
 def test_only_the_file_with_which_the_page_was_opened_is_saved() -> None:

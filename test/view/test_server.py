@@ -18,17 +18,28 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from contextlib import ExitStack
+from itertools import pairwise
 import json
 import os
 from pathlib import Path
 import random
+import shutil
 import signal
+import socket
 import subprocess
 import sys
+from threading import Event
+import time
 from typing import Any
+from urllib.error import HTTPError
+from urllib.parse import urlsplit
+from urllib.request import urlopen
 
 import aiohttp
+from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
+from linkage_ros.report.run import Window
 from linkage_ros.view.conversation import Conversation
 from linkage_ros.view.requests import LARGEST
 from linkage_ros.view.server import MOST_PAGES
@@ -37,22 +48,23 @@ from linkage_ros.view.worker import Worker
 import pytest
 
 from .served import asked, opened, Page, Served, served
+from ..cli.recorded import Recorded, scene_file
 from ..support.commands import environment, linkage
 
 FOUR_BAR = """\
 # A crank-rocker.
 links:
-  ground:  {O2: [0, 0], O4: [0.100, 0]}
-  crank:   {O2: [0, 0], A: [0.040, 0]}   # the motor turns it
+  ground: {O2: [0, 0], O4: [0.100, 0]}
+  crank: {O2: [0, 0], A: [0.040, 0]}   # the motor turns it
   coupler: {A: [0, 0], B: [0.120, 0]}
-  rocker:  {O4: [0, 0], B: [0.080, 0]}
+  rocker: {O4: [0, 0], B: [0.080, 0]}
 input: {joint: crank_joint, parent: ground, child: crank}
 assembly: {B: left}
 joints:
   rocker_joint: {parent: ground, child: rocker}
 """
+EXAMPLES = Path(__file__).parents[2] / 'examples'
 LONGER = {'length': {'link': 'crank', 'from': 'O2', 'to': 'A', 'value': 0.041}}
-SHORTER = {'length': {'link': 'crank', 'from': 'O2', 'to': 'A', 'value': 0.040}}
 
 
 @pytest.fixture(scope='module')
@@ -127,7 +139,9 @@ def test_without_the_token_nothing_is_there(server: Served, path: str) -> None:
     status, answer = asked(server, f'GET {path}', own(server))
     assert status == 404
     assert '<!doctype' not in answer
-    assert sum(server.server.refused.values()) == 1
+    known = 'a request for something that is not here'
+    unknown = 'a request without the token'
+    assert server.server.refused == {known if path == f'/{server.token}' else unknown: 1}
 
 
 @pytest.mark.parametrize(
@@ -178,8 +192,8 @@ def test_another_host_is_refused(server: Served, headers: list[str]) -> None:
 def test_another_origin_is_refused(server: Served, origin: str) -> None:
     header = f'Origin: {origin.replace("{p}", str(server.port))}'
     page = asked(server, f'GET /{server.token}/', own(server), header)
-    socket = asked(server, f'GET /{server.token}/ws', own(server), header, *UPGRADE)
-    assert (page[0], socket[0]) == (403, 403)
+    asking = asked(server, f'GET /{server.token}/ws', own(server), header, *UPGRADE)
+    assert (page[0], asking[0]) == (403, 403)
     assert server.server.refused == {'a request of another origin': 2}
 
 
@@ -311,21 +325,17 @@ def test_bytes_that_are_no_messages_end_their_page_alone(server: Served, frame: 
 
 
 def test_a_page_that_never_reads_holds_up_no_other(server: Served) -> None:
+    # An answer of a megabyte, of which more are asked for than all buffers hold.
+    large = {'text': f'{FOUR_BAR}# {"x" * 700_000}\n', 'kind': 'yaml'}
+
     async def run() -> None:
         async with opened(server.address) as deaf, opened(server.address) as page:
-            # More answers than any buffer between the two holds.
             transport = deaf.socket._conn.transport  # type: ignore[union-attr]
             transport.pause_reading()
-
-            async def send() -> None:
-                while True:
-                    await deaf.send('open', name='jansen_leg')
-
-            sending = asyncio.create_task(send())
+            sending = asyncio.gather(*(deaf.send('export', **large) for _ in range(17)))
             for _ in range(20):
-                ok(await page.ask('names'))
-                await asyncio.sleep(0.02)
-            sending.cancel()
+                ok(await page.ask('export', **large))
+            assert await asyncio.wait_for(sending, 60.0)
             transport.abort()
             ok(await page.ask('names'))
 
@@ -446,6 +456,7 @@ def test_a_file_that_was_changed_by_another_program_is_not_overwritten(
 ) -> None:
     async def run() -> None:
         async with opened(server.address) as page:
+            ok(await page.ask('names'))
             file.write_text(f'{FOUR_BAR}# by hand\n')
             error = (await page.ask('save', text=FOUR_BAR))['error']['text']
         assert error == (
@@ -462,6 +473,7 @@ def test_of_two_pages_the_second_does_not_overwrite_what_the_first_saved(
 ) -> None:
     async def run() -> None:
         async with opened(server.address) as one, opened(server.address) as other:
+            ok(await other.ask('names'))
             ok(await one.ask('save', text=f'{FOUR_BAR}# one\n'))
             assert 'error' in await other.ask('save', text=f'{FOUR_BAR}# other\n')
             ok(await one.ask('save', text=f'{FOUR_BAR}# one again\n'))
@@ -494,10 +506,20 @@ def test_a_shipped_linkage_is_not_saved_and_the_error_says_what_to_do() -> None:
 # The command.
 
 
-def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen[str], str]:
+def start(folder: Path, *arguments: str, files: int = 1024) -> tuple[subprocess.Popen[str], str]:
     """Start ``linkage view``, and return its process and its address."""
+    limited = (
+        f'import resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))'
+    )
     process = subprocess.Popen(
-        [sys.executable, '-m', 'linkage_ros', 'view', *arguments, '--no-browser'],
+        [
+            *(
+                sys.executable,
+                '-c',
+                f'{limited}; from linkage_ros.cli.main import main; sys.exit(main())',
+            ),
+            *('view', *arguments, '--no-browser'),
+        ],
         cwd=folder,
         env=environment(folder),
         stdout=subprocess.PIPE,
@@ -509,7 +531,9 @@ def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen[str], str]:
 
 
 def children(pid: int) -> set[int]:
-    return {int(c) for c in Path(f'/proc/{pid}/task/{pid}/children').read_text().split()}
+    """Return the processes that any thread of a process has started."""
+    tasks = Path(f'/proc/{pid}/task').iterdir()
+    return {int(child) for task in tasks for child in (task / 'children').read_text().split()}
 
 
 def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -> None:
@@ -532,6 +556,44 @@ def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -
     assert not any(Path(f'/proc/{worker}').exists() for worker in workers)
 
 
+def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
+    """The scene has an effect of the user's own, from the folder of the command."""
+    (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
+    (tmp_path / 'scene.yaml').write_text(
+        'linkage: mine.yaml\nrate: 60\neffects: {mine.dead_zone: {width: 0.05}}\n'
+    )
+    shutil.copytree(EXAMPLES / 'mine', tmp_path / 'mine')
+    process, address = start(tmp_path, 'scene.yaml')
+
+    async def run() -> None:
+        async with opened(address) as page:
+            reads = [
+                ok(await page.ask('read', t=n / 60, inputs=[0.02 * n], rates=[1.2]))['read']
+                for n in range(60)
+            ]
+            changes = [b != a for a, b in pairwise(read['rocker_joint'] for read in reads)]
+            assert 0 < sum(changes) < len(changes)
+            assert ok(await page.ask('save', text=FOUR_BAR)) == {'file': 'mine.yaml'}
+
+    try:
+        asyncio.run(run())
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=30.0)[1] == ''
+
+
+def test_a_server_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
+    process, _ = start(tmp_path, 'four_bar')
+    workers = children(process.pid)
+    assert workers
+    process.kill()
+    process.communicate(timeout=30.0)
+    until = time.monotonic() + 30.0
+    while any(Path(f'/proc/{worker}').exists() for worker in workers):
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
 def test_a_page_that_is_loaded_again_shows_the_file_as_it_is_now(tmp_path: Path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text(FOUR_BAR)
@@ -551,20 +613,56 @@ def test_a_page_that_is_loaded_again_shows_the_file_as_it_is_now(tmp_path: Path)
     finally:
         process.send_signal(signal.SIGTERM)
         _, err = process.communicate(timeout=30.0)
+    assert len(err.splitlines()) == 1, err
     (line,) = err.splitlines()
     assert line.startswith('linkage view: mine.yaml:1: links: ')
     assert line.endswith('; the page shows it as it was')
 
 
+def test_more_connections_than_files_are_said_in_one_line_and_survived(tmp_path: Path) -> None:
+    process, address = start(tmp_path, 'four_bar', files=64)
+    parts = urlsplit(address)
+    try:
+        with ExitStack() as connections:
+            for _ in range(100):
+                place = parts.hostname, parts.port
+                connections.enter_context(socket.create_connection(place, timeout=60.0))
+            assert process.stderr is not None
+            line = process.stderr.readline()
+        with urlopen(address, timeout=60.0) as page:
+            assert page.status == 200
+    finally:
+        process.send_signal(signal.SIGINT)
+        _, rest = process.communicate(timeout=30.0)
+    assert (line, rest) == ('linkage view: refused a connection (Too many open files)\n', '')
+
+
 def test_a_page_is_written_to_a_file(tmp_path: Path) -> None:
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
-    for named in ('mine.yaml', 'jansen_leg'):
-        answer = linkage(tmp_path, 'view', named, '-o', 'page.html')
-        assert (answer.returncode, answer.stderr) == (0, '')
-        assert answer.stdout.startswith('page.html: ')
-        page = (tmp_path / 'page.html').read_text('utf-8')
-        assert '"mode":"still"' in page
-        assert 'http-equiv="Content-Security-Policy"' in page
+    answer = linkage(tmp_path, 'view', 'mine.yaml', '-o', 'page.html')
+    assert (answer.returncode, answer.stderr) == (0, '')
+    assert answer.stdout.startswith('page.html: ')
+    page = (tmp_path / 'page.html').read_text('utf-8')
+    assert '"mode":"still"' in page
+    assert 'http-equiv="Content-Security-Policy"' in page
+
+
+def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
+    scene = scene_file(tmp_path, 'rate: 100\n')
+    Recorded(tmp_path / 'bag', scene, lambda tick: {'crank_joint': (0.01 * tick, 1.0)}).run(50)
+    expected = report(tmp_path / 'bag', Window(), Event()).encode()
+    answer = linkage(tmp_path, 'view', 'bag', '-o', 'view.html')
+    assert (answer.returncode, answer.stderr) == (0, '')
+    assert (tmp_path / 'view.html').read_bytes() == expected
+    process, address = start(tmp_path, 'bag')
+    try:
+        with urlopen(address, timeout=60.0) as page:
+            assert page.read() == expected
+        with pytest.raises(HTTPError, match='404'):
+            urlopen(f'{address}ws', timeout=60.0)
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30.0)
 
 
 @pytest.mark.parametrize(
