@@ -23,7 +23,6 @@ const Live = (() => {
     constructor(model) {
       this.drawn = model.drawn;
       this.reach = model.drawn.frame;
-      this.withoutPose = 'no pose is known';
       this.places = new Map(model.links.map((link, i) => [link, 3 * i]));
       this.times = [];
       this.frames = [];
@@ -287,9 +286,7 @@ const Live = (() => {
 
     const place = ({ clientX, clientY }) => {
       const box = picture.getBoundingClientRect();
-      const [x, y] = canvas.toPixel([0, 0]);
-      const { scale } = canvas.size;
-      return [(clientX - box.left - x) / scale, (y - (clientY - box.top)) / scale];
+      return canvas.toPlace([clientX - box.left, clientY - box.top]);
     };
 
     /** Return which crank is at a place; -1 for none. */
@@ -336,6 +333,8 @@ const Live = (() => {
     const picture = at('live').querySelector('canvas');
     linkage = null;
     canvas = new Picture.Canvas(picture, null);
+    canvas.tallest = 620;
+    canvas.absent = 'no pose is known';
     Page.keepDrawn([picture.parentElement], () => {
       if (!linkage) return;
       canvas.fit(Picture.ink());

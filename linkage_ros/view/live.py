@@ -31,7 +31,8 @@ from typing import Any, Protocol
 
 from aiohttp import web, WSMsgType
 from linkage_ros.drawing.painting import COLOURS, FACES, INK
-from linkage_ros.pages.document import document, POLICY
+from linkage_ros.pages.document import document
+from linkage_ros.view.page import SERVED_POLICY
 from linkage_ros.view.server import SERVER_KEY
 
 KINDS = ('model', 'node', 'state')
@@ -184,7 +185,6 @@ _BODY = """
 """
 
 _HERE = 'linkage_ros.view'
-_STYLES = [('linkage_ros.report', 'report.css'), (_HERE, 'live.css')]
 _SCRIPTS = [
     *(('linkage_ros.pages', f'{name}.js') for name in ('angles', 'curves', 'looks', 'picture')),
     (_HERE, 'live.js'),
@@ -209,5 +209,11 @@ def live_page(bridge: Bridge) -> str:
         'server': True,
         'node': bridge.name,
     }
-    policy = POLICY.replace("'unsafe-inline'; style", "'unsafe-inline'; connect-src 'self'; style")
-    return document(f'{bridge.name}: linkage view', body, data, _STYLES, _SCRIPTS, policy=policy)
+    return document(
+        f'{bridge.name}: linkage view',
+        body,
+        data,
+        [(_HERE, 'live.css')],
+        _SCRIPTS,
+        policy=SERVED_POLICY,
+    )
