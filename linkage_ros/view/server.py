@@ -205,12 +205,12 @@ class Server:
             timeout=_GOODBYE, heartbeat=_HEARTBEAT, max_msg_size=4 * LARGEST, compress=False
         )
         await socket.prepare(request)
-        if list(self._sockets.values()).count(request.path) >= MOST_PAGES:
+        if await self._has_place(request.path):
+            self._sockets[socket] = request.path
+        else:
             self.refuse('a page too many')
             message = f'{MOST_PAGES} pages are open; close one'.encode()
             await socket.close(code=TRY_LATER, message=message)
-        else:
-            self._sockets[socket] = request.path
         try:
             yield socket
         except ConnectionError:  # the page has gone
@@ -219,6 +219,14 @@ class Server:
             self._sockets.pop(socket, None)
             if socket.exception() is not None:
                 self.refuse('what is no WebSocket message')
+
+    async def _has_place(self, path: str) -> bool:
+        """Return whether one more page may be open, if need be after one that is being closed."""
+        for _ in range(20):
+            if list(self._sockets.values()).count(path) < MOST_PAGES:
+                return True
+            await asyncio.sleep(_GOODBYE / 20)
+        return False
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:

@@ -30,6 +30,7 @@ import os
 from pathlib import Path
 import signal
 import struct
+import subprocess
 import sys
 from typing import BinaryIO
 import warnings
@@ -68,7 +69,7 @@ class Worker:
         self._opening = json.dumps([name, scene, longest]).encode()
         self.longest = longest
         self._one = asyncio.Lock()
-        self._process: asyncio.subprocess.Process | None = None
+        self._process: subprocess.Popen[bytes] | None = None
         self._ended = False
 
     @property
@@ -79,7 +80,7 @@ class Worker:
     async def start(self) -> None:
         """Start the process before it is needed."""
         async with self._one:
-            await self._started()
+            await asyncio.to_thread(self._started)
 
     async def ask(self, page: int, do: str, message: str) -> str:
         """
@@ -103,64 +104,72 @@ class Worker:
         async with self._one:
             answered = False
             try:
-                answer = await asyncio.wait_for(self._exchange(page, message), self.longest)
+                exchange = asyncio.to_thread(self._exchange, page, message.encode())
+                answer = await asyncio.wait_for(exchange, self.longest)
                 answered = True
             except asyncio.TimeoutError:
                 reason, remedy = f'took longer than {self.longest:g} s', 'make it smaller'
                 raise LinkageError(do, reason, remedy) from None
-            except (asyncio.IncompleteReadError, OSError):
+            except (EOFError, OSError):
                 reason, remedy = 'ended the process that computes it', 'please report it'
                 raise LinkageError(do, reason, remedy) from None
             finally:
                 if not answered:
-                    await self._end()
+                    await asyncio.to_thread(self._end)
             return answer
 
     async def end(self) -> None:
         """End the process, whatever it computes."""
         self._ended = True
-        self._kill()
+        if self._process is not None:
+            self._process.kill()  # a request that waits for it then ends
         async with self._one:
-            await self._end()
+            await asyncio.to_thread(self._end)
 
-    async def _started(self) -> asyncio.subprocess.Process:
+    def _started(self) -> subprocess.Popen[bytes]:
         if self._ended:
             raise LinkageError('linkage view', 'has ended', 'start it again')
         if self._process is None:
-            self._process = await asyncio.create_subprocess_exec(
-                *(sys.executable, '-m', __name__),
-                stdin=asyncio.subprocess.PIPE,
-                stdout=asyncio.subprocess.PIPE,
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', __name__],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
                 # It imports the same package, and the user's own effects, as this process.
                 cwd=Path(__file__).parents[2],
                 env=os.environ | {'PYTHONPATH': os.pathsep.join(map(os.path.abspath, sys.path))},
                 # Ctrl-C is for the server, which then ends this process.
                 start_new_session=True,
             )
-            assert self._process.stdin is not None
-            self._process.stdin.write(_ASKED.pack(0, len(self._opening)) + self._opening)
+            self._write(0, self._opening)
         return self._process
 
-    async def _exchange(self, page: int, message: str) -> str:
-        process = await self._started()
-        assert process.stdin is not None
+    def _exchange(self, page: int, message: bytes) -> str:
+        process = self._started()
         assert process.stdout is not None
-        data = message.encode()
-        process.stdin.write(_ASKED.pack(page, len(data)) + data)
-        await process.stdin.drain()
-        (length,) = _ANSWERED.unpack(await process.stdout.readexactly(_ANSWERED.size))
-        return (await process.stdout.readexactly(length)).decode()
+        self._write(page, message)
+        head = process.stdout.read(_ANSWERED.size)
+        if len(head) < _ANSWERED.size:
+            raise EOFError
+        (length,) = _ANSWERED.unpack(head)
+        answer = process.stdout.read(length)
+        if len(answer) < length:
+            raise EOFError
+        return answer.decode()
 
-    def _kill(self) -> None:
-        if self._process is not None:
-            with suppress(ProcessLookupError):
-                self._process.kill()
+    def _write(self, page: int, message: bytes) -> None:
+        assert self._process is not None
+        assert self._process.stdin is not None
+        self._process.stdin.write(_ASKED.pack(page, len(message)) + message)
+        self._process.stdin.flush()
 
-    async def _end(self) -> None:
-        self._kill()
-        if self._process is not None:
-            await self._process.wait()
-            self._process = None
+    def _end(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.wait()
+            for pipe in (process.stdin, process.stdout):
+                with suppress(OSError):  # what is left in it
+                    pipe.close()  # type: ignore[union-attr]
 
 
 def main() -> None:

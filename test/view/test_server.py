@@ -531,7 +531,9 @@ def start(folder: Path, *arguments: str, files: int = 1024) -> tuple[subprocess.
 
 
 def children(pid: int) -> set[int]:
-    return {int(c) for c in Path(f'/proc/{pid}/task/{pid}/children').read_text().split()}
+    """Return the processes that any thread of a process has started."""
+    tasks = Path(f'/proc/{pid}/task').iterdir()
+    return {int(child) for task in tasks for child in (task / 'children').read_text().split()}
 
 
 def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -> None:
@@ -611,6 +613,7 @@ def test_a_page_that_is_loaded_again_shows_the_file_as_it_is_now(tmp_path: Path)
     finally:
         process.send_signal(signal.SIGTERM)
         _, err = process.communicate(timeout=30.0)
+    assert len(err.splitlines()) == 1, err
     (line,) = err.splitlines()
     assert line.startswith('linkage view: mine.yaml:1: links: ')
     assert line.endswith('; the page shows it as it was')
