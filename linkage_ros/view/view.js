@@ -259,9 +259,14 @@ const View = (() => {
   }
 
   /** End a drag: its last text is one step of the history. */
-  async function ended(pinned) {
+  function ended(pinned) {
     if (!pinned || !dragged) return;
     const settle = () => {
+      // The answer to the last request may still be on its way.
+      if (send.isBusy()) {
+        setTimeout(settle, 20);
+        return;
+      }
       const done = dragged;
       dragged = null;
       if (done?.last) history.add(done.last.text, done.last.inputs);
@@ -273,8 +278,7 @@ const View = (() => {
       buttons();
       askForWhole();
     };
-    // The answer to the last request may still be on its way.
-    setTimeout(settle, 120);
+    settle();
   }
 
   async function go(by) {
