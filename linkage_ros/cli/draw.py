@@ -13,7 +13,11 @@
 # limitations under the License.
 
 
-"""Draw a linkage in a pose, its range behind it, and beside it its joints over the input."""
+"""
+Draw a linkage in a pose, its range behind it, and beside it its joints over the input.
+
+A DXF holds the links as flat parts with holes instead, in millimetres, to be cut.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +25,21 @@ import argparse
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli.arguments import add_at, add_file, add_output, inputs, PICTURES
+from linkage_ros.cli.arguments import (
+    add_at,
+    add_file,
+    add_output,
+    bounded,
+    inputs,
+    PICTURES,
+)
+from linkage_ros.drawing.dxf import links_dxf
 from linkage_ros.drawing.figure import assemblies_picture, picture, view
+from linkage_ros.errors import LinkageError
 from linkage_ros.files.assemblies import assemblies
+from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import load
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 EXAMPLE = 'linkage draw jansen_leg -o jansen_leg.svg --names'
@@ -33,7 +48,7 @@ EXAMPLE = 'linkage draw jansen_leg -o jansen_leg.svg --names'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_file(parser)
-    add_output(parser, PICTURES, 'FILE.png in this folder')
+    add_output(parser, (*PICTURES, '.dxf'), 'FILE.png in this folder')
     add_at(
         parser,
         'pose to draw, in degrees, or metres for a slide; further ones are drawn in light grey',
@@ -45,18 +60,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='draw each choice of assembly sides that closes, with the line for the file',
     )
 
+    parts = parser.add_argument_group('parts, in a DXF')
+    parts.add_argument('--width', type=bounded(1e-6, 1e6), help='width of a bar, in mm')
+    parts.add_argument('--hole', type=bounded(1e-6, 1e6), help='diameter of a hole, in mm')
+
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Draw the linkage."""
     if arguments.assemblies:
         return _draw_assemblies(arguments)
     closure = load(arguments.file)
+    if arguments.output and arguments.output.suffix.lower() == '.dxf':
+        return _write_parts(closure, arguments)
+    for option in ('width', 'hole'):
+        if getattr(arguments, option) is not None:
+            raise LinkageError(f'--{option}', 'is of the parts in a DXF', 'add -o FILE.dxf')
     typed = [inputs(closure.linkage, at, '--at') for at in arguments.at]
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem
     file = arguments.output or Path(f'{name}.png')
     picture(view(closure, pose, ghosts), name, file, names=arguments.names)
     print(file)
+    return 0
+
+
+def _write_parts(closure: Closure, arguments: argparse.Namespace) -> int:
+    """Write the links as parts."""
+    width, hole = (
+        None if typed is None else typed / 1e3 for typed in (arguments.width, arguments.hole)
+    )
+    atomic_write(arguments.output, links_dxf(closure, width=width, hole=hole))
+    print(arguments.output)
     return 0
 
 

@@ -88,7 +88,7 @@ class LinkFrames:
 def blocks(closure: Closure) -> list[Block]:
     """Return the blocks that are not links."""
     links = closure.linkage.links
-    carriers = {point: link for link, points in reversed(links.items()) for point in points}
+    carriers = {point: link for link in reversed(list(links)) for point in links[link]}
     return [
         Block(block, slider.along, slider.point, carriers[slider.point])
         for name, slider in closure.linkage.sliders.items()

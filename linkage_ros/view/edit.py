@@ -378,11 +378,14 @@ def _in_pose(
         return linkage
     written = {name: side for name, side in linkage.assembly.items() if name in sides}
     # First the assembly that is written.
-    own = [sorted(sides[name], key=lambda side, name=name: side != written.get(name))
-           for name in sides]  # fmt: skip
+    own = [
+        sorted(possible, key=[written.get(name), *possible].index)
+        for name, possible in sides.items()
+    ]
     best, nearest = replace(linkage, assembly=written), float('inf')
     for chosen in islice(product(*own), _MOST_ASSEMBLIES):
-        one = replace(linkage, assembly=dict(zip(sides, chosen, strict=True)))
+        assembly: dict[str, Any] = dict(zip(sides, chosen, strict=True))
+        one = replace(linkage, assembly=assembly)
         try:
             closure = Closure(one)
             position = closure.position(*inputs)

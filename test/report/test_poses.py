@@ -20,6 +20,7 @@ from dataclasses import replace
 import json
 
 from linkage_ros.bag.reader import read_bag
+from linkage_ros.drawing.drawing_data import drawn_in_frames
 from linkage_ros.drawing.figure import view
 from linkage_ros.drawing.shapes import carried_shapes, Circle, link_frames, shapes
 from linkage_ros.files.linkage_file import read_linkage
@@ -28,7 +29,6 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.drawing.drawing_data import drawn_in_frames
 from linkage_ros.report.data import page_data, poses
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene

@@ -1,0 +1,179 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The links of a linkage as flat parts with holes, as DXF for a laser cutter or a mill.
+
+The parts lie side by side in their true size, in [mm]: outlines on the layer CUT, holes and slots
+on HOLE, names on NAME; the linkage in a pose is on ASSEMBLY, which is switched off. A link has a
+hole at each pin, and a slot where a slider of another link runs in it.
+"""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from collections.abc import Sequence
+from io import StringIO
+from math import tan, tau
+from typing import Any, NamedTuple
+
+from linkage_ros.drawing.figure import symbol_size, View, view
+from linkage_ros.drawing.painting import corners
+from linkage_ros.drawing.shapes import hull, link_frames
+from linkage_ros.errors import check_installed, LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import carriers
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+
+_MM = 1e3
+_HOLE = 0.4
+"""Diameter of a hole relative to the width of a bar."""
+
+_ROW = 6
+"""Parts in a row."""
+
+_FLATTEST = 1e-12
+
+
+class _Part(NamedTuple):
+    """A link in its own frame, in [mm]: the corners of its outline, its holes and slots."""
+
+    name: str
+    corners: Sequence[complex]
+    holes: Sequence[complex]
+    slots: Sequence[tuple[complex, complex]]
+
+
+def links_dxf(closure: Closure, *, width: float | None = None, hole: float | None = None) -> bytes:
+    """
+    Return the links as a DXF file.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    width
+        Width of a bar, in [m]; by default that of the drawing.
+    hole
+        Diameter of a hole, and width of a slot, in [m]; by default 0.4 of the width.
+
+    Raises
+    ------
+    LinkageError
+        If ezdxf is not installed, or a hole does not fit into a bar.
+
+    """
+    check_installed('ezdxf', "pip install 'linkage_ros[view]'")
+    from ezdxf import filemanagement, units  # local import: an extra, and slow to load
+
+    shown = view(closure, usual_inputs(closure))
+    wide = _MM * (2.0 * symbol_size(shown) if width is None else width)
+    bore = _HOLE * wide if hole is None else _MM * hole
+    if not 0.0 < bore < wide:
+        reason = f'a hole of {bore:.4g} mm does not fit into a bar of {wide:.4g} mm'
+        raise LinkageError(closure.name or 'links', reason, 'write --hole below --width')
+    document = filemanagement.new(units=units.MM)
+    for name, colour in (('CUT', 7), ('HOLE', 1), ('NAME', 3), ('ASSEMBLY', 8)):
+        document.layers.add(name, color=colour)
+    document.layers.get('ASSEMBLY').off()
+    space = document.modelspace()
+    parts = list(_parts(shown))
+    margin = complex(wide, wide) / 2.0
+    boxes = [corners(part.corners) for part in parts]
+    sizes = [top - low + 2.0 * margin for low, top in boxes]
+    place = 0j
+    for number, (part, (low, _), size) in enumerate(zip(parts, boxes, sizes, strict=True)):
+        if number % _ROW == 0:
+            tallest = max(each.imag for each in sizes[number : number + _ROW])
+            place = complex(0.0, place.imag - tallest - 2.0 * wide)
+        _paint(space, part, place - low + margin, 0.0, wide, bore)
+        text = space.add_text(part.name, height=wide / 3.0, dxfattribs={'layer': 'NAME'})
+        text.set_placement((place.real, place.imag - wide / 2.0))
+        place += size.real + wide
+    # Below the parts, as the linkage stands.
+    low, top = corners([place * _MM for place in closure.points(shown.position).values()])
+    below = complex(0.0, place.imag - 2.0 * wide) - complex(low.real, top.imag + wide)
+    frames = link_frames(closure, shown.position)
+    for part in parts:
+        frame = frames[part.name]
+        _paint(space, part, below + frame.place * _MM, frame.angle, wide, bore, 'ASSEMBLY')
+    written = StringIO()
+    document.write(written)
+    return written.getvalue().encode()
+
+
+def _parts(shown: View) -> list[_Part]:
+    """Return the links as parts."""
+    closure = shown.closure
+    linkage = closure.linkage
+    shared = {name for name, links in carriers(linkage.links).items() if len(links) > 1}
+    shared |= {slider.point for slider in linkage.sliders.values()}
+    parts = []
+    for link, points in linkage.links.items():
+        places = {name: complex(x, y) * _MM for name, (x, y) in points.items()}
+        slots = []
+        for name, slider in linkage.sliders.items():
+            if slider.along == link:
+                low, high = shown.sweep.travels.get(name, (0.0, 0.0))
+                through = places[slider.through]
+                slots.append(
+                    (through + slider.unit * low * _MM, through + slider.unit * high * _MM)
+                )
+        ends = [*places.values(), *(end for slot in slots for end in slot)]
+        holes = [at for name, at in places.items() if name in shared]
+        parts.append(_Part(link, hull(ends), holes, slots))
+    return parts
+
+
+def _paint(
+    space: Any, part: _Part, place: complex, angle: float, wide: float, bore: float,
+    layer: str = '',
+) -> None:  # fmt: skip
+    """Add a part in a place; on its own layers, or all on one."""
+
+    def at(point: complex) -> complex:
+        return place + point * rect(1.0, angle)
+
+    attributes = {'layer': layer or 'CUT'}
+    space.add_lwpolyline(
+        _outline([at(corner) for corner in part.corners], wide / 2.0), format='xyb', close=True,
+        dxfattribs=attributes,
+    )  # fmt: skip
+    attributes = {'layer': layer or 'HOLE'}
+    for hole in part.holes:
+        centre = at(hole)
+        space.add_circle((centre.real, centre.imag), bore / 2.0, dxfattribs=attributes)
+    for start, end in part.slots:
+        space.add_lwpolyline(
+            _outline(hull([at(start), at(end)]), bore / 2.0), format='xyb', close=True,
+            dxfattribs=attributes,
+        )  # fmt: skip
+
+
+def _outline(places: Sequence[complex], radius: float) -> list[tuple[float, float, float]]:
+    """Return the outline at a distance around a convex polygon: x, y and bulge of each vertex."""
+    if len(places) == 1:
+        centre = places[0]
+        return [(centre.real - radius, centre.imag, 1.0), (centre.real + radius, centre.imag, 1.0)]
+    vertices = []
+    for number, corner in enumerate(places):
+        coming = phase(corner - places[number - 1])
+        going = phase(places[(number + 1) % len(places)] - corner)
+        turn = (going - coming) % tau
+        if turn < _FLATTEST:
+            turn = 0.0
+        for way, bulge in ((coming, tan(turn / 4.0)), (going, 0.0)):
+            at = corner + rect(radius, way - tau / 4.0)
+            vertices.append((at.real, at.imag, bulge))
+    return vertices
