@@ -13,14 +13,26 @@
 # limitations under the License.
 
 
-"""Settings for all tests: how Hypothesis judges examples, and which files run first."""
+"""For all tests: how Hypothesis judges examples, a browser, and which files run first."""
+
+from collections.abc import Iterator
+from typing import Any
 
 from hypothesis import HealthCheck, settings
 import pytest
 
+from .browser import chromium
+
 # A property is not judged by the duration of an example.
 settings.register_profile('unhurried', deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('unhurried')
+
+
+@pytest.fixture(scope='module')
+def browser() -> Iterator[Any]:
+    """Give a running Chromium; not for the whole session, since its event loop runs as long."""
+    with chromium.browser() as started:
+        yield started
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

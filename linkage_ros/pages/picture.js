@@ -97,6 +97,8 @@ const Picture = (() => {
       this.canvas = canvas;
       this.linkage = linkage;
       this.traces = true;
+      this.tallest = MOST_HEIGHT;
+      this.absent = 'no pose was recorded here';
     }
 
     /** Fit the canvas to its width; `ink` has the colours of the page. */
@@ -105,7 +107,7 @@ const Picture = (() => {
       const [left, bottom, right, top] = this.linkage.reach;
       const width = Math.max(80, Math.floor(this.canvas.parentElement.clientWidth));
       const wanted = (width * (top - bottom)) / (right - left) + FOOT;
-      const tall = Math.min(Math.max(wanted, LEAST_HEIGHT), MOST_HEIGHT);
+      const tall = Math.min(Math.max(wanted, LEAST_HEIGHT), this.tallest);
       const scale = Math.min(width / (right - left), (tall - FOOT) / (top - bottom));
       const ratio = window.devicePixelRatio || 1;
       this.canvas.width = Math.round(width * ratio);
@@ -115,6 +117,7 @@ const Picture = (() => {
       const x = width / 2 - (scale * (left + right)) / 2;
       const y = (tall - FOOT) / 2 + (scale * (top + bottom)) / 2;
       this.toPixel = (place) => [x + scale * place[0], y - scale * place[1]];
+      this.toPlace = (pixel) => [(pixel[0] - x) / scale, (y - pixel[1]) / scale];
       this.curves = null;
     }
 
@@ -131,7 +134,7 @@ const Picture = (() => {
         this.drawShape(pen, shape, number);
       }
       if (there && this.traces) this.drawTraced(pen, number);
-      if (!there) this.say(pen, 'no pose was recorded here');
+      if (!there) this.say(pen, this.absent);
       this.drawScale(pen);
       return there;
     }
@@ -253,5 +256,15 @@ const Picture = (() => {
     }
   }
 
-  return { Linkage, Canvas };
+  /** Return the colours of a drawing by the roles of its shapes, on light or dark paper. */
+  function ink() {
+    const roles = [...Object.keys(Page.data.faces), 'slot', 'pin'];
+    const own = Page.colours(...roles.map((role) => `dark-${role}`));
+    const found = { slot: '#ffffff', pin: '#ffffff', ...Page.data.faces, faint: own.faint };
+    if (!Page.isDark()) return found;
+    for (const role of roles) found[role] = own[`dark-${role}`] || found[role];
+    return found;
+  }
+
+  return { Linkage, Canvas, ink };
 })();

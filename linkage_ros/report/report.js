@@ -157,15 +157,6 @@ const Report = (() => {
     }));
   }
 
-  function ink() {
-    const roles = [...Object.keys(data.faces), 'slot', 'pin'];
-    const own = Page.colours(...roles.map((role) => `dark-${role}`));
-    const found = { slot: '#ffffff', pin: '#ffffff', ...data.faces, faint: own.faint };
-    if (!Page.isDark()) return found;
-    for (const role of roles) found[role] = own[`dark-${role}`] || found[role];
-    return found;
-  }
-
   function begin() {
     Angles.chosen.wrapped = data.wrapped;
     canvases = [...document.querySelectorAll('figure[data-linkage]')].flatMap((figure) => {
@@ -176,9 +167,9 @@ const Report = (() => {
     });
     plots = [...document.querySelectorAll('figure[data-plot]')].map((f) => new Plots.Plot(f));
     // All of them have to have their size before the first is shown.
-    canvases.forEach((canvas) => canvas.fit(ink()));
+    canvases.forEach((canvas) => canvas.fit(Picture.ink()));
     Page.keepDrawn(canvases.map((each) => each.canvas.parentElement), (figure) => {
-      canvases.find((each) => each.canvas.parentElement === figure).fit(ink());
+      canvases.find((each) => each.canvas.parentElement === figure).fit(Picture.ink());
       show();
     });
     Page.keepDrawn(plots.map((plot) => plot.figure), (figure) => {
@@ -186,7 +177,7 @@ const Report = (() => {
     });
     // Paper has a width and colours of its own.
     Page.paper.addEventListener('change', () => {
-      canvases.forEach((canvas) => canvas.fit(ink()));
+      canvases.forEach((canvas) => canvas.fit(Picture.ink()));
       plots.forEach((plot) => plot.draw(state.view));
       show();
     });

@@ -121,7 +121,7 @@ def edited(text: str, edit: Mapping[str, Any], name: str = _NAME) -> Edited:
 def pin_of(error: LinkageError, text: str) -> str | None:
     """Return the pin, slider or link that an error concerns; None if it names none."""
     try:
-        written, _ = written_linkage(parse_yaml(text.encode(), _NAME))
+        written, _ = written_linkage(parse_yaml(text.encode('utf-8', 'replace'), _NAME))
     except LinkageError:
         return None
     names = {*carriers(written.links), *written.sliders, *written.links}

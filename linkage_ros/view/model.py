@@ -27,6 +27,7 @@ from typing import Any
 
 from linkage_ros.drawing.drawing_data import drawn_in_frames
 from linkage_ros.drawing.figure import view
+from linkage_ros.drawing.shapes import driven_links
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.files.assemblies import closures
 from linkage_ros.files.linkage_file import closable, written_linkage
@@ -117,6 +118,7 @@ def _model(closure: Closure, name: str, text: str, units: Units) -> dict[str, An
             for joint, turning in zip(closure.joint_names, closure.turning, strict=True)
         ],
         'links': list(closure.link_frames.links),
+        'driven': sorted(driven_links(closure)),
         'program': program_of(closure),
         'drawn': drawn_in_frames(view(closure, inputs)),
         'pins': [

@@ -12,17 +12,49 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The page of `linkage view`: one file with its data, its style and its scripts."""
+"""The page of `linkage view`: the linkage under the hand, its curves, its numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
 from linkage_ros.drawing.painting import COLOURS, FACES, INK
 from linkage_ros.errors import clean
-from linkage_ros.pages.document import document
+from linkage_ros.pages.document import document, POLICY
+
+_POLICY = POLICY.replace(
+    "script-src 'unsafe-inline'",
+    # The program of the linkage; and the server that has sent this page.
+    "script-src 'unsafe-inline' 'unsafe-eval'; connect-src ws://127.0.0.1:* ws://localhost:*",
+).replace('img-src data:', 'img-src data: blob:')
+
+_PACKAGE = 'linkage_ros.view'
+_SCRIPTS = ('linkage', 'board', 'hand', 'talk', 'edits', 'over_input', 'view')
+_SHARED = ('angles', 'curves', 'looks', 'picture')
+
+_DOWNLOADS = {
+    'svg': 'drawing, SVG',
+    'png': 'drawing, PNG',
+    'gif': 'animation, GIF',
+    'dxf': 'links with holes, DXF',
+    'yaml': 'linkage file',
+    'c': 'C',
+    'py': 'Python',
+    'js': 'JavaScript',
+}
+_TOOLS = {
+    'shape': 'move pins',
+    'turn': 'turn the crank',
+    'trace': 'trace a point',
+    'input': 'choose the input',
+}
+_CURVES = {
+    'joints': 'Joints',
+    'rates': 'Rates, at an input rate of 1 rad/s or 1 m/s',
+    'accelerations': 'Accelerations, at a constant input rate of 1 rad/s or 1 m/s',
+}
 
 
 def page(
@@ -64,4 +96,76 @@ def page(
         'node': node,
     }
     title = clean(node or model['name'])
-    return document(title, [f'<h1>{escape(title)}</h1>'], data, [], [])
+    scripts = [('linkage_ros.pages', f'{name}.js') for name in _SHARED]
+    scripts += [(_PACKAGE, f'{name}.js') for name in _SCRIPTS]
+    styles = [(_PACKAGE, 'view.css')]
+    body = _body(title, mode, can_save)
+    return document(title, body, data, styles, scripts, policy=_POLICY)
+
+
+def _body(title: str, mode: str, can_save: bool) -> Iterator[str]:
+    editing = mode == 'edit'
+    yield '<header class="bar">'
+    yield f'<h1 id="title">{escape(title)}</h1>'
+    if editing:
+        yield '<button type="button" id="undo" title="Undo (Ctrl+Z)">Undo</button>'
+        yield '<button type="button" id="redo" title="Redo (Ctrl+Y)">Redo</button>'
+        if can_save:
+            yield '<button type="button" id="save" title="Save (Ctrl+S)">Save</button>'
+        yield '<select id="open" class="edit" aria-label="New from a shipped linkage">'
+        yield '<option value="">New from …</option></select>'
+        yield '<select id="download" class="edit" aria-label="Download">'
+        yield '<option value="">Download …</option>'
+        for kind, what in _DOWNLOADS.items():
+            yield f'<option value="{kind}">{what}</option>'
+        yield '</select>'
+    yield '</header>'
+    yield '<p id="lost" role="status" hidden>Not connected: <span id="lost-why"></span>. '
+    yield 'The linkage still moves; it is tried again.</p>'
+    yield '<p id="wrong" role="alert" hidden></p>'
+    yield '<noscript><p class="warnings">This page needs JavaScript.</p></noscript>'
+    yield '<main><section class="player" aria-label="The linkage">'
+    yield '<figure><canvas id="drawing" tabindex="0" role="application" aria-label="The linkage; '
+    yield 'n and p choose a pin, the arrows move it, or turn the crank"></canvas></figure>'
+    yield '<p id="status" role="status"></p>'
+    yield '<div class="controls"><button type="button" id="play" aria-label="Play">▶</button>'
+    yield '<label>angles in <select id="angles"><option value="degrees">degrees</option>'
+    yield '<option value="radians">radians</option></select></label>'
+    for what, checked in {
+        'names': 'names', 'ghosts': 'other assemblies', 'centres': 'instant centres'
+    }.items():  # fmt: skip
+        on = '' if what == 'centres' else ' checked'
+        yield f'<label><input type="checkbox" id="{what}"{on}> {checked}</label>'
+    yield '</div><div id="inputs"></div>'
+    if editing:
+        yield '<div class="controls"><fieldset><legend hidden>tool</legend>'
+        for tool, what in _TOOLS.items():
+            on = ' checked' if tool == 'shape' else ''
+            yield f'<label><input type="radio" name="tool" class="edit" value="{tool}"{on}> '
+            yield f'{what}</label>'
+        yield '</fieldset><label>snap to <select id="snap" class="edit">'
+        yield '<option value="0">nothing</option>'
+        for step in ('0.001', '0.005', '0.01', '0.1', '1', '5', '10'):
+            yield f'<option>{step}</option>'
+        yield '</select></label></div>'
+    yield '<dl class="readout" id="readout" aria-live="off"></dl>'
+    yield '<ul class="warnings" id="warnings" hidden></ul>'
+    yield '</section><section>'
+    yield '<div id="plots">'
+    for key, what in _CURVES.items():
+        yield f'<figure data-key="{key}"><figcaption>{what}</figcaption><div class="plot"></div>'
+        yield '</figure>'
+        if key == 'joints':
+            yield '<figure class="band"><figcaption>Transmission angle '
+            yield '<span class="key"><i style="background:#d55e00"></i>below 30°'
+            yield '<i style="background:#e6b422"></i>30 to 45°'
+            yield '<i style="background:#009e73"></i>above 45°; the line is the singularity '
+            yield 'margin, from 0 at a singularity to 1</span></figcaption>'
+            yield '<div><canvas id="band" role="img" aria-label="transmission angle over the '
+            yield 'input"></canvas></div></figure>'
+    yield '</div>'
+    yield '<div class="forms"><div><h2>Lengths [<span id="unit-of-length"></span>]</h2>'
+    yield '<table><tbody id="lengths"></tbody></table></div>'
+    yield '<div><h2>Assembly</h2><table><tbody id="choices"></tbody></table></div>'
+    yield '<div><h2>Traced points</h2><div id="traced"></div></div></div>'
+    yield '</section></main>'

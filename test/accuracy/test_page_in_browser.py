@@ -23,7 +23,6 @@ from linkage_ros.accuracy.page.files import PAGE, write_page
 import pytest
 
 from .shown import DIAGRAMS, EMPTY, FAILED, LONG, METHODS, POSITION, RESULTS
-from ..browser.chromium import browser as chromium
 from ..browser.opened import opened
 
 pytest.importorskip('matplotlib', reason='draws the pictures')
@@ -40,12 +39,6 @@ DRAWN = """(folded) => {
   return new Promise((done) => setTimeout(done, 300));
 }"""
 LAYOUT = f'document.querySelector("[data-diagram={POSITION.key}] .plot").layout'
-
-
-@pytest.fixture(scope='module')
-def browser():
-    with chromium() as started:
-        yield started
 
 
 @pytest.fixture(scope='module')

@@ -30,7 +30,6 @@ from linkage_ros.scene.schema import linkage_schema, scene_schema
 import pytest
 
 from .blocks import ROOT
-from ..browser.chromium import browser as chromium
 from ..browser.opened import opened
 
 for needed in ('sphinx', 'myst_parser', 'furo', 'matplotlib'):
@@ -205,10 +204,11 @@ def test_the_tutorial_shows_its_pictures(site):
     [(1600, 'light'), (400, 'dark')],
     ids=['wide and light', 'narrow and dark'],
 )
-def test_in_a_browser_the_site_loads_no_other_host_and_fits_its_window(site, pages, width, scheme):
-    with chromium() as browser:
-        for name in LOOKED_AT:
-            with opened(browser, site / f'{name}.html', width=width, color_scheme=scheme) as page:
-                assert page.said == [], name
-                assert [asked for asked in page.asked if not asked.startswith('file:')] == []
-                assert not page.is_wider_than_its_window(), name
+def test_in_a_browser_the_site_loads_no_other_host_and_fits_its_window(
+    browser, site, pages, width, scheme
+):
+    for name in LOOKED_AT:
+        with opened(browser, site / f'{name}.html', width=width, color_scheme=scheme) as page:
+            assert page.said == [], name
+            assert [asked for asked in page.asked if not asked.startswith('file:')] == []
+            assert not page.is_wider_than_its_window(), name

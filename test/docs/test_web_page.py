@@ -20,9 +20,9 @@ from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 from .blocks import blocks, ROOT
-from ..browser.chromium import browser as chromium
 from ..support.commands import linkage
 
 
@@ -31,15 +31,12 @@ class Quiet(SimpleHTTPRequestHandler):
         """Do not log requests."""
 
 
-def test_the_web_page_shows_the_joints(tmp_path: Path) -> None:
+def test_the_web_page_shows_the_joints(tmp_path: Path, browser: Any) -> None:
     page = ROOT / 'docs' / 'how_to' / 'compile.md'
     texts = {block.language: block.text for block in blocks(page)}
     (tmp_path / 'page.html').write_text(f'<!doctype html>\n{texts["html"]}')
     assert linkage(tmp_path, 'compile', 'four_bar', '-o', 'four_bar.js').returncode == 0
-    with (
-        ThreadingHTTPServer(('127.0.0.1', 0), partial(Quiet, directory=tmp_path)) as server,
-        chromium() as browser,
-    ):
+    with ThreadingHTTPServer(('127.0.0.1', 0), partial(Quiet, directory=tmp_path)) as server:
         Thread(target=server.serve_forever, daemon=True).start()
         shown = browser.new_page()
         shown.goto(f'http://127.0.0.1:{server.server_port}/page.html')

@@ -45,7 +45,7 @@ from ..support.scenes import closure_of
 # A four-bar is solved as well as its lengths and crank angle allow, in the right assembly.
 
 
-COUNT = 2000
+COUNT = 1000
 length = st.floats(0.1, 10.0)
 crank = st.floats(-7.0, 7.0)
 side = st.sampled_from((1, -1))

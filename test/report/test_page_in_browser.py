@@ -27,7 +27,6 @@ import numpy as np
 import pytest
 
 from . import bags
-from ..browser.chromium import browser as chromium
 from ..browser.opened import opened
 
 pytest.importorskip('plotly', reason='is within the page')
@@ -91,12 +90,6 @@ COLOUR_AT = f"""([x, y]) => {{ {COPY}
 }}"""
 INPUT_FACE, LINK_FACE = '240,160,122', '195,211,226'
 DARK_INPUT_FACE = '168,85,58'
-
-
-@pytest.fixture(scope='module')
-def browser():
-    with chromium() as started:
-        yield started
 
 
 @pytest.fixture(scope='module')

@@ -24,7 +24,6 @@ import pytest
 from . import bags
 from .runs import but, recorded
 from .test_page_in_browser import COLOURS, page_of, readout, settle, TRACE
-from ..browser.chromium import browser as chromium
 from ..browser.opened import opened
 from ..cli.recorded import BEGIN, scene_file, SECOND
 
@@ -51,12 +50,6 @@ WIDER = """() => [...document.body.querySelectorAll(':not(.scroll *, svg *)')]
     each.getBoundingClientRect().right > document.documentElement.clientWidth + 0.5)
   .map((each) => `${each.tagName} ${each.id} ${each.className}`)"""
 RATE = 100
-
-
-@pytest.fixture(scope='module')
-def browser():
-    with chromium() as started:
-        yield started
 
 
 @pytest.fixture(scope='module')

@@ -1,0 +1,330 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page in a browser: what the hand does, compared with the closure; what goes wrong, said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from linkage_ros.files.linkage_file import load, read_closure
+from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.resources import linkage_names, shipped
+from linkage_ros.view.conversation import Conversation
+from linkage_ros.view.model import model
+from linkage_ros.view.page import page as page_of
+from linkage_ros.view.user_file import UserFile
+import pytest
+
+from .served import Served, served
+from ..browser.opened import opened
+
+NEAR = 1e-12
+FOUR_BAR = shipped('linkages/four_bar.yaml').read_text('utf-8')
+QUIET = '() => !View.state().busy && View.state().there'
+
+
+@pytest.fixture(scope='module')
+def stills(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Return a function that writes the page of a shipped linkage, which needs no server."""
+    folder = tmp_path_factory.mktemp('stills')
+
+    def written(name: str) -> Path:
+        file = folder / f'{name}.html'
+        if not file.exists():
+            text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
+            file.write_text(page_of(model(text, name), mode='still'), 'utf-8')
+        return file
+
+    return written
+
+
+@contextmanager
+def edited(browser: Any, folder: Path, **settings: Any) -> Iterator[tuple[Any, Path, Served]]:
+    """Open the page of a file of the user's, with its server."""
+    file = folder / 'mine.yaml'
+    file.write_text(FOUR_BAR, 'utf-8')
+    user = UserFile(file)
+
+    def page() -> str:
+        return page_of(model(file.read_text('utf-8'), 'mine'), mode='edit', can_save=True)
+
+    with served([Conversation('mine', None, user).add], page) as server:
+        shown = browser.new_page(**settings)
+        said: list[str] = []
+        shown.on('console', lambda one: said.append(one.text) if one.type == 'error' else None)
+        shown.on('pageerror', lambda one: said.append(str(one)))
+        shown.goto(server.address)
+        shown.wait_for_function(QUIET)
+        try:
+            yield shown, file, server
+            assert said == []
+        finally:
+            shown.close()
+
+
+def state(page: Any) -> dict[str, Any]:
+    found: dict[str, Any] = page.evaluate('() => View.state()')
+    return found
+
+
+def closure_of(text: str) -> Closure:
+    return read_closure(parse_yaml(text.encode(), 'page'))
+
+
+def pixel_of(page: Any, pin: str) -> tuple[float, float]:
+    """Return where a pin is in the window."""
+    box = page.locator('#drawing').bounding_box()
+    x, y = page.evaluate(
+        'pin => View.board.toPixel(View.linkage.pins().find((p) => p.name === pin).place)', pin
+    )
+    return box['x'] + x, box['y'] + y
+
+
+def drag(page: Any, pin: str, across: float, down: float) -> None:
+    """Drag a pin by so many pixels, in steps as a hand does."""
+    text = state(page)['text']
+    x, y = pixel_of(page, pin)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(1, 6):
+        page.mouse.move(x + across * step / 5, y + down * step / 5)
+        page.wait_for_timeout(30)
+    page.mouse.up()
+    page.wait_for_function(QUIET)
+    page.wait_for_function('text => View.state().text !== text', arg=text)
+
+
+def agrees(page: Any) -> None:
+    """Check that all joints of the page are those of the closure, for the text of the page."""
+    shown = state(page)
+    position = closure_of(shown['text']).position(*shown['inputs'])
+    assert shown['joints'] == pytest.approx(position.joints, abs=NEAR)
+
+
+# Without a server.
+
+
+@pytest.mark.parametrize('name', linkage_names())
+def test_every_shipped_linkage_opens_and_stands_where_the_closure_says(
+    browser: Any, stills: Callable[[str], Path], name: str
+) -> None:
+    with opened(browser, stills(name)) as page:
+        page.wait_for_function('() => window.View && View.board')
+        shown = state(page)
+        assert page.said == []
+        assert shown['closed']
+        position = load(name).position(*shown['inputs'])
+        near = NEAR if shown['model']['program'] else 1e-9
+        assert shown['joints'] == pytest.approx(position.joints, abs=near)
+
+
+@pytest.mark.parametrize('width', [1600, 400])
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+def test_the_page_fits_its_window(
+    browser: Any, stills: Callable[[str], Path], width: int, scheme: str
+) -> None:
+    with opened(browser, stills('jansen_leg'), width=width, color_scheme=scheme) as page:
+        assert page.said == []
+        assert not page.is_wider_than_its_window()
+
+
+def test_the_keyboard_alone_turns_the_crank_and_plays(
+    browser: Any, stills: Callable[[str], Path]
+) -> None:
+    with opened(browser, stills('four_bar')) as page:
+        page.focus('#drawing')
+        before = state(page)['inputs'][0]
+        page.keyboard.press('ArrowRight')
+        after = state(page)
+        assert after['inputs'][0] == pytest.approx(before + 6.283185307179586 / 360)
+        joints = load('four_bar').position(*after['inputs']).joints
+        assert after['joints'] == pytest.approx(joints, abs=NEAR)
+        page.keyboard.press(' ')
+        page.wait_for_function(f'() => View.state().inputs[0] > {after["inputs"][0] + 0.1}')
+        page.keyboard.press(' ')
+
+
+def test_a_finger_turns_the_crank(browser: Any, stills: Callable[[str], Path]) -> None:
+    context = browser.new_context(has_touch=True, viewport={'width': 400, 'height': 900})
+    page = context.new_page()
+    page.goto(stills('four_bar').as_uri())
+    page.wait_for_function('() => window.View && View.board')
+    before = state(page)['inputs'][0]
+    x, y = pixel_of(page, 'A')
+    a, b = pixel_of(page, 'O2')
+    wire = context.new_cdp_session(page)
+    for kind, at in (
+        ('touchStart', [(x, y)]),
+        ('touchMove', [(a, b - 60)]),
+        ('touchEnd', []),
+    ):
+        points = [{'x': px, 'y': py} for px, py in at]
+        wire.send('Input.dispatchTouchEvent', {'type': kind, 'touchPoints': points})
+    page.wait_for_function(f'() => View.state().inputs[0] !== {before}')
+    # The finger is straight above the pivot.
+    assert state(page)['inputs'][0] == pytest.approx(1.5707963, abs=1e-6)
+    context.close()
+
+
+# With a server.
+
+
+def test_a_pin_is_dragged_and_all_is_undone_to_the_last_bit(browser: Any, tmp_path: Path) -> None:
+    with edited(browser, tmp_path) as (page, _, _):
+        first = state(page)
+        drag(page, 'B', 40, -30)
+        agrees(page)
+        one = state(page)
+        assert one['text'] != first['text']
+        drag(page, 'A', 15, 10)
+        agrees(page)
+        assert state(page)['inputs'] != one['inputs']  # the crank has turned with its pin
+        for wanted in (one, first):
+            page.click('#undo')
+            page.wait_for_function('text => View.state().text === text', arg=wanted['text'])
+            page.wait_for_function(QUIET)
+            found = state(page)
+            for key in ('inputs', 'joints', 'rates', 'accelerations', 'frames'):
+                assert found[key] == wanted[key]
+        page.keyboard.press('Control+y')
+        page.wait_for_function('text => View.state().text === text', arg=one['text'])
+        assert state(page)['joints'] == one['joints']
+
+
+def test_a_length_that_cannot_close_is_said_at_its_pin_and_the_page_goes_on(
+    browser: Any, tmp_path: Path
+) -> None:
+    with edited(browser, tmp_path) as (page, _, _):
+        before = state(page)
+        field = page.get_by_label('length coupler A–B')
+        field.fill('1.3')
+        field.press('Enter')
+        page.wait_for_function('() => View.state().wrong')
+        wrong = state(page)['wrong']
+        assert wrong['pin'] == 'B'
+        assert 'the loops close at no value of the input' in page.inner_text('#wrong')
+        assert state(page)['text'] == before['text']
+        field.fill('0.13')
+        field.press('Enter')
+        page.wait_for_function('text => View.state().text !== text', arg=before['text'])
+        assert state(page)['wrong'] is None
+        agrees(page)
+        assert 'B: [0.13, 0]' in state(page)['text']
+
+
+def test_what_is_saved_is_the_text_of_the_page_and_is_loaded_again(
+    browser: Any, tmp_path: Path
+) -> None:
+    with edited(browser, tmp_path) as (page, file, _):
+        assert page.is_disabled('#save')
+        drag(page, 'B', 20, 20)
+        page.click('#save')
+        page.wait_for_function("() => document.getElementById('status').textContent !== ''")
+        text = state(page)['text']
+        assert file.read_text('utf-8') == text
+        assert '# A crank-rocker: the crank turns fully' in text  # the author's comment
+        page.reload()
+        page.wait_for_function(QUIET)
+        assert state(page)['text'] == text
+        agrees(page)
+
+
+def test_points_inputs_and_sides_are_chosen_by_clicking(browser: Any, tmp_path: Path) -> None:
+    with edited(browser, tmp_path) as (page, _, _):
+        page.select_option('#choices select', 'right')
+        page.wait_for_function("() => View.state().text.includes('{B: right}')")
+        agrees(page)
+        page.check('input[value=trace]')
+        page.mouse.click(*middle(page, 'O4', 'B'))
+        page.wait_for_function("() => View.state().text.includes('traced: [P, P1]')")
+        page.get_by_label('trace P no more').click()
+        page.wait_for_function("() => View.state().text.includes('traced: [P1]')")
+        page.check('input[value=input]')
+        page.mouse.click(*middle(page, 'O4', 'B', 0.7))
+        page.wait_for_function("() => View.state().text.includes('input: {joint: rocker_joint')")
+        agrees(page)
+
+
+def middle(page: Any, one: str, other: str, share: float = 0.5) -> tuple[float, float]:
+    (x, y), (u, v) = pixel_of(page, one), pixel_of(page, other)
+    return x + share * (u - x), y + share * (v - y)
+
+
+def test_the_keyboard_alone_moves_a_pin(browser: Any, tmp_path: Path) -> None:
+    with edited(browser, tmp_path) as (page, _, _):
+        text = state(page)['text']
+        page.focus('#drawing')
+        while page.evaluate('() => View.board.chosen') != 'B':
+            page.keyboard.press('n')
+        page.keyboard.press('Shift+ArrowUp')
+        page.wait_for_function('text => View.state().text !== text', arg=text)
+        agrees(page)
+        page.keyboard.press('Control+z')
+        page.wait_for_function('text => View.state().text === text', arg=text)
+
+
+def test_a_shipped_linkage_is_opened_and_a_file_downloaded(browser: Any, tmp_path: Path) -> None:
+    with edited(browser, tmp_path) as (page, _, _):
+        page.wait_for_function("() => document.getElementById('open').options.length > 5")
+        page.select_option('#open', 'slider_crank')
+        page.wait_for_function("() => View.state().model.name === 'slider_crank'")
+        agrees(page)
+        for kind in ('yaml', 'svg', 'png'):
+            with page.expect_download() as found:
+                page.select_option('#download', kind)
+            data = Path(found.value.path()).read_bytes()
+            assert len(data) > 500
+            assert found.value.suggested_filename.endswith(f'.{kind}')
+
+
+def test_a_server_that_ends_is_said_and_the_linkage_still_moves(
+    browser: Any, tmp_path: Path
+) -> None:
+    with edited(browser, tmp_path) as (page, _, server):
+        with served([]) as _other:  # ends before the page's
+            pass
+        page.evaluate("() => { window.lost = document.getElementById('lost'); }")
+        assert page.evaluate('() => lost.hidden')
+        assert server.server.refused == {}
+        other = browser.new_page()  # a second page is one of its own
+        other.goto(server.address)
+        other.wait_for_function(QUIET)
+        drag(page, 'B', 20, 10)
+        assert state(other)['text'] != state(page)['text']
+        other.close()
+
+
+def test_two_assemblies_are_seen_and_instant_centres_on_request(
+    browser: Any, stills: Callable[[str], Path]
+) -> None:
+    with opened(browser, stills('four_bar')) as page:
+        assert page.evaluate('() => View.board.ghosts.length') == 1
+        # Of the rocker it is its pivot; of the coupler where crank and rocker meet (Kennedy).
+        centre = page.evaluate("() => View.linkage.centre('rocker')")
+        assert centre == pytest.approx([0.1, 0.0], abs=1e-9)
+        places = page.evaluate(
+            '() => Object.fromEntries(View.linkage.pins().map((p) => [p.name, p.place]))'
+        )
+        o2, a, o4, b = (complex(*places[name]) for name in ('O2', 'A', 'O4', 'B'))
+        u, w, d = a - o2, b - o4, o4 - o2
+        meets = o2 + u * (d.real * w.imag - d.imag * w.real) / (u.real * w.imag - u.imag * w.real)
+        x, y = page.evaluate("() => View.linkage.centre('coupler')")
+        assert complex(x, y) == pytest.approx(meets, abs=1e-9)
+        page.check('#centres')
+        assert page.said == []
