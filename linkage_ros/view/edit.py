@@ -131,16 +131,28 @@ def pin_of(error: LinkageError, text: str) -> str | None:
 
 def _shown(closure: Closure, given: Any) -> _Shown:
     count = len(closure.linkage.inputs)
-    inputs = usual_inputs(closure) if given is None else _numbers('inputs', given, count)
+    inputs = _usual(closure) if given is None else _numbers('inputs', given, count)
     position = closure.position(*inputs)
     if not position.status.has_pose:
-        inputs = usual_inputs(closure)
+        inputs = _usual(closure)
         position = closure.position(*inputs)
+        if not position.status.has_pose:  # several inputs
+            raise _open()
     frames: dict[str, tuple[complex, float]] = {GROUND: (0j, 0.0)}
     found = closure.link_frames
     frames |= dict(zip(found.links, found.at(position), strict=True))
     points = closure.points(position)
     return _Shown(closure, inputs, frames, {point: place for (_, point), place in points.items()})
+
+
+def _usual(closure: Closure) -> tuple[float, ...]:
+    if len(closure.linkage.inputs) == 1 and not closure.closing_ranges:
+        raise _open()
+    return usual_inputs(closure)
+
+
+def _open() -> LinkageError:
+    return LinkageError('links', 'close nowhere, so no pose can be changed', 'undo')
 
 
 def _move_pin(shown: _Shown, edit: Mapping[str, Any]) -> _Change:

@@ -249,6 +249,8 @@ class Server:
             return self._refused(404, 'a request for something that is not here')
         except LinkageError as error:
             return web.Response(status=500, text=f'{error}\n')
+        except ConnectionError:  # the page has gone
+            raise
         except Exception as error:  # noqa: BLE001 (a page must not end its server)
             found = defect('linkage view', error)
             self._report(str(found))

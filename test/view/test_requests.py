@@ -204,6 +204,21 @@ def test_the_error_of_an_edit_names_its_pin(edit: dict[str, Any], pin: str | Non
     assert asked('edit', text=FOUR_BAR, edit=edit)['error']['pin'] == pin
 
 
+@pytest.mark.parametrize(
+    ('name', 'old', 'new'),
+    [('four_bar', '0.080', '0.800'), ('five_bar', '0.120', '9.120')],
+)
+def test_an_edit_of_what_closes_nowhere_is_an_error_and_no_defect(
+    name: str, old: str, new: str
+) -> None:
+    text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
+    far = text.replace(old, new)
+    assert far != text
+    for inputs in (None, [1.0] * len(lr.load(name).linkage.inputs)):
+        edit = {'pin': 'A', 'to': [0.03, 0.03], 'inputs': inputs}
+        assert 'error' in asked('edit', text=far, edit=edit)
+
+
 def test_only_the_file_with_which_the_page_was_opened_is_saved() -> None:
     assert ok('save', text=FOUR_BAR) == {}
     line = error('save', text=FOUR_BAR, name='jansen_leg')
