@@ -443,13 +443,15 @@ class LiveBridge:
                 self._do(content, future)
             except LinkageError as error:
                 _reply(future, str(error))
+            except Exception as error:  # noqa: BLE001 (rcl's have no base class)
+                _reply(future, f'{type(error).__name__}: {shortened(clean(str(error)), 200)}')
 
     def _do(self, content: Mapping[str, Any], future: Future[str]) -> None:
         """Do what a page asks for; the answer may come later."""
         do = content['do']
         if do == 'fault':
             name = content.get('name')
-            if name not in self._faults:
+            if not isinstance(name, str) or name not in self._faults:
                 raise LinkageError(
                     'fault', f'{quoted(name)} is not in the scene', _any_of(self._faults)
                 )

@@ -169,6 +169,7 @@ def test_a_fault_and_a_recording_begin_and_end(graph, start, scene):
         )
         for do, content in (
             ('fault', {'name': 'frozen', 'on': 1}),
+            ('fault', {'name': ['frozen'], 'on': True}),
             ('crank', {'angle': 1e300}),
             ('crank', {'angle': None}),
             ('crank', {'angle': 1.0, 'input': 3}),
