@@ -25,6 +25,7 @@ from __future__ import annotations
 from cmath import phase, rect
 from collections.abc import Sequence
 from io import StringIO
+from itertools import islice
 from math import tan, tau
 from typing import Any, NamedTuple
 
@@ -95,7 +96,7 @@ def links_dxf(closure: Closure, *, width: float | None = None, hole: float | Non
     place = 0j
     for number, (part, (low, _), size) in enumerate(zip(parts, boxes, sizes, strict=True)):
         if number % _ROW == 0:
-            tallest = max(each.imag for each in sizes[number : number + _ROW])
+            tallest = max(each.imag for each in islice(sizes, number, number + _ROW))
             place = complex(0.0, place.imag - tallest - 2.0 * wide)
         _paint(space, part, place - low + margin, 0.0, wide, bore)
         text = space.add_text(part.name, height=wide / 3.0, dxfattribs={'layer': 'NAME'})

@@ -387,12 +387,12 @@ class Closure:
 
     @cached_property
     def link_frames(self) -> LinkFrames:
-        """The frames of the links and blocks that move."""
+        """Return the frames of the links and blocks that move."""
         from linkage_ros.kinematics.link_frames import (
             LinkFrames,  # local import: only drawings need it
         )
 
-        return LinkFrames(self)
+        return LinkFrames(self.linkage, self.structure, self._known)
 
     def link_angles(self, position: Position) -> dict[str, float]:
         """Return the angle of every link to the ground, in [rad], not wrapped."""

@@ -18,11 +18,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.linkage import GROUND, Linkage
+from linkage_ros.kinematics.point_tracker import PointTracker
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics.known_links import KnownLinks
     from linkage_ros.kinematics.results import Position, Velocity
+    from linkage_ros.kinematics.topology import Structure
 
 
 class Block(NamedTuple):
@@ -42,8 +44,10 @@ class LinkFrames:
 
     Parameters
     ----------
-    closure
-        The linkage.
+    linkage, structure
+        The linkage, and its groups.
+    known
+        Its links, all of them known.
 
     Attributes
     ----------
@@ -52,18 +56,18 @@ class LinkFrames:
 
     """
 
-    def __init__(self, closure: Closure) -> None:
-        carriers = {link: (link, 0j, link) for link in closure.linkage.links if link != GROUND} | {
+    def __init__(self, linkage: Linkage, structure: Structure, known: KnownLinks) -> None:
+        carriers = {link: (link, 0j, link) for link in linkage.links if link != GROUND} | {
             block.name: (
                 block.link,
-                complex(*closure.linkage.links[block.link][block.point]),
+                complex(*linkage.links[block.link][block.point]),
                 block.along,
             )
-            for block in blocks(closure)
+            for block in blocks(linkage, structure)
         }
         self.links = tuple(carriers)
-        self._tracker = closure.point_tracker([(link, at) for link, at, _ in carriers.values()])
-        self._angles = [closure.angles[turning] for _, _, turning in carriers.values()]
+        self._tracker = PointTracker(known, [(link, at) for link, at, _ in carriers.values()])
+        self._angles = [known.angles[turning] for _, _, turning in carriers.values()]
 
     def at(self, position: Position) -> list[tuple[Any, Any]]:
         """Return the origin of each frame, as x + iy in [m], and its angle, in [rad]."""
@@ -85,12 +89,12 @@ class LinkFrames:
         ]
 
 
-def blocks(closure: Closure) -> list[Block]:
+def blocks(linkage: Linkage, structure: Structure) -> list[Block]:
     """Return the blocks that are not links."""
-    links = closure.linkage.links
+    links = linkage.links
     carriers = {point: link for link in reversed(list(links)) for point in links[link]}
     return [
         Block(block, slider.along, slider.point, carriers[slider.point])
-        for name, slider in closure.linkage.sliders.items()
-        if (block := closure.structure.blocks[name]) not in links
+        for name, slider in linkage.sliders.items()
+        if (block := structure.blocks[name]) not in links
     ]

@@ -117,7 +117,7 @@ def poses(
         found, reason = _by_joints(grow(linkage, names), prefix, known), ''
     except DefinitionError as error:
         found, reason = _by_closing(closure, [known[name] for name in inputs]), error.reason
-    for block in blocks(closure):
+    for block in blocks(linkage, closure.structure):
         place = _at(found, block.link, linkage.links[block.link][block.point])
         found.setdefault(block.name, (place, found[block.along][1]))
     links = tuple(link for link in found if link != GROUND)
@@ -160,7 +160,10 @@ def _by_joints(tree: Tree, prefix: str, values: Mapping[str, Numbers]) -> _Found
 
 
 def _by_closing(closure: Closure, inputs: Sequence[Numbers]) -> _Found:
-    links = (*closure.linkage.links, *(block.name for block in blocks(closure)))
+    links = (
+        *closure.linkage.links,
+        *(block.name for block in blocks(closure.linkage, closure.structure)),
+    )
     count = len(inputs[0])
     found = {link: (np.full(count, np.nan + 0j), np.full(count, np.nan + 0j)) for link in links}
     for i, given in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):

@@ -60,7 +60,7 @@ def run(program: str, states: Sequence[Any], folder: Path) -> list[dict[str, Any
 
 
 def batches(flat: list[float]) -> list[list[float]]:
-    return [flat[i : i + 3] for i in range(0, len(flat), 3)]
+    return [list(batch) for batch in zip(*[iter(flat)] * 3, strict=True)]
 
 
 def states_of(closure: Closure, found: dict[str, Any]) -> list[list[list[float]]]:

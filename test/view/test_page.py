@@ -35,8 +35,9 @@ from .served import Served, served
 from ..browser.opened import opened
 
 NEAR = 1e-12
+FOUR = model(shipped('linkages/four_bar.yaml').read_text('utf-8'), 'mine')
 READY = "() => typeof View !== 'undefined' && View.board"
-FOUR_BAR = shipped('linkages/four_bar.yaml').read_text('utf-8')
+FOUR_BAR = FOUR['text']
 QUIET = "() => typeof View !== 'undefined' && !View.state().busy && View.state().there"
 
 
@@ -301,18 +302,24 @@ def test_a_shipped_linkage_is_opened_and_a_file_downloaded(browser: Any, tmp_pat
 def test_a_server_that_ends_is_said_and_the_linkage_still_moves(
     browser: Any, tmp_path: Path
 ) -> None:
-    with edited(browser, tmp_path) as (page, _, server):
-        with served([]) as _other:  # ends before the page's
-            pass
-        page.evaluate("() => { window.lost = document.getElementById('lost'); }")
-        assert page.evaluate('() => lost.hidden')
-        assert server.server.refused == {}
+    page = browser.new_page()
+    with served([Conversation('mine', None, None).add], lambda: page_of(FOUR, mode='edit')) as one:
+        page.goto(one.address)
+        page.wait_for_function(QUIET)
         other = browser.new_page()  # a second page is one of its own
-        other.goto(server.address)
+        other.goto(one.address)
         other.wait_for_function(QUIET)
         drag(page, 'B', 20, 10)
         assert state(other)['text'] != state(page)['text']
         other.close()
+    page.get_by_text('linkage view has ended').wait_for()
+    assert page.is_disabled('#undo')
+    before = state(page)['inputs']
+    page.focus('#drawing')
+    page.keyboard.press('ArrowRight')
+    assert state(page)['inputs'] != before
+    agrees(page)
+    page.close()
 
 
 def test_two_assemblies_are_seen_and_instant_centres_on_request(
