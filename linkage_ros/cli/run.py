@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.cli.arguments import add_radians, add_set, AngleUnit, bounded, SCENE_HELP
 from linkage_ros.cli.bag_reading import gaps
+from linkage_ros.cli.page_of_run import check_page, PageOfRun, view_command
 from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.status import Status
@@ -79,11 +80,15 @@ class Display:
         Whether to print lines even where a live display is possible.
     angles
         Unit in which angles are shown.
+    page
+        Whether to serve a page of the run.
 
     """
 
-    def __init__(self, *, plain: bool, angles: AngleUnit) -> None:
+    def __init__(self, *, plain: bool, angles: AngleUnit, page: bool = False) -> None:
         self._angles = angles
+        self._with_page = page
+        self._page: PageOfRun | None = None
         live = not plain and _RICH and sys.stdout.isatty()
         self._live: Any = None
         if live:
@@ -94,8 +99,25 @@ class Display:
         self._before = (0, self._shown)
         self._entered = False
 
+    def begin(self, node: LinkageNode) -> None:
+        """Open the page of the run, or say how it is opened."""
+        if self._with_page:
+            self._page = PageOfRun(node.get_fully_qualified_name(), self._say_page)
+        else:
+            self._say_page(f'{view_command()}   (in a second terminal)')
+
+    def _say_page(self, line: str) -> None:
+        text = f'page      {line}'
+        if self._entered:
+            self._live.console.print(Text(text))
+        else:
+            print(text, flush=True)
+
     def close(self) -> None:
-        """End the display; calling it again does nothing."""
+        """End display and page; calling it again does nothing."""
+        if self._page is not None:
+            self._page.end()
+            self._page = None
         if self._entered:
             self._live.stop()
             self._entered = False
@@ -292,6 +314,9 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--runs', default='', metavar='FOLDER', help="folder of the bags' folders")
     parser.add_argument('--plain', action='store_true', help='a line a second, no live display')
+    parser.add_argument(
+        '--view', action='store_true', help='serve a page of the run, as linkage view --node does'
+    )
     add_radians(parser)
 
 
@@ -317,18 +342,24 @@ def run_scene(
         bags.extend(recording.folder for recording in node.recording.ended)
         show(summary(node))
 
-    with heeded():
-        code = run_linkage_node(
-            stop,
-            ros,
-            {
-                'scene': scene,
-                'runs_directory': arguments.runs,
-                **({'set': arguments.set} if arguments.set else {}),  # rclpy: no empty list
-            },
-            seconds=arguments.seconds,
-            patience=patience,
-            view=Display(plain=arguments.plain, angles=arguments.angles),
-            at_end=at_end,
-        )
+    if arguments.view:
+        check_page()
+    display = Display(plain=arguments.plain, angles=arguments.angles, page=arguments.view)
+    try:
+        with heeded():
+            code = run_linkage_node(
+                stop,
+                ros,
+                {
+                    'scene': scene,
+                    'runs_directory': arguments.runs,
+                    **({'set': arguments.set} if arguments.set else {}),  # rclpy: no empty list
+                },
+                seconds=arguments.seconds,
+                patience=patience,
+                view=display,
+                at_end=at_end,
+            )
+    finally:
+        display.close()
     return code, bags[-1] if bags else None

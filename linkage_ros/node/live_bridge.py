@@ -26,9 +26,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 import json
-from math import inf, isfinite, nan
+from math import dist, inf, isfinite, nan
 import os
 from queue import Empty, SimpleQueue
 from threading import Event, Lock, Thread
@@ -95,8 +96,12 @@ _SERVICE_PATIENCE, _SNAPSHOT_PATIENCE = 5.0, 80.0
 _FARTHEST = 1e6
 """Greatest angle, slide or effort that a page may ask for."""
 
+_USUAL_EFFORT = 1.0
+"""Range of the slider for an effort that has no limit, in [N·m] or [N]."""
+
 _NEWEST_QOS = QoSProfile(depth=4, reliability=ReliabilityPolicy.BEST_EFFORT)
-_HAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+_HAND_QOS = QoSProfile(depth=1)
+"""Reliable, for any subscriber; only the newest crank matters."""
 
 
 class _Run(NamedTuple):
@@ -126,6 +131,31 @@ class _Run(NamedTuple):
     turned: SceneLinkage | None
     crank_topic: str
     links: tuple[str, ...]
+
+
+@dataclass(slots=True, eq=False)
+class _Call:
+    """
+    A call of a service of the node.
+
+    Attributes
+    ----------
+    client, request
+        The client of the service, and what is asked.
+    future
+        Has the line that the answer says.
+    until
+        When it is given up, in [s].
+    answer
+        The future of the client, as soon as the service is found and called.
+
+    """
+
+    client: Any
+    request: Any
+    future: Future[str]
+    until: float
+    answer: Any = None
 
 
 class LiveBridge:
@@ -178,7 +208,7 @@ class LiveBridge:
         self._newest: dict[str, tuple[int, str]] = dict.fromkeys(KINDS, (0, ''))
         self._listeners: list[Callable[[], None]] = []
         self._asked: SimpleQueue[tuple[Mapping[str, Any], Future[str]]] = SimpleQueue()
-        self._waiting: list[tuple[float, Any, Any, Future[str]]] = []
+        self._calls: list[_Call] = []
         self._clients: dict[str, Any] = {}
         self._run: _Run | None = None
         self._trouble = ''
@@ -335,7 +365,7 @@ class LiveBridge:
             )
             self._follow(self._run, topics.joint_states_topic, topics.faults_topic)
             self._say('model', {'model': {**model, 'live': _live_model(self._run)}})
-            self._heard = monotonic()
+            self._heard, self._there = monotonic(), True
         self._told = -inf
 
     def _follow(self, run: _Run, joint_states: str, faults: str) -> None:
@@ -446,12 +476,7 @@ class LiveBridge:
     def _look(self) -> None:
         """Find out whether the node is there, and give up what it does not answer."""
         now = monotonic()
-        for entry in self._waiting.copy():
-            until, client, called, answer = entry
-            if now > until:
-                client.remove_pending_request(called)
-                self._waiting.remove(entry)
-                answer.set_result(f'{self.name} does not answer')
+        self._attend_calls(now)
         if self._asked_state is not None and now > self._asked_state[0]:
             self._client(GetState, 'get_state').remove_pending_request(self._asked_state[1])
             self._asked_state = None
@@ -553,23 +578,31 @@ class LiveBridge:
             raise LinkageError('do', f'{quoted(do)} is not known', _any_of(_REQUESTS))
 
     def _call(self, kind: Any, service: str, request: Any, future: Future[str]) -> None:
-        client = self._client(kind, service)
-        if not self._there or not client.service_is_ready():
-            raise LinkageError(
-                f'{self.name}/{service}', 'does not answer', 'see whether the node runs'
-            )
+        if not self._there:
+            remedy = 'see whether the node runs'
+            raise LinkageError(f'{self.name}/{service}', 'does not answer', remedy)
         patience = _SNAPSHOT_PATIENCE if service == 'snapshot' else _SERVICE_PATIENCE
-        called = client.call_async(request)
-        entry = (monotonic() + patience, client, called, future)
-        self._waiting.append(entry)
-        called.add_done_callback(partial(self._on_answer, entry))
+        client = self._client(kind, service)
+        self._calls.append(_Call(client, request, future, monotonic() + patience))
+        self._attend_calls(monotonic())
 
-    def _on_answer(self, entry: tuple[float, Any, Any, Future[str]], called: Any) -> None:
-        if entry not in self._waiting:
-            return
-        self._waiting.remove(entry)
-        failed = called.exception()
-        entry[3].set_result(str(failed) if failed else str(called.result().message))
+    def _attend_calls(self, now: float) -> None:
+        """Send the calls whose service is found by now, and give up those that are overdue."""
+        for call in self._calls.copy():
+            if call.answer is None and call.client.service_is_ready():
+                call.answer = call.client.call_async(call.request)
+                call.answer.add_done_callback(partial(self._on_answer, call))
+            elif now > call.until:
+                self._calls.remove(call)
+                if call.answer is not None:
+                    call.client.remove_pending_request(call.answer)
+                call.future.set_result(f'{self.name} does not answer')
+
+    def _on_answer(self, call: _Call, answer: Any) -> None:
+        if call in self._calls:
+            self._calls.remove(call)
+            failed = answer.exception()
+            call.future.set_result(str(failed) if failed else str(answer.result().message))
 
     def _client(self, kind: Any, service: str) -> Any:
         if service not in self._clients:
@@ -649,14 +682,17 @@ _REQUESTS = ('fault', 'record', *_PLAIN, 'crank', 'effort')
 def _live_model(run: _Run) -> dict[str, Any]:
     """Return what a page shows of a scene beside the model of its first linkage."""
     closure = run.closure
-    cranks = []
+    cranks: list[list[float] | None] = []
     for given in closure.linkage.inputs:
         # A crank on the ground is turned by the mouse about its pin.
         points = closure.linkage.links.get(given.child, {})
         ground = closure.linkage.links[GROUND]
-        pivots = [ground[name] for name in points if name in ground]
-        turns = given.unit == 'rad' and given.parent == GROUND and pivots
-        cranks.append(list(pivots[0]) if turns else None)
+        pivots = [name for name in points if name in ground]
+        if given.unit != 'rad' or given.parent != GROUND or not pivots:
+            cranks.append(None)
+            continue
+        reach = max(dist(point, points[pivots[0]]) for point in points.values())
+        cranks.append([*ground[pivots[0]], reach])
     return {
         'joints': [
             [name, 'rad' if turning else 'm']
@@ -664,11 +700,18 @@ def _live_model(run: _Run) -> dict[str, Any]:
             for name, turning in zip(member.joints, member.closure.turning, strict=True)
         ],
         'inputs': list(run.shown.inputs),
-        'pivots': cranks,
+        'cranks': cranks,
         'turned': run.turned is run.shown,
         'drive': (run.turned or run.shown).drive[0],
+        'effort': _range_of_effort(closure),
         'linkages': len(run.scene.members),
     }
+
+
+def _range_of_effort(closure: Closure) -> float:
+    """Return the greatest effort of a slider, in [N·m] or [N]; a greater one can be typed."""
+    limit = closure.linkage.inputs[0].limits.effort
+    return limit if isfinite(limit) else _USUAL_EFFORT
 
 
 def _frames(run: _Run, known: Mapping[str, float]) -> list[float] | None:

@@ -50,6 +50,9 @@ _AFTER_FAILURE = 0.01
 class View(Protocol):
     """Displays a run while it goes on."""
 
+    def begin(self, node: LinkageNode) -> None:
+        """Prepare to show a node; called before its first tick."""
+
     def show(self, node: LinkageNode) -> None:
         """Show the current state of the node; called ten times a second on another thread."""
 
@@ -146,6 +149,8 @@ def _spin(
             node.trigger_configure()
         if node.failure is not None:
             return EXIT_CONFIGURATION
+    if view is not None:
+        view.begin(node)
     with _no_garbage_in_ticks():
         if autostart and node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
             return EXIT_INCOMPLETE

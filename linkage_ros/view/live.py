@@ -31,7 +31,8 @@ from typing import Any, Protocol
 
 from aiohttp import web, WSMsgType
 from linkage_ros.drawing.painting import COLOURS, FACES, INK
-from linkage_ros.pages.document import document, POLICY
+from linkage_ros.pages.document import document
+from linkage_ros.view.page import SERVED_POLICY
 from linkage_ros.view.server import SERVER_KEY
 
 KINDS = ('model', 'node', 'state')
@@ -152,6 +153,37 @@ def _news(bridge: Bridge) -> Iterator[asyncio.Event]:
         end()
 
 
+_BODY = """
+<p id="banner" role="alert" hidden></p>
+<main id="live">
+<section class="player">
+<figure><canvas role="img" aria-label="the linkage as the node publishes it"></canvas></figure>
+<p id="age"></p>
+<p id="more" class="note"></p>
+<div id="hands"></div>
+<div class="controls">
+<button type="button" id="record" aria-pressed="false">Record</button>
+<button type="button" id="snapshot" hidden>Snapshot</button>
+<button type="button" id="reset">Reset</button>
+</div>
+<p id="said" role="status"></p>
+</section>
+<section class="told">
+<h2>Joints</h2>
+<div class="scroll"><table>
+<thead><tr><th>joint</th><th class="number">position</th><th class="number">rate</th></tr></thead>
+<tbody id="joints"></tbody>
+</table></div>
+<h2 id="faults-title" hidden>Faults</h2>
+<div id="faults"></div>
+<h2>Node</h2>
+<dl id="facts" class="facts"></dl>
+<h2>Diagnostics</h2>
+<ul id="diagnostics"></ul>
+</section>
+</main>
+"""
+
 _HERE = 'linkage_ros.view'
 _SCRIPTS = [
     *(('linkage_ros.pages', f'{name}.js') for name in ('angles', 'curves', 'looks', 'picture')),
@@ -169,11 +201,7 @@ def live_page(bridge: Bridge) -> str:
         If plotly is not installed.
 
     """
-    body = [
-        f'<h1>{escape(bridge.name)}</h1>',
-        '<p id="banner" role="alert" hidden></p>',
-        '<main id="live"></main>',
-    ]
+    body = [f'<h1 id="title">{escape(bridge.name)}</h1>', _BODY]
     data = {
         'mode': 'live',
         'colours': COLOURS,
@@ -181,7 +209,11 @@ def live_page(bridge: Bridge) -> str:
         'server': True,
         'node': bridge.name,
     }
-    policy = POLICY.replace("'unsafe-inline'; style", "'unsafe-inline'; connect-src 'self'; style")
     return document(
-        f'{bridge.name}: linkage view', body, data, [(_HERE, 'live.css')], _SCRIPTS, policy=policy
+        f'{bridge.name}: linkage view',
+        body,
+        data,
+        [(_HERE, 'live.css')],
+        _SCRIPTS,
+        policy=SERVED_POLICY,
     )

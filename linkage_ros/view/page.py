@@ -24,11 +24,12 @@ from linkage_ros.drawing.painting import COLOURS, FACES, INK
 from linkage_ros.errors import clean
 from linkage_ros.pages.document import document, POLICY
 
-_POLICY = POLICY.replace(
+SERVED_POLICY = POLICY.replace(
     "script-src 'unsafe-inline'",
     # The program of the linkage; and the server that has sent this page.
     "script-src 'unsafe-inline' 'unsafe-eval'; connect-src ws://127.0.0.1:* ws://localhost:*",
 ).replace('img-src data:', 'img-src data: blob:')
+"""Content policy of a page that asks the server which has sent it."""
 
 _PACKAGE = 'linkage_ros.view'
 _SCRIPTS = ('linkage', 'board', 'hand', 'talk', 'edits', 'over_input', 'view')
@@ -100,7 +101,7 @@ def page(
     scripts += [(_PACKAGE, f'{name}.js') for name in _SCRIPTS]
     styles = [(_PACKAGE, 'view.css')]
     body = _body(title, mode, can_save)
-    return document(title, body, data, styles, scripts, policy=_POLICY)
+    return document(title, body, data, styles, scripts, policy=SERVED_POLICY)
 
 
 def _body(title: str, mode: str, can_save: bool) -> Iterator[str]:

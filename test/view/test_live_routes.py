@@ -1,0 +1,168 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page of a running node, beside a bridge that is none: what pages get, and what they ask."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+import json
+import socket as sockets
+from typing import Any
+from urllib.parse import urlsplit
+
+from linkage_ros.view.live import add_live
+from linkage_ros.view.server import Server
+
+from .served import opened, served
+
+PATIENCE = 20.0
+LARGE = 'x' * 200_000
+
+
+class Script:
+    """A bridge that says what a test tells it to."""
+
+    name = '/scripted'
+
+    def __init__(self) -> None:
+        self.said: dict[str, tuple[int, str]] = dict.fromkeys(('model', 'node', 'state'), (0, ''))
+        self.heard: list[Callable[[], None]] = []
+        self.taken = 0
+        self.asked: list[Mapping[str, Any]] = []
+        self.future: Future[str] | None = None
+
+    def say(self, kind: str, content: Any) -> None:
+        self.said[kind] = self.said[kind][0] + 1, json.dumps({kind: content})
+        for heard in self.heard:
+            heard()
+
+    def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
+        self.heard.append(heard)
+        return lambda: self.heard.remove(heard)
+
+    def newest(self, kind: str) -> tuple[int, str]:
+        self.taken += kind == 'state'
+        return self.said[kind]
+
+    def ask(self, content: Mapping[str, Any]) -> Future[str]:
+        self.asked.append(content)
+        future: Future[str] = Future()
+        if content['do'] != 'wait':
+            future.set_result(f'did {content["do"]}')
+        return future
+
+
+def live(script: Script) -> Callable[[Any], None]:
+    return lambda app: add_live(app, script)
+
+
+def test_a_page_gets_the_newest_of_each_kind_model_first() -> None:
+    script = Script()
+    for number in range(50):
+        script.say('state', number)
+    script.say('node', 'well')
+    script.say('model', 'four_bar')
+
+    async def page(address: str) -> list[Any]:
+        async with opened(address, 'live') as page:
+            first = [await page.get() for _ in range(3)]
+            script.say('state', 'new')
+            return [*first, await page.get()]
+
+    with served([live(script)]) as server:
+        heard = asyncio.run(page(server.address))
+    assert heard == [{'model': 'four_bar'}, {'node': 'well'}, {'state': 49}, {'state': 'new'}]
+    assert not script.heard
+
+
+def test_what_is_asked_is_answered_while_another_request_waits() -> None:
+    script = Script()
+
+    async def page(address: str) -> Any:
+        async with opened(address, 'live') as page:
+            await page.send('wait')
+            await page.send('reset')
+            return await page.get()
+
+    with served([live(script)]) as server:
+        assert asyncio.run(page(server.address)) == {'said': 'did reset', 'do': 'reset'}
+    assert [content['do'] for content in script.asked] == ['wait', 'reset']
+
+
+def test_what_is_no_request_is_counted_and_the_page_goes_on() -> None:
+    script = Script()
+    bad = ['', '{', '[]', '{"do": 1}', '"do"', '[' * 5000, '{"d\ud800": 1}']
+
+    async def page(address: str) -> Any:
+        async with opened(address, 'live') as page:
+            for text in bad:
+                await page.socket.send_bytes(text.encode('utf-8', 'surrogatepass'))
+            for text in bad[:-1]:
+                await page.socket.send_str(text)
+            await page.send('reset')
+            return await page.get()
+
+    with served([live(script)]) as server:
+        assert asyncio.run(page(server.address))['said'] == 'did reset'
+        refused = server.server.refused
+    assert refused == {'a message that is no request': 2 * len(bad) - 1}
+
+
+def test_a_page_that_never_reads_is_sent_no_more_than_fits_and_holds_nobody_up() -> None:
+    script = Script()
+
+    async def reading(address: str) -> None:
+        async with opened(address, 'live') as page:
+            for number in range(60):
+                script.say('state', [number, LARGE])
+                assert (await page.get())['state'][0] == number
+
+    with served([live(script)]) as server:
+        deaf = _upgraded(server.address, server.server)
+        asyncio.run(reading(server.address))
+        before = script.taken
+        for number in range(60):
+            script.say('state', [number, LARGE])
+            asyncio.run(asyncio.sleep(0.01))
+        # The page that reads has gone; the other one is stuck within its buffers.
+        assert script.taken - before <= 3
+        assert len(script.heard) == 1
+        deaf.close()
+
+
+def _upgraded(address: str, server: Server) -> sockets.socket:
+    """Open a WebSocket that is never read."""
+    parts = urlsplit(address)
+    wire = sockets.socket()
+    wire.setsockopt(sockets.SOL_SOCKET, sockets.SO_RCVBUF, 4096)
+    wire.settimeout(PATIENCE)
+    wire.connect((parts.hostname, parts.port))
+    lines = (
+        f'GET {parts.path}live HTTP/1.1',
+        f'Host: {parts.netloc}',
+        f'Origin: http://{parts.netloc}',
+        'Upgrade: websocket',
+        'Connection: Upgrade',
+        'Sec-WebSocket-Version: 13',
+        'Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==',
+        '',
+        '',
+    )
+    wire.sendall('\r\n'.join(lines).encode())
+    assert wire.recv(12) == b'HTTP/1.1 101'
+    assert not server.refused
+    return wire
