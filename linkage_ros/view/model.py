@@ -41,6 +41,7 @@ from linkage_ros.kinematics.plan import assembly_sides
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.scene.notes import linkage_notes
+from linkage_ros.view.poses import pose
 
 _SAMPLES = 180
 """Number of inputs at which transmission angle and margin are told."""
@@ -98,6 +99,7 @@ def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
 def _model(closure: Closure, name: str, text: str, units: Units) -> dict[str, Any]:
     linkage = closure.linkage
     inputs = usual_inputs(closure)
+    program = program_of(closure)
     carried = carriers(linkage.links)
     sides = assembly_sides(closure.structure)
     return {
@@ -119,7 +121,8 @@ def _model(closure: Closure, name: str, text: str, units: Units) -> dict[str, An
         ],
         'links': list(closure.link_frames.links),
         'driven': sorted(driven_links(closure)),
-        'program': program_of(closure),
+        'program': program,
+        'poses': [] if program else _poses(closure, inputs),
         'drawn': drawn_in_frames(view(closure, inputs)),
         'pins': [
             {
@@ -161,6 +164,17 @@ def program_of(closure: Closure) -> str | None:
         return source(subject, JavaScript(for_page=True))
     except DefinitionError:
         return None
+
+
+def _poses(closure: Closure, inputs: tuple[float, ...]) -> list[dict[str, Any]]:
+    """Return poses over the range of the first input, the others held."""
+    way = InputSweep(closure, inputs)
+    values = {inputs[0]}
+    for interval in way.ranges:
+        step = (interval.highest - interval.lowest) / _SAMPLES
+        values |= {interval.lowest + step * i for i in range(_SAMPLES + 1)}
+    states = [(value, *inputs[1:]) for value in sorted(values)]
+    return [{'inputs': list(state), **pose(closure, state)} for state in states]
 
 
 def _lengths(closure: Closure) -> Iterator[dict[str, Any]]:

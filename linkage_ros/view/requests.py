@@ -23,11 +23,9 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
-from itertools import chain
 import json
-from math import isfinite
 from typing import Any, NamedTuple, NoReturn
 
 from linkage_ros.errors import (
@@ -42,11 +40,11 @@ from linkage_ros.errors import (
 from linkage_ros.files.linkage_file import FARTHEST, read_closure
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.source import STATUSES
 from linkage_ros.resources import linkage_names, shipped
 from linkage_ros.view.edit import edited, pin_of
 from linkage_ros.view.exports import export
 from linkage_ros.view.model import model
+from linkage_ros.view.poses import pose
 from linkage_ros.view.sensors import SceneFiles, Sensors
 
 LARGEST = 1_000_000
@@ -58,8 +56,6 @@ _MOST_SENSORS = 8
 """Pages whose sensors are kept."""
 
 _LONGEST_NAME = 80
-
-_STATUSES = {name: number for number, name in enumerate(STATUSES)}
 
 
 class Request(NamedTuple):
@@ -294,7 +290,7 @@ def _poses(asked: _Asked) -> dict[str, Any]:
     if not isinstance(poses, list) or len(poses) > _MOST_POSES:
         raise _wrong('inputs', poses, f'a list of at most {_MOST_POSES} lists of numbers')
     count = len(closure.linkage.inputs)
-    return {'poses': [_pose(closure, _numbers('inputs', inputs, count)) for inputs in poses]}
+    return {'poses': [pose(closure, _numbers('inputs', inputs, count)) for inputs in poses]}
 
 
 def _read(asked: _Asked) -> dict[str, Any]:
@@ -347,40 +343,6 @@ def encoded(text: str, name: str) -> bytes:
     except UnicodeEncodeError as error:
         reason = f'is not Unicode text (character {error.start})'
         raise FileError(name, '', reason, 'remove the character') from None
-
-
-def _pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
-    """Return a pose as the program of a model gives it; rates are those of a first input at 1."""
-    position = closure.position(*inputs)
-    found: dict[str, Any] = {
-        'status': _STATUSES[position.status.name],
-        'joints': list(position.joints),
-        'rates': [],
-        'accelerations': [],
-        'frames': [],
-        'frameRates': [],
-    }
-    if not position.joints:
-        return found
-    frames = closure.link_frames
-    found['frames'] = _flat(frames.at(position))
-    if position.status.has_rates:
-        rest = [0.0] * (len(inputs) - 1)
-        velocity = closure.velocity(position, 1.0, *rest)
-        acceleration = closure.acceleration(position, velocity, 0.0, *rest)
-        motion = {
-            'rates': list(velocity.joints),
-            'accelerations': list(acceleration.joints),
-            'frameRates': _flat(frames.rates(position, velocity)),
-        }
-        # Beside a toggle they may be larger than a number can be.
-        if all(map(isfinite, chain(*motion.values()))):
-            found |= motion
-    return found
-
-
-def _flat(frames: Sequence[tuple[complex, float]]) -> list[float]:
-    return [value for place, angle in frames for value in (place.real, place.imag, angle)]
 
 
 def defect(where: str, error: BaseException) -> LinkageError:

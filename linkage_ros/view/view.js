@@ -22,6 +22,7 @@ const View = (() => {
   let drawnAt = 0;
   let curvesDue = null;
   let wholeDue = null;
+  let settling = 0; // requests for a whole model
   let dragged = null; // { pin, inputs }: the drag that is under way
   let grip = 0; // angle between the hand and the crank it turns
 
@@ -67,32 +68,25 @@ const View = (() => {
       curvesDue = setTimeout(curves, wait);
       return;
     }
-    if (!linkage.model.program && editing && there && !dragged) askForPoses();
     const found = OverInput.states(linkage);
     plots.forEach((plot) => plot.draw(linkage, found));
     OverInput.paintBand(named('band'), linkage);
     drawnAt = performance.now();
   }
 
-  /** Ask the server for the poses of a linkage that is solved by iteration. */
-  async function askForPoses() {
-    const asked = linkage;
-    if (asked.known.poses.length) return;
-    const [low, high] = asked.range();
-    const count = 181;
-    const inputs = Array.from({ length: count }, (_, i) => (
-      [low + ((high - low) * i) / (count - 1), ...asked.inputs.slice(1)]));
+  /** Ask the server for the pose of a linkage that is solved by iteration, between known ones. */
+  const askForPose = Talk.newest(async (asked) => {
+    if (asked.model.program || !mayEdit()) return;
+    const inputs = [...asked.inputs];
     try {
-      const { poses } = await Talk.ask('poses', { text: history.now.text, inputs });
-      asked.known.take(poses.map((pose, i) => ({ ...pose, inputs: inputs[i] })));
-      if (linkage !== asked) return;
-      asked.seek(asked.inputs);
-      curves();
+      const { poses: [pose] } = await Talk.ask('poses', { text: history.now.text, inputs: [inputs] });
+      if (linkage !== asked || asked.inputs.some((value, i) => value !== inputs[i])) return;
+      asked.now = pose;
       moved();
     } catch (error) {
       said(error);
     }
-  }
+  });
 
   function readout() {
     const { joints, inputs } = linkage.model;
@@ -153,6 +147,7 @@ const View = (() => {
     if (inputs.length > 1) curves();
     moved();
     read();
+    askForPose(linkage);
   }
 
   // Playing.
@@ -219,13 +214,16 @@ const View = (() => {
         askForWhole();
         return;
       }
+      wholeDue = null;
       const { text } = history.now;
+      settling += 1;
       try {
         const model = await Talk.ask('model', { text, whole: true });
         if (text === history.now.text && !dragged) show(model, linkage.inputs);
       } catch (error) {
         said(error);
       }
+      settling -= 1;
     }, WHOLE_AFTER);
   }
 
@@ -602,8 +600,9 @@ const View = (() => {
     onMove: (listener) => listeners.push(listener),
     /** Return what tests and other scripts of this page look at. */
     state: () => ({
-      inputs: linkage.inputs, ...linkage.now, text: history.now.text, model: linkage.model,
-      closed: linkage.closed, there, busy: Boolean(dragged), wrong: board.wrong,
+      inputs: linkage.inputs, ...linkage.now, text: linkage.model.text, model: linkage.model,
+      closed: linkage.closed, there, wrong: board.wrong,
+      busy: Boolean(dragged || wholeDue || settling),
     }),
     get board() { return board; },
     get linkage() { return linkage; },

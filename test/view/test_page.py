@@ -35,8 +35,9 @@ from .served import Served, served
 from ..browser.opened import opened
 
 NEAR = 1e-12
+READY = "() => typeof View !== 'undefined' && View.board"
 FOUR_BAR = shipped('linkages/four_bar.yaml').read_text('utf-8')
-QUIET = '() => !View.state().busy && View.state().there'
+QUIET = "() => typeof View !== 'undefined' && !View.state().busy && View.state().there"
 
 
 @pytest.fixture(scope='module')
@@ -124,14 +125,15 @@ def agrees(page: Any) -> None:
 def test_every_shipped_linkage_opens_and_stands_where_the_closure_says(
     browser: Any, stills: Callable[[str], Path], name: str
 ) -> None:
-    with opened(browser, stills(name)) as page:
-        page.wait_for_function('() => window.View && View.board')
-        shown = state(page)
-        assert page.said == []
-        assert shown['closed']
-        position = load(name).position(*shown['inputs'])
-        near = NEAR if shown['model']['program'] else 1e-9
-        assert shown['joints'] == pytest.approx(position.joints, abs=near)
+    with opened(browser, stills(name)) as shown:
+        page = shown.page
+        page.wait_for_function(READY)
+        assert shown.said == []
+        found = state(page)
+        assert found['closed']
+        position = load(name).position(*found['inputs'])
+        near = NEAR if found['model']['program'] else 1e-9
+        assert found['joints'] == pytest.approx(position.joints, abs=near)
 
 
 @pytest.mark.parametrize('width', [1600, 400])
@@ -139,15 +141,16 @@ def test_every_shipped_linkage_opens_and_stands_where_the_closure_says(
 def test_the_page_fits_its_window(
     browser: Any, stills: Callable[[str], Path], width: int, scheme: str
 ) -> None:
-    with opened(browser, stills('jansen_leg'), width=width, color_scheme=scheme) as page:
-        assert page.said == []
-        assert not page.is_wider_than_its_window()
+    with opened(browser, stills('jansen_leg'), width=width, color_scheme=scheme) as shown:
+        assert shown.said == []
+        assert not shown.is_wider_than_its_window()
 
 
 def test_the_keyboard_alone_turns_the_crank_and_plays(
     browser: Any, stills: Callable[[str], Path]
 ) -> None:
-    with opened(browser, stills('four_bar')) as page:
+    with opened(browser, stills('four_bar')) as shown:
+        page = shown.page
         page.focus('#drawing')
         before = state(page)['inputs'][0]
         page.keyboard.press('ArrowRight')
@@ -164,7 +167,7 @@ def test_a_finger_turns_the_crank(browser: Any, stills: Callable[[str], Path]) -
     context = browser.new_context(has_touch=True, viewport={'width': 400, 'height': 900})
     page = context.new_page()
     page.goto(stills('four_bar').as_uri())
-    page.wait_for_function('() => window.View && View.board')
+    page.wait_for_function(READY)
     before = state(page)['inputs'][0]
     x, y = pixel_of(page, 'A')
     a, b = pixel_of(page, 'O2')
@@ -256,6 +259,7 @@ def test_points_inputs_and_sides_are_chosen_by_clicking(browser: Any, tmp_path: 
         page.get_by_label('trace P no more').click()
         page.wait_for_function("() => View.state().text.includes('traced: [P1]')")
         page.check('input[value=input]')
+        page.wait_for_function(QUIET)
         page.mouse.click(*middle(page, 'O4', 'B', 0.7))
         page.wait_for_function("() => View.state().text.includes('input: {joint: rocker_joint')")
         agrees(page)
@@ -313,7 +317,8 @@ def test_a_server_that_ends_is_said_and_the_linkage_still_moves(
 def test_two_assemblies_are_seen_and_instant_centres_on_request(
     browser: Any, stills: Callable[[str], Path]
 ) -> None:
-    with opened(browser, stills('four_bar')) as page:
+    with opened(browser, stills('four_bar')) as shown:
+        page = shown.page
         assert page.evaluate('() => View.board.ghosts.length') == 1
         # Of the rocker it is its pivot; of the coupler where crank and rocker meet (Kennedy).
         centre = page.evaluate("() => View.linkage.centre('rocker')")
@@ -327,4 +332,4 @@ def test_two_assemblies_are_seen_and_instant_centres_on_request(
         x, y = page.evaluate("() => View.linkage.centre('coupler')")
         assert complex(x, y) == pytest.approx(meets, abs=1e-9)
         page.check('#centres')
-        assert page.said == []
+        assert shown.said == []
