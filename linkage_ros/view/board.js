@@ -5,6 +5,7 @@ const Board = (() => {
   const TALLEST = 640;
   const NEAR = 13; // pixels about a pin that are the pin's
   const NEAR_BY_TOUCH = 24;
+  const HIGH = 12; // pixels: the letters of a name
   const PALE = 0.22;
   const LOOKED_AT = 36; // poses of a ghost, to see how far it reaches
   const ALONG = 9; // pixels beside a bar that are the bar's
@@ -103,7 +104,7 @@ const Board = (() => {
           else pen.lineTo(x + dx, y + dy);
         }
         pen.stroke();
-        pen.fillText(link, x + 8, y - 6);
+        this.drawName(pen, link, x + 8, y - 6);
       }
     }
 
@@ -118,10 +119,20 @@ const Board = (() => {
           pen.strokeStyle = Looks.colour(1, this.ink.edge);
           pen.stroke();
         }
-        if (!this.shown.names) continue;
-        pen.fillStyle = this.ink.edge;
-        pen.fillText(pin.name, x + 9, y - 9);
+        if (this.shown.names) this.drawName(pen, pin.name, x + 9, y - 9);
       }
+    }
+
+    /** Write a name within the picture, with an edge of paper that parts it from what it is on. */
+    drawName(pen, name, x, y) {
+      const { width, tall } = this.size;
+      const left = Math.min(x, width - pen.measureText(name).width - 2);
+      if (left < 0 || x > width || y < HIGH || y > tall) return;
+      pen.lineWidth = 3;
+      pen.strokeStyle = this.ink.paper;
+      pen.strokeText(name, left, y);
+      pen.fillStyle = this.ink.edge;
+      pen.fillText(name, left, y);
     }
 
     /** Say what is wrong at the pin or link that it concerns. */

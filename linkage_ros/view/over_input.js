@@ -4,6 +4,8 @@
 const OverInput = (() => {
   const COUNT = 361;
   const SECONDS = { joints: '', rates: '/s', accelerations: '/s²' };
+  const ASIDE = 0.05; // of the values at each end do not count for how high a curve is drawn
+  const WILD = 6; // times the span of the others: values as far as these are beside a toggle
   const [POOR, FAIR] = [Math.PI / 6, Math.PI / 4];
   const QUALITY = { poor: '#d55e00', fair: '#e6b422', good: '#009e73' };
 
@@ -16,6 +18,20 @@ const OverInput = (() => {
       found.push([value, linkage.motion([value, ...linkage.inputs.slice(1)])]);
     }
     return found;
+  }
+
+  /**
+   * Return the range of an axis for the curves on it; undefined leaves it to Plotly.
+   *
+   * Beside a toggle rates and accelerations have no bound: there the axis ends before they do.
+   */
+  function within(traces) {
+    const sorted = traces.flatMap(({ y }) => y).filter((each) => each !== null).sort((a, b) => a - b);
+    const share = (part) => sorted[Math.round(part * (sorted.length - 1))];
+    const [low, high] = [share(ASIDE), share(1 - ASIDE)];
+    const span = high - low;
+    if (!(share(1) - share(0) > WILD * span) || !span) return undefined;
+    return [Math.max(share(0), low - span), Math.min(share(1), high + span)];
   }
 
   class Plot {
@@ -50,7 +66,7 @@ const OverInput = (() => {
         };
       });
       const edges = { ...Looks.margin(width) };
-      if (both) edges.r += 46;
+      if (both) edges.r += 58;
       const [room, legend] = Looks.legend(joints.map((joint) => joint.name), width);
       const range = [found[0][0], found[found.length - 1][0]].map((value) => value * across.factor);
       const first = Angles.shown(joints.every((joint) => joint.unit === 'm') ? 'm' : 'rad');
@@ -62,11 +78,14 @@ const OverInput = (() => {
         height: 210 + room,
         margin: { ...edges, t: edges.t + room },
         xaxis: Page.axis(`${Looks.label(input.name)} [${across.unit}]`, ink, { range, automargin: false }),
-        yaxis: Page.axis(`[${first.unit}${SECONDS[this.key]}]`, ink, { automargin: false }),
+        yaxis: Page.axis(`[${first.unit}${SECONDS[this.key]}]`, ink, {
+          automargin: false, range: within(traces.filter(({ yaxis }) => yaxis === 'y')),
+        }),
         shapes: toggles,
         ...(both && {
           yaxis2: Page.axis(`[m${SECONDS[this.key]}]`, ink, {
-            overlaying: 'y', side: 'right', automargin: false, showgrid: false,
+            overlaying: 'y', side: 'right', automargin: false, showgrid: false, tickmode: 'auto',
+            range: within(traces.filter(({ yaxis }) => yaxis === 'y2')),
           }),
         }),
         ...legend,
