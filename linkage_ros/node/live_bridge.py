@@ -24,26 +24,24 @@ the page shows what the node has published, with its noise, play and faults.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 import json
-from math import dist, inf, isfinite, nan
+from math import inf, isfinite
 import os
 from queue import Empty, SimpleQueue
 from threading import Event, Lock, Thread
 from time import monotonic, sleep, time_ns
-from typing import Any, NamedTuple
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.srv import GetState
-from linkage_ros.bag.run_events import run_account
 from linkage_ros.errors import clean, did_you_mean, LinkageError, listed, quoted, shortened
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, JointStateWriter
-from linkage_ros.messages.layout import MalformedError, NANOSECONDS
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.node.followed_run import diagnosed, FollowedRun, read_run
 from linkage_ros.node.real_time import leave_out_shared_memory
 from linkage_ros.node.scene_topics import (
     CHANGES_QOS,
@@ -52,14 +50,10 @@ from linkage_ros.node.scene_topics import (
     SCENE_TOPIC,
     TakenByTick,
 )
-from linkage_ros.replay.replay import read_announced, read_change, recorded_scene
-from linkage_ros.report.data import poses
-from linkage_ros.scene.scene import Scene, SceneLinkage
+from linkage_ros.replay.replay import read_change
 from linkage_ros.signals import bounded_end
 from linkage_ros.view.hand_crank import HandCrank, HELD
 from linkage_ros.view.live import KINDS
-from linkage_ros.view.model import model_of
-import numpy as np
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
@@ -84,11 +78,8 @@ _NODE_PERIOD = 1.0
 _SILENT, _GONE = 0.75, 1.75
 """Times without any message after which a node is asked for its state, and taken for gone [s]."""
 
-_SETTLED = 1.0
+_SETTLED = 2.0
 """How long the graph is watched for a second node once it has a first one, in [s]."""
-
-_LONGEST_LEAD = 0.25
-"""Most time by which a crank sample is carried to the time of the joints, in [s]."""
 
 _SERVICE_PATIENCE, _SNAPSHOT_PATIENCE = 5.0, 80.0
 """Time limits of the node's answers, in [s]."""
@@ -96,41 +87,9 @@ _SERVICE_PATIENCE, _SNAPSHOT_PATIENCE = 5.0, 80.0
 _FARTHEST = 1e6
 """Greatest angle, slide or effort that a page may ask for."""
 
-_USUAL_EFFORT = 1.0
-"""Range of the slider for an effort that has no limit, in [N·m] or [N]."""
-
 _NEWEST_QOS = QoSProfile(depth=4, reliability=ReliabilityPolicy.BEST_EFFORT)
 _HAND_QOS = QoSProfile(depth=1)
 """Reliable, for any subscriber; only the newest crank matters."""
-
-
-class _Run(NamedTuple):
-    """
-    What is known of the node's scene.
-
-    Attributes
-    ----------
-    scene
-        The scene.
-    shown
-        Its first linkage, which is drawn.
-    closure
-        The closure of that one.
-    turned
-        The linkage whose crank or effort comes from a topic; None if there is none.
-    crank_topic
-        That topic; '' for none.
-    links
-        Links of the model, in its order.
-
-    """
-
-    scene: Scene
-    shown: SceneLinkage
-    closure: Closure
-    turned: SceneLinkage | None
-    crank_topic: str
-    links: tuple[str, ...]
 
 
 @dataclass(slots=True, eq=False)
@@ -210,7 +169,7 @@ class LiveBridge:
         self._asked: SimpleQueue[tuple[Mapping[str, Any], Future[str]]] = SimpleQueue()
         self._calls: list[_Call] = []
         self._clients: dict[str, Any] = {}
-        self._run: _Run | None = None
+        self._run: FollowedRun | None = None
         self._trouble = ''
         self._faults: dict[str, bool] = {}
         self._followed: list[Any] = []
@@ -220,7 +179,6 @@ class LiveBridge:
         self._heard = -inf
         self._there = False
         self._told = -inf
-        self._joints: CrankSample | None = None
         self._cranks: CrankSample | None = None
         self._hand = HandCrank(())
         self._hand_publisher: Any = None
@@ -342,33 +300,18 @@ class LiveBridge:
     def _on_scene(self, message: bytes) -> None:
         """Learn the scene: at the beginning, and whenever the node is configured anew."""
         try:
-            announced = read_announced(message, f'{self.name}/scene')
-            scene = recorded_scene(announced)
-            topics = run_account(announced)
-            shown = scene.members[0]
-            closure = Closure(shown.linkage)
-            model = model_of(closure, scene.name)
+            run = read_run(message, f'{self.name}/scene')
         except LinkageError as error:
             self._trouble = f'has a scene that cannot be read ({clean(str(error))})'
-        except (ValueError, MalformedError) as error:
-            self._trouble = f'has a scene that cannot be read ({quoted(str(error))})'
         else:
             self._trouble = ''
-            turned = next((each for each in scene.members if each.drive[0] in _TURNED), None)
-            self._run = _Run(
-                scene,
-                shown,
-                closure,
-                turned if topics.crank_topic else None,
-                topics.crank_topic,
-                tuple(model['links']),
-            )
-            self._follow(self._run, topics.joint_states_topic, topics.faults_topic)
-            self._say('model', {'model': {**model, 'live': _live_model(self._run)}})
+            self._run = run
+            self._follow(run)
+            self._say('model', {'model': run.model})
             self._heard, self._there = monotonic(), True
         self._told = -inf
 
-    def _follow(self, run: _Run, joint_states: str, faults: str) -> None:
+    def _follow(self, run: FollowedRun) -> None:
         """Subscribe to the topics of a run, and forget those of the run before."""
         node = self._node
         for subscription in self._followed:
@@ -377,29 +320,27 @@ class LiveBridge:
             node.destroy_timer(self._hand_timer)
             node.destroy_publisher(self._hand_publisher)
             self._hand_publisher = None
-        self._joints = self._cranks = None
+        self._cranks = None
         self._effort = 0.0, -inf
         self._faults = dict.fromkeys(run.scene.faults, False)
         self._followed = []
         # Taken by a timer, so that a fast node costs this process nothing.
-        self._joint_states = self._subscribe(JointState, joint_states)
+        self._joint_states = self._subscribe(JointState, run.account.joint_states_topic)
         self._read_joints = JointStateReader(run.scene.joints)
         self._read_inputs = JointStateReader(run.shown.inputs)
         self._crank_states = None
-        if run.crank_topic and run.crank_topic != joint_states:
+        if run.crank_topic not in ('', run.account.joint_states_topic):
             self._crank_states = self._subscribe(JointState, run.crank_topic)
-        if faults:
+        if faults := run.account.faults_topic:
             # Latched: what began before comes now.
             self._followed.append(
                 node.create_subscription(String, faults, self._on_fault, CHANGES_QOS, raw=True)
             )
         if run.turned is not None:
-            inputs = run.turned.linkage.inputs
-            bounds = [(given.limits.low, given.limits.high) for given in inputs]
             self._hand = HandCrank(
                 [
-                    given.unit == 'rad' and not isfinite(low) and not isfinite(high)
-                    for given, (low, high) in zip(inputs, bounds, strict=True)
+                    given.unit == 'rad' and not isfinite(given.limits.high - given.limits.low)
+                    for given in run.turned.linkage.inputs
                 ]
             )
 
@@ -439,39 +380,8 @@ class LiveBridge:
             inputs = self._read_inputs.read(message)
             self._cranks = inputs if isinstance(inputs, CrankSample) else self._cranks
         if joints is not None:
-            self._joints, self._heard = joints, monotonic()
-            self._say('state', {'state': self._state(run, joints)})
-
-    def _state(self, run: _Run, joints: CrankSample) -> dict[str, Any]:
-        names = run.scene.joints
-        rates = joints.rates or (nan,) * len(names)
-        values = dict(zip(names, joints.angles, strict=True))
-        inputs = self._inputs_at(joints.stamp)
-        known = dict.fromkeys(run.shown.joints, nan) | values
-        known |= dict(zip(run.shown.inputs, inputs, strict=True))
-        return {
-            't': joints.stamp * 1e-9,
-            'age': (time_ns() - joints.stamp) * 1e-9,
-            'inputs': [_finite(value) for value in inputs],
-            'joints': {
-                name: [_finite(value), _finite(rate)]
-                for name, value, rate in zip(names, joints.angles, rates, strict=True)
-            },
-            'frames': _frames(run, known),
-        }
-
-    def _inputs_at(self, stamp: int) -> list[float]:
-        """Return the inputs at the time of the joints; NaN where they are unknown."""
-        assert self._run is not None
-        if self._cranks is None:
-            return [nan] * len(self._run.shown.inputs)
-        lead = (stamp - self._cranks.stamp) * 1e-9
-        rates = self._cranks.rates
-        if rates is None or abs(lead) > _LONGEST_LEAD:
-            return list(self._cranks.angles)
-        return [
-            angle + rate * lead for angle, rate in zip(self._cranks.angles, rates, strict=True)
-        ]
+            self._heard = monotonic()
+            self._say('state', {'state': run.state(joints, self._cranks, time_ns())})
 
     def _look(self) -> None:
         """Find out whether the node is there, and give up what it does not answer."""
@@ -499,41 +409,21 @@ class LiveBridge:
 
     def _tell_node(self) -> None:
         """Tell how the node is."""
-        run = self._run
-        if run is None:
+        if self._run is None:
             return
         self._told = monotonic()
-        values = {
-            _task(status): {pair.key: pair.value for pair in status.values}
-            for status in self._statuses
-        }
-        tick, recording = values.get('tick', {}), values.get('recording', {})
         troubles = [[2, f'the node {self._trouble}']] if self._trouble else []
-        self._say(
-            'node',
-            {
-                'node': {
-                    'name': self.name,
-                    'there': self._there,
-                    'state': self._lifecycle,
-                    'ticks': tick.get('Actual frequency (Hz)', ''),
-                    'late': tick.get('Late by more than a period', ''),
-                    'lost': tick.get('Lost ticks', ''),
-                    'lateness': [
-                        tick.get(f'Lateness {each} (us)', '') for each in ('p50', 'p99', 'max')
-                    ],
-                    'diagnostics': troubles
-                    + [
-                        [status.level[0], f'{_task(status)}: {status.message}']
-                        for status in self._statuses
-                    ],
-                    'faults': self._faults,
-                    'memory': any(key.startswith('In memory') for key in recording),
-                    'recording': any(key.startswith('Recorded: ') for key in recording),
-                    'drive': (run.turned or run.shown).drive[0],
-                }
-            },
-        )
+        told = diagnosed(self._statuses)
+        node = {
+            'name': self.name,
+            'there': self._there,
+            'state': self._lifecycle,
+            'faults': self._faults,
+            'drive': self._run.drive,
+            **told,
+            'diagnostics': troubles + told['diagnostics'],
+        }
+        self._say('node', {'node': node})
 
     def _say(self, kind: str, content: dict[str, Any]) -> None:
         number, _ = self._newest[kind]
@@ -552,7 +442,7 @@ class LiveBridge:
             try:
                 self._do(content, future)
             except LinkageError as error:
-                future.set_result(str(error))
+                _reply(future, str(error))
 
     def _do(self, content: Mapping[str, Any], future: Future[str]) -> None:
         """Do what a page asks for; the answer may come later."""
@@ -571,9 +461,9 @@ class LiveBridge:
         elif do in _PLAIN:
             self._call(Trigger, do, Trigger.Request(), future)
         elif do == 'crank':
-            future.set_result(self._turn(content))
+            _reply(future, self._turn(content))
         elif do == 'effort':
-            future.set_result(self._push(content))
+            _reply(future, self._push(content))
         else:
             raise LinkageError('do', f'{quoted(do)} is not known', _any_of(_REQUESTS))
 
@@ -596,13 +486,13 @@ class LiveBridge:
                 self._calls.remove(call)
                 if call.answer is not None:
                     call.client.remove_pending_request(call.answer)
-                call.future.set_result(f'{self.name} does not answer')
+                _reply(call.future, f'{self.name} does not answer')
 
     def _on_answer(self, call: _Call, answer: Any) -> None:
         if call in self._calls:
             self._calls.remove(call)
             failed = answer.exception()
-            call.future.set_result(str(failed) if failed else str(answer.result().message))
+            _reply(call.future, str(failed) if failed else str(answer.result().message))
 
     def _client(self, kind: Any, service: str) -> Any:
         if service not in self._clients:
@@ -631,16 +521,15 @@ class LiveBridge:
         self._hold(run)
         return f'effort {self._effort[0]:g} on {run.crank_topic}'
 
-    def _turnable(self, drive: str, what: str) -> _Run:
+    def _turnable(self, drive: str, what: str) -> FollowedRun:
         run = self._run
         assert run is not None
         if run.turned is None or run.turned.drive[0] != drive:
-            own = (run.turned or run.shown).drive[0]
             remedy = f'run a scene with the drive {drive}'
-            raise LinkageError(what, f'is not taken by the drive {own}', remedy)
+            raise LinkageError(what, f'is not taken by the drive {run.drive}', remedy)
         return run
 
-    def _hold(self, run: _Run) -> None:
+    def _hold(self, run: FollowedRun) -> None:
         """Publish from now on, as long as a hand holds the crank."""
         assert run.turned is not None
         if self._hand_publisher is None:
@@ -670,66 +559,17 @@ class LiveBridge:
             self._hand_timer.cancel()
 
 
-_TURNED = ('topic', 'torque')
-"""Drives that listen to a topic."""
-
 _PLAIN = ('snapshot', 'reset')
 """Requests that are services without an argument."""
 
 _REQUESTS = ('fault', 'record', *_PLAIN, 'crank', 'effort')
 
 
-def _live_model(run: _Run) -> dict[str, Any]:
-    """Return what a page shows of a scene beside the model of its first linkage."""
-    closure = run.closure
-    cranks: list[list[float] | None] = []
-    for given in closure.linkage.inputs:
-        # A crank on the ground is turned by the mouse about its pin.
-        points = closure.linkage.links.get(given.child, {})
-        ground = closure.linkage.links[GROUND]
-        pivots = [name for name in points if name in ground]
-        if given.unit != 'rad' or given.parent != GROUND or not pivots:
-            cranks.append(None)
-            continue
-        reach = max(dist(point, points[pivots[0]]) for point in points.values())
-        cranks.append([*ground[pivots[0]], reach])
-    return {
-        'joints': [
-            [name, 'rad' if turning else 'm']
-            for member in run.scene.members
-            for name, turning in zip(member.joints, member.closure.turning, strict=True)
-        ],
-        'inputs': list(run.shown.inputs),
-        'cranks': cranks,
-        'turned': run.turned is run.shown,
-        'drive': (run.turned or run.shown).drive[0],
-        'effort': _range_of_effort(closure),
-        'linkages': len(run.scene.members),
-    }
-
-
-def _range_of_effort(closure: Closure) -> float:
-    """Return the greatest effort of a slider, in [N·m] or [N]; a greater one can be typed."""
-    limit = closure.linkage.inputs[0].limits.effort
-    return limit if isfinite(limit) else _USUAL_EFFORT
-
-
-def _frames(run: _Run, known: Mapping[str, float]) -> list[float] | None:
-    """Return place and angle of the frame of each link; None if they are unknown."""
-    values = {name: np.array([value]) for name, value in known.items()}
-    found = poses(run.closure, run.shown.prefix, values, run.shown.inputs)
-    if not set(run.links) <= set(found.links):
-        return None
-    order = [found.links.index(link) for link in run.links]
-    frames = found.frames[0][order]
-    return frames.ravel().tolist() if np.isfinite(frames).all() else None
-
-
 def _all(subscription: Any) -> list[bytes]:
     """Take the waiting messages of a subscription."""
     if subscription is None:
         return []
-    taken = []
+    taken: list[bytes] = []
     while len(taken) < _NEWEST_QOS.depth:
         found = subscription.handle.take_message(JointState, True)
         if found is None:
@@ -738,16 +578,8 @@ def _all(subscription: Any) -> list[bytes]:
     return taken
 
 
-def _task(status: DiagnosticStatus) -> str:
-    return str(status.name.partition(': ')[2])
-
-
-def _finite(value: float) -> float | None:
-    return value if isfinite(value) else None
-
-
 def _number(content: Mapping[str, Any], key: str) -> float:
-    value = content.get(key)
+    value: Any = content.get(key)
     if type(value) not in (int, float) or not abs(value) <= _FARTHEST:
         raise LinkageError(key, f'{quoted(value)} is not valid', 'send a number')
     return float(value)
@@ -762,6 +594,11 @@ def _flag(content: Mapping[str, Any]) -> bool:
 
 def _any_of(names: Sequence[str] | Mapping[str, Any]) -> str:
     return f'there are: {listed(names)}' if names else 'there is none'
+
+
+def _reply(future: Future[str], line: str) -> None:
+    with suppress(InvalidStateError):  # the page has gone
+        future.set_result(line)
 
 
 def _remedy(names: Sequence[str]) -> str:

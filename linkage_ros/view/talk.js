@@ -47,7 +47,7 @@ const Talk = (() => {
   function newest(act) {
     let busy = false;
     let next = null;
-    return async function go(content) {
+    async function go(content) {
       if (busy) {
         next = content;
         return;
@@ -63,7 +63,9 @@ const Talk = (() => {
           go(last);
         }
       }
-    };
+    }
+    go.isBusy = () => busy;
+    return go;
   }
 
   return { open, ask, newest, onChange, isThere };

@@ -254,14 +254,19 @@ const View = (() => {
     if (!dragged) dragged = { text: history.now.text, inputs: [...linkage.inputs], last: null };
     const snap = Number(named('snap').value) * linkage.model.unit.factor;
     send({
-      edit: { pin, to: [x, y], inputs: dragged.inputs, snap }, inputs: dragged.inputs, whole: false,
+      edit: { pin, to: [seen(x), seen(y)], inputs: dragged.inputs, snap }, inputs: dragged.inputs, whole: false,
     });
   }
 
   /** End a drag: its last text is one step of the history. */
-  async function ended(pinned) {
+  function ended(pinned) {
     if (!pinned || !dragged) return;
     const settle = () => {
+      // The answer to the last request may still be on its way.
+      if (send.isBusy()) {
+        setTimeout(settle, 20);
+        return;
+      }
       const done = dragged;
       dragged = null;
       if (done?.last) history.add(done.last.text, done.last.inputs);
@@ -273,8 +278,7 @@ const View = (() => {
       buttons();
       askForWhole();
     };
-    // The answer to the last request may still be on its way.
-    setTimeout(settle, 120);
+    settle();
   }
 
   async function go(by) {
@@ -403,6 +407,13 @@ const View = (() => {
     setInput(0, whole ? value : Math.min(Math.max(value, low), high));
   }
 
+  /** Return a length as finely as an eye can point. */
+  function seen(value) {
+    const [left, , right] = linkage.reach;
+    const fine = 10 ** Math.floor(Math.log10((right - left) / 2000));
+    return Number((fine * Math.round(value / fine)).toPrecision(9));
+  }
+
   const act = {
     mayEdit,
     tool: () => document.querySelector('input[name=tool]:checked')?.value ?? 'turn',
@@ -412,7 +423,7 @@ const View = (() => {
     ended,
     pointed(link, place) {
       if (act.tool() === 'input') edit({ input: { link } });
-      else edit({ trace: { link, at: linkage.within(link, place) } });
+      else edit({ trace: { link, at: linkage.within(link, place).map(seen) } });
     },
     choose(name) {
       board.chosen = name;

@@ -22,8 +22,13 @@ graph. The browser's test drives the whole chain, from a slider to DDS.
 from collections.abc import Iterator
 from contextlib import contextmanager
 import json
+import os
 import signal
+import subprocess
+import sys
 import time
+from urllib.error import URLError
+from urllib.request import urlopen
 
 from linkage_ros import load
 from linkage_ros.bag.reader import read_bag
@@ -37,7 +42,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from .conftest import LINKAGES
-from .graph import stamp_of, wait_for
+from .graph import PATIENCE, stamp_of, wait_for
 from .turning import turning
 from ..browser import chromium
 from ..view.served import served
@@ -134,7 +139,7 @@ def test_the_linkage_comes_from_the_node_and_a_hand_turns_its_crank(graph, start
 def test_a_fault_and_a_recording_begin_and_end(graph, start, scene):
     states = graph.listen(JointState, '/joint_states')
     start(scene)
-    with bridged(graph) as followed, turning(graph.publisher(JointState, '/crank_states')):
+    with bridged(graph, 'linkage_node') as followed, turning(graph.publisher(JointState, '/crank_states')):
         wait_for(lambda: states, 'joint states')
         said = followed.ask('record', on=True)
         assert said.startswith('recording to '), said
@@ -172,7 +177,7 @@ def test_a_fault_and_a_recording_begin_and_end(graph, start, scene):
 
 def test_a_node_that_is_killed_is_said_and_one_that_starts_again_is_found(graph, start, scene):
     node = start(scene)
-    with bridged(graph) as followed:
+    with bridged(graph, 'linkage_node') as followed:
         followed.wait_for_node(lambda node: node['there'], 'the node')
         first, _ = followed.bridge.newest('model')
         node.end(signal.SIGKILL)
@@ -210,12 +215,40 @@ def test_a_scene_that_is_none_is_refused_in_one_line(graph):
         graph.node.destroy_publisher(publisher)
 
 
+def test_a_run_serves_its_page_and_ends_it(graph, scene, folder):
+    """Without --view, it says the command that opens the page."""
+    environment = os.environ | {'ROS_DOMAIN_ID': str(graph.domain)}
+    command = [sys.executable, '-m', 'linkage_ros', 'run', scene, '--plain']
+
+    def pages(lines):
+        return (line.removeprefix('page      ') for line in lines if line.startswith('page '))
+
+    with subprocess.Popen(
+        [*command, '--view'], cwd=folder, env=environment, stdout=subprocess.PIPE, text=True
+    ) as run:
+        name, address = next(pages(run.stdout)).split(': ')
+        assert name == '/linkage_node'
+        with urlopen(address.strip(), timeout=PATIENCE) as page:
+            assert b'linkage view' in page.read()
+        run.send_signal(signal.SIGINT)
+        assert 'Traceback' not in run.stdout.read()
+    assert run.returncode == 0
+    with pytest.raises(URLError):
+        urlopen(address.strip(), timeout=PATIENCE)
+
+    run = subprocess.run(  # noqa: PLW1510 (its output is judged)
+        [*command, '--seconds', '0.1'], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    (told,) = pages(run.stdout.splitlines())
+    assert f'ROS_DOMAIN_ID={graph.domain} linkage view --node ' in told
+
+
 def test_in_a_browser_a_slider_turns_the_crank_and_a_switch_shows_the_fault(graph, start, scene):
     cranks = graph.listen(JointState, '/crank_states')
     node = start(scene)
     errors = []
     with (
-        bridged(graph) as followed,
+        bridged(graph, 'linkage_node') as followed,
         served(
             [lambda app: add_live(app, followed.bridge)], lambda: live_page(followed.bridge)
         ) as server,

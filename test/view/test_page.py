@@ -90,6 +90,7 @@ def closure_of(text: str) -> Closure:
 
 def pixel_of(page: Any, pin: str) -> tuple[float, float]:
     """Return where a pin is in the window."""
+    page.locator('#drawing').scroll_into_view_if_needed()
     box = page.locator('#drawing').bounding_box()
     x, y = page.evaluate(
         'pin => View.board.toPixel(View.linkage.pins().find((p) => p.name === pin).place)', pin
