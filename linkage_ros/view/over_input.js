@@ -5,6 +5,7 @@ const OverInput = (() => {
   const COUNT = 361;
   const SECONDS = { joints: '', rates: '/s', accelerations: '/s²' };
   const ASIDE = 0.05; // of the values at each end do not count for how high a curve is drawn
+  const SECOND_AXIS = 58; // pixels
   const WILD = 6; // times the span of the others: values as far as these are beside a toggle
   const [POOR, FAIR] = [Math.PI / 6, Math.PI / 4];
   const QUALITY = { poor: '#d55e00', fair: '#e6b422', good: '#009e73' };
@@ -18,6 +19,14 @@ const OverInput = (() => {
       found.push([value, linkage.motion([value, ...linkage.inputs.slice(1)])]);
     }
     return found;
+  }
+
+  const hasTwoUnits = ({ model }) => new Set(model.joints.map((joint) => joint.unit)).size > 1;
+
+  /** Return the edges of a plot; where joints turn and slide, there is an axis on both sides. */
+  function margin(linkage, width) {
+    const edges = Looks.margin(width);
+    return hasTwoUnits(linkage) ? { ...edges, r: edges.r + SECOND_AXIS } : edges;
   }
 
   /**
@@ -49,7 +58,7 @@ const OverInput = (() => {
       const ink = Page.colours();
       const { inputs: [input], joints } = linkage.model;
       const across = Angles.shown(input.unit);
-      const both = new Set(joints.map((joint) => joint.unit)).size > 1;
+      const both = hasTwoUnits(linkage);
       const traces = joints.map((joint, i) => {
         const own = Angles.shown(joint.unit);
         const unit = `${own.unit}${SECONDS[this.key]}`;
@@ -65,8 +74,7 @@ const OverInput = (() => {
           line: Looks.line(joint.name, ink.ink),
         };
       });
-      const edges = { ...Looks.margin(width) };
-      if (both) edges.r += 58;
+      const edges = margin(linkage, width);
       const [room, legend] = Looks.legend(joints.map((joint) => joint.name), width);
       const range = [found[0][0], found[found.length - 1][0]].map((value) => value * across.factor);
       const first = Angles.shown(joints.every((joint) => joint.unit === 'm') ? 'm' : 'rad');
@@ -125,7 +133,7 @@ const OverInput = (() => {
     const pen = canvas.getContext('2d');
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, tall);
-    const { l, r } = Looks.margin(width);
+    const { l, r } = margin(linkage, width);
     const known = quality?.input ?? [];
     if (!known.length) return;
     const [from, to] = linkage.range();

@@ -4,7 +4,7 @@
 const View = (() => {
   const { data } = Page;
   const TURN_IN = 4; // s: a turn of the crank that plays
-  const SLOWER = 140; // ms between two drawings of all curves while a pin is dragged
+  const SLOWER = 140; // ms between two drawings of all curves
   const WHOLE_AFTER = 250; // ms without an edit, until what takes longer is asked for
   const KEY = 1 / 400; // of the picture: a step of a key
   const SLIDER_STEPS = 1000;
@@ -64,7 +64,7 @@ const View = (() => {
   function curves() {
     clearTimeout(curvesDue);
     const wait = drawnAt + SLOWER - performance.now();
-    if (dragged && wait > 0) {
+    if (wait > 0) {
       curvesDue = setTimeout(curves, wait);
       return;
     }
@@ -143,8 +143,9 @@ const View = (() => {
 
   /** Go to inputs. */
   function seek(inputs) {
+    const others = inputs.some((value, i) => i && value !== linkage.inputs[i]);
     linkage.seek(inputs);
-    if (inputs.length > 1) curves();
+    if (others) curves(); // over the first input, the others held
     moved();
     read();
     askForPose(linkage);
@@ -455,6 +456,7 @@ const View = (() => {
   }
 
   function typed(label, value, change) {
+    if (!editing) return cell('span', String(value));
     const field = document.createElement('input');
     Object.assign(field, { type: 'number', step: 'any', value, className: 'edit', disabled: !mayEdit() });
     field.setAttribute('aria-label', label);
@@ -483,6 +485,7 @@ const View = (() => {
       return cell('tr', cell('th', each.key), cell('td', field));
     }));
     named('choices').replaceChildren(...Object.entries(model.choices).map(([name, { now, sides }]) => {
+      if (!editing) return cell('tr', cell('th', name), cell('td', now ?? ''));
       const choice = document.createElement('select');
       choice.className = 'edit';
       choice.disabled = !mayEdit();
@@ -492,6 +495,7 @@ const View = (() => {
       return cell('tr', cell('th', name), cell('td', choice));
     }));
     named('traced').replaceChildren(...model.drawn.traced.map(({ point }) => {
+      if (!editing) return cell('span', point);
       const remove = cell('button', `✕ ${point}`);
       Object.assign(remove, { type: 'button', className: 'edit', disabled: !mayEdit() });
       remove.setAttribute('aria-label', `trace ${point} no more`);
