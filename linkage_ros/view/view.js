@@ -255,7 +255,9 @@ const View = (() => {
     if (!dragged) dragged = { text: history.now.text, inputs: [...linkage.inputs], last: null };
     const snap = Number(named('snap').value) * linkage.model.unit.factor;
     send({
-      edit: { pin, to: [seen(x), seen(y)], inputs: dragged.inputs, snap }, inputs: dragged.inputs, whole: false,
+      edit: { pin, to: [seen(x), seen(y)], inputs: dragged.inputs, snap },
+      inputs: dragged.inputs,
+      whole: false,
     });
   }
 

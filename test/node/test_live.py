@@ -139,7 +139,10 @@ def test_the_linkage_comes_from_the_node_and_a_hand_turns_its_crank(graph, start
 def test_a_fault_and_a_recording_begin_and_end(graph, start, scene):
     states = graph.listen(JointState, '/joint_states')
     start(scene)
-    with bridged(graph, 'linkage_node') as followed, turning(graph.publisher(JointState, '/crank_states')):
+    with (
+        bridged(graph, 'linkage_node') as followed,
+        turning(graph.publisher(JointState, '/crank_states')),
+    ):
         wait_for(lambda: states, 'joint states')
         said = followed.ask('record', on=True)
         assert said.startswith('recording to '), said
@@ -262,6 +265,8 @@ def test_in_a_browser_a_slider_turns_the_crank_and_a_switch_shows_the_fault(grap
         page.locator('#hands input[type=range]').focus()
         for _ in range(20):
             page.keyboard.press('ArrowRight')
+        page.get_by_label('hold').focus()
+        page.keyboard.press('Space')
         wait_for(lambda: page.evaluate('Live.state().state?.frames'), 'a pose')
         assert page.evaluate('Live.state().state.inputs[0]') > 0.0
         wait_for(lambda: cranks and cranks[-1].position[0] > 0.0, 'a crank')

@@ -239,7 +239,7 @@ def test_what_is_saved_is_the_text_of_the_page_and_is_loaded_again(
         assert page.is_disabled('#save')
         drag(page, 'B', 20, 20)
         page.click('#save')
-        page.wait_for_function("() => document.getElementById('status').textContent !== ''")
+        page.get_by_text('saved: mine.yaml').wait_for()
         text = state(page)['text']
         assert file.read_text('utf-8') == text
         assert '# A crank-rocker: the crank turns fully' in text  # the author's comment
