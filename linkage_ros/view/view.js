@@ -211,7 +211,8 @@ const View = (() => {
   function askForWhole() {
     clearTimeout(wholeDue);
     wholeDue = setTimeout(async () => {
-      if (dragged) {
+      // Of two requests that wait, the server drops the older one: no edit may be that.
+      if (dragged || send.isBusy()) {
         askForWhole();
         return;
       }
@@ -235,6 +236,7 @@ const View = (() => {
     if (!error.text) throw error;
     board.wrong = { pin: error.pin ?? pin, text: reason(error.text) };
     warn(error.text);
+    sides();
     board.paint();
   }
 
@@ -462,51 +464,78 @@ const View = (() => {
     const field = document.createElement('input');
     Object.assign(field, { type: 'number', step: 'any', value, className: 'edit', disabled: !mayEdit() });
     field.setAttribute('aria-label', label);
+    field.addEventListener('input', () => { field.isTyped = true; });
     field.addEventListener('change', () => {
+      field.isTyped = false;
       if (field.value !== '' && Number.isFinite(field.valueAsNumber)) change(field.valueAsNumber);
     });
     return field;
   }
 
-  /** Write lengths, without the field in which somebody types. */
+  /** Write lengths and sides, without the field in which somebody types. */
   function numbers() {
     const { lengths, unit } = linkage.model;
     document.querySelectorAll('#lengths input').forEach((field, i) => {
-      if (document.activeElement !== field && lengths[i]) field.value = shownLength(lengths[i].value);
+      if (!field.isTyped && lengths[i]) field.value = shownLength(lengths[i].value);
     });
     named('unit-of-length').textContent = unit.length;
+    sides();
+  }
+
+  function sides() {
+    const now = Object.values(linkage.model.choices);
+    document.querySelectorAll('#choices select').forEach((choice, i) => {
+      choice.value = now[i].now;
+    });
+  }
+
+  /**
+   * Fill an element with a part for each of its contents, if they are others than before.
+   *
+   * A part that stays keeps the focus, and the press of a button that is not yet let go.
+   */
+  function fill(id, contents, make) {
+    const place = named(id);
+    const key = JSON.stringify([contents, linkage.model.unit, mayEdit()]);
+    if (place.filledWith === key) return;
+    place.filledWith = key;
+    place.replaceChildren(...contents.map(make));
   }
 
   function form() {
     const { model } = linkage;
     const { factor } = model.unit;
-    named('lengths').replaceChildren(...model.lengths.map((each) => {
-      const field = typed(`length ${each.key}`, shownLength(each.value), (value) => edit({
+    // Without a server the numbers are text, and stay.
+    const lengths = editing ? model.lengths.map(({ value, ...own }) => own) : model.lengths;
+    fill('lengths', lengths, (each, i) => {
+      const field = typed(`length ${each.key}`, shownLength(model.lengths[i].value), (value) => edit({
         length: { link: each.link, from: each.from, to: each.to, value: value * factor },
       }));
       return cell('tr', cell('th', each.key), cell('td', field));
-    }));
-    named('choices').replaceChildren(...Object.entries(model.choices).map(([name, { now, sides }]) => {
+    });
+    const choices = Object.entries(model.choices).map(([name, each]) => [name, each.sides]);
+    fill('choices', choices, ([name, possible]) => {
+      const { now } = model.choices[name];
       if (!editing) return cell('tr', cell('th', name), cell('td', now ?? ''));
       const choice = document.createElement('select');
       choice.className = 'edit';
       choice.disabled = !mayEdit();
       choice.setAttribute('aria-label', `side of ${name}`);
-      choice.append(...sides.map((side) => new Option(side, side, side === now, side === now)));
+      choice.append(...possible.map((side) => new Option(side, side, side === now, side === now)));
       choice.addEventListener('change', () => edit({ side: { [name]: choice.value } }));
       return cell('tr', cell('th', name), cell('td', choice));
-    }));
-    named('traced').replaceChildren(...model.drawn.traced.map(({ point }) => {
+    });
+    fill('traced', model.drawn.traced.map(({ point }) => point), (point) => {
       if (!editing) return cell('span', point);
       const remove = cell('button', `✕ ${point}`);
       Object.assign(remove, { type: 'button', className: 'edit', disabled: !mayEdit() });
       remove.setAttribute('aria-label', `trace ${point} no more`);
       remove.addEventListener('click', () => edit({ untrace: point }));
       return remove;
-    }));
+    });
     named('warnings').replaceChildren(...(model.warnings ?? []).map((text) => cell('li', text)));
     named('warnings').hidden = !(model.warnings ?? []).length;
-    named('inputs').replaceChildren(...model.inputs.map((input, i) => {
+    fill('inputs', model.inputs.map(({ name }) => name), (name, i) => {
       const slider = document.createElement('input');
       Object.assign(slider, { type: 'range', min: 0, max: SLIDER_STEPS, step: 1 });
       slider.addEventListener('input', () => {
@@ -514,8 +543,8 @@ const View = (() => {
         const [low, high] = bounds(i);
         setInput(i, low + ((high - low) * slider.valueAsNumber) / SLIDER_STEPS);
       });
-      return cell('label', cell('span', input.name), slider);
-    }));
+      return cell('label', cell('span', name), slider);
+    });
     numbers();
     sliders();
   }
