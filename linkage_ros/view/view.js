@@ -19,7 +19,7 @@ const View = (() => {
   let forth = 1;
   let last = 0;
   let there = !data.server;
-  let drawnAt = 0;
+  let drawnAt = -SLOWER;
   let curvesDue = null;
   let wholeDue = null;
   let settling = 0; // requests for a whole model
