@@ -587,8 +587,12 @@ const View = (() => {
   async function shipped() {
     const list = named('open');
     if (!list || list.options.length > 1) return;
-    const { linkages } = await Talk.ask('names');
-    list.append(...linkages.map((name) => new Option(name, name)));
+    try {
+      const { linkages } = await Talk.ask('names');
+      list.append(...linkages.map((name) => new Option(name, name)));
+    } catch (error) {
+      said(error);
+    }
   }
 
   function controls() {

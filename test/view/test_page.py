@@ -345,21 +345,52 @@ def test_a_shipped_linkage_is_opened_and_a_file_downloaded(browser: Any, tmp_pat
             assert found.value.suggested_filename.endswith(f'.{kind}')
 
 
-def test_a_server_that_ends_is_said_and_the_linkage_still_moves(
-    browser: Any, tmp_path: Path
-) -> None:
+def test_a_second_page_is_one_of_its_own(browser: Any, tmp_path: Path) -> None:
     with edited(browser, tmp_path) as (page, _, server):
-        with served([]) as _other:  # ends before the page's
-            pass
-        page.evaluate("() => { window.lost = document.getElementById('lost'); }")
-        assert page.evaluate('() => lost.hidden')
-        assert server.server.refused == {}
-        other = browser.new_page()  # a second page is one of its own
+        other = browser.new_page()
         other.goto(server.address)
         other.wait_for_function(QUIET)
         drag(page, 'B', 20, 10)
         assert state(other)['text'] != state(page)['text']
         other.close()
+
+
+def test_a_lost_connection_is_said_and_comes_back_while_the_linkage_moves(
+    browser: Any, tmp_path: Path
+) -> None:
+    file = tmp_path / 'mine.yaml'
+    file.write_text(FOUR_BAR, 'utf-8')
+    sockets: list[Any] = []
+
+    def through(socket: Any) -> None:
+        socket.connect_to_server()
+        sockets.append(socket)
+
+    page = browser.new_page()
+    page.route_web_socket(lambda address: address.endswith('/ws'), through)
+    text = page_of(model(FOUR_BAR, 'mine'), mode='edit', can_save=True)
+    with served([Conversation('mine', None, UserFile(file)).add], lambda: text) as server:
+        page.goto(server.address)
+        page.wait_for_function(QUIET)
+        sockets[0].close(code=4000, reason='the network has gone')
+        page.wait_for_selector('#lost:not([hidden])')
+        assert 'the network has gone' in page.inner_text('#lost')
+        page.wait_for_function(QUIET)
+        page.wait_for_selector('#lost', state='hidden')
+        drag(page, 'B', 20, 10)
+        agrees(page)
+        edited_text = state(page)['text']
+    # The server has ended.
+    page.wait_for_selector('#lost:not([hidden])')
+    assert page.is_disabled('#undo')
+    assert page.get_by_label('length coupler A–B').is_disabled()
+    before = state(page)['inputs'][0]
+    page.focus('#drawing')
+    page.keyboard.press('ArrowRight')
+    assert state(page)['inputs'][0] > before
+    assert state(page)['text'] == edited_text
+    agrees(page)
+    page.close()
 
 
 def test_two_assemblies_are_seen_and_instant_centres_on_request(
