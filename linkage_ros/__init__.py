@@ -100,6 +100,7 @@ _HOMES = {
     'linkage_ros.synthesis.motion': 'from_fixed_pivots from_moving_pivots Pose',
     'linkage_ros.synthesis.path.curves': 'PathTask',
     'linkage_ros.synthesis.path.generate': 'generate_path',
+    'linkage_ros.view.linkage_page': 'LinkagePage',
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}
 

@@ -61,5 +61,6 @@ from linkage_ros.synthesis.motion import (
 )
 from linkage_ros.synthesis.path.curves import PathTask as PathTask
 from linkage_ros.synthesis.path.generate import generate_path as generate_path
+from linkage_ros.view.linkage_page import LinkagePage as LinkagePage
 
 __version__: str

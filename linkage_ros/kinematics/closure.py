@@ -50,6 +50,7 @@ from linkage_ros.kinematics.step import Pose, State
 from linkage_ros.kinematics.topology import assur_groups, Structure
 
 if TYPE_CHECKING:
+    from linkage_ros import LinkagePage
     from linkage_ros.kinematics.batch import Batch
     from linkage_ros.kinematics.compiling.linkage import Compiled
     from linkage_ros.kinematics.compiling.solve import Solver
@@ -144,6 +145,20 @@ class Closure:
         from linkage_ros import svg  # local import: only a notebook asks for pictures
 
         return svg(self)
+
+    def view(self) -> LinkagePage:
+        """
+        Return the page of `linkage view`, which a notebook shows in a cell.
+
+        Raises
+        ------
+        LinkageError
+            If plotly is not installed.
+
+        """
+        from linkage_ros import LinkagePage  # local import: only a notebook asks for pages
+
+        return LinkagePage(self)
 
     def _keep_limits(self) -> None:
         """Let `position` check the limits; without limits it checks nothing."""

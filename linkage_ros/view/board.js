@@ -5,9 +5,23 @@ const Board = (() => {
   const TALLEST = 640;
   const NEAR = 13; // pixels about a pin that are the pin's
   const NEAR_BY_TOUCH = 24;
+  const [LETTERS, MOST_LINES, LINE] = [44, 4, 16]; // of what is said at a pin; a line in pixels
+  const HIGH = 12; // pixels: the letters of a name
   const PALE = 0.22;
   const LOOKED_AT = 36; // poses of a ghost, to see how far it reaches
   const ALONG = 9; // pixels beside a bar that are the bar's
+
+  /** Return a text in lines that are short enough for a narrow picture. */
+  function folded(text) {
+    const lines = [''];
+    for (const word of text.split(' ')) {
+      const line = lines[lines.length - 1];
+      if (line && line.length + 1 + word.length > LETTERS) lines.push(word);
+      else lines[lines.length - 1] = line ? `${line} ${word}` : word;
+    }
+    if (lines.length <= MOST_LINES) return lines;
+    return [...lines.slice(0, MOST_LINES - 1), `${lines[MOST_LINES - 1]} …`];
+  }
 
   class Drawing extends Picture.Canvas {
     constructor(canvas, linkage) {
@@ -103,7 +117,8 @@ const Board = (() => {
           else pen.lineTo(x + dx, y + dy);
         }
         pen.stroke();
-        pen.fillText(link, x + 8, y - 6);
+        // To its left: where it is a pin, that one's name is on the right.
+        this.drawName(pen, link, x - 8 - pen.measureText(link).width, y - 6);
       }
     }
 
@@ -115,13 +130,23 @@ const Board = (() => {
           pen.beginPath();
           pen.arc(x, y, NEAR - 3, 0, 2 * Math.PI);
           pen.lineWidth = 2;
-          pen.strokeStyle = Looks.colour(1, this.ink.edge);
+          pen.strokeStyle = this.ink.chosen;
           pen.stroke();
         }
-        if (!this.shown.names) continue;
-        pen.fillStyle = this.ink.edge;
-        pen.fillText(pin.name, x + 9, y - 9);
+        if (this.shown.names) this.drawName(pen, pin.name, x + 9, y - 9);
       }
+    }
+
+    /** Write a name within the picture, with an edge of paper that parts it from what it is on. */
+    drawName(pen, name, x, y) {
+      const { width, tall } = this.size;
+      const left = Math.min(x, width - pen.measureText(name).width - 2);
+      if (left < 0 || x > width || y < HIGH || y > tall) return;
+      pen.lineWidth = 3;
+      pen.strokeStyle = this.ink.paper;
+      pen.strokeText(name, left, y);
+      pen.fillStyle = this.ink.edge;
+      pen.fillText(name, left, y);
     }
 
     /** Say what is wrong at the pin or link that it concerns. */
@@ -137,16 +162,17 @@ const Board = (() => {
       pen.strokeStyle = '#d55e00';
       pen.stroke();
       pen.font = this.font(12);
-      const words = text.length > 60 ? `${text.slice(0, 59)}…` : text;
-      const wide = pen.measureText(words).width + 12;
+      const lines = folded(text);
+      const wide = Math.max(...lines.map((line) => pen.measureText(line).width)) + 12;
+      const high = lines.length * LINE + 8;
       const left = Math.max(4, Math.min(x - wide / 2, this.size.width - wide - 4));
-      const top = y > 60 ? y - 44 : y + 22;
+      const top = y > high + 24 ? y - high - 20 : y + 22;
       pen.fillStyle = this.ink.paper;
-      pen.fillRect(left, top, wide, 22);
+      pen.fillRect(left, top, wide, high);
       pen.lineWidth = 1.5;
-      pen.strokeRect(left, top, wide, 22);
+      pen.strokeRect(left, top, wide, high);
       pen.fillStyle = this.ink.text;
-      pen.fillText(words, left + 6, top + 15);
+      lines.forEach((line, i) => pen.fillText(line, left + 6, top + (i + 1) * LINE));
     }
 
     font(size) {
@@ -154,8 +180,8 @@ const Board = (() => {
     }
 
     words() {
-      const { paper, ink } = Page.colours();
-      return { paper, text: ink };
+      const { paper, ink, link } = Page.colours('link');
+      return { paper, text: ink, chosen: link };
     }
 
     /** Return the pin under a pixel; null if there is none. */

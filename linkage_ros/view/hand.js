@@ -42,6 +42,7 @@ const Hand = (() => {
       if (!what) return;
       held = { ...what, id: down.pointerId };
       canvas.setPointerCapture(down.pointerId);
+      canvas.focus({ preventScroll: true }); // its keys go on from here
       if (held.pin) act.choose(held.pin.name);
       else act.turnTo(board.toPlace(pixel), true);
       down.preventDefault();

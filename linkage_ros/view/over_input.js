@@ -4,6 +4,10 @@
 const OverInput = (() => {
   const COUNT = 361;
   const SECONDS = { joints: '', rates: '/s', accelerations: '/s²' };
+  const ASIDE = 0.05; // of the values at each end do not count for how high a curve is drawn
+  const EDGE = 0.08; // of the span
+  const SECOND_AXIS = 58; // pixels
+  const WILD = 6; // times the span of the others: values as far as these are beside a toggle
   const [POOR, FAIR] = [Math.PI / 6, Math.PI / 4];
   const QUALITY = { poor: '#d55e00', fair: '#e6b422', good: '#009e73' };
 
@@ -17,6 +21,56 @@ const OverInput = (() => {
     }
     return found;
   }
+
+  /** Return where the first input is between two values, from 0 to 1; an angle less its turns. */
+  function share(linkage, from, to) {
+    let [at] = linkage.inputs;
+    if (linkage.model.inputs[0].unit === 'rad') {
+      at -= Angles.TURN * Math.floor((at - from) / Angles.TURN);
+    }
+    return (at - from) / (to - from || 1);
+  }
+
+  const hasTwoUnits = ({ model }) => new Set(model.joints.map((joint) => joint.unit)).size > 1;
+
+  /** Return the edges of a plot; where joints turn and slide, there is an axis on both sides. */
+  function edgesOf(linkage, width) {
+    const edges = Looks.margin(width);
+    return hasTwoUnits(linkage) ? { ...edges, r: edges.r + SECOND_AXIS } : edges;
+  }
+
+  /**
+   * Return the range of an axis for the curves on it; undefined leaves it to Plotly.
+   *
+   * Beside a toggle rates and accelerations have no bound: there the axis ends before they do.
+   */
+  function within(traces) {
+    const sorted = traces.flatMap(({ y }) => y).filter((each) => each !== null).sort((a, b) => a - b);
+    const part = (number) => sorted[Math.round(number * (sorted.length - 1))];
+    const [low, high] = [part(ASIDE), part(1 - ASIDE)];
+    const span = high - low;
+    if (!(part(1) - part(0) > WILD * span) || !span) return undefined;
+    const edge = EDGE * span;
+    return [Math.max(part(0) - edge, low - span), Math.min(part(1) + edge, high + span)];
+  }
+
+  /**
+   * Return angles without leaps of whole turns, which are no motion; null where there is none.
+   *
+   * The one numbered `at` is within half a turn of `now`, where the linkage is.
+   */
+  function unwrapped(angles, at, now) {
+    let before = null;
+    const found = angles.map((angle) => {
+      if (angle !== null) before = near(angle, before ?? angle);
+      return angle === null ? null : before;
+    });
+    const moved = found[at] === null ? 0 : near(found[at], now) - found[at];
+    return found.map((angle) => (angle === null ? null : angle + moved));
+  }
+
+  /** Return an angle with as many whole turns more or less as bring it nearest to another. */
+  const near = (angle, other) => angle - Angles.TURN * Math.round((angle - other) / Angles.TURN);
 
   class Plot {
     constructor(figure) {
@@ -33,7 +87,7 @@ const OverInput = (() => {
       const ink = Page.colours();
       const { inputs: [input], joints } = linkage.model;
       const across = Angles.shown(input.unit);
-      const both = new Set(joints.map((joint) => joint.unit)).size > 1;
+      const both = hasTwoUnits(linkage);
       const traces = joints.map((joint, i) => {
         const own = Angles.shown(joint.unit);
         const unit = `${own.unit}${SECONDS[this.key]}`;
@@ -43,14 +97,13 @@ const OverInput = (() => {
           mode: 'lines',
           name: both ? `${label} [${unit}]` : label,
           x: found.map(([value]) => value * across.factor),
-          y: found.map(([, state]) => (state[this.key].length ? state[this.key][i] * own.factor : null)),
+          y: this.values(linkage, found, i).map((value) => (value === null ? null : value * own.factor)),
           yaxis: both && joint.unit === 'm' ? 'y2' : 'y',
           hovertemplate: `<b>${label}</b> %{y:.6~g} ${unit}<br>at %{x:.6~g} ${across.unit}<extra></extra>`,
           line: Looks.line(joint.name, ink.ink),
         };
       });
-      const edges = { ...Looks.margin(width) };
-      if (both) edges.r += 46;
+      const edges = edgesOf(linkage, width);
       const [room, legend] = Looks.legend(joints.map((joint) => joint.name), width);
       const range = [found[0][0], found[found.length - 1][0]].map((value) => value * across.factor);
       const first = Angles.shown(joints.every((joint) => joint.unit === 'm') ? 'm' : 'rad');
@@ -62,37 +115,43 @@ const OverInput = (() => {
         height: 210 + room,
         margin: { ...edges, t: edges.t + room },
         xaxis: Page.axis(`${Looks.label(input.name)} [${across.unit}]`, ink, { range, automargin: false }),
-        yaxis: Page.axis(`[${first.unit}${SECONDS[this.key]}]`, ink, { automargin: false }),
+        yaxis: Page.axis(`[${first.unit}${SECONDS[this.key]}]`, ink, {
+          automargin: false, range: within(traces.filter(({ yaxis }) => yaxis === 'y')),
+        }),
         shapes: toggles,
         ...(both && {
           yaxis2: Page.axis(`[m${SECONDS[this.key]}]`, ink, {
-            overlaying: 'y', side: 'right', automargin: false, showgrid: false,
+            overlaying: 'y', side: 'right', automargin: false, showgrid: false, tickmode: 'auto',
+            range: within(traces.filter(({ yaxis }) => yaxis === 'y2')),
           }),
         }),
         ...legend,
       });
       Plotly.react(this.place, traces, layout, Page.config);
-      [this.width, this.edges, this.height, this.range] = [width, layout.margin, layout.height, range];
+      [this.width, this.edges, this.height] = [width, layout.margin, layout.height];
+      this.ends = [found[0][0], found[found.length - 1][0]];
       this.place.append(this.cursor);
       this.mark(linkage);
     }
 
+    /** Return the values of a joint in its unit, null where the loops do not close. */
+    values(linkage, found, i) {
+      const values = found.map(([, state]) => state[this.key][i] ?? null);
+      const turns = this.key === 'joints' && linkage.model.joints[i].unit === 'rad';
+      if (!turns || !linkage.closed) return values;
+      const at = Math.round(share(linkage, found[0][0], found[COUNT - 1][0]) * (COUNT - 1));
+      return unwrapped(values, Math.min(Math.max(at, 0), COUNT - 1), linkage.now.joints[i]);
+    }
+
     /** Put the line where the linkage is. */
     mark(linkage) {
-      if (!this.range) return;
-      const { factor } = Angles.shown(linkage.model.inputs[0].unit);
-      const [from, to] = this.range;
-      let at = linkage.inputs[0] * factor;
-      if (linkage.model.inputs[0].unit === 'rad') {
-        const turn = Angles.TURN * factor;
-        at -= turn * Math.floor((at - from) / turn);
-      }
-      const share = (at - from) / (to - from || 1);
+      if (!this.ends) return;
+      const across = share(linkage, ...this.ends);
       const { l, r, t, b } = this.edges;
-      this.cursor.hidden = !(share >= 0 && share <= 1);
+      this.cursor.hidden = !(across >= 0 && across <= 1);
       this.cursor.style.height = `${this.height - t - b}px`;
       this.cursor.style.top = `${t}px`;
-      this.cursor.style.transform = `translateX(${l + share * (this.width - l - r)}px)`;
+      this.cursor.style.transform = `translateX(${l + across * (this.width - l - r)}px)`;
     }
   }
 
@@ -106,27 +165,26 @@ const OverInput = (() => {
     const pen = canvas.getContext('2d');
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, tall);
-    const { l, r } = Looks.margin(width);
-    const known = quality?.input ?? [];
-    if (!known.length) return;
+    const { l, r } = edgesOf(linkage, width);
     const [from, to] = linkage.range();
+    const known = (quality?.input ?? []).map((value, i) => (
+      { value, angle: quality.transmission_angle[i], margin: quality.margin[i] }))
+      .filter(({ value }) => value > from - 1e-9 && value < to + 1e-9);
     const across = (value) => l + ((value - from) / (to - from || 1)) * (width - l - r);
     const ink = Page.colours();
     pen.lineWidth = 1.5;
-    known.forEach((value, i) => {
-      const angle = quality.transmission_angle[i];
-      if (angle === null || value < from - 1e-9 || value > to + 1e-9) return;
-      const step = Math.max(1, (across(to) - across(from)) / known.length + 0.6);
+    known.forEach(({ value, angle }, i) => {
+      if (angle === null) return;
+      // Halfway to the one before, and to the one after; a pixel's share leaves no gap.
+      const left = across((value + (known[i - 1]?.value ?? value)) / 2);
+      const right = across((value + (known[i + 1]?.value ?? value)) / 2) + 0.5;
       pen.fillStyle = QUALITY[angle < POOR ? 'poor' : angle < FAIR ? 'fair' : 'good'];
-      pen.fillRect(across(value) - step / 2, 6, step, 12);
+      pen.fillRect(left, 6, right - left, 12);
     });
     pen.beginPath();
-    known.forEach((value, i) => {
-      const margin = quality.margin[i];
-      if (margin !== null && value >= from - 1e-9 && value <= to + 1e-9) {
-        pen.lineTo(across(value), 42 - 20 * Math.min(1, margin));
-      }
-    });
+    for (const { value, margin } of known) {
+      if (margin !== null) pen.lineTo(across(value), 42 - 20 * Math.min(1, margin));
+    }
     pen.strokeStyle = ink.ink;
     pen.stroke();
   }

@@ -4,7 +4,7 @@
 const View = (() => {
   const { data } = Page;
   const TURN_IN = 4; // s: a turn of the crank that plays
-  const SLOWER = 140; // ms between two drawings of all curves while a pin is dragged
+  const SLOWER = 140; // ms between two drawings of all curves
   const WHOLE_AFTER = 250; // ms without an edit, until what takes longer is asked for
   const KEY = 1 / 400; // of the picture: a step of a key
   const SLIDER_STEPS = 1000;
@@ -19,7 +19,7 @@ const View = (() => {
   let forth = 1;
   let last = 0;
   let there = !data.server;
-  let drawnAt = 0;
+  let drawnAt = -SLOWER;
   let curvesDue = null;
   let wholeDue = null;
   let settling = 0; // requests for a whole model
@@ -64,7 +64,7 @@ const View = (() => {
   function curves() {
     clearTimeout(curvesDue);
     const wait = drawnAt + SLOWER - performance.now();
-    if (dragged && wait > 0) {
+    if (wait > 0) {
       curvesDue = setTimeout(curves, wait);
       return;
     }
@@ -143,8 +143,9 @@ const View = (() => {
 
   /** Go to inputs. */
   function seek(inputs) {
+    const others = inputs.some((value, i) => i && value !== linkage.inputs[i]);
     linkage.seek(inputs);
-    if (inputs.length > 1) curves();
+    if (others) curves(); // over the first input, the others held
     moved();
     read();
     askForPose(linkage);
@@ -210,7 +211,8 @@ const View = (() => {
   function askForWhole() {
     clearTimeout(wholeDue);
     wholeDue = setTimeout(async () => {
-      if (dragged) {
+      // Of two requests that wait, the server drops the older one: no edit may be that.
+      if (dragged || send.isBusy()) {
         askForWhole();
         return;
       }
@@ -234,6 +236,7 @@ const View = (() => {
     if (!error.text) throw error;
     board.wrong = { pin: error.pin ?? pin, text: reason(error.text) };
     warn(error.text);
+    sides();
     board.paint();
   }
 
@@ -457,52 +460,82 @@ const View = (() => {
   }
 
   function typed(label, value, change) {
+    if (!editing) return cell('span', String(value));
     const field = document.createElement('input');
     Object.assign(field, { type: 'number', step: 'any', value, className: 'edit', disabled: !mayEdit() });
     field.setAttribute('aria-label', label);
+    field.addEventListener('input', () => { field.isTyped = true; });
     field.addEventListener('change', () => {
+      field.isTyped = false;
       if (field.value !== '' && Number.isFinite(field.valueAsNumber)) change(field.valueAsNumber);
     });
     return field;
   }
 
-  /** Write lengths, without the field in which somebody types. */
+  /** Write lengths and sides, without the field in which somebody types. */
   function numbers() {
     const { lengths, unit } = linkage.model;
     document.querySelectorAll('#lengths input').forEach((field, i) => {
-      if (document.activeElement !== field && lengths[i]) field.value = shownLength(lengths[i].value);
+      if (!field.isTyped && lengths[i]) field.value = shownLength(lengths[i].value);
     });
     named('unit-of-length').textContent = unit.length;
+    sides();
+  }
+
+  function sides() {
+    const now = Object.values(linkage.model.choices);
+    document.querySelectorAll('#choices select').forEach((choice, i) => {
+      choice.value = now[i].now;
+    });
+  }
+
+  /**
+   * Fill an element with a part for each of its contents, if they are others than before.
+   *
+   * A part that stays keeps the focus, and the press of a button that is not yet let go.
+   */
+  function fill(id, contents, make) {
+    const place = named(id);
+    const key = JSON.stringify([contents, linkage.model.unit, mayEdit()]);
+    if (place.filledWith === key) return;
+    place.filledWith = key;
+    place.replaceChildren(...contents.map(make));
   }
 
   function form() {
     const { model } = linkage;
     const { factor } = model.unit;
-    named('lengths').replaceChildren(...model.lengths.map((each) => {
-      const field = typed(`length ${each.key}`, shownLength(each.value), (value) => edit({
+    // Without a server the numbers are text, and stay.
+    const lengths = editing ? model.lengths.map(({ value, ...own }) => own) : model.lengths;
+    fill('lengths', lengths, (each, i) => {
+      const field = typed(`length ${each.key}`, shownLength(model.lengths[i].value), (value) => edit({
         length: { link: each.link, from: each.from, to: each.to, value: value * factor },
       }));
       return cell('tr', cell('th', each.key), cell('td', field));
-    }));
-    named('choices').replaceChildren(...Object.entries(model.choices).map(([name, { now, sides }]) => {
+    });
+    const choices = Object.entries(model.choices).map(([name, each]) => [name, each.sides]);
+    fill('choices', choices, ([name, possible]) => {
+      const { now } = model.choices[name];
+      if (!editing) return cell('tr', cell('th', name), cell('td', now ?? ''));
       const choice = document.createElement('select');
       choice.className = 'edit';
       choice.disabled = !mayEdit();
       choice.setAttribute('aria-label', `side of ${name}`);
-      choice.append(...sides.map((side) => new Option(side, side, side === now, side === now)));
+      choice.append(...possible.map((side) => new Option(side, side, side === now, side === now)));
       choice.addEventListener('change', () => edit({ side: { [name]: choice.value } }));
       return cell('tr', cell('th', name), cell('td', choice));
-    }));
-    named('traced').replaceChildren(...model.drawn.traced.map(({ point }) => {
+    });
+    fill('traced', model.drawn.traced.map(({ point }) => point), (point) => {
+      if (!editing) return cell('span', point);
       const remove = cell('button', `✕ ${point}`);
       Object.assign(remove, { type: 'button', className: 'edit', disabled: !mayEdit() });
       remove.setAttribute('aria-label', `trace ${point} no more`);
       remove.addEventListener('click', () => edit({ untrace: point }));
       return remove;
-    }));
+    });
     named('warnings').replaceChildren(...(model.warnings ?? []).map((text) => cell('li', text)));
     named('warnings').hidden = !(model.warnings ?? []).length;
-    named('inputs').replaceChildren(...model.inputs.map((input, i) => {
+    fill('inputs', model.inputs.map(({ name }) => name), (name, i) => {
       const slider = document.createElement('input');
       Object.assign(slider, { type: 'range', min: 0, max: SLIDER_STEPS, step: 1 });
       slider.addEventListener('input', () => {
@@ -510,8 +543,8 @@ const View = (() => {
         const [low, high] = bounds(i);
         setInput(i, low + ((high - low) * slider.valueAsNumber) / SLIDER_STEPS);
       });
-      return cell('label', cell('span', input.name), slider);
-    }));
+      return cell('label', cell('span', name), slider);
+    });
     numbers();
     sliders();
   }
@@ -554,8 +587,12 @@ const View = (() => {
   async function shipped() {
     const list = named('open');
     if (!list || list.options.length > 1) return;
-    const { linkages } = await Talk.ask('names');
-    list.append(...linkages.map((name) => new Option(name, name)));
+    try {
+      const { linkages } = await Talk.ask('names');
+      list.append(...linkages.map((name) => new Option(name, name)));
+    } catch (error) {
+      said(error);
+    }
   }
 
   function controls() {
