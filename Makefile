@@ -49,7 +49,7 @@ help:
 	@echo 'make disk      let system calls fail, disks fill and stall, into docs/recordings (10 min)'
 	@echo 'make attacks   send hostile input to commands and node, into docs/recordings (5 min)'
 	@echo 'make endurance run 24 h in minutes and 10 min over DDS, into docs/recordings (25 min)'
-	@echo 'make gallery   draw the linkages that come with the package, and animate one for the first page'
+	@echo 'make gallery   draw the linkages that come with the package, and the moving pictures of the README'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
 	@echo 'make cost      measure the cost of every effect, into docs/cost.md'
 	@echo 'make effects   draw the pictures of drives, effects and faults for docs/effects.md'
@@ -183,6 +183,7 @@ endurance: $(STAMP)
 
 gallery: $(STAMP)
 	@$(BIN)/python docs/make_gallery.py
+	@$(BIN)/python -m docs.make_view
 
 schema: $(STAMP)
 	@mkdir -p config/schema

@@ -29,6 +29,9 @@ const View = (() => {
   const driven = () => linkage.model.driven;
   const mayEdit = () => editing && there;
 
+  /** Ask the server about the linkage that is shown; the name tells a file from what is new. */
+  const ask = (what, content) => Talk.ask(what, { name: linkage.model.name, ...content });
+
   // What is shown.
 
   /** Show another model of the linkage; of one during a drag, ranges and checks are the old ones. */
@@ -79,7 +82,7 @@ const View = (() => {
     if (asked.model.program || !mayEdit()) return;
     const inputs = [...asked.inputs];
     try {
-      const { poses: [pose] } = await Talk.ask('poses', { text: history.now.text, inputs: [inputs] });
+      const { poses: [pose] } = await ask('poses', { text: history.now.text, inputs: [inputs] });
       if (linkage !== asked || asked.inputs.some((value, i) => value !== inputs[i])) return;
       asked.now = pose;
       moved();
@@ -193,7 +196,7 @@ const View = (() => {
     const { text } = history.now;
     try {
       const base = dragged?.text ?? text;
-      const model = await Talk.ask('edit', { text: base, edit, whole });
+      const model = await ask('edit', { text: base, edit, whole });
       board.wrong = null;
       warn('');
       const now = model.inputs.map((input) => input.value);
@@ -220,7 +223,7 @@ const View = (() => {
       const { text } = history.now;
       settling += 1;
       try {
-        const model = await Talk.ask('model', { text, whole: true });
+        const model = await ask('model', { text, whole: true });
         if (text === history.now.text && !dragged) show(model, linkage.inputs);
       } catch (error) {
         said(error);
@@ -290,7 +293,7 @@ const View = (() => {
     const state = history.go(by);
     if (!state) return;
     try {
-      const model = await Talk.ask('model', { text: state.text, whole: true });
+      const model = await ask('model', { text: state.text, whole: true });
       board.wrong = null;
       warn('');
       show(model, state.inputs);
@@ -318,7 +321,7 @@ const View = (() => {
 
   async function save() {
     try {
-      const { file } = await Talk.ask('save', { text: history.now.text });
+      const { file } = await ask('save', { text: history.now.text });
       history.saved = history.now.text;
       tell(`saved: ${file}`);
     } catch (error) {
@@ -335,7 +338,7 @@ const View = (() => {
     }
     try {
       tell(`making ${kind} …`);
-      const { name, type, data: text } = await Talk.ask('export', {
+      const { name, type, data: text } = await ask('export', {
         kind, text: history.now.text, inputs: linkage.inputs,
       });
       const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -373,7 +376,7 @@ const View = (() => {
     if (!data.scene || !there) return;
     try {
       const t = (performance.now() - begun) / 1000;
-      const found = await Talk.ask('read', {
+      const found = await ask('read', {
         t, text: history.now.text, inputs: linkage.inputs, rates: linkage.inputs.map(() => 0),
       });
       board.values = found.read;

@@ -345,6 +345,17 @@ def test_a_shipped_linkage_is_opened_and_a_file_downloaded(browser: Any, tmp_pat
             assert found.value.suggested_filename.endswith(f'.{kind}')
 
 
+def test_what_is_new_is_not_saved_over_the_file(browser: Any, tmp_path: Path) -> None:
+    with edited(browser, tmp_path) as (page, file, _):
+        page.wait_for_function("() => document.getElementById('open').options.length > 5")
+        page.select_option('#open', 'slider_crank')
+        page.wait_for_function("() => View.state().model.name === 'slider_crank'")
+        page.wait_for_function(QUIET)
+        page.click('#save')
+        page.get_by_text('is not the file with which this page was opened').first.wait_for()
+        assert file.read_text('utf-8') == FOUR_BAR
+
+
 def test_a_second_page_is_one_of_its_own(browser: Any, tmp_path: Path) -> None:
     with edited(browser, tmp_path) as (page, _, server):
         other = browser.new_page()

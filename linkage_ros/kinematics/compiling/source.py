@@ -52,7 +52,7 @@ RETURNED = ('joints', 'joint_rates', 'joint_accelerations')
 
 UNDECIDED = 'UNDECIDED'
 
-STATUSES = {
+STATUSES: dict[str, str] = {
     Status.CLOSED.name: 'Every loop closes; the values are valid.',
     Status.CHANGE_POINT.name: 'All links of a loop lie in one line; the values are valid: those '
     'of the motion that passes through.',
