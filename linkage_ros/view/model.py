@@ -23,21 +23,23 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 from math import degrees, dist, inf, isfinite, radians
-from typing import Any
+from typing import Any, NamedTuple
 
-from linkage_ros.drawing.drawing_data import drawn_in_frames
+from linkage_ros.drawing.drawing_data import drawn_in_frames, pose_in_frames
 from linkage_ros.drawing.figure import view
 from linkage_ros.drawing.shapes import driven_links
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.files.assemblies import closures
 from linkage_ros.files.linkage_file import closable, written_linkage
+from linkage_ros.files.section import Section
 from linkage_ros.files.units import Units
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.javascript import JavaScript
 from linkage_ros.kinematics.compiling.source import source, Subject
-from linkage_ros.kinematics.linkage import carriers, GROUND
+from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage
 from linkage_ros.kinematics.plan import assembly_sides
+from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.scene.notes import linkage_notes
@@ -56,7 +58,16 @@ _POOR = radians(30.0)
 """Transmission angle below which a page warns; textbooks ask for 30 to 45°."""
 
 
-def model(text: str, name: str, *, whole: bool = True) -> dict[str, Any]:
+class Shown(NamedTuple):
+    """How a page shows a linkage: at which inputs, and half the width of its bars, in [m]."""
+
+    inputs: tuple[float, ...]
+    size: float
+
+
+def model(
+    text: str, name: str, *, whole: bool = True, shown: Shown | None = None
+) -> dict[str, Any]:
     """
     Return the model of a linkage file.
 
@@ -68,6 +79,9 @@ def model(text: str, name: str, *, whole: bool = True) -> dict[str, Any]:
         Its name, for errors and as a title.
     whole
         Whether what takes longer is wanted too: other assemblies, ranges, quality, warnings.
+    shown
+        How the page shows the linkage during a drag. Where it closes so, a linkage of pins is not
+        searched for its ranges, and its ``drawn`` has neither ``frame`` nor ``paths``.
 
     Raises
     ------
@@ -77,9 +91,17 @@ def model(text: str, name: str, *, whole: bool = True) -> dict[str, Any]:
     """
     content = parse_yaml(text.encode(), name)
     written, shorthand = written_linkage(content)
+    try:
+        quick = None if whole or shown is None else _quick(written, name, text, content, shown)
+    except DefinitionError:  # which the checks tell with its place
+        quick = None
+    if quick:
+        return quick
     closure = closable(content, written, name, shorthand)
     try:
-        found = _model(closure, name, text, content.units)
+        inputs = usual_inputs(closure)
+        drawn = drawn_in_frames(view(closure, inputs))
+        found = _model(closure, name, text, content.units, inputs, drawn)
         if whole:
             found['others'] = _others(closure, content)
             found |= _analysis(closure)
@@ -90,15 +112,33 @@ def model(text: str, name: str, *, whole: bool = True) -> dict[str, Any]:
 
 def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
     """Return the model of a linkage without a file, whose other assemblies are not told."""
-    return _model(closure, name or closure.name, '', Units()) | {
+    inputs = usual_inputs(closure)
+    drawn = drawn_in_frames(view(closure, inputs))
+    return _model(closure, name or closure.name, '', Units(), inputs, drawn) | {
         'others': [],
         **_analysis(closure),
     }
 
 
-def _model(closure: Closure, name: str, text: str, units: Units) -> dict[str, Any]:
+def _quick(
+    written: Linkage, name: str, text: str, content: Section, shown: Shown
+) -> dict[str, Any] | None:
+    """Return the model of a linkage as it is shown; None if it does not close, or slides."""
+    closure = Closure(written, name)
+    if written.sliders or closure.bounds or len(shown.inputs) != len(written.inputs):
+        return None
+    position = closure.position(*shown.inputs)
+    if not position.joints or iterated(closure):
+        return None
+    drawn = pose_in_frames(closure, position, shown.size)
+    return _model(closure, name, text, content.units, shown.inputs, drawn)
+
+
+def _model(
+    closure: Closure, name: str, text: str, units: Units, inputs: tuple[float, ...],
+    drawn: dict[str, Any],
+) -> dict[str, Any]:  # fmt: skip
     linkage = closure.linkage
-    inputs = usual_inputs(closure)
     program = program_of(closure)
     carried = carriers(linkage.links)
     sides = assembly_sides(closure.structure)
@@ -123,7 +163,7 @@ def _model(closure: Closure, name: str, text: str, units: Units) -> dict[str, An
         'driven': sorted(driven_links(closure)),
         'program': program,
         'poses': [] if program else _poses(closure, inputs),
-        'drawn': drawn_in_frames(view(closure, inputs)),
+        'drawn': drawn,
         'pins': [
             {
                 'name': pin,
@@ -193,7 +233,7 @@ def _lengths(closure: Closure) -> Iterator[dict[str, Any]]:
             }
 
 
-def _others(closure: Closure, content: Any) -> list[dict[str, Any]]:
+def _others(closure: Closure, content: Section) -> list[dict[str, Any]]:
     """Return the other assemblies in which the linkage closes."""
     try:
         found = closures(content, closure.name)

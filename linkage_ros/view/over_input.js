@@ -72,6 +72,20 @@ const OverInput = (() => {
   /** Return an angle with as many whole turns more or less as bring it nearest to another. */
   const near = (angle, other) => angle - Angles.TURN * Math.round((angle - other) / Angles.TURN);
 
+  /** Return what the traced points go through in the states, x and y in turn. */
+  function paths(linkage, found) {
+    const there = linkage.now;
+    const made = Object.fromEntries(linkage.drawn.traced.map(({ point, link, at }) => {
+      const closed = found.filter(([, state]) => state.frames.length);
+      return [point, closed.flatMap(([, state]) => {
+        linkage.now = state;
+        return linkage.place(link, ...at);
+      })];
+    }));
+    linkage.now = there;
+    return made;
+  }
+
   class Plot {
     constructor(figure) {
       this.figure = figure;
@@ -189,5 +203,5 @@ const OverInput = (() => {
     pen.stroke();
   }
 
-  return { Plot, states, paintBand };
+  return { Plot, paths, states, paintBand };
 })();

@@ -43,7 +43,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.resources import linkage_names, shipped
 from linkage_ros.view.edit import edited, pin_of
 from linkage_ros.view.exports import export
-from linkage_ros.view.model import model
+from linkage_ros.view.model import model, Shown
 from linkage_ros.view.poses import pose
 from linkage_ros.view.sensors import SceneFiles, Sensors
 
@@ -232,6 +232,12 @@ class _Asked(NamedTuple):
         return whole
 
     @property
+    def size(self) -> float:
+        """Return half the width of the bars that are shown, in [m]; 0 if it is not told."""
+        (size,) = _numbers('size', [self.content.get('size', 0.0)], 1)
+        return max(0.0, size)
+
+    @property
     def closure(self) -> Closure:
         """Return the linkage."""
         return closure_of(self.text, self.name)
@@ -250,7 +256,8 @@ def _edit(asked: _Asked) -> dict[str, Any]:
     if not isinstance(edit, dict):
         raise _wrong('edit', edit, 'an object')
     text, inputs = edited(asked.text, edit, asked.name)
-    found = model(text, asked.name, whole=asked.whole)
+    shown = Shown(tuple(inputs), asked.size) if asked.size else None
+    found = model(text, asked.name, whole=asked.whole, shown=shown)
     for given, value in zip(found['inputs'], inputs, strict=False):
         given['value'] = value
     return found

@@ -41,7 +41,9 @@ const View = (() => {
       ranges: before.model.ranges, toggles: before.model.toggles, quality: before.model.quality,
       warnings: before.model.warnings,
     };
-    linkage = new Motion.Linkage({ ...kept, ...model });
+    // A quick answer draws the links; where they go follows from the program.
+    const { frame, paths } = before.drawn;
+    linkage = new Motion.Linkage({ ...kept, ...model, drawn: { frame, paths, ...model.drawn } });
     const same = model.inputs.length === before.inputs.length;
     linkage.seek(inputs ?? (same ? before.inputs : linkage.inputs));
     if (!linkage.closed && !inputs) linkage.seek(model.inputs.map((input) => input.value));
@@ -72,6 +74,7 @@ const View = (() => {
       return;
     }
     const found = OverInput.states(linkage);
+    if (linkage.inputs.length === 1) linkage.drawn.paths = OverInput.paths(linkage, found);
     plots.forEach((plot) => plot.draw(linkage, found));
     OverInput.paintBand(named('band'), linkage);
     drawnAt = performance.now();
@@ -196,7 +199,7 @@ const View = (() => {
     const { text } = history.now;
     try {
       const base = dragged?.text ?? text;
-      const model = await ask('edit', { text: base, edit, whole });
+      const model = await ask('edit', { text: base, edit, whole, size: linkage.drawn.size });
       board.wrong = null;
       warn('');
       const now = model.inputs.map((input) => input.value);

@@ -30,7 +30,7 @@ from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.resources import linkage_names, shipped
-from linkage_ros.view.model import model, model_of
+from linkage_ros.view.model import model, model_of, Shown
 import pytest
 
 needs_node = pytest.mark.skipif(shutil.which('node') is None, reason='needs node')
@@ -151,6 +151,28 @@ def test_the_other_assemblies_are_those_of_the_other_sides() -> None:
 def test_what_takes_longer_is_left_out_during_a_drag() -> None:
     found = model(text_of('four_bar'), 'four_bar', whole=False)
     assert {'others', 'ranges', 'quality', 'warnings'}.isdisjoint(found)
+
+
+@pytest.mark.parametrize('name', linkage_names())
+def test_during_a_drag_it_is_the_same_but_for_where_the_links_go(name: str) -> None:
+    found = model(text_of(name), name)
+    start = tuple(given['value'] for given in found['inputs'])
+    shown = Shown(start, found['drawn']['size'])
+    quick = model(text_of(name), name, whole=False, shown=shown)
+    drawn, wanted = quick.pop('drawn'), found['drawn']
+    assert quick == {key: found[key] for key in quick}
+    assert drawn['traced'] == wanted['traced']
+    for one, other in zip(drawn['shapes'], wanted['shapes'], strict=True):
+        assert (one['link'], one['role'], one['name']) == (
+            other['link'], other['role'], other['name']
+        )  # fmt: skip
+        assert one['points'] == pytest.approx(other['points'], abs=1e-3 * wanted['size'])
+
+
+def test_a_drag_to_where_nothing_closes_is_refused_as_the_file_would_be() -> None:
+    text = text_of('four_bar').replace('B: [0.120, 0]', 'B: [1.2, 0]')
+    with pytest.raises(FileError, match='the loops close at no value of the input'):
+        model(text, 'x', whole=False, shown=Shown((0.7,), 0.005))
 
 
 def test_a_closure_without_a_file_has_the_same_model() -> None:
