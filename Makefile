@@ -113,8 +113,8 @@ demo: $(DEMO)
 
 # The tests run even if lint fails, so that one run shows all failures. Each test that starts nodes
 # has its own ROS domain; it mostly waits, so the other tests run beside these, at the lowest
-# priority. Tests that measure nodes run alone. Of these kinds only files with such tests are
-# collected.
+# priority. Tests that measure nodes come after those with nodes, one at a time. Of these kinds only
+# files with such tests are collected.
 PYTEST := $(BIN)/python -m pytest --durations 25
 BY_FILE := --dist loadfile --no-loadscope-reorder
 marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)' test)
@@ -122,7 +122,6 @@ test: $(STAMP)
 	@status=0; \
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory --keep-going --jobs 2 test_nodes lint test_rest || status=$$?; \
-	$(PYTEST) -m alone $(call marked,alone) || status=$$?; \
 	exit $$status
 
 # What it prints comes at its end, as a whole.
@@ -130,6 +129,7 @@ test_nodes: $(STAMP)
 	@mkdir -p build; \
 	$(PYTEST) -m 'ros and not alone' --numprocesses 3 $(BY_FILE) test/node $(call marked,ros) \
 	  >build/test_nodes.log 2>&1; status=$$?; \
+	$(PYTEST) -m alone $(call marked,alone) >>build/test_nodes.log 2>&1 || status=$$?; \
 	cat build/test_nodes.log; \
 	exit $$status
 

@@ -58,8 +58,8 @@ _AFTERWARDS = 3.0
 """How long a demo runs on after the last fault, in [s]."""
 
 _PATIENCE = 20.0
-"""How long the demo's duration waits for the first joint states, in [s]: a busy machine takes
-seconds to start the process beside it."""
+"""How long the demo's duration waits for the first message for the crank, in [s]: a busy machine
+takes seconds to start the process beside it."""
 
 EXAMPLE = 'linkage demo fault_drill --seconds 10'
 

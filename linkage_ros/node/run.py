@@ -84,7 +84,7 @@ def run_linkage_node(
     seconds
         Duration of the run from its first tick, in [s].
     patience
-        How long the duration waits at most for the first joint states, in [s].
+        How long the duration waits at most for the first message for the crank, in [s].
     view
         Displays the run.
     at_end
@@ -195,7 +195,7 @@ def _attend(
     waits_until, end = begin + patience, begin + seconds
     while not stop.wait(_LOOK) and serving.is_alive():
         now = monotonic()
-        if now < waits_until and node.loop is not None and not node.loop.counts.published:
+        if now < waits_until and not _is_heard(node):
             end = now + seconds
         if now >= end:
             break
@@ -213,6 +213,14 @@ def _attend(
         view.close()
     node.end()
     return EXIT_OK if served else EXIT_INCOMPLETE
+
+
+def _is_heard(node: LinkageNode) -> bool:
+    """Return whether a message for the crank has come, where the drive wants some."""
+    if node.loop is None:
+        return False
+    counts = node.loop.counts
+    return bool(counts.received if node.crank_topic else counts.published)
 
 
 def _serve(node: LinkageNode, executor: SingleThreadedExecutor, ended: Event) -> None:

@@ -75,15 +75,24 @@ def test_the_demo_runs_records_proves_and_draws(linkage: Run, tmp_path: Path) ->
     assert picture.read_bytes().startswith(PNG)
 
 
-def test_the_duration_counts_from_the_first_joint_states(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ('name', 'beside', 'topic'),
+    [
+        ('demo', 'crank_source', '/crank_states'),
+        ('torque_crank', 'pd_controller', '/crank_commands'),
+    ],
+)
+def test_the_duration_counts_from_the_first_message_for_the_crank(
+    tmp_path: Path, name: str, beside: str, topic: str
+) -> None:
     # The process beside it begins late, as on a busy machine.
     (tmp_path / 'sitecustomize.py').write_text(
         'import sys, time\n'
-        "if 'linkage_ros.node.crank_source' in sys.orig_argv:\n"
+        f"if 'linkage_ros.node.{beside}' in sys.orig_argv:\n"
         '    time.sleep(4.0)\n'
     )
     answer = subprocess.run(
-        [sys.executable, '-m', 'linkage_ros', 'demo', '--seconds', '1', '--plain'],
+        [sys.executable, '-m', 'linkage_ros', 'demo', name, '--seconds', '1', '--plain'],
         cwd=tmp_path,
         env={**environment(tmp_path), 'PYTHONPATH': str(tmp_path)},
         capture_output=True,
@@ -93,6 +102,7 @@ def test_the_duration_counts_from_the_first_joint_states(tmp_path: Path) -> None
     )
     same, of = map(int, re.search(r'(\d+) of (\d+) joint states replay', answer.stdout).groups())
     assert same == of > 50
+    assert messages(only_bag(tmp_path / 'runs'))[topic] > 50
 
 
 def test_a_controller_moves_the_crank_of_a_scene_that_is_pushed(

@@ -192,6 +192,7 @@ SHOWN = {
 }
 OF_EVERY_NODE = {
     '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
+    '/linkage_node/scene': 'std_msgs/msg/String',
     '/linkage_node/transition_event': 'lifecycle_msgs/msg/TransitionEvent',
     '/parameter_events': 'rcl_interfaces/msg/ParameterEvent',
     '/rosout': 'rcl_interfaces/msg/Log',
