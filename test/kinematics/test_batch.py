@@ -213,7 +213,7 @@ def check_against_scalar(
     return {STATUSES[code] for code in found[0]}
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, deadline=None, max_examples=150)
 @given(length, length, length, length, cranks, side)
 def test_any_lengths_are_solved_as_by_the_scalar_dyad(a, b, c, d, phi, sign):
     check_against_scalar((a, b, c, d), sign, phi, 1.0, 0.3)

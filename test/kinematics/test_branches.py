@@ -52,7 +52,7 @@ KINDS = {
     'a slide driven': (False, 0),
     'a slide driven, a line': (False, 1),
 }
-COUNT = 16
+COUNT = 8
 DEFECTS = {'class3_over_a_turn': 50.0, 'class3_beyond_range': 30.0, 'ref_11': 1.0}
 NEAR = 1e-6
 """What a walk in steps of 1/250 is off by at most, but next to where it turns back."""

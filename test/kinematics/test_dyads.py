@@ -87,7 +87,7 @@ def test_the_sweep_holds_open_loops_and_toggles_too():
     assert found == {Status.CLOSED, Status.TOGGLE, Status.OPEN}
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, deadline=None, max_examples=150)
 @given(length, length, length, length, crank, side)
 def test_walking_the_loop_of_a_four_bar_ends_where_it_began(a, b, c, d, phi, sign):
     pose = FourBar(a, b, c, d, sign).close(phi)
@@ -101,7 +101,7 @@ def test_walking_the_loop_of_a_four_bar_ends_where_it_began(a, b, c, d, phi, sig
         assert abs(y) < reached
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, deadline=None, max_examples=150)
 @given(length, length, length, length, crank, side)
 def test_the_closing_pin_lies_on_the_side_that_the_assembly_says(a, b, c, d, phi, sign):
     pose = FourBar(a, b, c, d, sign).close(phi)
@@ -115,7 +115,7 @@ def test_the_closing_pin_lies_on_the_side_that_the_assembly_says(a, b, c, d, phi
     assert left * sign > 0.0
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, deadline=None, max_examples=150)
 @given(length, length, length, length, crank, side)
 def test_a_mirrored_four_bar_moves_in_the_mirror(a, b, c, d, phi, sign):
     dyad, mirrored = FourBar(a, b, c, d, sign), FourBar(a, b, c, d, -sign)
@@ -132,7 +132,7 @@ def test_a_mirrored_four_bar_moves_in_the_mirror(a, b, c, d, phi, sign):
         assert dyad.rates(pose, 1.0) == mirrored.rates(image, 1.0)
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(derandomize=True, deadline=None, max_examples=100)
 @given(length, length, length, length, crank, side, st.integers(-40, 40))
 def test_rates_are_proportional_to_the_crank_rate(a, b, c, d, phi, sign, power):
     dyad = FourBar(a, b, c, d, sign)
@@ -183,7 +183,7 @@ def test_the_sweep_holds_open_loops_too():
     assert {Status.CLOSED, Status.OPEN} <= found
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, deadline=None, max_examples=150)
 @given(length, length, offset, crank, side)
 def test_walking_the_loop_of_a_slider_crank_ends_where_it_began(a, d, h, phi, sign):
     pose = InvertedSliderCrank(a, d, h, sign).close(phi)
@@ -196,7 +196,7 @@ def test_walking_the_loop_of_a_slider_crank_ends_where_it_began(a, d, h, phi, si
     assert abs(y) < reached
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, deadline=None, max_examples=150)
 @given(length, length, offset, crank, side)
 def test_a_mirrored_linkage_moves_in_the_mirror(a, d, h, phi, sign):
     assume(abs(a - d) != abs(h))
@@ -212,7 +212,7 @@ def test_a_mirrored_linkage_moves_in_the_mirror(a, d, h, phi, sign):
         assert sin(pose.rail) == pytest.approx(-sin(image.rail), rel=1e-14, abs=1e-15)
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(derandomize=True, deadline=None, max_examples=100)
 @given(length, length, crank)
 def test_a_straight_rod_behind_is_the_one_ahead_turned_round(a, d, phi):
     assume(a != d)

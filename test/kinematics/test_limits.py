@@ -212,7 +212,7 @@ def test_a_narrow_gap_between_samples_is_found():
     assert not one.whole
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     sides=st.tuples(*[st.floats(0.2, 1.0)] * 4),
     own=st.none() | st.tuples(st.floats(-8.0, 8.0), st.floats(0.01, 9.0)),

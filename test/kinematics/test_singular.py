@@ -31,7 +31,7 @@ from ..support.scenes import closure_of
 # Inputs at toggles and change points: a list with the kind of each.
 
 
-COUNT = 100
+COUNT = 50
 
 
 def met(closure: Closure, status: Status) -> list[float]:

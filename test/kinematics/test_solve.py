@@ -377,7 +377,7 @@ def linkages(draw: Any) -> tuple[Linkage, float]:
     return inverted_slider_crank_linkage((a, d, offset), side, frames, along=0.1), slenderness
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, deadline=None, max_examples=150)
 @given(linkages(), crank_angles)
 def test_any_linkage_of_one_loop_is_solved_as_state_by_state(drawn, angles):
     linkage, slenderness = drawn

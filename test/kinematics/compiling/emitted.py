@@ -40,7 +40,7 @@ needs = {
 }
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Werror', '-ffp-contract=off')
 NUMBERS = list(STATUSES)
-COUNT = int(os.environ.get('LINKAGE_STATES', '1500'))
+COUNT = int(os.environ.get('LINKAGE_STATES', '600'))
 """States of each linkage; `make compiled` takes 100,000."""
 
 State = tuple[float, ...]
