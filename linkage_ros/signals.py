@@ -132,6 +132,11 @@ def raising() -> Iterator[None]:
         _Raising.now = False
 
 
+def has_raised() -> bool:
+    """Return whether a signal has raised `StoppedError` in the last `raising` context."""
+    return _Raising.last > -inf
+
+
 @contextmanager
 def heeded() -> Iterator[None]:
     """Let a signal only set the stop event; the code within the context checks it often."""

@@ -35,7 +35,7 @@ from linkage_ros.errors import (
     missing_packages_reported,
     quoted,
 )
-from linkage_ros.signals import end_soon, raising, stop_on_signals, StoppedError
+from linkage_ros.signals import end_soon, has_raised, raising, stop_on_signals, StoppedError
 
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
@@ -149,7 +149,11 @@ def main(arguments: list[str] | None = None) -> int:
         try:
             with raising():
                 return _run(arguments, stop)
-        except StoppedError:
+        except (StoppedError, Exception) as error:
+            # A library may make an error of its own of what the signal raised within it.
+            stopped = isinstance(error, StoppedError) or has_raised()
+            if isinstance(error, BrokenPipeError) or not stopped:
+                raise
             end_soon(1)
             name = ' '.join(['linkage', *(name for name in arguments[:1] if name in COMMANDS)])
             print(f'{name}: stopped', file=sys.stderr)

@@ -111,6 +111,22 @@ sys.exit(main())
 """
 
 
+# A library takes whatever its import raises for an error of its own.
+CONVERTED = """
+import os, sys, time
+from linkage_ros.cli import main
+def load(*_):
+    os.write(1, b'stuck')
+    try:
+        while True:
+            time.sleep(0.01)
+    except BaseException as error:
+        raise RuntimeError('cannot load the library') from error
+main.import_module = load
+sys.exit(main.main())
+"""
+
+
 # The main thread waits for the stop event again and again, while signals keep coming.
 STORM = """
 import signal, time
@@ -208,6 +224,11 @@ def test_an_impatient_user_gets_one_line(folder) -> None:
 
 def test_a_signal_is_not_lost_in_a_finalizer(folder) -> None:
     process = start(folder, FINALIZER, 'check', 'four.yaml')
+    assert ended_by(process, signal.SIGTERM) == (1, 'linkage check: stopped\n')
+
+
+def test_a_signal_that_a_library_takes_for_an_error_of_its_own_is_a_stop(folder) -> None:
+    process = start(folder, CONVERTED, 'check', 'four.yaml')
     assert ended_by(process, signal.SIGTERM) == (1, 'linkage check: stopped\n')
 
 
