@@ -127,7 +127,7 @@ test: $(STAMP)
 # What it prints comes at its end, as a whole.
 test_nodes: $(STAMP)
 	@mkdir -p build; \
-	$(PYTEST) -m 'ros and not alone' --numprocesses 3 $(BY_FILE) test/node $(call marked,ros) \
+	$(PYTEST) -m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/node $(call marked,ros) \
 	  >build/test_nodes.log 2>&1; status=$$?; \
 	$(PYTEST) -m alone $(call marked,alone) >>build/test_nodes.log 2>&1 || status=$$?; \
 	cat build/test_nodes.log; \

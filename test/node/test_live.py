@@ -196,6 +196,8 @@ def test_a_node_that_is_killed_is_said_and_one_that_starts_again_is_found(graph,
 def test_which_node_is_asked_for_where_there_are_several(graph, start, scene):
     start(scene)
     start(scene, '-r', '__node:=other')
+    scenes = '/linkage_node/scene', '/other/scene'
+    wait_for(lambda: all(map(graph.node.count_publishers, scenes)), 'both nodes')
     with pytest.raises(LinkageError) as told:
         LiveBridge(domain=graph.domain)
     assert 'there are 2 linkage nodes' in str(told.value)
