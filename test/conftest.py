@@ -16,9 +16,11 @@
 """For all tests: how Hypothesis judges examples, a browser, and which files run first."""
 
 from collections.abc import Iterator
+from math import inf
 from typing import Any
 
 from hypothesis import HealthCheck, settings
+from linkage_ros.cli import terminal
 import pytest
 
 from .browser import chromium
@@ -26,6 +28,12 @@ from .browser import chromium
 # A property is not judged by the duration of an example.
 settings.register_profile('unhurried', deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('unhurried')
+
+
+@pytest.fixture(autouse=True)
+def no_progress_in_a_pipe(monkeypatch):
+    """Print no line of progress, or what a command prints would depend on how fast it is."""
+    monkeypatch.setattr(terminal, 'FIRST_LINE', inf)
 
 
 @pytest.fixture(scope='module')

@@ -197,7 +197,7 @@ def _drawn(table: Table) -> object:
 ProgressCallback = Callable[[int, int], None]
 """Takes the amount done and the total."""
 
-_FIRST, _EVERY = 2.0, 30.0
+FIRST_LINE, _EVERY = 2.0, 30.0
 """Seconds until the first line, and between two."""
 
 
@@ -220,7 +220,7 @@ def progress(what: str) -> Iterator[ProgressCallback]:
             yield lambda done, of: bars.update(task, completed=done, total=of)
         return
     begin = monotonic()
-    due, shown = begin + _FIRST, False
+    due, shown = begin + FIRST_LINE, False
 
     def line(done: int, of: int) -> None:
         nonlocal due, shown

@@ -20,7 +20,7 @@ from pathlib import Path
 import re
 
 from linkage_ros.cli import terminal
-from linkage_ros.cli.terminal import folded, progress, show, Table, text
+from linkage_ros.cli.terminal import FIRST_LINE, folded, progress, show, Table, text
 import pytest
 
 from .conftest import on_terminal
@@ -97,6 +97,7 @@ class Clock:
 def clock(monkeypatch) -> Clock:
     made = Clock()
     monkeypatch.setattr(terminal, 'monotonic', made)
+    monkeypatch.setattr(terminal, 'FIRST_LINE', FIRST_LINE)
     return made
 
 
