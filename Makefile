@@ -115,7 +115,12 @@ demo: $(DEMO)
 # has its own ROS domain; it mostly waits, so the other tests run beside these, at the lowest
 # priority. Tests that measure nodes come after those with nodes, one at a time. Of these kinds only
 # files with such tests are collected.
+# Tests that fail beside others run again, one at a time, as by `colcon test --retest-until-pass 1`:
+# on a busy machine a test may wait in vain. Both outcomes are printed.
 PYTEST := $(BIN)/python -m pytest --durations 25
+tests = { $(PYTEST) -o cache_dir=build/pytest_$(1) $(2) || { [ $$? = 1 ] && \
+  echo 'make: the tests that failed run again, one at a time' && \
+  $(PYTEST) -o cache_dir=build/pytest_$(1) --last-failed; }; }
 BY_FILE := --dist loadfile --no-loadscope-reorder
 marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)' test)
 test: $(STAMP)
@@ -127,14 +132,15 @@ test: $(STAMP)
 # What it prints comes at its end, as a whole.
 test_nodes: $(STAMP)
 	@mkdir -p build; \
-	$(PYTEST) -m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/node $(call marked,ros) \
-	  >build/test_nodes.log 2>&1; status=$$?; \
-	$(PYTEST) -m alone $(call marked,alone) >>build/test_nodes.log 2>&1 || status=$$?; \
+	{ $(call tests,nodes,-m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/node \
+	  $(call marked,ros)); status=$$?; \
+	$(call tests,alone,-m alone $(call marked,alone)) || status=$$?; \
+	} >build/test_nodes.log 2>&1; \
 	cat build/test_nodes.log; \
 	exit $$status
 
 test_rest: $(STAMP)
-	@nice -n 19 $(PYTEST) -m 'not ros' --numprocesses auto $(BY_FILE)
+	@renice -n 19 $$$$ >/dev/null; $(call tests,rest,-m 'not ros' --numprocesses auto $(BY_FILE))
 
 bench: $(STAMP)
 	@$(BIN)/python -m bench
