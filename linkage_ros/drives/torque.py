@@ -25,7 +25,7 @@ of the same method, which is then discarded.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign, inf, isfinite
+from math import copysign, inf, isfinite, pi
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
@@ -33,6 +33,7 @@ from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import choice, number
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import without_limits
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.messages.joint_state import EffortCommand, JointEffortReader, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
@@ -116,11 +117,18 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         raise DefinitionError(
             'drive.torque.brake', 'the brake is never applied', 'add on_timeout: brake'
         )
+    mechanics = context.mechanics
+    yielding = mechanics.loads.applied.stops
     motion = OneFreedom(
-        context.mechanics.equation,
+        mechanics.equation,
         METHODS[parameters.method].step,
-        _stops(closure, parameters.start, parameters.stop_margin),
+        _stops(
+            Closure(without_limits(closure.linkage, yielding)) if yielding else closure,
+            parameters.start,
+            parameters.stop_margin,
+        ),
         parameters.restitution,
+        mechanics.applied.laws if mechanics.applied else (),
     )
     start = motion.at(parameters.start, parameters.rate)
     if start is None:
@@ -128,6 +136,14 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             'drive.torque.start',
             f'at {parameters.start:g} nothing can be moved: a toggle, or no inertia',
             'start elsewhere',
+        )
+    if mechanics.applied:
+        low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
+        mechanics.applied.check_step(
+            lambda value: terms.inertia if (terms := mechanics.equation(value)) else 0.0,
+            (low, high),
+            parameters.method,
+            parameters.step,
         )
     # A scene with slow ticks must not skip time between them.
     period = round(NANOSECONDS / context.rate) if context.rate else 0
@@ -183,6 +199,7 @@ class TorqueDrive(Drive):
     """
 
     __slots__ = (
+        '_begun',
         '_boundary',
         '_force',
         '_idle',
@@ -221,7 +238,7 @@ class TorqueDrive(Drive):
         self._step = round(use.step * NANOSECONDS)
         self._made_up = made_up
         self._idle = self._force = (0.0, use.brake)
-        self._time = self._boundary = -1
+        self._time = self._boundary = self._begun = -1
         self._until = _NEVER
         self.max_age = round(use.timeout * NANOSECONDS)
         self._most = most
@@ -260,13 +277,15 @@ class TorqueDrive(Drive):
     def state(self, now: int) -> CrankState:
         """Return the crank state at a time, in [ns]; for an earlier time, the last state."""
         if self._time < 0:
-            self._time = now
+            self._time = self._begun = now
             self._boundary = now + self._step
         self._advance(now)
-        motion, force = self._motion, self._force
+        motion, force, time = self._motion, self._force, (self._time - self._begun) * 1e-9
         if now > self._time:
-            motion = self._mechanism.advance(motion, (now - self._time) * 1e-9, *force)
-        acceleration = self._mechanism.acceleration(motion, *force)
+            seconds = (now - self._time) * 1e-9
+            motion = self._mechanism.advance(motion, seconds, *force, time)
+            time += seconds
+        acceleration = self._mechanism.acceleration(motion, *force, time)
         return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
 
     def _advance(self, now: int) -> None:
@@ -287,6 +306,6 @@ class TorqueDrive(Drive):
     def _go_to(self, end: int) -> None:
         """Integrate a step, or the rest of one."""
         if end > self._time:
-            seconds = (end - self._time) * 1e-9
-            self._motion = self._mechanism.advance(self._motion, seconds, *self._force)
+            seconds, time = (end - self._time) * 1e-9, (self._time - self._begun) * 1e-9
+            self._motion = self._mechanism.advance(self._motion, seconds, *self._force, time)
             self._time = end

@@ -14,7 +14,7 @@
 
 
 """
-The methods of integration, for one freedom: q' = w, w' = a(q, w).
+The methods of integration, for one freedom: q' = w, w' = a(q, w, t).
 
 All use the value q and its rate w, not the momentum, so their state is what is published. The step
 is fixed: with an adaptive step the cost of a tick, and so whether it meets its deadline, would
@@ -27,12 +27,12 @@ from collections.abc import Callable
 from math import fsum, sqrt
 from typing import NamedTuple
 
-Field = Callable[[float, float], float | None]
-"""a(q, w), in [rad/s²] or [m/s²]; None if there is no such motion."""
+Field = Callable[[float, float, float], float | None]
+"""a(q, w, t), in [rad/s²] or [m/s²], t seconds into the step; None if there is no such motion."""
 
 Step = Callable[[Field, float, float, float, float], tuple[float, float] | None]
 """
-Takes a(q, w), q, w, the acceleration there, and the step in [s]; returns q and w at its end.
+Takes a(q, w, t), q, w, the acceleration there, and the step in [s]; returns q and w at its end.
 
 Returns None if a stage lies where there is no motion, or does not converge.
 """
@@ -66,7 +66,7 @@ def rk4(
     for node, weight in ((0.5, 1 / 3), (0.5, 1 / 3), (1.0, 1 / 6)):
         ahead = node * length
         slope, at = rate + ahead * change, value + ahead * slope
-        stage = field(at, slope)
+        stage = field(at, slope, ahead)
         if stage is None:
             return None
         change = stage
@@ -111,7 +111,8 @@ def gauss_legendre(
     Wanner, Geometric Numerical Integration, 2nd ed., 2006, II.1.3, XI.3). With the accelerations A
     of the stages::
 
-        q_i = q + h·c_i·w + h²·Σ ā_ij·A_j        w_i = w + h·Σ a_ij·A_j        A_i = a(q_i, w_i)
+        q_i = q + h·c_i·w + h²·Σ ā_ij·A_j        w_i = w + h·Σ a_ij·A_j
+        A_i = a(q_i, w_i, h·c_i)
         q₁  = q + h·w     + h²·Σ b̄_j·A_j         w₁  = w + h·Σ b_j·A_j
 
     where ā = a·a and b̄_j = b_j·(1 − c_j). The stages are iterated until only rounding changes
@@ -127,7 +128,8 @@ def gauss_legendre(
             # Earlier stages already have this iteration's values, which converges faster.
             f1, f2, f3 = stages
             at = value + (length * c * rate + square * (s1 * f1 + s2 * f2 + s3 * f3))
-            new = field(at, rate + length * (a1 * f1 + a2 * f2 + a3 * f3))
+            speed = rate + length * (a1 * f1 + a2 * f2 + a3 * f3)
+            new = field(at, speed, length * c)
             if new is None:
                 return None
             change = max(change, abs(new - stages[i]))

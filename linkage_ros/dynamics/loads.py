@@ -24,6 +24,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.files.parameters import choice, each, number, point, rows
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 
 
@@ -69,10 +70,115 @@ class Spring:
         return self.stiffness * (length - self.free_length) + self.damping * growth
 
 
+GREATEST_LOAD, STIFFEST = 1e9, 1e12
+"""Bounds on loads, in [N], [N·m], [m] and [kg·m²], and on stiffness and damping, in SI units."""
+
+_EFFORT = 'N·m or N'
+
+
+@dataclass(frozen=True, slots=True)
+class JointSpring:
+    """A spring at a joint, with a parallel damper."""
+
+    stiffness: float = number('stiffness', unit='N·m/rad or N/m', least=0.0, most=STIFFEST)
+    free: float = number(
+        'angle or slide at which it has no force', 0.0, unit='rad or m', least=-1e6, most=1e6
+    )
+    damping: float = number('damping', 0.0, unit='N·m·s/rad or N·s/m', least=0.0, most=STIFFEST)
+
+
+@dataclass(frozen=True, slots=True)
+class SoftStop:
+    """A stop at the limits of a joint: a spring with a parallel damper."""
+
+    stiffness: float = number('stiffness', unit='N·m/rad or N/m', above=0.0, most=STIFFEST)
+    damping: float = number('damping', 0.0, unit='N·m·s/rad or N·s/m', least=0.0, most=STIFFEST)
+
+
+@dataclass(frozen=True, slots=True)
+class JointLoad:
+    """An effort on a joint: the sum of a constant and tables, each linear between its rows."""
+
+    constant: float = number(
+        'constant part', 0.0, unit=_EFFORT, least=-GREATEST_LOAD, most=GREATEST_LOAD
+    )
+    over_time: tuple[tuple[float, float], ...] = rows(
+        'part over the time since the first tick',
+        ('time [s]', f'effort [{_EFFORT}]'),
+        default=(),
+        most=GREATEST_LOAD,
+    )
+    over_position: tuple[tuple[float, float], ...] = rows(
+        'part over the position of the joint',
+        ('position [rad or m]', f'effort [{_EFFORT}]'),
+        default=(),
+        most=GREATEST_LOAD,
+    )
+    over_rate: tuple[tuple[float, float], ...] = rows(
+        'part over the rate of the joint',
+        ('rate [rad/s or m/s]', f'effort [{_EFFORT}]'),
+        default=(),
+        most=GREATEST_LOAD,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PointLoad:
+    """A force on a point of a link: the sum of a constant and tables."""
+
+    direction: tuple[float, float] = point('its direction: [x, y]', unit='', most=1e6)
+    frame: str = choice('frame of the direction', ('ground', 'link'), 'ground')
+    constant: float = number(
+        'constant part', 0.0, unit='N', least=-GREATEST_LOAD, most=GREATEST_LOAD
+    )
+    over_time: tuple[tuple[float, float], ...] = rows(
+        'part over the time since the first tick',
+        ('time [s]', 'force [N]'),
+        default=(),
+        most=GREATEST_LOAD,
+    )
+    over_position: tuple[tuple[float, float], ...] = rows(
+        'part over the position of the input',
+        ('position [rad or m]', 'force [N]'),
+        default=(),
+        most=GREATEST_LOAD,
+    )
+    over_rate: tuple[tuple[float, float], ...] = rows(
+        'part over the rate of the input',
+        ('rate [rad/s or m/s]', 'force [N]'),
+        default=(),
+        most=GREATEST_LOAD,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class AppliedLoads:
+    """Loads on joints and points."""
+
+    joint_springs: Mapping[str, JointSpring] = each('springs at joints', 'any_joint', JointSpring)
+    stops: Mapping[str, SoftStop] = each(
+        'stops that yield, at the limits of joints; without, a limit is a hard stop',
+        'any_joint',
+        SoftStop,
+    )
+    efforts: Mapping[str, JointLoad] = each('efforts on joints', 'any_joint', JointLoad)
+    forces: Mapping[str, PointLoad] = each('forces on points', 'point', PointLoad)
+
+    def __bool__(self) -> bool:
+        """Return whether there are any."""
+        return bool(self.joint_springs or self.stops or self.efforts or self.forces)
+
+    @property
+    def timed(self) -> bool:
+        """Whether a load changes with the time."""
+        efforts, forces = self.efforts.values(), self.forces.values()
+        return any(load.over_time for load in efforts) or any(load.over_time for load in forces)
+
+
 @dataclass(frozen=True, slots=True)
 class Loads:
     """
-    Gravity, springs and the inertia of the drive.
+    Gravity, springs, the inertia of the drive, and the loads on joints and points.
 
     Attributes
     ----------
@@ -82,12 +188,15 @@ class Loads:
         All springs.
     drive_inertia
         Inertia of each input's motor, seen at the input: in [kg·m²], or in [kg] for a slide.
+    applied
+        Springs, stops and efforts of joints, and forces on points.
 
     """
 
     gravity: tuple[float, float] = (0.0, 0.0)
     springs: tuple[Spring, ...] = ()
     drive_inertia: float = 0.0
+    applied: AppliedLoads = field(default_factory=AppliedLoads)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,15 +260,15 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
         or ``effects.friction.joints.NAME``.
 
     """
-    for number, spring in enumerate(loads.springs, 1):
-        key = f'loads.springs.{spring.name or number}'
-        for link, point in spring.ends:
+    for count, spring in enumerate(loads.springs, 1):
+        key = f'loads.springs.{spring.name or count}'
+        for link, end in spring.ends:
             if link not in linkage.links:
                 raise DefinitionError(key, f'{quoted(link)} is not a link', _one_of(linkage.links))
-            if point not in linkage.links[link]:
+            if end not in linkage.links[link]:
                 raise DefinitionError(
                     key,
-                    f'{quoted(point)} is not a point of {link!r}',
+                    f'{quoted(end)} is not a point of {link!r}',
                     _one_of(linkage.links[link]),
                 )
         if spring.from_link == spring.to_link:
@@ -168,9 +277,9 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
                 f'both its ends lie on {spring.from_link!r}, so that nothing stretches it',
                 'name points of two links',
             )
-    carried = [point for points in linkage.links.values() for point in points]
+    carried = [name for names in linkage.links.values() for name in names]
     carried += [slider.point for slider in linkage.sliders.values() if not slider.block]
-    pins = {point for point in carried if carried.count(point) > 1}
+    pins = {name for name in carried if carried.count(name) > 1}
     for name in friction.joints if friction else ():
         if name not in pins and name not in linkage.sliders:
             raise DefinitionError(

@@ -38,7 +38,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from typing import NamedTuple
+from itertools import chain
+from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.loads import check_loads, check_masses, Friction, Loads
 from linkage_ros.kinematics.arithmetic import all_finite, copysign, where
@@ -47,6 +48,10 @@ from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
+
+if TYPE_CHECKING:
+    from linkage_ros.dynamics.applied import AppliedForces
+    from linkage_ros.dynamics.laws import LawTerm
 
 _ROUNDING = 1e-9
 """Slips below this fraction of the rates that they come from count as zero."""
@@ -71,6 +76,9 @@ class Terms(NamedTuple):
     slips
         T·ψ' of each joint with Coulomb friction, so that F is the sum of their absolute values; 0
         if ψ' is 0 within rounding. Empty without such friction.
+    laws
+        For each law of an applied force (`linkage_ros.dynamics.laws`): the force on q is the sum
+        of λ·f(x, ẋ, t). Empty without laws.
 
     """
 
@@ -80,6 +88,7 @@ class Terms(NamedTuple):
     viscous: float
     coulomb: float
     slips: tuple[float, ...] = ()
+    laws: tuple[LawTerm, ...] = ()
 
 
 class Rubbing(NamedTuple):
@@ -145,6 +154,8 @@ class Mechanics:
         self._gravity = complex(*self.loads.gravity)
         self.rubbing = tuple(self._rubbing_joints())
         """The joints that have friction."""
+        self.applied = _applied(closure, self.loads)
+        """Loads on joints and points; None if there are none."""
         self._units = tuple(closure.scale if given.slider else 1.0 for given in linkage.inputs)
 
     def terms(self, position: Position) -> Terms | None:
@@ -186,7 +197,10 @@ class Mechanics:
                 slips += (where(_stands(v, one, other), 0.0, limit * slip),)
         if not all_finite((inertia, half_slope)):
             return None
-        return Terms(inertia, half_slope, slope, viscous, coulomb, slips)
+        if self.applied is None:
+            return Terms(inertia, half_slope, slope, viscous, coulomb, slips)
+        pull, drag, laws = self.applied.one_input(position, velocity)
+        return Terms(inertia, half_slope, slope + pull, viscous + drag, coulomb, slips, laws)
 
     @cached_property
     def equation(self) -> Callable[[float], Terms | None]:
@@ -205,11 +219,35 @@ class Mechanics:
             (inertia, half_slope, potential_slope, viscous, coulomb), slips = values
             return Terms(inertia, half_slope, potential_slope, viscous, coulomb, slips)
 
-        return equation
+        if self.applied is None:
+            return equation
+        named = self.applied.named
+
+        def equation_with_laws(value: float) -> Terms | None:
+            values = fast(value)
+            if values is None:
+                return terms(position(value))
+            (inertia, half_slope, potential_slope, viscous, coulomb), slips, laws = values
+            return Terms(
+                inertia, half_slope, potential_slope, viscous, coulomb, slips, named(laws)
+            )
+
+        return equation_with_laws
 
     def _wanted_terms(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
         terms = self.terms(motion.position)
-        return [terms[:-1], terms.slips] if terms else []
+        if terms is None:
+            return []
+        linear = (
+            terms.inertia,
+            terms.half_slope,
+            terms.potential_slope,
+            terms.viscous,
+            terms.coulomb,
+        )
+        if self.applied is None:
+            return [linear, terms.slips]
+        return [linear, terms.slips, [*chain.from_iterable(terms.laws)]]
 
     def potential(self, position: Position) -> float:
         """Return V at a closed position, in [J]; weight has potential 0 at the origin's height."""
@@ -221,7 +259,7 @@ class Mechanics:
         for stiffness, free_length, _, start, end in self._springs:
             stretch = abs(places[end] - places[start]) - free_length
             energy += 0.5 * stiffness * stretch * stretch
-        return energy
+        return energy if self.applied is None else energy + self.applied.potential(position)
 
     def kinetic(self, position: Position, velocity: Velocity) -> float:
         """Return the kinetic energy, including that of the drive's inertia, in [J]."""
@@ -253,7 +291,11 @@ class Mechanics:
         return self.kinetic(position, velocity) + self.potential(position)
 
     def drive_efforts(
-        self, position: Position, velocity: Velocity, acceleration: Acceleration
+        self,
+        position: Position,
+        velocity: Velocity,
+        acceleration: Acceleration,
+        seconds: float = 0.0,
     ) -> tuple[float, ...]:
         """
         Return the effort of each drive for a motion, against inertia, loads and friction.
@@ -264,6 +306,8 @@ class Mechanics:
             A closed position, not a toggle.
         velocity, acceleration
             Results of the closure, including those of the inputs.
+        seconds
+            Time since the first tick, for loads that change with it.
 
         Returns
         -------
@@ -300,6 +344,8 @@ class Mechanics:
                 effort += pull * stretched(places, moved, start, end)[1]
             for drag, (_, _, _, one, other, factor) in zip(drags, self.rubbing, strict=True):
                 effort += drag * factor * (w[one] - w[other])
+            if self.applied is not None:
+                effort -= self.applied.work(position, velocity, virtual, seconds)
             efforts += (effort,)
         return efforts
 
@@ -315,6 +361,15 @@ class Mechanics:
                 slide = closure.slides[joint.name]
                 one, other, factor = slide.coordinate, 0, slide.sign * closure.scale
             yield Rubbing(number, friction.viscous, friction.coulomb, one, other, factor)
+
+
+def _applied(closure: Closure, loads: Loads) -> AppliedForces | None:
+    """Return the loads on joints and points, or None without importing their model."""
+    if not loads.applied:
+        return None
+    from linkage_ros.dynamics.applied import AppliedForces  # local import: only with such loads
+
+    return AppliedForces(closure, loads.applied)
 
 
 def resistance(rubbing: Rubbing, v: list[float]) -> float:

@@ -31,6 +31,10 @@ signs of the slips, too, are those at its start; if one has changed at the end, 
 finds the instant and cuts the step there. Both pieces are smooth, and the order is that of the
 method (`test/dynamics/test_kinks.py`). Without Coulomb friction no instant is searched for.
 
+A law of an applied force (`linkage_ros.dynamics.laws`) is smooth in segments. Within a step each
+law stays in the segment of the step's start; if a segment has been left at the end, the
+integrator finds the instant and cuts the step there, too. Without laws no instant is searched for.
+
 A stop is hard: the integrator finds the instant of the impact, the rate becomes −e·q̇, and the
 rest of the step continues from there. A mechanism that is pushed against a stop rests at it.
 
@@ -43,11 +47,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from math import copysign, inf
-from typing import NamedTuple, TypeVar
+from math import copysign, inf, ulp
+from typing import NamedTuple, TYPE_CHECKING, TypeVar
 
 from linkage_ros.dynamics.integrators import Step
 from linkage_ros.dynamics.mechanics import Terms
+
+if TYPE_CHECKING:
+    from linkage_ros.dynamics.laws import Law
 
 _NARROWINGS = 80
 NARROW = 1e-14
@@ -130,7 +137,7 @@ After these the mechanism rests: with so many bounces in one step it comes to re
 """
 
 _KINKS = 20
-"""Most cuts of a step where slips reverse; the rest of the step is integrated without cuts."""
+"""Most cuts of a step at slips and segments; the rest of the step is integrated without cuts."""
 
 _SHORTEST = 0.5**30
 """Smallest fraction of a step that is integrated."""
@@ -148,12 +155,15 @@ class Motion(NamedTuple):
         Its rate, in [rad/s] or [m/s].
     terms
         The equation of motion at the value.
+    ahead
+        The time since the start of the step in which it was found, in [s].
 
     """
 
     value: float
     rate: float
     terms: Terms
+    ahead: float = 0.0
 
 
 class _Event(Enum):
@@ -163,6 +173,7 @@ class _Event(Enum):
     HIGH = 'upper stop'
     TURN = 'rate zero'
     KINK = 'slip zero'
+    SEGMENT = 'segment left'
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +191,8 @@ class OneFreedom:
         Lower and upper stop, in [rad] or [m].
     restitution
         Ratio of the rates after and before an impact, 0 to 1.
+    laws
+        The laws of the applied forces, as in ``Terms.laws``.
 
     """
 
@@ -187,18 +200,30 @@ class OneFreedom:
     step: Step
     stops: tuple[float, float] = (-inf, inf)
     restitution: float = 0.0
+    laws: tuple[Law, ...] = ()
 
     def at(self, value: float, rate: float) -> Motion | None:
         """Return a state, or None if it cannot exist."""
         low, high = self.stops
         return self._reached(value, rate) if low <= value <= high else None
 
-    def acceleration(self, motion: Motion, force: float, brake: float = 0.0) -> float:
+    def acceleration(
+        self, motion: Motion, force: float, brake: float = 0.0, time: float = 0.0
+    ) -> float:
         """Return q̈, in [rad/s²] or [m/s²]; the parameters are those of `advance`."""
+        if self.laws:
+            force += self._applied(motion.terms, motion.rate, time)
         sense = self._sense(motion, force, brake)
         return _acceleration(motion.terms, motion.rate, force, sense * brake, sense)
 
-    def advance(self, motion: Motion, seconds: float, force: float, brake: float = 0.0) -> Motion:
+    def advance(
+        self,
+        motion: Motion,
+        seconds: float,
+        force: float,
+        brake: float = 0.0,
+        time: float = 0.0,
+    ) -> Motion:
         """
         Advance a state by one step.
 
@@ -216,17 +241,30 @@ class OneFreedom:
             τ on the input, in [N·m] or [N].
         brake
             B, the holding force of a brake on the input, in [N·m] or [N].
+        time
+            Time of the state since the first tick, in [s].
 
         """
         left = seconds
         pieces = kinks = 0
         while pieces < _PIECES:
-            sense = self._sense(motion, force, brake)
+            now = time + (seconds - left)
+            push = force
+            if self.laws:
+                push += self._applied(motion.terms, motion.rate, now)
+            sense = self._sense(motion, push, brake)
             if sense == 0.0:
-                return motion
+                held = self._held(motion, left, force, brake, now) if self.laws else left
+                left -= held
+                if left <= seconds * NARROW:
+                    return motion
+                pieces += 1
+                continue
             sticks = motion.terms.coulomb + brake > 0.0
-            slips = motion.terms.slips if kinks < _KINKS else ()
-            reach = self._reach(motion, force, sense * brake, sense, slips)
+            cuts = kinks < _KINKS
+            slips = motion.terms.slips if cuts else ()
+            segments = self._segments(motion, now) if cuts else ()
+            reach = self._reach(motion, now, force, sense * brake, sense, slips, segments)
             length = left
             reached = reach(length)
             while reached is None:
@@ -236,12 +274,18 @@ class OneFreedom:
                 reached = reach(length)
             event = None
             # At the last state before one event, another event may have happened already.
-            while (happened := self._event(reached, sense, sticks, slips)) is not None:
-                margin = self._margin(happened, sense, slips)
+            while happened := self._event(reached, now, sense, sticks, slips, segments):
+                margin = self._margin(happened, now, sense, slips, segments)
                 length, last, known = last_before(reach, margin, motion, length, reached)
                 reached, event = last, happened if known else None
+            if event is _Event.SEGMENT:
+                # The next segment begins just beyond, at a time that differs when it is rounded.
+                length = min(length + 2.0 * ulp(now + length), left)
+                beyond = reach(length)
+                if beyond and not self._event(beyond, now, sense, sticks, slips, ()):
+                    reached = beyond
             motion = reached
-            if event is _Event.KINK:
+            if event in (_Event.KINK, _Event.SEGMENT):
                 kinks += 1
             else:
                 pieces += 1
@@ -256,7 +300,7 @@ class OneFreedom:
 
     def _sense(self, motion: Motion, force: float, brake: float) -> float:
         """Return the direction of motion, 1 or -1, or 0 if it stays at rest."""
-        value, rate, terms = motion
+        value, rate, terms, _ = motion
         if rate:
             return copysign(1.0, rate)
         push = force - terms.potential_slope
@@ -269,45 +313,55 @@ class OneFreedom:
     def _reach(
         self,
         motion: Motion,
+        now: float,
         force: float,
         braking: float,
         sense: float,
         slips: tuple[float, ...],
+        segments: tuple[int, ...],
     ) -> Callable[[float], Motion | None]:
         """Return a function that gives the state after some seconds of one step."""
-        value, rate, here = motion
-        terms, step, reached = self.terms, self.step, self._reached
-        start = _acceleration(here, rate, force, braking, sense)
+        value, rate, here, _ = motion
+        terms, step, reached, laws = self.terms, self.step, self._reached, self.laws
+        push = force + self._applied(here, rate, now, segments) if laws else force
+        start = _acceleration(here, rate, push, braking, sense)
 
-        def field(q: float, w: float) -> float | None:
+        def field(q: float, w: float, ahead: float) -> float | None:
             if not (-LARGEST <= q <= LARGEST and -LARGEST <= w <= LARGEST):
                 return None
             there = terms(q)
             if there is None or there.inertia < _LEAST:
                 return None
+            push = force + self._applied(there, w, now + ahead, segments) if laws else force
             return _acceleration(
-                there, w, force, braking, sense, _turned(there, slips) if slips else 0.0
+                there, w, push, braking, sense, _turned(there, slips) if slips else 0.0
             )
 
         def reach(seconds: float) -> Motion | None:
             end = step(field, value, rate, start, seconds)
-            return None if end is None else reached(*end)
+            return None if end is None else reached(*end, seconds)
 
         return reach
 
-    def _reached(self, value: float, rate: float) -> Motion | None:
+    def _reached(self, value: float, rate: float, ahead: float = 0.0) -> Motion | None:
         if not (-LARGEST <= value <= LARGEST and -LARGEST <= rate <= LARGEST):
             return None
         terms = self.terms(value)
         if terms is None or terms.inertia < _LEAST:
             return None
-        return Motion(value, rate, terms)
+        return Motion(value, rate, terms, ahead)
 
     def _event(
-        self, motion: Motion, sense: float, sticks: bool, slips: tuple[float, ...]
+        self,
+        motion: Motion,
+        now: float,
+        sense: float,
+        sticks: bool,
+        slips: tuple[float, ...],
+        segments: tuple[int, ...],
     ) -> _Event | None:
         """Return the event that has happened before a state, or None."""
-        value, rate, terms = motion
+        value, rate, terms, _ = motion
         low, high = self.stops
         if sticks and sense * rate < 0.0:
             return _Event.TURN
@@ -315,10 +369,17 @@ class OneFreedom:
             return _Event.HIGH
         if value < low:
             return _Event.LOW
-        return _Event.KINK if slips and _turned(terms, slips) else None
+        if slips and _turned(terms, slips):
+            return _Event.KINK
+        return _Event.SEGMENT if segments and self._within(motion, now, segments) < 0.0 else None
 
     def _margin(
-        self, event: _Event, sense: float, slips: tuple[float, ...]
+        self,
+        event: _Event,
+        now: float,
+        sense: float,
+        slips: tuple[float, ...],
+        segments: tuple[int, ...],
     ) -> Callable[[Motion], float]:
         """Return a function that gives the margin of a state to an event."""
         low, high = self.stops
@@ -328,6 +389,8 @@ class OneFreedom:
             return lambda motion: high - motion.value
         if event is _Event.LOW:
             return lambda motion: motion.value - low
+        if event is _Event.SEGMENT:
+            return lambda motion: self._within(motion, now, segments)
         return lambda motion: min(
             copysign(1.0, before) * now
             for before, now in zip(slips, motion.terms.slips, strict=True)
@@ -342,12 +405,57 @@ class OneFreedom:
         return self._bounced(at_stop) if outward * motion.rate > 0.0 else _at_rest(at_stop)
 
     def _bounced(self, motion: Motion) -> Motion:
-        value, rate, terms = motion
-        return Motion(value, 0.0 - self.restitution * rate, terms)
+        return motion._replace(rate=0.0 - self.restitution * motion.rate)
+
+    def _held(
+        self, motion: Motion, seconds: float, force: float, brake: float, now: float
+    ) -> float:
+        """Return how long a state stays at rest, while the applied forces change with the time."""
+        low, high = self.stops
+        value, _, terms, _ = motion
+        most = terms.coulomb + brake
+
+        def margin(ahead: float) -> float:
+            push = force - terms.potential_slope + self._applied(terms, 0.0, now + ahead)
+            held = most - abs(push)
+            if value >= high:
+                return max(held, push)
+            return max(held, -push) if value <= low else held
+
+        if margin(seconds) >= 0.0:
+            return seconds
+        held = last_before(lambda ahead: ahead, margin, 0.0, seconds, seconds)[0]
+        return min(held + 2.0 * ulp(now + held), seconds)
+
+    def _segments(self, motion: Motion, now: float) -> tuple[int, ...]:
+        """Return the segment of each law."""
+        return tuple(
+            law.segment(at.value, at.factor * motion.rate, now)
+            for law, at in zip(self.laws, motion.terms.laws, strict=True)
+        )
+
+    def _within(self, motion: Motion, now: float, segments: tuple[int, ...]) -> float:
+        """Return the least margin of the laws to the ends of their segments."""
+        rate, time = motion.rate, now + motion.ahead
+        return min(
+            law.margin(segment, at.value, at.factor * rate, time)
+            for law, segment, at in zip(self.laws, segments, motion.terms.laws, strict=True)
+        )
+
+    def _applied(
+        self, terms: Terms, rate: float, time: float, segments: tuple[int, ...] = ()
+    ) -> float:
+        """Return the force of the laws on the input, in given segments or in the present ones."""
+        force = 0.0
+        for number, (law, at) in enumerate(zip(self.laws, terms.laws, strict=True)):
+            moving = at.factor * rate
+            segment = segments[number] if segments else law.segment(at.value, moving, time)
+            force += at.lever * law.force(segment, at.value, moving, time)
+        return force
 
 
 def _at_rest(motion: Motion) -> Motion:
-    return Motion(motion.value, 0.0, motion.terms)
+    return motion._replace(rate=0.0)
 
 
 def _turned(terms: Terms, before: tuple[float, ...]) -> float:
@@ -369,6 +477,6 @@ def _acceleration(
     """
     if sense == 0.0:
         return 0.0
-    inertia, half_slope, slope, viscous, coulomb, _ = terms
+    inertia, half_slope, slope, viscous, coulomb, _, _ = terms
     resisted = viscous * rate + (coulomb - 2.0 * turned) * sense + braking
     return (force - slope - resisted - half_slope * rate * rate) / inertia

@@ -35,7 +35,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from math import isfinite
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.mechanics import Mechanics, resistance, stretched
 from linkage_ros.kinematics.arithmetic import called, facing, is_found, vector
@@ -46,6 +46,9 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.topology import Joint
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from linkage_ros.dynamics.applied import JointCoordinate, LoadedPoint
 
 Array = NDArray[np.float64]
 
@@ -281,6 +284,9 @@ class Reactions:
             points.append((joint.link, complex(*structure.links[joint.link][name])))
         for spring in mechanics.loads.springs:
             points += [(link, complex(*linkage.links[link][name])) for link, name in spring.ends]
+        if mechanics.applied is not None:
+            points += mechanics.applied.points
+        self._sliders = {joint.name: n for n, joint in enumerate(self.joints) if joint.kind == 'P'}
 
         self._follower = closure.point_tracker(points)
         at = iter(self._follower.indices)
@@ -296,17 +302,20 @@ class Reactions:
             (spring, (next(at), next(at)), tuple(rows.get(link, -1) for link, _ in spring.ends))
             for spring in mechanics.loads.springs
         )
+        self._loaded = tuple(at)
         self._published = tuple(
             (rows.get(joint.child, -1), rows.get(joint.parent, -1))
             if isinstance(joint, RevoluteJoint)
-            else next(
-                n for n, j in enumerate(self.joints) if (j.kind, j.name) == ('P', joint.slider)
-            )
+            else self._sliders[joint.slider]
             for joint in linkage.joints.values()
         )
 
     def solve(
-        self, position: Position, velocity: Velocity, acceleration: Acceleration
+        self,
+        position: Position,
+        velocity: Velocity,
+        acceleration: Acceleration,
+        seconds: float = 0.0,
     ) -> tuple[Reaction, ...] | None:
         """
         Return the reaction in each joint, in the order of `names`.
@@ -317,9 +326,11 @@ class Reactions:
         ----------
         position, velocity, acceleration
             Results of the closure.
+        seconds
+            Time since the first tick, for loads that change with it.
 
         """
-        balance = self._balance(position, velocity, acceleration)
+        balance = self._balance(position, velocity, acceleration, seconds)
         if balance is None:
             return None
         forces, resistances = balance
@@ -400,7 +411,11 @@ class Reactions:
         return slid
 
     def _balance(
-        self, position: Position, velocity: Velocity, acceleration: Acceleration
+        self,
+        position: Position,
+        velocity: Velocity,
+        acceleration: Acceleration,
+        seconds: float = 0.0,
     ) -> tuple[list[float], list[float]] | None:
         """Return the solution of the system, and the friction in each joint."""
         if position.status not in _SOLVED:
@@ -425,6 +440,9 @@ class Reactions:
                     if row >= 0:
                         lever = places[point] - places[self._bodies[row // 3][2]]
                         self._push(sides, row, lever, pulled)
+        if self._mechanics.applied is not None:
+            for at, load in self._mechanics.applied.acting(position, velocity, seconds):
+                self._apply(sides, at, load, position, places)
         resistances = [0.0] * len(self.joints)
         for rubbing in self._mechanics.rubbing:
             number = rubbing.joint
@@ -432,6 +450,30 @@ class Reactions:
             self._rub(sides, number, resistances[number], x, places)
         forces = called(_solved, self._matrix.at(x, places), *sides)
         return (forces, resistances) if is_found(forces) else None
+
+    def _apply(
+        self,
+        sides: list[float],
+        at: JointCoordinate | LoadedPoint,
+        load: float,
+        position: Position,
+        places: list[complex],
+    ) -> None:
+        """Add a load on a joint or a point to the right sides of its links."""
+        from linkage_ros.dynamics.applied import LoadedPoint  # local import: only with such loads
+
+        rows = self._matrix.rows
+        if isinstance(at, LoadedPoint):
+            row = rows[at.link]
+            lever = places[self._loaded[at.number]] - places[self._bodies[row // 3][2]]
+            self._push(sides, row, lever, load * at.direction(position))
+        elif at.slider:
+            number = self._sliders[at.slider]
+            self._rub(sides, number, -load, position.state.coordinates, places)
+        else:
+            for link, moment in ((at.child, load), (at.parent, -load)):
+                if link != GROUND:
+                    sides[rows[link] + 2] -= moment / self._scale
 
     def _rub(
         self,

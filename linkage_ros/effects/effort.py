@@ -53,7 +53,7 @@ def stage(_parameters: EffortParameters, context: Context) -> Stage:
         velocity, acceleration = motion.velocity, motion.acceleration
         if velocity is None or acceleration is None:
             return motion
-        efforts = efforts_of(motion.position, velocity, acceleration)
+        efforts = efforts_of(motion.position, velocity, acceleration, motion.seconds)
         # Near a toggle efforts grow with the accelerations, and faster.
         if not all_finite(efforts):
             return motion

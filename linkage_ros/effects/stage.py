@@ -136,6 +136,8 @@ class MechanismState(NamedTuple):
         In pins and sliders; empty as the efforts are.
     shift
         Displacement of the published joints under load, in [rad] or [m]; empty for none.
+    seconds
+        Time since the first tick, in [s].
 
     """
 
@@ -146,6 +148,7 @@ class MechanismState(NamedTuple):
     efforts: tuple[float, ...]
     reactions: tuple[Reaction, ...]
     shift: tuple[float, ...]
+    seconds: float = 0.0
 
 
 class SensorReading(NamedTuple):

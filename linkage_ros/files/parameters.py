@@ -44,6 +44,7 @@ Parts = Mapping[str, Sequence[str]]
 KINDS = {
     'joint': 'published joint',
     'input': 'driven joint',
+    'any_joint': 'driven or published joint',
     'pin': 'pin or slider',
     'link': 'moving link',
     'body': 'link or the ground',
@@ -277,7 +278,7 @@ class Name(Kind):
             return name
         raise content.error(
             key,
-            f'there is no {self.kind} {quoted(name)}',
+            f'there is no {self.kind.removeprefix("any_")} {quoted(name)}',
             did_you_mean(name, names, f'there are: {listed(names) or "none"}'),
         )
 
@@ -322,7 +323,7 @@ class Each(Name):
         inner, values = content.section(key), {}
         for name in inner:
             part = self._known(inner, name, name, parts)
-            if self.kind in {'joint', 'input'}:
+            if self.kind in {'joint', 'input', 'any_joint'}:
                 inner.units = replace(inner.units, slides=name in parts.get('slide', ()))
             values[part] = self._value.read(inner, name, parts, folder)
         return values
@@ -401,9 +402,11 @@ def numbers(meaning: str, default: Any = MISSING, *, unit: str = '', most: float
     return _declared(Numbers(meaning, unit, most), default)
 
 
-def rows(meaning: str, columns: Sequence[str], *, most: float = inf) -> Any:
+def rows(
+    meaning: str, columns: Sequence[str], *, default: Any = MISSING, most: float = inf
+) -> Any:
     """Declare a list of rows of numbers, read as a tuple of tuples."""
-    return _declared(Rows(meaning, tuple(columns), most), MISSING)
+    return _declared(Rows(meaning, tuple(columns), most), default)
 
 
 def flag(meaning: str, default: Any = MISSING) -> Any:

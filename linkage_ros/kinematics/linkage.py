@@ -21,10 +21,10 @@ is a pin of these links.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from math import inf
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 Point = tuple[float, float]
 
@@ -230,6 +230,21 @@ class Linkage:
         named = {given.joint: given.limits for given in self.inputs}
         named |= {name: limits for name, limits in published.items() if name not in named}
         return {name: limits for name, limits in named.items() if limits != NO_LIMITS}
+
+
+def without_limits(linkage: Linkage, joints: Collection[str]) -> Linkage:
+    """Return a linkage in which the ranges of some joints have no limits."""
+
+    def free(name: str, part: Any) -> Any:
+        if name not in joints:
+            return part
+        return replace(part, limits=replace(part.limits, low=-inf, high=inf))
+
+    return replace(
+        linkage,
+        inputs=tuple(free(given.joint, given) for given in linkage.inputs),
+        joints={name: free(name, joint) for name, joint in linkage.joints.items()},
+    )
 
 
 def carriers(links: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:

@@ -253,6 +253,8 @@ class LinkagePipeline:
             if effect.drive_stage is not None
         ]
         # Closure and mechanism.
+        self._timed = forced and member.loads is not None and member.loads.applied.timed
+        self._first = -1
         self._close = self.closure.position
         if member.silent_beyond_limits and self.closure.bounds:
             self._close = _silent_beyond(self._close, self.closure)
@@ -293,7 +295,8 @@ class LinkagePipeline:
         self._read_behind = partial(self._read, first=len(running)) if behind else None
         self._straight: Straight | None = None
         moved = {effect.name for effect in effects if effect.stage is not None}
-        if self.closure.by_steps and moved <= {*_KINEMATIC, *FORCE_EFFECTS} and not self._faults:
+        numbers_only = not self._faults and not self._timed
+        if self.closure.by_steps and moved <= {*_KINEMATIC, *FORCE_EFFECTS} and numbers_only:
             wanted = None
             if 'acceleration' in moved:
                 of = [given[name] for name in self.stages if name in moved]
@@ -330,6 +333,8 @@ class LinkagePipeline:
 
     def look(self, now: int, crank: CrankState | None) -> LinkageTick:
         """Return the state of the linkage, given the crank state."""
+        if self._timed and self._first < 0:
+            self._first = now
         if crank is None:
             return LinkageTick(None, None, None, self._read_gap(now))
         position = self._close(*crank.angles)
@@ -337,7 +342,7 @@ class LinkagePipeline:
             position = fault(position)
         if not position.joints:
             return LinkageTick(crank, position, None, self._read_gap(now))
-        motion = self._moved(crank, position)
+        motion = self._moved(crank, position, (now - self._first) * 1e-9 if self._timed else 0.0)
         return LinkageTick(crank, position, motion, self._read(now, self._observed(now, motion)))
 
     def _ideal(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
@@ -352,9 +357,11 @@ class LinkagePipeline:
         reactions = [] if _OF_FORCES.isdisjoint(self._read_off) else [*chain(*moved.reactions)]
         return [*self._observed(0, moved)[1:], reactions]
 
-    def _moved(self, crank: CrankState, position: Position) -> MechanismState:
+    def _moved(
+        self, crank: CrankState, position: Position, seconds: float = 0.0
+    ) -> MechanismState:
         """Return the motion of the mechanism in a pose."""
-        motion = MechanismState(crank, position, None, None, (), (), ())
+        motion = MechanismState(crank, position, None, None, (), (), (), seconds)
         for stage in self._stages:
             motion = stage(motion)
         return motion

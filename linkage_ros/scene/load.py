@@ -27,7 +27,7 @@ from typing import Any, Literal
 from zlib import crc32
 
 from linkage_ros.drives.drive import DRIVES
-from linkage_ros.dynamics.loads import Loads, Spring
+from linkage_ros.dynamics.loads import AppliedLoads, GREATEST_LOAD, Loads, Spring, STIFFEST
 from linkage_ros.effects.dispatch import in_order, module_of
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed, quoted
@@ -63,9 +63,6 @@ _MOST_LINKAGES = 400
 
 FINEST_ACCURACY, COARSEST_ACCURACY = 1e-12, 1e-2
 """Bounds of `accuracy`, in [rad] or [m]."""
-
-STRONGEST_SPRING, STIFFEST = 1e9, 1e12
-"""Bounds on loads, in [N], [m], [kg·m²], and on stiffness, in [N/m] or [N·s/m]."""
 
 PUBLISHED_ANGLES = ('continuous', 'wrapped')
 """How angles are published; see `Scene.wrapped`."""
@@ -395,7 +392,7 @@ def _member(
             ),
         ),
         effects={e: read_parameters(effects.section(e), of, parts) for e, of in types.items()},
-        loads=_read_loads(loads) if loads is not None else None,
+        loads=_read_loads(loads, parts) if loads is not None else None,
         content=own,
         linkage_content=linkage_content,
         silent_beyond_limits=_silent(where('beyond_limits'), linkage),
@@ -510,8 +507,8 @@ def _named(where: Section) -> tuple[str, Any]:
     return name, parameters()
 
 
-def _read_loads(content: Section) -> Loads:
-    """Read gravity, springs and the inertia of the drive."""
+def _read_loads(content: Section, parts: Parts) -> Loads:
+    """Read gravity, springs, the inertia of the drive, and the loads on joints and points."""
     springs = content.section('springs', required=False)
     loads = Loads(
         gravity=content.point('gravity', most=1e3, unit='m/s²')
@@ -519,11 +516,12 @@ def _read_loads(content: Section) -> Loads:
         else (0.0, 0.0),
         springs=tuple(_spring(name, springs.section(name)) for name in springs),
         drive_inertia=content.number(
-            'drive_inertia', 0.0, least=0.0, most=STRONGEST_SPRING, unit='kg·m², or kg of a slide'
+            'drive_inertia', 0.0, least=0.0, most=GREATEST_LOAD, unit='kg·m², or kg of a slide'
         ),
     )
-    content.finish(('gravity',))
-    return loads
+    # Only here: what is read below refuses the keys that it does not know.
+    content.taken('gravity')
+    return replace(loads, applied=read_parameters(content, AppliedLoads, parts))
 
 
 def _spring(name: str, content: Section) -> Spring:
@@ -531,7 +529,7 @@ def _spring(name: str, content: Section) -> Spring:
         *_end(content, 'from'),
         *_end(content, 'to'),
         content.number('stiffness', least=0.0, most=STIFFEST, unit='N/m'),
-        content.number('free_length', 0.0, least=0.0, most=STRONGEST_SPRING, unit='m'),
+        content.number('free_length', 0.0, least=0.0, most=GREATEST_LOAD, unit='m'),
         content.number('damping', 0.0, least=0.0, most=STIFFEST, unit='N·s/m'),
         name,
     )

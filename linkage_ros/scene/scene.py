@@ -260,6 +260,7 @@ def parts_of(linkage: Linkage) -> Parts:
     return {
         'joint': tuple(linkage.joints),
         'input': tuple(given.joint for given in linkage.inputs),
+        'any_joint': tuple(dict.fromkeys([*(i.joint for i in linkage.inputs), *linkage.joints])),
         'pin': (*pins, *linkage.sliders),
         'link': tuple(link for link in linkage.links if link != GROUND),
         'body': tuple(linkage.links),

@@ -30,6 +30,7 @@ from math import inf
 from typing import Any
 
 from linkage_ros.drives.drive import DRIVES
+from linkage_ros.dynamics.loads import AppliedLoads, GREATEST_LOAD, STIFFEST
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.faults.fault import FAULTS
 from linkage_ros.files.linkage_file import FARTHEST, HEAVIEST, STRONGEST
@@ -52,8 +53,6 @@ from linkage_ros.scene.load import (
     HIGHEST_RATE,
     LOWEST_RATE,
     PUBLISHED_ANGLES,
-    STIFFEST,
-    STRONGEST_SPRING,
 )
 from linkage_ros.scene.scene import AS_THE_RUN_GOES, LEASTS, SPLITS, StorageParameters
 from linkage_ros.solvers.registry import SOLVERS
@@ -250,10 +249,11 @@ def _of_a_linkage() -> dict[str, Schema]:
                         'of the motor, at the input',
                         'kg·m², or kg of a slide',
                         least=0.0,
-                        most=STRONGEST_SPRING,
+                        most=GREATEST_LOAD,
                     ),
                     'default': 0,
                 },
+                **parameters_schema(AppliedLoads)['properties'],
             },
         ),
     }
@@ -282,7 +282,7 @@ def _solver() -> Schema:
 
 def _spring() -> Schema:
     end = _text('where it ends: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
-    free = _number('length without a force', 'm', least=0.0, most=STRONGEST_SPRING)
+    free = _number('length without a force', 'm', least=0.0, most=GREATEST_LOAD)
     damping = _number('damping along it', 'N·s/m', least=0.0, most=STIFFEST)
     return mapping(
         'A spring, with a damper beside it.',

@@ -20,7 +20,14 @@ from itertools import pairwise
 from pathlib import Path
 import random
 
-from linkage_ros.dynamics.loads import Loads, Spring
+from linkage_ros.dynamics.loads import (
+    AppliedLoads,
+    JointLoad,
+    JointSpring,
+    Loads,
+    PointLoad,
+    Spring,
+)
 from linkage_ros.dynamics.reactions import Reactions
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import parse_yaml, read_yaml
@@ -172,3 +179,26 @@ def efforts_by_forces(mechanics, position, velocity, acceleration):
         moment, length = (1.0, closure.scale) if given.slider else (closure.scale, 1.0)
         efforts.append(force * moment + mechanics.loads.drive_inertia * pull * length)
     return tuple(efforts)
+
+
+def everywhere(closure: Closure) -> AppliedLoads:
+    """Return loads on every joint and on a point of each link."""
+    linkage = closure.linkage
+    names = [*(given.joint for given in linkage.inputs), *linkage.joints]
+    one = len(linkage.inputs) == 1
+    return AppliedLoads(
+        {name: JointSpring(1.5 + n, 0.1 * n, 0.02) for n, name in enumerate(names)},
+        {},
+        {
+            name: JointLoad(0.3 - n, ((0.0, n), (2.0, 1.0)), ((-9.0, 1.0), (9.0, 2.0 + n)), ())
+            for n, name in enumerate(names)
+        },
+        {
+            f'{link}.{next(iter(points))}': PointLoad(
+                (1.0, 0.5 * n), ('ground', 'link')[n % 2], 2.5 - n,
+                over_rate=((-5.0, 1.0), (5.0, n)) if one else (),
+            )
+            for n, (link, points) in enumerate(linkage.links.items())
+            if link != GROUND
+        },
+    )  # fmt: skip

@@ -53,7 +53,7 @@ OMEGA = 3.0
 LET_GO = 2.0
 
 
-def weight(angle, _rate):
+def weight(angle, _rate, _time=0.0):
     return -OMEGA * OMEGA * sin(angle)
 
 
@@ -204,14 +204,14 @@ def test_gauss_goes_back_the_way_it_came():
 
 
 def test_gauss_does_not_answer_where_it_does_not_converge():
-    stiff = lambda value, _rate: -1e9 * value  # noqa: E731
+    stiff = lambda value, _rate, _time: -1e9 * value  # noqa: E731
     assert gauss_legendre(stiff, 1.0, 0.0, -1e9, 1e-2) is None
     assert gauss_legendre(stiff, 1.0, 0.0, -1e9, 1e-6) is not None
 
 
 @pytest.mark.parametrize('method', [rk4, gauss_legendre])
 def test_where_a_stage_has_no_motion_there_is_no_step(method):
-    def ends(value, _rate):
+    def ends(value, _rate, _time):
         return 0.0 if value < 1.0 else None
 
     assert method(ends, 0.0, 1.0, 0.0, 0.5) == pytest.approx((0.5, 1.0))

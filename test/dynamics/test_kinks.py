@@ -210,8 +210,8 @@ def test_a_step_without_a_kink_is_one_step_to_the_last_bit():
         motion = crank.at(2.0, 5.0)
         assert motion.terms.coulomb == pytest.approx(sum(map(abs, motion.terms.slips)))
 
-        def plain(value, rate):
-            inertia, half_slope, slope, viscous, coulomb, _ = terms(position(value))
+        def plain(value, rate, _time=0.0):
+            inertia, half_slope, slope, viscous, coulomb, *_ = terms(position(value))
             resisted = viscous * rate + coulomb + 0.0
             return (0.3 - slope - resisted - half_slope * rate * rate) / inertia
 

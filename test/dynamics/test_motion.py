@@ -108,7 +108,7 @@ def test_without_friction_a_step_in_which_it_turns_is_one_step(method):
     mass = OneFreedom(on_spring(100.0, 0.0), STEP[method])
     motion = mass.advance(mass.at(0.2, 0.01), 5 * MS, 0.0)
     assert motion.rate < 0.0
-    assert motion[:2] == STEP[method](lambda q, _: -100.0 * q, 0.2, 0.01, -20.0, 5 * MS)
+    assert motion[:2] == STEP[method](lambda q, _w, _t: -100.0 * q, 0.2, 0.01, -20.0, 5 * MS)
 
 
 @pytest.mark.parametrize('method', EXACT)

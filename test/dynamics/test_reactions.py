@@ -35,6 +35,7 @@ import pytest
 from .loaded import (
     closed,
     efforts_by_forces,
+    everywhere,
     four_bar,
     loads_of,
     scotch_yoke,
@@ -145,7 +146,8 @@ def test_both_ways_to_the_effort(name):
     friction = Friction(
         {joint.name: JointFriction(0.1, 0.3) for joint in closure.structure.joints}
     )
-    mechanics = Mechanics(closure, loads_of(closure.linkage, damping=15.0), friction)
+    loads = replace(loads_of(closure.linkage, damping=15.0), applied=everywhere(closure))
+    mechanics = Mechanics(closure, loads, friction)
     for q in STATES[name]:
         rates, pulls = [1.3, -0.8][: len(q)], [-2.0, 3.5][: len(q)]
         position = closure.position(*q)

@@ -1,0 +1,469 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Loads that are applied to joints and points, and their work over the motion of a linkage.
+
+A joint effort acts on the joint's child, and the opposite on its parent; a force on a slide acts
+along its line. By virtual work, a load f adds f·λ to the force on an input, with the lever λ: the
+rate of its joint, or the velocity of its point along its direction, at a rate of the input of 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from math import hypot, inf, sqrt, tau
+from typing import NamedTuple
+
+from linkage_ros.dynamics.laws import Contact, Law, LawTerm, Table
+from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, JointSpring, PointLoad, SoftStop
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.arithmetic import called, facing, remainder
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
+from linkage_ros.kinematics.results import Position, Velocity
+
+_CARRIED = {'semi_implicit_euler': 1.5, 'rk4': 2.5, 'gauss_legendre': 1.5}
+"""
+Greatest |s|·h of a motion e^{s·t} for a step h.
+
+The explicit methods are stable up to 2 and 2.78 (E. Hairer, G. Wanner, Solving Ordinary
+Differential Equations II, 2nd ed., 1996, IV.2); the stages of the implicit one converge.
+"""
+
+_SAMPLES = 90
+"""Intervals of the range over which the stiffest place is looked for."""
+
+SHORTEST_STEP = 1e-6
+
+
+class JointCoordinate(NamedTuple):
+    """
+    A joint, driven or published.
+
+    Attributes
+    ----------
+    number, driven
+        Its number among the driven joints, or among the published ones.
+    turns
+        Whether it is an angle.
+    slider
+        The slider whose slide it is; '' for an angle.
+    child, parent
+        The links whose angle it is; '' for a slide.
+    one, other, factor
+        Its rate is factor·(v[one] − v[other]) of the closure's coordinates.
+
+    """
+
+    number: int
+    driven: bool
+    turns: bool
+    slider: str
+    child: str
+    parent: str
+    one: int
+    other: int
+    factor: float
+
+    def value(self, position: Position) -> float:
+        """Return its value, in [rad] or [m]; of a driven joint with all its turns."""
+        return (position.inputs if self.driven else position.joints)[self.number]
+
+    def lever(self, velocity: Velocity, _position: Position, _moved: Sequence[complex]) -> float:
+        """Return its rate, in [rad/s] or [m/s]."""
+        v = velocity.state.coordinates
+        return self.factor * (v[self.one] - v[self.other])
+
+    def middle(self, low: float, high: float) -> float | None:
+        """Return the angle nearest to which it is compared, if whole turns do not count."""
+        return 0.5 * (low + high) if self.turns and high - low <= tau + 1e-9 else None
+
+
+def joint_coordinate(closure: Closure, name: str) -> JointCoordinate:
+    """Return a driven or published joint of a linkage by its name."""
+    linkage = closure.linkage
+    for number, given in enumerate(linkage.inputs):
+        if given.joint == name:
+            unit = closure.scale if given.slider else 1.0
+            names = (given.slider, '', '') if given.slider else ('', given.child, given.parent)
+            return JointCoordinate(number, True, not given.slider, *names, 1 + number, 0, unit)
+    joint = linkage.joints[name]
+    place = list(linkage.joints).index(name)
+    if isinstance(joint, RevoluteJoint):
+        one, other = (closure.angles[link].coordinate for link in (joint.child, joint.parent))
+        return JointCoordinate(place, False, True, '', joint.child, joint.parent, one, other, 1.0)
+    slide = closure.slides[joint.slider]
+    factor = slide.sign * closure.scale
+    return JointCoordinate(place, False, False, joint.slider, '', '', slide.coordinate, 0, factor)
+
+
+class LoadedPoint(NamedTuple):
+    """
+    A point of a link under a force.
+
+    Attributes
+    ----------
+    link, number
+        Its link, and its number among the loaded points.
+    place
+        Its index among the tracked points.
+    unit
+        Direction of the force, a unit vector.
+    coordinate
+        Index of the closure's coordinate that turns the direction; 0 for none.
+
+    """
+
+    link: str
+    number: int
+    place: int
+    unit: complex
+    coordinate: int
+
+    def direction(self, position: Position) -> complex:
+        """Return the direction in the frame of the ground."""
+        if not self.coordinate:
+            return self.unit
+        return facing(position.state.coordinates[self.coordinate]) * self.unit
+
+    def lever(self, _velocity: Velocity, position: Position, moved: Sequence[complex]) -> float:
+        """Return the velocity of the point along the direction, in [m/s]."""
+        way, along = moved[self.place], self.direction(position)
+        return way.real * along.real + way.imag * along.imag
+
+
+class _Lawful(NamedTuple):
+    at: JointCoordinate | LoadedPoint
+    of: JointCoordinate
+    force: Callable[[float, float, float], tuple[float]]
+
+
+class AppliedForces:
+    """
+    The loads of a linkage on joints and points.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    applied
+        The loads.
+
+    Attributes
+    ----------
+    laws
+        The laws of the loads that are not constant, in the order of `LawTerm` in `one_input`.
+    points
+        The loaded points: link, and place in its frame, in [m].
+
+    Raises
+    ------
+    DefinitionError
+        A table, a stop or a direction is wrong; with the key ``loads.KIND.NAME``.
+
+    """
+
+    def __init__(self, closure: Closure, applied: AppliedLoads) -> None:
+        linkage = closure.linkage
+        self._closure, self._given = closure, applied
+        _check(closure, applied)
+        places = [name.rpartition('.') for name in applied.forces]
+        self.points = [(link, complex(*linkage.links[link][name])) for link, _, name in places]
+        self._tracker = closure.point_tracker(self.points)
+        self._springs = tuple(
+            (joint_coordinate(closure, name), spring)
+            for name, spring in applied.joint_springs.items()
+        )
+        self._constant: list[tuple[JointCoordinate | LoadedPoint, float]] = []
+        self._lawful: list[_Lawful] = []
+        laws: list[Law] = []
+
+        def add(at: JointCoordinate | LoadedPoint, of: JointCoordinate, law: Law) -> None:
+            laws.append(law)
+            self._lawful.append(_Lawful(at, of, _whole(law)))
+
+        self._stops: dict[str, tuple[JointCoordinate, Contact]] = {}
+        for name, stop in applied.stops.items():
+            joint = joint_coordinate(closure, name)
+            limits = linkage.limits[name]
+            middle = None if joint.driven else joint.middle(limits.low, limits.high)
+            contact = Contact(limits.low, limits.high, stop.stiffness, stop.damping, middle)
+            self._stops[name] = joint, contact
+            add(joint, joint, contact)
+        loaded: list[tuple[JointCoordinate | LoadedPoint, JointCoordinate, JointLoad | PointLoad]]
+        loaded = []
+        for name, effort in applied.efforts.items():
+            joint = joint_coordinate(closure, name)
+            loaded.append((joint, joint, effort))
+        first = joint_coordinate(closure, linkage.inputs[0].joint)
+        pairs = zip(places, applied.forces.values(), self._tracker.indices, strict=True)
+        for count, ((link, _, _), force, index) in enumerate(pairs):
+            angle = closure.angles[link]
+            unit = complex(*force.direction) / hypot(*force.direction)
+            turns = force.frame == 'link'
+            if turns:
+                unit *= angle.unit
+            at = LoadedPoint(link, count, index, unit, angle.coordinate if turns else 0)
+            loaded.append((at, first, force))
+        for part, of, load in loaded:
+            if load.constant:
+                self._constant.append((part, load.constant))
+            for over in ('time', 'position', 'rate'):
+                table = getattr(load, f'over_{over}')
+                if table:
+                    middle = of.middle(table[0][0], table[-1][0]) if over == 'position' else None
+                    add(part, of, Table(over, table, middle))
+        self.laws = tuple(laws)
+
+    def check_step(
+        self,
+        inertia: Callable[[float], float],
+        between: tuple[float, float],
+        method: str,
+        step: float,
+    ) -> None:
+        """
+        Refuse a spring or a stop that is too stiff for the step of the integration.
+
+        Parameters
+        ----------
+        inertia
+            Of the equation of motion, as a function of the only input; 0 where there is none.
+        between
+            Range of the input, in [rad] or [m].
+        method, step
+            The method of integration, by name, and its step, in [s].
+
+        Raises
+        ------
+        DefinitionError
+            With the key of the stiffest load; the remedy is the longest step that carries it.
+
+        """
+        yielding: dict[str, JointSpring | SoftStop] = {
+            **{
+                f'joint_springs.{name}': spring
+                for name, spring in self._given.joint_springs.items()
+            },
+            **{f'stops.{name}': stop for name, stop in self._given.stops.items()},
+        }
+        worst, blamed = 0.0, ''
+        for inert, touched in self._sampled(inertia, between):
+            stiffness = sum(yielding[key].stiffness * lever**2 for key, lever in touched.items())
+            damping = sum(yielding[key].damping * lever**2 for key, lever in touched.items())
+            fastest = _fastest(stiffness / inert, damping / inert)
+            if fastest > worst:
+                worst = fastest
+                blamed = max(touched, key=lambda key: yielding[key].stiffness * touched[key] ** 2)
+        carried = _CARRIED[method] / worst if worst else inf
+        if step > carried:
+            whole = (
+                f'{carried:.1e}' if float(f'{carried:.1e}') <= carried else f'{0.95 * carried:.1e}'
+            )
+            raise DefinitionError(
+                f'loads.{blamed}',
+                f'it is too stiff for a step of {step:g} s: motion changes at {worst:.3g}/s there',
+                f'write a step of {whole} s or less in drive.torque'
+                if carried >= SHORTEST_STEP
+                else 'write a smaller stiffness or damping',
+            )
+
+    def _sampled(
+        self, inertia: Callable[[float], float], between: tuple[float, float]
+    ) -> Iterator[tuple[float, dict[str, float]]]:
+        """Yield inertia, and the lever of each spring and of each touched stop, over the range."""
+        low, high = between
+        before: dict[str, float] = {}
+        for number in range(_SAMPLES + 1):
+            value = low + (high - low) * number / _SAMPLES
+            inert, position = inertia(value), self._closure.position(value)
+            if not (inert > 0.0 and position.status.has_rates):
+                continue
+            velocity = self._closure.velocity(position, 1.0)
+            levers, depths = {}, {}
+            for name, (joint, _) in zip(self._given.joint_springs, self._springs, strict=True):
+                levers[f'joint_springs.{name}'] = joint.lever(velocity, position, ())
+            for name, (joint, contact) in self._stops.items():
+                at = joint.value(position)
+                depths[name] = max(contact.depth(side, at) for side in (-1, 1))
+                if max(depths[name], before.get(name, 0.0)) > 0.0:
+                    levers[f'stops.{name}'] = joint.lever(velocity, position, ())
+            before = depths
+            yield inert, levers
+
+    def one_input(
+        self, position: Position, velocity: Velocity
+    ) -> tuple[float, float, tuple[LawTerm, ...]]:
+        """
+        Return what the loads add to the equation of motion of a linkage with one input.
+
+        Parameters
+        ----------
+        position
+            A closed position.
+        velocity
+            The velocity at a rate of 1.
+
+        Returns
+        -------
+        slope, viscous
+            The force on the input is −slope − viscous·q̇, without that of the laws.
+        terms
+            For each law.
+
+        """
+        moved = self._moved(position, velocity)
+        slope = viscous = 0.0
+        for joint, spring in self._springs:
+            lever = joint.lever(velocity, position, moved)
+            slope += spring.stiffness * _stretch(joint, spring, position) * lever
+            viscous += spring.damping * lever * lever
+        for at, force in self._constant:
+            slope -= force * at.lever(velocity, position, moved)
+        terms: tuple[LawTerm, ...] = ()
+        for at, of, _ in self._lawful:
+            lever, factor = (of.lever(velocity, position, moved) for of in (at, of))
+            terms += (LawTerm(lever, of.value(position), factor),)
+        return slope, viscous, terms
+
+    @staticmethod
+    def named(numbers: Sequence[float]) -> tuple[LawTerm, ...]:
+        """Return the terms of `one_input` from their numbers, three each."""
+        return tuple(LawTerm(*numbers[i : i + 3]) for i in range(0, len(numbers), 3))
+
+    def potential(self, position: Position) -> float:
+        """Return the energy of the springs at joints, in [J]."""
+        energy = 0.0
+        for joint, spring in self._springs:
+            energy += 0.5 * spring.stiffness * _stretch(joint, spring, position) ** 2
+        return energy
+
+    def acting(
+        self, position: Position, velocity: Velocity, time: float
+    ) -> Iterator[tuple[JointCoordinate | LoadedPoint, float]]:
+        """
+        Yield each load, where it acts and how strong, in [N·m] or [N].
+
+        Parameters
+        ----------
+        position, velocity
+            The motion.
+        time
+            Since the first tick, in [s].
+
+        """
+        for joint, spring in self._springs:
+            rate = joint.lever(velocity, position, ())
+            stretch = _stretch(joint, spring, position)
+            yield joint, -spring.stiffness * stretch - spring.damping * rate
+        yield from self._constant
+        for at, of, force in self._lawful:
+            rate = of.lever(velocity, position, ())
+            yield at, called(force, of.value(position), rate, time)[0]
+
+    def work(
+        self,
+        position: Position,
+        velocity: Velocity,
+        virtual: Velocity,
+        time: float,
+    ) -> float:
+        """Return the work of the loads over a virtual velocity; arguments as of `acting`."""
+        moved, work = self._moved(position, virtual), 0.0
+        for at, force in self.acting(position, velocity, time):
+            work += force * at.lever(virtual, position, moved)
+        return work
+
+    def _moved(self, position: Position, velocity: Velocity) -> list[complex]:
+        """Return the velocities of the loaded points."""
+        if not self._tracker.indices:
+            return []
+        return self._tracker.velocities(position, velocity, self._tracker.places(position))
+
+
+def _fastest(stiffness: float, damping: float) -> float:
+    """Return the greatest |s| of s² + damping·s + stiffness = 0, in [1/s]."""
+    half = 0.5 * damping
+    if half * half > stiffness:
+        return half + sqrt(half * half - stiffness)
+    return sqrt(stiffness)
+
+
+def _whole(law: Law) -> Callable[[float, float, float], tuple[float]]:
+    """Return a law as one function of value, rate and time, which may be `called`."""
+
+    def force(value: float, rate: float, time: float) -> tuple[float]:
+        return (law.force(law.segment(value, rate, time), value, rate, time),)
+
+    return force
+
+
+def _stretch(joint: JointCoordinate, spring: JointSpring, position: Position) -> float:
+    """Return how far a spring is from where it has no force, in [rad] or [m]."""
+    stretch = joint.value(position) - spring.free
+    return remainder(stretch, tau) if joint.turns and not joint.driven else stretch
+
+
+def _check(closure: Closure, applied: AppliedLoads) -> None:
+    """Refuse loads that make no sense."""
+    linkage = closure.linkage
+    for name in applied.stops:
+        limits = linkage.limits.get(name)
+        if limits is None or not limits.bounded:
+            raise DefinitionError(
+                f'loads.stops.{name}',
+                'the joint has no limits',
+                'write limits: [low, high] for it into the linkage file',
+            )
+    loads: list[tuple[str, JointLoad | PointLoad]] = []
+    loads += [(f'loads.efforts.{name}', load) for name, load in applied.efforts.items()]
+    for name, force in applied.forces.items():
+        key = f'loads.forces.{name}'
+        loads.append((key, force))
+        if name.rpartition('.')[0] == GROUND:
+            raise DefinitionError(
+                key, 'lies on the ground, which a force does not move', 'name another point'
+            )
+        if not any(force.direction):
+            raise DefinitionError(f'{key}.direction', '[0, 0] is no direction', 'write [1, 0]')
+        if len(linkage.inputs) > 1 and (force.over_position or force.over_rate):
+            raise DefinitionError(
+                key,
+                f'there is a table over the input, and there are {len(linkage.inputs)}',
+                'write over_time',
+            )
+    for key, load in loads:
+        tables = {
+            over: getattr(load, over) for over in ('over_time', 'over_position', 'over_rate')
+        }
+        if not load.constant and not any(tables.values()):
+            raise DefinitionError(
+                key, 'is a load of 0', f'write constant, or one of {", ".join(tables)}'
+            )
+        for over, table in tables.items():
+            _check_table(f'{key}.{over}', table)
+
+
+def _check_table(key: str, table: Sequence[tuple[float, float]]) -> None:
+    if len(table) == 1:
+        raise DefinitionError(key, 'has one row', 'write two or more, or constant')
+    for row, ((before, _), (after, _)) in enumerate(pairwise(table), 2):
+        if after <= before:
+            raise DefinitionError(
+                key,
+                f'row {row} begins with {after:g}, not after {before:g} of row {row - 1}',
+                'write rows in which the first number increases',
+            )

@@ -1,0 +1,188 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Laws of applied forces: tables, and stops with a spring and a damper.
+
+A law is a force as a function of a joint's value x, its rate ẋ and the time. It is smooth in
+segments: from one row of a table to the next, and within or beyond a stop. `force` continues a
+segment smoothly beyond its ends, so that an integrator can find the instant at which the segment
+is left and cut its step there (`linkage_ros.dynamics.motion`).
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from math import inf, tau
+from typing import NamedTuple, Protocol
+
+
+class Law(Protocol):
+    """
+    A force in segments.
+
+    The value is in [rad] or [m], the rate in [rad/s] or [m/s], the time since the first tick in
+    [s]; the force in [N·m] or [N].
+    """
+
+    def segment(self, value: float, rate: float, time: float) -> int:
+        """Return the segment of a state."""
+
+    def margin(self, segment: int, value: float, rate: float, time: float) -> float:
+        """Return how far a state is within a segment; negative outside."""
+
+    def force(self, segment: int, value: float, rate: float, time: float) -> float:
+        """Return the force by the law of a segment."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """
+    A force that is linear between the rows of a table, and constant before and after them.
+
+    Attributes
+    ----------
+    over
+        What the first column is: 'time', 'position' or 'rate'.
+    rows
+        Pairs of it and the force; the first column increases.
+    middle
+        Of the positions of a joint that turns: whole turns are left out so that its angle is
+        nearest to this one, in [rad]. None if turns count, and for the others.
+
+    """
+
+    over: str
+    rows: tuple[tuple[float, float], ...]
+    middle: float | None = None
+
+    def segment(self, value: float, rate: float, time: float) -> int:
+        """Return how many rows a state has passed."""
+        return bisect_right(self.rows, (self._at(value, rate, time), inf))
+
+    def margin(self, segment: int, value: float, rate: float, time: float) -> float:
+        """Return the distance from the nearer of both rows, in the unit of the first column."""
+        at, rows = self._at(value, rate, time), self.rows
+        below = at - rows[segment - 1][0] if segment else inf
+        above = rows[segment][0] - at if segment < len(rows) else inf
+        return min(below, above)
+
+    def force(self, segment: int, value: float, rate: float, time: float) -> float:
+        """Return the force on the line through both rows."""
+        rows = self.rows
+        if not segment:
+            return rows[0][1]
+        begin, force = rows[segment - 1]
+        if segment == len(rows):
+            return force
+        end, other = rows[segment]
+        return force + (self._at(value, rate, time) - begin) / (end - begin) * (other - force)
+
+    def _at(self, value: float, rate: float, time: float) -> float:
+        if self.over == 'time':
+            return time
+        if self.over == 'rate':
+            return rate
+        return value if self.middle is None else turned(value, self.middle)
+
+
+class LawTerm(NamedTuple):
+    """
+    A load by a law, at one value of the only input.
+
+    Attributes
+    ----------
+    lever
+        λ of the load.
+    value
+        x of the law, in [rad] or [m].
+    factor
+        ẋ at a rate of the input of 1.
+
+    """
+
+    lever: float
+    value: float
+    factor: float
+
+
+_LOW, _FREE, _HIGH = -1, 0, 1
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """
+    A stop at either limit of a joint: a spring with a parallel damper, which pushes only.
+
+    At the depth p beyond a limit the force is k·p + c·ṗ, and 0 where this would pull: a joint
+    that leaves the stop faster than the damper follows is free (P. Flores, H. M. Lankarani,
+    Contact Force Models for Multibody Dynamics, 2016, ch. 3, on the Kelvin-Voigt model and its
+    pull at the end of a contact).
+
+    Attributes
+    ----------
+    low, high
+        The limits, in [rad] or [m]; infinite for none.
+    stiffness
+        k, in [N·m/rad] or [N/m].
+    damping
+        c, in [N·m·s/rad] or [N·s/m].
+    middle
+        As in `Table`.
+
+    """
+
+    low: float
+    high: float
+    stiffness: float
+    damping: float
+    middle: float | None = None
+
+    def segment(self, value: float, rate: float, _time: float) -> int:
+        """Return -1 at the lower stop, 1 at the upper one, or 0."""
+        for side in (_LOW, _HIGH):
+            if self._push(side, value, rate) > 0.0:
+                return side
+        return _FREE
+
+    def margin(self, segment: int, value: float, rate: float, _time: float) -> float:
+        """Return the depth or the force of a contact, the smaller; without, the opposite."""
+        if segment:
+            return self._push(segment, value, rate)
+        return -max(self._push(_LOW, value, rate), self._push(_HIGH, value, rate))
+
+    def force(self, segment: int, value: float, rate: float, _time: float) -> float:
+        """Return the force of a contact, towards the range; 0 without."""
+        if not segment:
+            return 0.0
+        return -segment * (
+            self.stiffness * self.depth(segment, value) + segment * self.damping * rate
+        )
+
+    def depth(self, side: int, value: float) -> float:
+        """Return how far a value is beyond the limit on a side, -1 or 1; negative within."""
+        if self.middle is not None:
+            value = turned(value, self.middle)
+        return value - self.high if side == _HIGH else self.low - value
+
+    def _push(self, side: int, value: float, rate: float) -> float:
+        """Return a number that is positive where the stop pushes, and 0 where that changes."""
+        depth = self.depth(side, value)
+        return min(depth, self.stiffness * depth + side * self.damping * rate)
+
+
+def turned(angle: float, middle: float) -> float:
+    """Return an angle plus the whole turns that bring it nearest to another one, in [rad]."""
+    return angle - tau * round((angle - middle) / tau)
