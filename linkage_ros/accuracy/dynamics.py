@@ -38,7 +38,7 @@ from linkage_ros.accuracy.energy_integral import (
 )
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.loads import Loads
+from linkage_ros.dynamics.loads import AppliedLoads, Loads
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.dynamics.motion import Motion, OneFreedom
 from linkage_ros.kinematics.closure import Closure
@@ -116,7 +116,8 @@ def free_motion(member: SceneLinkage) -> FreeMotion:
 
     """
     given = member.loads or Loads()
-    loads = replace(given, springs=tuple(replace(s, damping=0.0) for s in given.springs))
+    springs = tuple(replace(spring, damping=0.0) for spring in given.springs)
+    loads = replace(given, springs=springs, applied=AppliedLoads())
     closure = Closure(member.linkage)
     mechanics = Mechanics(closure, loads)
     energy = ExactEnergy(member.linkage, loads)

@@ -24,11 +24,13 @@ from __future__ import annotations
 
 from cmath import phase, rect
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from itertools import combinations
 from math import inf, prod, remainder, tau
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
+from linkage_ros.dynamics.loads import AppliedLoads
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     carriers,
@@ -439,9 +441,11 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
     Raises
     ------
     PartError
-        If one has another gravity than the first, or names that are taken.
+        If one has another gravity than the first, loads on joints or points, or names that are
+        taken.
 
     """
+    _refuse_applied(parts)
     model = ET.Element('mujoco', model=name)
     model.append(comment(_HEAD.splitlines()))
     ET.SubElement(model, 'compiler', angle='radian', autolimits='true')
@@ -474,6 +478,21 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
         if not len(section) and key != 'worldbody':
             model.remove(section)
     return document(model)
+
+
+def _refuse_applied(parts: Sequence[Part]) -> None:
+    """Refuse loads that a model of MuJoCo would leave out."""
+    for count, part in enumerate(parts):
+        applied = part.loads.applied if part.loads else AppliedLoads()
+        for entry in fields(applied):
+            if named := getattr(applied, entry.name):
+                raise PartError(
+                    count,
+                    f'loads.{entry.name}.{next(iter(named))}',
+                    'is not written into an MJCF model',
+                    f'leave {entry.name} out of the scene, and apply it in MuJoCo',
+                    of_linkage=False,
+                )
 
 
 def _gravity(parts: Sequence[Part]) -> tuple[float, float]:

@@ -21,6 +21,7 @@ seen by itself; then on linkages, where a load does the work f·dψ.
 
 from itertools import pairwise
 from math import cos, exp, remainder, sin, sqrt, tau
+from pathlib import Path
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.drives.torque import build, TorqueParameters
@@ -36,12 +37,15 @@ from linkage_ros.dynamics.loads import (
 )
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene
 import pytest
 from scipy.integrate import solve_ivp
 
 from .loaded import closed, everywhere, STATES
 from ..support.scenes import closure_of, PENDULUM, pipeline_of
 
+SCENES = Path(__file__).parents[2] / 'config' / 'scenes'
 MS = 1_000_000
 BEGIN = 1_700_000_000_000 * MS
 INERTIA = 0.05 + 2.0 * 0.3**2
@@ -328,3 +332,21 @@ def test_the_step_that_is_said_to_carry_a_spring_does(method, spring):
     )
     after = swing(applied=applied, start=0.1, method=method, step=step)
     assert all(abs(after(step * n)[0]) < 0.15 for n in range(0, 300, 7))
+
+
+# Andrews' squeezing mechanism as shipped, under its constant torque. Reference: Test Set for IVP
+# Solvers, Bari, "Andrews' squeezing mechanism", the angles after 0.03 s.
+SQUEEZED = {
+    'beta': 15.81077119629904, 'theta': -15.75637105984298, 'gamma': 0.04082224013073101,
+    'phi': -0.5347301163226948, 'delta': 0.5244099658805304, 'omega': 0.5347301163226948,
+    'epsilon': 1.048080741042263,
+}  # fmt: skip
+
+
+def test_the_squeezer_ends_where_the_test_set_says():
+    scene = load_scene(SCENES / 'andrews_squeezer.yaml')
+    (line,) = Pipeline(scene).lines
+    for tick in range(301):
+        seen = line.see(BEGIN + tick * MS // 10)
+    found = dict(zip(scene.joints, seen.reading.joints, strict=True))
+    assert found == pytest.approx(SQUEEZED, abs=1e-8)
