@@ -128,7 +128,7 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             parameters.stop_margin,
         ),
         parameters.restitution,
-        mechanics.applied.laws if mechanics.applied else (),
+        mechanics.laws,
     )
     start = motion.at(parameters.start, parameters.rate)
     if start is None:

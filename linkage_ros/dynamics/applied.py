@@ -339,11 +339,6 @@ class AppliedForces:
             terms += (LawTerm(lever, of.value(position), factor),)
         return slope, viscous, terms
 
-    @staticmethod
-    def named(numbers: Sequence[float]) -> tuple[LawTerm, ...]:
-        """Return the terms of `one_input` from their numbers, three each."""
-        return tuple(LawTerm(*numbers[i : i + 3]) for i in range(0, len(numbers), 3))
-
     def potential(self, position: Position) -> float:
         """Return the energy of the springs at joints, in [J]."""
         energy = 0.0

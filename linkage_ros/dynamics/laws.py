@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Laws of applied forces: tables, and stops with a spring and a damper.
+Laws of forces: tables, stops with a spring and a damper, and friction at low rates.
 
 A law is a force as a function of a joint's value x, its rate ẋ and the time. It is smooth in
 segments: from one row of a table to the next, and within or beyond a stop. `force` continues a
@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from math import inf, tau
+from math import exp, inf, tau
 from typing import NamedTuple, Protocol
 
 
@@ -181,6 +181,42 @@ class Contact:
         """Return a number that is positive where the stop pushes, and 0 where that changes."""
         depth = self.depth(side, value)
         return min(depth, self.stiffness * depth + side * self.damping * rate)
+
+
+@dataclass(frozen=True, slots=True)
+class Stribeck:
+    """
+    The excess of friction at low rates: −e·sign(ẋ)·exp(−(ẋ/s)²).
+
+    Its segments are the directions of motion. The value x does not matter.
+
+    Attributes
+    ----------
+    excess
+        e, in [N·m] or [N].
+    rate
+        s, in [rad/s] or [m/s].
+
+    """
+
+    excess: float
+    rate: float
+
+    def segment(self, _value: float, rate: float, _time: float) -> int:
+        """Return the sign of the rate."""
+        return (rate > 0.0) - (rate < 0.0)
+
+    def margin(self, segment: int, _value: float, rate: float, _time: float) -> float:
+        """Return the rate in the direction of the segment; infinity for a joint that stands."""
+        return segment * rate if segment else inf
+
+    def force(self, segment: int, _value: float, rate: float, _time: float) -> float:
+        """Return the force, as if the direction were that of the segment."""
+        return -segment * self.excess * exp(-((rate / self.rate) ** 2))
+
+    def at(self, rate: float) -> tuple[float]:
+        """Return the force at a rate, for `linkage_ros.kinematics.arithmetic.called`."""
+        return (self.force(self.segment(0.0, rate, 0.0), 0.0, rate, 0.0),)
 
 
 def turned(angle: float, middle: float) -> float:

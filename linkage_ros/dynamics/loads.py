@@ -201,20 +201,27 @@ class Loads:
 
 @dataclass(frozen=True, slots=True)
 class JointFriction:
-    """
-    The friction of a pin or slider.
+    """Friction of one pin or slider; it does not depend on the force in the joint."""
 
-    Attributes
-    ----------
-    viscous
-        Of a pin in [N·m·s/rad], of a slider in [N·s/m].
-    coulomb
-        Of a pin in [N·m], of a slider in [N]; independent of the force in the joint.
+    viscous: float = number(
+        'for each unit of rate', 0.0, unit='N·m·s/rad or N·s/m', least=0.0, most=GREATEST_LOAD
+    )
+    coulomb: float = number('at any rate', 0.0, unit='N·m or N', least=0.0, most=GREATEST_LOAD)
+    breakaway: float = number(
+        'at rest, if it is more than coulomb', 0.0, unit='N·m or N', least=0.0, most=GREATEST_LOAD
+    )
+    stribeck: float = number(
+        'rate at which what breakaway adds has fallen to 1/e; 0: it acts at rest only',
+        0.0,
+        unit='rad/s or m/s',
+        least=0.0,
+        most=1e6,
+    )
 
-    """
-
-    viscous: float = 0.0
-    coulomb: float = 0.0
+    @property
+    def excess(self) -> float:
+        """Return how much more it is at rest, in [N·m] or [N]."""
+        return max(0.0, self.breakaway - self.coulomb)
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +234,8 @@ class Friction:
     """
 
     joints: Mapping[str, JointFriction] = field(default_factory=dict)
+    holds: bool = False
+    """Whether friction carries the load at rest as far as it can, and the effort is the rest."""
 
 
 def check_masses(linkage: Linkage) -> None:

@@ -41,8 +41,15 @@ from functools import cached_property
 from itertools import chain
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.dynamics.loads import check_loads, check_masses, Friction, Loads
-from linkage_ros.kinematics.arithmetic import all_finite, copysign, where
+from linkage_ros.dynamics.loads import (
+    check_loads,
+    check_masses,
+    Friction,
+    JointFriction,
+    Loads,
+)
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.arithmetic import all_finite, called, copysign, where
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
@@ -51,7 +58,7 @@ from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.applied import AppliedForces
-    from linkage_ros.dynamics.laws import LawTerm
+    from linkage_ros.dynamics.laws import Law, LawTerm, Stribeck
 
 _ROUNDING = 1e-9
 """Slips below this fraction of the rates that they come from count as zero."""
@@ -79,6 +86,8 @@ class Terms(NamedTuple):
     laws
         For each law of an applied force (`linkage_ros.dynamics.laws`): the force on q is the sum
         of λ·f(x, ẋ, t). Empty without laws.
+    breakaway
+        What friction holds at q̇ = 0 in addition to F.
 
     """
 
@@ -89,6 +98,7 @@ class Terms(NamedTuple):
     coulomb: float
     slips: tuple[float, ...] = ()
     laws: tuple[LawTerm, ...] = ()
+    breakaway: float = 0.0
 
 
 class Rubbing(NamedTuple):
@@ -96,15 +106,20 @@ class Rubbing(NamedTuple):
     A joint with friction.
 
     Its rate is factor·(v[one] − v[other]) of the closure's coordinates, in [rad/s] or [m/s];
-    ``joint`` is its index among the joints of the structure.
+    ``joint`` is its index among the joints of the structure. ``law`` is that of the friction that
+    falls with the rate, if it has any.
     """
 
     joint: int
-    viscous: float
-    coulomb: float
+    friction: JointFriction
     one: int
     other: int
     factor: float
+    law: Stribeck | None
+
+    def slip(self, v: Sequence[float]) -> float:
+        """Return the rate for the rates of the closure's coordinates."""
+        return self.factor * (v[self.one] - v[self.other])
 
 
 class Mechanics:
@@ -136,6 +151,12 @@ class Mechanics:
         linkage = closure.linkage
         check_masses(linkage)
         check_loads(linkage, self.loads, self.friction)
+        if self.friction.holds and len(linkage.inputs) > 1:
+            raise DefinitionError(
+                'effects.friction.holds',
+                f'the linkage has {len(linkage.inputs)} inputs, and friction could hold either',
+                'leave it out',
+            )
         moving = [link for link in linkage.links if link != GROUND]
         points = [(link, complex(*linkage.masses[link].center)) for link in moving]
         for spring in self.loads.springs:
@@ -156,6 +177,14 @@ class Mechanics:
         """The joints that have friction."""
         self.applied = _applied(closure, self.loads)
         """Loads on joints and points; None if there are none."""
+        self.laws: tuple[Law, ...] = (
+            *(self.applied.laws if self.applied else ()),
+            *(rubbing.law for rubbing in self.rubbing if rubbing.law),
+        )
+        """Laws of the forces, in the order of ``Terms.laws``."""
+        sticks = any(rubbing.friction.excess for rubbing in self.rubbing)
+        self._plain = not sticks and self.applied is None
+        """Whether the equation has neither laws nor an excess of friction at rest."""
         self._units = tuple(closure.scale if given.slider else 1.0 for given in linkage.inputs)
 
     def terms(self, position: Position) -> Terms | None:
@@ -189,18 +218,30 @@ class Mechanics:
             length, growth = stretched(places, velocities, start, end)
             slope += stiffness * (length - free_length) * growth
             viscous += damping * growth * growth
-        for _, drag, limit, one, other, factor in self.rubbing:
-            slip = factor * (v[one] - v[other])
-            viscous += drag * slip * slip
+        for rubbing in self.rubbing:
+            slip, limit = rubbing.slip(v), rubbing.friction.coulomb
+            viscous += rubbing.friction.viscous * slip * slip
             coulomb += limit * abs(slip)
             if limit:
-                slips += (where(_stands(v, one, other), 0.0, limit * slip),)
+                slips += (where(_stands(v, rubbing.one, rubbing.other), 0.0, limit * slip),)
         if not all_finite((inertia, half_slope)):
             return None
-        if self.applied is None:
+        if self._plain:
             return Terms(inertia, half_slope, slope, viscous, coulomb, slips)
-        pull, drag, laws = self.applied.one_input(position, velocity)
-        return Terms(inertia, half_slope, slope + pull, viscous + drag, coulomb, slips, laws)
+        from linkage_ros.dynamics.laws import LawTerm  # local import: only with laws
+
+        laws: tuple[LawTerm, ...] = ()
+        if self.applied is not None:
+            pull, drag, laws = self.applied.one_input(position, velocity)
+            slope, viscous = slope + pull, viscous + drag
+        breakaway = 0.0
+        for rubbing in self.rubbing:
+            slip = rubbing.slip(v)
+            breakaway += rubbing.friction.excess * abs(slip)
+            if rubbing.law:
+                slip = where(_stands(v, rubbing.one, rubbing.other), 0.0, slip)
+                laws += (LawTerm(slip, 0.0, slip),)
+        return Terms(inertia, half_slope, slope, viscous, coulomb, slips, laws, breakaway)
 
     @cached_property
     def equation(self) -> Callable[[float], Terms | None]:
@@ -219,17 +260,24 @@ class Mechanics:
             (inertia, half_slope, potential_slope, viscous, coulomb), slips = values
             return Terms(inertia, half_slope, potential_slope, viscous, coulomb, slips)
 
-        if self.applied is None:
+        if self._plain:
             return equation
-        named = self.applied.named
+        from linkage_ros.dynamics.laws import LawTerm  # local import: only with laws
 
         def equation_with_laws(value: float) -> Terms | None:
             values = fast(value)
             if values is None:
                 return terms(position(value))
-            (inertia, half_slope, potential_slope, viscous, coulomb), slips, laws = values
+            (inertia, half_slope, potential_slope, viscous, coulomb), slips, laws, more = values
             return Terms(
-                inertia, half_slope, potential_slope, viscous, coulomb, slips, named(laws)
+                inertia,
+                half_slope,
+                potential_slope,
+                viscous,
+                coulomb,
+                slips,
+                tuple(map(LawTerm, *[iter(laws)] * 3)),
+                *more,
             )
 
         return equation_with_laws
@@ -245,9 +293,9 @@ class Mechanics:
             terms.viscous,
             terms.coulomb,
         )
-        if self.applied is None:
+        if self._plain:
             return [linear, terms.slips]
-        return [linear, terms.slips, [*chain.from_iterable(terms.laws)]]
+        return [linear, terms.slips, [*chain.from_iterable(terms.laws)], [terms.breakaway]]
 
     def potential(self, position: Position) -> float:
         """Return V at a closed position, in [J]; weight has potential 0 at the origin's height."""
@@ -342,10 +390,17 @@ class Mechanics:
                 effort += gyration * a[turn] * w[turn]
             for pull, (_, _, _, start, end) in zip(pulls, self._springs, strict=True):
                 effort += pull * stretched(places, moved, start, end)[1]
-            for drag, (_, _, _, one, other, factor) in zip(drags, self.rubbing, strict=True):
-                effort += drag * factor * (w[one] - w[other])
+            for drag, rubbing in zip(drags, self.rubbing, strict=True):
+                effort += drag * rubbing.slip(w)
             if self.applied is not None:
                 effort -= self.applied.work(position, velocity, virtual, seconds)
+            if self.friction.holds:
+                held = sum(
+                    (rubbing.friction.coulomb + rubbing.friction.excess) * abs(rubbing.slip(w))
+                    for rubbing in self.rubbing
+                )
+                rest = copysign(where(abs(effort) > held, abs(effort) - held, 0.0), effort)
+                effort = where(abs(v[1]) <= 0.0, rest, effort)
             efforts += (effort,)
         return efforts
 
@@ -360,7 +415,12 @@ class Mechanics:
             if joint.kind == 'P':
                 slide = closure.slides[joint.name]
                 one, other, factor = slide.coordinate, 0, slide.sign * closure.scale
-            yield Rubbing(number, friction.viscous, friction.coulomb, one, other, factor)
+            law = None
+            if friction.excess and friction.stribeck:
+                from linkage_ros.dynamics.laws import Stribeck  # local import: only with it
+
+                law = Stribeck(friction.excess, friction.stribeck)
+            yield Rubbing(number, friction, one, other, factor, law)
 
 
 def _applied(closure: Closure, loads: Loads) -> AppliedForces | None:
@@ -378,10 +438,12 @@ def resistance(rubbing: Rubbing, v: list[float]) -> float:
 
     Coulomb friction is 0 in a joint at rest, within rounding.
     """
-    _, viscous, coulomb, one, other, factor = rubbing
-    slip = factor * (v[one] - v[other])
-    dry = where(_stands(v, one, other), 0.0, copysign(coulomb, slip)) if coulomb else 0.0
-    return viscous * slip + dry
+    slip, coulomb = rubbing.slip(v), rubbing.friction.coulomb
+    stands = _stands(v, rubbing.one, rubbing.other)
+    dry = where(stands, 0.0, copysign(coulomb, slip)) if coulomb else 0.0
+    if rubbing.law:
+        dry -= where(stands, 0.0, called(rubbing.law.at, slip)[0])
+    return rubbing.friction.viscous * slip + dry
 
 
 def _stands(v: list[float], one: int, other: int) -> bool:

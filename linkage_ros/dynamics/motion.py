@@ -139,6 +139,9 @@ After these the mechanism rests: with so many bounces in one step it comes to re
 _KINKS = 20
 """Most cuts of a step at slips and segments; the rest of the step is integrated without cuts."""
 
+_BEGINNING = 1e-200
+"""A rate that has a direction and no size."""
+
 _SHORTEST = 0.5**30
 """Smallest fraction of a step that is integrated."""
 
@@ -214,6 +217,9 @@ class OneFreedom:
         if self.laws:
             force += self._applied(motion.terms, motion.rate, time)
         sense = self._sense(motion, force, brake)
+        if self.laws and not motion.rate:
+            force += self._applied(motion.terms, sense * _BEGINNING, time)
+            force -= self._applied(motion.terms, 0.0, time)
         return _acceleration(motion.terms, motion.rate, force, sense * brake, sense)
 
     def advance(
@@ -260,10 +266,10 @@ class OneFreedom:
                     return motion
                 pieces += 1
                 continue
-            sticks = motion.terms.coulomb + brake > 0.0
+            sticks = motion.terms.coulomb + motion.terms.breakaway + brake > 0.0
             cuts = kinks < _KINKS
             slips = motion.terms.slips if cuts else ()
-            segments = self._segments(motion, now) if cuts else ()
+            segments = self._segments(motion, now, sense) if cuts else ()
             reach = self._reach(motion, now, force, sense * brake, sense, slips, segments)
             length = left
             reached = reach(length)
@@ -305,7 +311,7 @@ class OneFreedom:
             return copysign(1.0, rate)
         push = force - terms.potential_slope
         low, high = self.stops
-        held = abs(push) <= terms.coulomb + brake
+        held = abs(push) <= terms.coulomb + terms.breakaway + brake
         if held or (value >= high and push > 0.0) or (value <= low and push < 0.0):
             return 0.0
         return copysign(1.0, push)
@@ -413,7 +419,7 @@ class OneFreedom:
         """Return how long a state stays at rest, while the applied forces change with the time."""
         low, high = self.stops
         value, _, terms, _ = motion
-        most = terms.coulomb + brake
+        most = terms.coulomb + terms.breakaway + brake
 
         def margin(ahead: float) -> float:
             push = force - terms.potential_slope + self._applied(terms, 0.0, now + ahead)
@@ -427,10 +433,11 @@ class OneFreedom:
         held = last_before(lambda ahead: ahead, margin, 0.0, seconds, seconds)[0]
         return min(held + 2.0 * ulp(now + held), seconds)
 
-    def _segments(self, motion: Motion, now: float) -> tuple[int, ...]:
-        """Return the segment of each law."""
+    def _segments(self, motion: Motion, now: float, sense: float) -> tuple[int, ...]:
+        """Return the segment of each law, of a motion that begins with those of its direction."""
+        rate = motion.rate or sense * _BEGINNING
         return tuple(
-            law.segment(at.value, at.factor * motion.rate, now)
+            law.segment(at.value, at.factor * rate, now)
             for law, at in zip(self.laws, motion.terms.laws, strict=True)
         )
 
@@ -477,6 +484,6 @@ def _acceleration(
     """
     if sense == 0.0:
         return 0.0
-    inertia, half_slope, slope, viscous, coulomb, _, _ = terms
+    inertia, half_slope, slope, viscous, coulomb, _, _, _ = terms
     resisted = viscous * rate + (coulomb - 2.0 * turned) * sense + braking
     return (force - slope - resisted - half_slope * rate * rate) / inertia

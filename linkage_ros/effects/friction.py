@@ -19,12 +19,17 @@ Friction: resistance of pins and sliders to their motion.
 It is no stage of the tick: all that works with forces includes it, namely efforts, pin forces,
 clearance and compliance, and the torque drive. In a pin::
 
-    T = −viscous·ω − coulomb·sign(ω)          ω: rate of one of its links against the other
+    T = −viscous·ω − (coulomb + (breakaway − coulomb)·exp(−(ω/stribeck)²))·sign(ω)
 
-and in a slider likewise, with the rate of its slide. The Coulomb part does not depend on the force
-in the joint (for this and better models: H. Olsson, K. J. Åström, C. Canudas de Wit, M. Gäfvert
-and P. Lischinsky, Friction models and friction compensation, European Journal of Control 4, 1998).
-At rest it is 0 in an effort; under the torque drive it sticks.
+with ω the rate of one of its links against the other, and in a slider likewise, with the rate of
+its slide. It does not depend on the force in the joint (for this and better models: H. Olsson, K.
+J. Åström, C. Canudas de Wit, M. Gäfvert and P. Lischinsky, Friction models and friction
+compensation, European Journal of Control 4, 1998; with Stribeck's curve in the form of eq. 5 with
+the exponent 2).
+
+Under the torque drive a linkage at rest sticks up to the sum of breakaway·|ψ'| over its joints. In
+an effort under another drive, friction at rest is 0; with `holds` it carries the load as far as it
+can, and the drive the rest.
 """
 
 from __future__ import annotations
@@ -33,36 +38,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from linkage_ros.dynamics.loads import Friction, JointFriction
-from linkage_ros.files.parameters import each, number
-
-_STRONGEST = 1e9
-
-
-@dataclass(frozen=True, slots=True)
-class OneJoint:
-    """Friction of one pin or slider."""
-
-    viscous: float = number(
-        'for each unit of rate', 0.0, unit='N·m·s/rad or N·s/m', least=0.0, most=_STRONGEST
-    )
-    coulomb: float = number('at any rate', 0.0, unit='N·m or N', least=0.0, most=_STRONGEST)
+from linkage_ros.files.parameters import each, flag
 
 
 @dataclass(frozen=True, slots=True)
 class FrictionParameters:
     """Friction in pins and sliders, for all effects and drives that use forces."""
 
-    joints: Mapping[str, OneJoint] = each('of each pin or slider', 'pin', OneJoint, required=True)
+    joints: Mapping[str, JointFriction] = each(
+        'of each pin or slider', 'pin', JointFriction, required=True
+    )
+    holds: bool = flag(
+        'at rest friction carries what it can, and effort the rest; for a linkage of one input',
+        False,
+    )
 
     @property
     def friction(self) -> Friction:
         """Return the friction in the form that `Mechanics` takes."""
-        return Friction(
-            {
-                name: JointFriction(joint.viscous, joint.coulomb)
-                for name, joint in self.joints.items()
-            }
-        )
+        return Friction(self.joints, self.holds)
 
 
 PARAMETERS = FrictionParameters

@@ -20,6 +20,8 @@ from itertools import pairwise
 from pathlib import Path
 import random
 
+from linkage_ros.drives.drive import Context
+from linkage_ros.drives.torque import build, TorqueParameters
 from linkage_ros.dynamics.loads import (
     AppliedLoads,
     JointLoad,
@@ -40,6 +42,8 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
+
+from ..support.scenes import closure_of, PENDULUM
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'
 
@@ -181,6 +185,9 @@ def efforts_by_forces(mechanics, position, velocity, acceleration):
     return tuple(efforts)
 
 
+BEGIN = 1_700_000_000_000_000_000
+
+
 def everywhere(closure: Closure) -> AppliedLoads:
     """Return loads on every joint and on a point of each link."""
     linkage = closure.linkage
@@ -202,3 +209,17 @@ def everywhere(closure: Closure) -> AppliedLoads:
             if link != GROUND
         },
     )  # fmt: skip
+
+
+def swing(linkage=PENDULUM, friction=None, gravity=(0.0, 0.0), applied=None, **parameters):
+    """Return a function that gives value, rate and acceleration of a crank after some seconds."""
+    loads = Loads(gravity, applied=AppliedLoads(**(applied or {})))
+    context = Context(closure_of(linkage), 1000.0, True, 'seed', loads, friction)
+    drive = build(TorqueParameters(**parameters), context)
+    drive.state(BEGIN)
+
+    def after(seconds):
+        state = drive.state(BEGIN + round(seconds * 1e9))
+        return state.angles[0], state.rates[0], state.accelerations[0]
+
+    return after

@@ -23,10 +23,7 @@ from itertools import pairwise
 from math import cos, exp, remainder, sin, sqrt, tau
 from pathlib import Path
 
-from linkage_ros.drives.drive import Context
-from linkage_ros.drives.torque import build, TorqueParameters
 from linkage_ros.dynamics.loads import (
-    AppliedLoads,
     Friction,
     JointFriction,
     JointLoad,
@@ -42,8 +39,8 @@ from linkage_ros.scene.load import load_scene
 import pytest
 from scipy.integrate import solve_ivp
 
-from .loaded import closed, everywhere, STATES
-from ..support.scenes import closure_of, PENDULUM, pipeline_of
+from .loaded import closed, everywhere, STATES, swing
+from ..support.scenes import PENDULUM, pipeline_of
 
 SCENES = Path(__file__).parents[2] / 'config' / 'scenes'
 MS = 1_000_000
@@ -51,20 +48,6 @@ BEGIN = 1_700_000_000_000 * MS
 INERTIA = 0.05 + 2.0 * 0.3**2
 LIMITED = PENDULUM.replace('child: crank}\n', 'child: crank, limits: [-2, 1]}\n', 1)
 METHODS = ('rk4', 'gauss_legendre')
-
-
-def swing(linkage=PENDULUM, friction=None, gravity=(0.0, 0.0), applied=None, **parameters):
-    """Return a function that gives value, rate and acceleration of a crank after some seconds."""
-    loads = Loads(gravity, applied=AppliedLoads(**(applied or {})))
-    context = Context(closure_of(linkage), 1000.0, True, 'seed', loads, friction)
-    drive = build(TorqueParameters(**parameters), context)
-    drive.state(BEGIN)
-
-    def after(seconds):
-        state = drive.state(BEGIN + round(seconds * 1e9))
-        return state.angles[0], state.rates[0], state.accelerations[0]
-
-    return after
 
 
 # What a load does, as (load, start, rate) and the motion q(t).

@@ -17,7 +17,7 @@
 
 from linkage_ros.dynamics.loads import Friction, JointFriction
 from linkage_ros.effects import friction
-from linkage_ros.effects.friction import FrictionParameters, OneJoint
+from linkage_ros.effects.friction import FrictionParameters
 from linkage_ros.errors import FileError
 import pytest
 
@@ -29,22 +29,14 @@ SLIDER_CRANK = shipped('slider_crank')
 
 
 def test_each_joint_has_its_own_friction():
-    parameters = FrictionParameters(
-        {'A': OneJoint(viscous=0.002), 'B': OneJoint(coulomb=0.1), 'cylinder': OneJoint(3.0, 4.0)}
-    )
-    assert parameters.friction == Friction(
-        {
-            'A': JointFriction(0.002, 0.0),
-            'B': JointFriction(0.0, 0.1),
-            'cylinder': JointFriction(3.0, 4.0),
-        }
-    )
+    joints = {'A': JointFriction(viscous=0.002), 'cylinder': JointFriction(3.0, 4.0)}
+    assert FrictionParameters(joints).friction == Friction(joints)
 
 
 @pytest.mark.parametrize('rate', [5.0, -5.0])
 def test_a_cylinder_that_rubs_takes_that_much_more_power(rate):
     # The piston's rate is the slope of its place over time: the rod's pin on its line.
-    rubbing = FrictionParameters({'cylinder': OneJoint(3.0, 4.0)}).friction
+    rubbing = FrictionParameters({'cylinder': JointFriction(3.0, 4.0)}).friction
     with_it, without = (
         moved(context(SLIDER_CRANK, by), (1.0, rate, 7.0), {'effort': ()})
         for by in (rubbing, None)
