@@ -31,9 +31,10 @@ import sys
 from typing import NamedTuple
 
 from linkage_ros.cli.scene import REGISTRIES, table_of
+from linkage_ros.dynamics.loads import AppliedLoads
 from linkage_ros.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
 from linkage_ros.errors import FileError
-from linkage_ros.files.parameters import summary
+from linkage_ros.files.parameters import parameter_rows, summary
 from linkage_ros.pages import markdown
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
@@ -46,6 +47,7 @@ PAGES = [
     PAGE,
     *(PICTURES / f'{name}.md' for kind in ('drive', 'effect') for name in REGISTRIES[kind]),
     PICTURES / 'faults.md',
+    PICTURES / 'loads.md',
 ]
 REFUSED = DOCS / 'refused.yaml'
 LINKAGES = DOCS.parent / 'config' / 'linkages'
@@ -230,6 +232,13 @@ def parameters(kind: str, name: str) -> str:
     return '\n'.join(markdown.table_lines(heads, [(f'`{row[0]}`', *row[1:]) for row in rows]))
 
 
+def loads() -> str:
+    """Return the table of parameters of the loads on joints and points."""
+    heads = 'parameter', 'unit', 'default', 'values', 'meaning'
+    rows = [(f'`{key}`', *more) for key, *more in parameter_rows(AppliedLoads)]
+    return '\n'.join(markdown.table_lines(heads, rows))
+
+
 def refused() -> str:
     """Return the table of refused scenes with their errors."""
     scenes = yaml.safe_load(REFUSED.read_text('utf-8'))
@@ -240,6 +249,7 @@ def refused() -> str:
 _MADE = {
     'drives': lambda: thumbnails('drive'),
     'effects': lambda: thumbnails('effect'),
+    'loads': loads,
     'order': order,
     'refused': refused,
 }

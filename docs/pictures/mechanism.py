@@ -107,6 +107,22 @@ def friction(scene: Scene) -> Figure:
     return figure
 
 
+def loads(scene: Scene) -> Figure:
+    """Draw the run-up of a crank under its motor's curve, alone and with all loads."""
+    figure, axes = sheet()
+    alone = changed(scene, ('loads.joint_springs', None), ('loads.efforts.rocker_joint', None))
+    for given, label, style in (
+        (alone, "motor's curve alone", IDEAL),
+        (scene, 'with the loads on the rocker', {'color': BLUE}),
+    ):
+        moving = run(given, 1.5)
+        axes.plot(moving.times, moving.crank()[1], label=label, **style)
+    axes.set_xlabel('time [s]')
+    axes.set_ylabel('crank [rad/s]')
+    legend(axes)
+    return figure
+
+
 def effort(scene: Scene) -> Figure:
     """Draw the drive's torque at the scene's rate, and at a very low one."""
     figure, axes = sheet()
@@ -214,6 +230,7 @@ PICTURES = {
     'velocity': velocity,
     'acceleration': acceleration,
     'friction': friction,
+    'loads': loads,
     'effort': effort,
     'pin_forces': pin_forces,
     'compliance': compliance,

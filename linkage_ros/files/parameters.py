@@ -346,7 +346,8 @@ class Each(Name):
     def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
         """Yield one row, and the rows of the values."""
         yield from Kind.rows(self, key, default)
-        part = f'{key}.{"LINK.POINT" if self.kind == "point" else self.kind.upper()}'
+        one = 'LINK.POINT' if self.kind == 'point' else self.kind.removeprefix('any_').upper()
+        part = f'{key}.{one}'
         rows = self._value.rows(part, '')
         if isinstance(self.of, type):
             next(rows)
