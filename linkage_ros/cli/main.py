@@ -40,6 +40,7 @@ from linkage_ros.signals import end_soon, has_raised, raising, stop_on_signals, 
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
     'demo': 'run the demo scene with a crank of its own, on a ROS graph of its own',
+    'simulate': 'run a scene as fast as it goes, without ROS, to a bag, CSV or Parquet',
     'play': 'publish a bag on the graph, at its own pace or another',
     'echo': 'print the messages of a topic as YAML, or their rate',
     'plot': 'draw the joints of a bag over the angle of its crank',

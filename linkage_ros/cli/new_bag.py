@@ -22,6 +22,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
+from linkage_ros.bag.definition import described, message_type
 from linkage_ros.bag.reader import Bag, RUN_FILE
 from linkage_ros.bag.run_events import (
     BEGUN,
@@ -36,7 +37,6 @@ from linkage_ros.bag.run_events import (
 )
 from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -235,11 +235,4 @@ def _described(bag: Bag, name: str, kind: str, qos: QosProfile) -> Topic:
     for topic in bag.topics:
         if topic.type == kind and topic.definition:
             return replace(topic, name=name, qos=qos)
-    try:
-        from linkage_ros.node.bag_topics import bag_topic, message_type
-        from rclpy.qos import QoSProfile as RosProfile
-    except ImportError:
-        raise LinkageError(
-            '--output', f'{kind} takes rclpy, which is not installed', 'source a ROS 2 workspace'
-        ) from None
-    return replace(bag_topic(name, message_type(kind, '--scene'), RosProfile(depth=10)), qos=qos)
+    return described(name, message_type(kind, '--scene'), qos)

@@ -19,106 +19,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from importlib import import_module
-import json
-from pathlib import Path
 import re
 from typing import Any
 
+from linkage_ros.bag.definition import described, message_type
 from linkage_ros.bag.topic import INFINITE, QosProfile, Topic
-from linkage_ros.errors import LinkageError, quoted, RecordingError
+from linkage_ros.errors import LinkageError, quoted
 from linkage_ros.resources import share_folders
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-_NESTED = re.compile(r'([a-z]\w*)/([A-Z]\w*)')
-"""A message type within the type of a field, as in sequence<geometry_msgs/Point>."""
 
-_SEPARATOR = f'\n{"=" * 80}\n'
-
-
-def message_type(name: str, key: str) -> Any:
-    """
-    Return the class of a message type; imports it only here, when the scene asks for it.
-
-    Parameters
-    ----------
-    name
-        package/msg/Type.
-    key
-        Key of the scene that asks for it.
-
-    Raises
-    ------
-    LinkageError
-        The package of the type is not installed.
-
-    """
-    package, _, kind = name.split('/')
-    try:
-        return getattr(import_module(f'{package}.msg'), kind)
-    except ImportError:
-        raise LinkageError(
-            key,
-            f'the ROS package {package} is not installed',
-            'install it, or leave it out',
-        ) from None
-
-
-def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:
-    """
-    Describe a topic for a bag.
-
-    Parameters
-    ----------
-    name
-        Resolved name.
-    message_type
-        The message's class.
-    qos
-        QoS offered on the topic.
-
-    Raises
-    ------
-    RecordingError
-        The definition of the message is not installed.
-
-    """
-    package, kind = message_type.__module__.split('.')[0], message_type.__name__
-    texts: dict[str, str] = {}
-    _collect(message_type, package, kind, texts)
-    first, *others = texts
-    definition = texts[first] + ''.join(
-        f'{_SEPARATOR}MSG: {other}\n{texts[other]}' for other in others
-    )
-    return Topic(name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), _qos(qos))
-
-
-def _collect(message_type: Any, package: str, kind: str, texts: dict[str, str]) -> None:
-    """Collect the text of a type and, after it, those of all types that it contains."""
-    if f'{package}/{kind}' in texts:
-        return
-    texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
-    nested = _NESTED.findall(' '.join(message_type.get_fields_and_field_types().values()))
-    # Sorted by full name, as rosbag2 does.
-    for other, other_kind in sorted(nested):
-        _collect(getattr(import_module(f'{other}.msg'), other_kind), other, other_kind, texts)
-
-
-def _type_hash(package: str, kind: str) -> str:
-    described = json.loads(_share(package, f'{kind}.json').read_text('utf-8'))
-    hashes = {entry['type_name']: entry['hash_string'] for entry in described['type_hashes']}
-    return str(hashes[f'{package}/msg/{kind}'])
-
-
-def _share(package: str, file: str) -> Path:
-    for folder in share_folders(package):
-        if (folder / 'msg' / file).is_file():
-            return folder / 'msg' / file
-    raise RecordingError(
-        f'{package}/msg/{file}', 'is not installed', f'install the ROS package {package}'
-    )
+def bag_topic(name: str, message_class: Any, qos: QoSProfile) -> Topic:
+    """Describe a topic for a bag, as `described` does, with the QoS of a publisher."""
+    return described(name, message_class, _qos(qos))
 
 
 def _qos(profile: QoSProfile) -> QosProfile:

@@ -17,26 +17,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
-import json
 from os.path import lexists
 from pathlib import Path
-import platform
 from typing import Any, cast
 
-from linkage_ros import __version__
 from linkage_ros.bag.bag_file import compression_type
-from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.recorder import Recorder, RecordingSummary, TopicCounts
 from linkage_ros.bag.run_events import (
-    BEGUN,
-    CHOSEN,
     MID_RUN,
-    SEED,
-    USER_EFFECTS,
     WITH_THE_RUN,
 )
 from linkage_ros.bag.snapshot import KeptCounts, SnapshotMemory, SnapshotWriting
@@ -46,16 +38,13 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import LinkagePipeline
-from linkage_ros.replay.replay import user_effects_here
+from linkage_ros.replay.run_files import attachments, EXTRA, scene_files
 from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
 """Recording settings for a service call if the scene has none."""
 
-
-EXTRA = 'extra'
-"""Key of the auxiliary topics, of which there may be several."""
 
 DESCRIPTION = 'description_topic'
 """Key of the robot model's topic."""
@@ -251,53 +240,7 @@ def _attachments(
 ) -> dict[str, tuple[str, bytes]]:
     named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
-    return {
-        name: ('application/json' if name == RUN_FILE else 'application/yaml', data)
-        for name, data in scene_files(scene, named, begun, lines).items()
-    }
-
-
-def scene_files(
-    scene: Scene, topics: Mapping[str, Any], begun: str, lines: Sequence[LinkagePipeline]
-) -> dict[str, bytes]:
-    """
-    Return a scene as files: its own, and the run's account of itself.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-    topics
-        Names of the topics, by their keys in the account.
-    begun
-        Beginning of the bag.
-    lines
-        Pipelines of the linkages.
-
-    """
-    run = {
-        'scene': scene.name,
-        'scene_folder': str(Path(scene.folder).resolve()),
-        **topics,
-        BEGUN: begun,
-        SEED: scene.seed,
-        # A replay must use the same solver.
-        **({CHOSEN: chosen} if (chosen := _chosen(lines)) else {}),
-        **({USER_EFFECTS: own} if (own := user_effects_here(scene)) else {}),
-        'linkage_ros': __version__,
-        'python': platform.python_version(),
-        'machine': platform.machine(),
-    }
-    return {**scene.files, RUN_FILE: json.dumps(run).encode()}
-
-
-def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:
-    """Return the chosen solver of each linkage that has one, by name of the linkage."""
-    return {
-        line.member.name: {line.choice.solver: line.choice.parameters}
-        for line in lines
-        if line.choice is not None
-    }
+    return attachments(scene_files(scene, named, begun, lines))
 
 
 def _folder(directory: Path, name: str, scene: str) -> Path:

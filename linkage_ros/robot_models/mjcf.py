@@ -24,13 +24,11 @@ from __future__ import annotations
 
 from cmath import phase, rect
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
 from itertools import combinations
 from math import inf, prod, remainder, tau
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.dynamics.loads import AppliedLoads
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     carriers,
@@ -424,7 +422,8 @@ are equality constraints between sites. A hinge or slide that is a published joi
 sign and zero; others are CHILD_at_PIN. Lengths in [m], angles in [rad].
 Links with a mass are thin plates; others are steel bars of {DENSITY:g} kg/m3, as they are drawn. A
 pin in a slot has a block of {LIGHT:g} kg/m3. Inputs have position servos. Nothing collides.
-Friction, tolerances and other effects of a scene are not here; its gravity and springs are."""
+Friction, tolerances and other effects of a scene are not here, nor its loads on joints and points;
+its gravity and its springs between points are."""
 
 
 def mjcf(name: str, parts: Sequence[Part]) -> bytes:
@@ -441,11 +440,9 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
     Raises
     ------
     PartError
-        If one has another gravity than the first, loads on joints or points, or names that are
-        taken.
+        If one has another gravity than the first, or names that are taken.
 
     """
-    _refuse_applied(parts)
     model = ET.Element('mujoco', model=name)
     model.append(comment(_HEAD.splitlines()))
     ET.SubElement(model, 'compiler', angle='radian', autolimits='true')
@@ -478,21 +475,6 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
         if not len(section) and key != 'worldbody':
             model.remove(section)
     return document(model)
-
-
-def _refuse_applied(parts: Sequence[Part]) -> None:
-    """Refuse loads that a model of MuJoCo would leave out."""
-    for count, part in enumerate(parts):
-        applied = part.loads.applied if part.loads else AppliedLoads()
-        for entry in fields(applied):
-            if named := getattr(applied, entry.name):
-                raise PartError(
-                    count,
-                    f'loads.{entry.name}.{next(iter(named))}',
-                    'is not written into an MJCF model',
-                    f'leave {entry.name} out of the scene, and apply it in MuJoCo',
-                    of_linkage=False,
-                )
 
 
 def _gravity(parts: Sequence[Part]) -> tuple[float, float]:

@@ -28,6 +28,7 @@ from textwrap import dedent
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from linkage_ros.bag.definition import message_type
 from linkage_ros.bag.metadata import UNFINISHED_DATA
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.storage import Storage
@@ -35,11 +36,12 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.main import main
 from linkage_ros.cost import feed
 from linkage_ros.messages.single_values import text_message
-from linkage_ros.node.bag_topics import bag_topic, message_type
-from linkage_ros.node.run_recording import EXTRA, RunRecording
+from linkage_ros.node.bag_topics import bag_topic
+from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import change_text
+from linkage_ros.replay.run_files import EXTRA
 from linkage_ros.scene.load import load_scene
 import numpy as np
 import pytest

@@ -1,0 +1,115 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The description of topics for a bag: definition and hash of a message's type, as installed."""
+
+from __future__ import annotations
+
+from importlib import import_module
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.errors import LinkageError, RecordingError
+from linkage_ros.resources import share_folders
+
+_NESTED = re.compile(r'([a-z]\w*)/([A-Z]\w*)')
+"""A message type within the type of a field, as in sequence<geometry_msgs/Point>."""
+
+_SEPARATOR = f'\n{"=" * 80}\n'
+
+
+def message_type(name: str, key: str) -> Any:
+    """
+    Return the class of a message type; imports it only here, when the scene asks for it.
+
+    Parameters
+    ----------
+    name
+        package/msg/Type.
+    key
+        Key of the scene that asks for it.
+
+    Raises
+    ------
+    LinkageError
+        The package of the type is not installed.
+
+    """
+    package, _, kind = name.split('/')
+    try:
+        return getattr(import_module(f'{package}.msg'), kind)
+    except ImportError:
+        raise LinkageError(
+            key,
+            f'the ROS package {package} is not installed',
+            'install it, or leave it out',
+        ) from None
+
+
+def described(name: str, message_class: Any, qos: QosProfile) -> Topic:
+    """
+    Describe a topic for a bag.
+
+    Parameters
+    ----------
+    name
+        Resolved name.
+    message_class
+        The message's class.
+    qos
+        QoS offered on the topic.
+
+    Raises
+    ------
+    RecordingError
+        The definition of the message is not installed.
+
+    """
+    package, kind = message_class.__module__.split('.')[0], message_class.__name__
+    texts: dict[str, str] = {}
+    _collect(message_class, package, kind, texts)
+    first, *others = texts
+    definition = texts[first] + ''.join(
+        f'{_SEPARATOR}MSG: {other}\n{texts[other]}' for other in others
+    )
+    return Topic(name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), qos)
+
+
+def _collect(message_type: Any, package: str, kind: str, texts: dict[str, str]) -> None:
+    """Collect the text of a type and, after it, those of all types that it contains."""
+    if f'{package}/{kind}' in texts:
+        return
+    texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
+    nested = _NESTED.findall(' '.join(message_type.get_fields_and_field_types().values()))
+    # Sorted by full name, as rosbag2 does.
+    for other, other_kind in sorted(nested):
+        _collect(getattr(import_module(f'{other}.msg'), other_kind), other, other_kind, texts)
+
+
+def _type_hash(package: str, kind: str) -> str:
+    described = json.loads(_share(package, f'{kind}.json').read_text('utf-8'))
+    hashes = {entry['type_name']: entry['hash_string'] for entry in described['type_hashes']}
+    return str(hashes[f'{package}/msg/{kind}'])
+
+
+def _share(package: str, file: str) -> Path:
+    for folder in share_folders(package):
+        if (folder / 'msg' / file).is_file():
+            return folder / 'msg' / file
+    raise RecordingError(
+        f'{package}/msg/{file}', 'is not installed', f'install the ROS package {package}'
+    )

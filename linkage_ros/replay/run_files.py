@@ -1,0 +1,84 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A scene as the files that a bag of its run carries, with the run's account of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import json
+from pathlib import Path
+import platform
+from typing import Any
+
+from linkage_ros import __version__
+from linkage_ros.bag.reader import RUN_FILE
+from linkage_ros.bag.run_events import BEGUN, CHOSEN, SEED, USER_EFFECTS
+from linkage_ros.pipeline.pipeline import LinkagePipeline
+from linkage_ros.replay.replay import user_effects_here
+from linkage_ros.scene.scene import Scene
+
+EXTRA = 'extra'
+"""Key of the auxiliary topics, of which there may be several."""
+
+
+def scene_files(
+    scene: Scene, topics: Mapping[str, Any], begun: str, lines: Sequence[LinkagePipeline]
+) -> dict[str, bytes]:
+    """
+    Return a scene as files: its own, and the run's account of itself.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    topics
+        Names of the topics, by their keys in the account.
+    begun
+        Beginning of the bag.
+    lines
+        Pipelines of the linkages.
+
+    """
+    run = {
+        'scene': scene.name,
+        'scene_folder': str(Path(scene.folder).resolve()),
+        **topics,
+        BEGUN: begun,
+        SEED: scene.seed,
+        # A replay must use the same solver.
+        **({CHOSEN: chosen} if (chosen := _chosen(lines)) else {}),
+        **({USER_EFFECTS: own} if (own := user_effects_here(scene)) else {}),
+        'linkage_ros': __version__,
+        'python': platform.python_version(),
+        'machine': platform.machine(),
+    }
+    return {**scene.files, RUN_FILE: json.dumps(run).encode()}
+
+
+def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:
+    """Return the chosen solver of each linkage that has one, by name of the linkage."""
+    return {
+        line.member.name: {line.choice.solver: line.choice.parameters}
+        for line in lines
+        if line.choice is not None
+    }
+
+
+def attachments(files: Mapping[str, bytes]) -> dict[str, tuple[str, bytes]]:
+    """Return such files as attachments of a bag, each with its media type."""
+    return {
+        name: ('application/json' if name == RUN_FILE else 'application/yaml', data)
+        for name, data in files.items()
+    }

@@ -1,0 +1,165 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``linkage simulate``: a bag that replays to the bit, a table of it, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+import subprocess
+import sys
+
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.cli.main import main
+from linkage_ros.errors import RecordingError
+from linkage_ros.node import simulated_run
+from linkage_ros.node.simulated_run import BEGIN, simulate
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene
+import pytest
+
+SQUEEZER = str(Path(__file__).parents[2] / 'config' / 'scenes' / 'andrews_squeezer.yaml')
+
+
+LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
+
+
+def messages_of(folder):
+    return list(read_bag(folder).messages())
+
+
+# A scene each for what a run records: draws, faults, ticks without a message, further topics.
+SCENES = {
+    'under torque, with friction': 'torque_crank',
+    'with faults': """
+linkage: LINKAGES/four_bar.yaml
+rate: 200
+drive: {sine: {amplitude: 0.7, frequency: 1.5}}
+effects: {velocity: {}, noise: {joints: {rocker_joint: {white: 0.001}}}, markers: {rate: 30}}
+faults:
+  stuck: {freeze: {}, at: [0.2, 0.7], seconds: 0.1}
+  jump: {time_jump: {seconds: -0.05}, at: [0.5], seconds: 0.1}
+""",
+    'with ticks that a delay and a dropout withhold': """
+linkage: LINKAGES/four_bar.yaml
+rate: 100
+drive: {constant_rate: {rate: 3}}
+effects: {dropout: {probability: 0.3}, delay: {seconds: 0.05}, rate_limit: {rate: 40}}
+""",
+}
+
+
+@pytest.mark.parametrize('name', SCENES)
+def test_a_replay_of_the_bag_gives_the_same_bytes(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    text = SCENES[name]
+    if '\n' in text:
+        Path('scene.yaml').write_text(text.replace('LINKAGES', str(LINKAGES)))
+    scene = 'scene.yaml' if '\n' in text else text
+    assert main(['simulate', scene, '--seconds', '1.2', '-o', 'bag']) == 0
+    assert main(['replay', 'bag']) == 0
+    assert 'identical' in capsys.readouterr().out
+    assert main(['simulate', scene, '--seconds', '1.2', '-o', 'again']) == 0
+    once, twice = (messages_of(Path(folder)) for folder in ('bag', 'again'))
+    assert once == twice
+    assert once
+
+
+def test_ticks_are_those_of_the_pipeline_at_whole_nanoseconds(tmp_path):
+    scene = load_scene('torque_crank', ['rate=300'])
+    simulate(scene, tmp_path / 'bag', 7, lambda _: True)
+    pipeline = Pipeline(scene)
+    expected = []
+    for number in range(7):
+        now = BEGIN + round(number * 1e9 / 300.0)
+        expected.append((now, pipeline.tick(now).message))
+    found = [
+        (log_time, data)
+        for topic, log_time, _, data in messages_of(tmp_path / 'bag')
+        if topic == '/joint_states'
+    ]
+    assert found == expected
+
+
+def test_the_squeezer_comes_out_as_the_test_set_says(tmp_path):
+    # Test Set for IVP Solvers, Bari, "Andrews' squeezing mechanism", after 0.03 s.
+    file = tmp_path / 'squeezer.csv'
+    assert main(['simulate', SQUEEZER, '--seconds', '0.03', '-o', str(file)]) == 0
+    with file.open(newline='') as lines:
+        *_, last = csv.DictReader(lines)
+    assert float(last['time [s]']) == 0.03
+    assert float(last['beta [rad]']) == pytest.approx(15.81077119629904, abs=1e-8)
+    assert float(last['epsilon [rad]']) == pytest.approx(1.048080741042263, abs=1e-8)
+
+
+def test_nothing_of_rclpy_is_imported(tmp_path):
+    check = (
+        'import sys; from linkage_ros.cli.main import main; '
+        f'main(["simulate", "torque_crank", "--seconds", "0.1", "-o", {str(tmp_path / "b")!r}]); '
+        'assert "rclpy" not in sys.modules'
+    )
+    subprocess.run([sys.executable, '-c', check], check=True, timeout=60, capture_output=True)
+
+
+REFUSED = {
+    ('demo', '-o', 'x'): 'drive: topic waits for samples',
+    ('jansen_leg', '-o', 'x'): 'drive: topic waits for samples',
+    ('torque_crank', '--set', 'rate=0', '-o', 'x'): 'torque has none; name a rate',
+    ('torque_crank', '-o', 'x.txt'): "ends in '.txt'; name a file that ends in .csv or .parquet",
+    ('torque_crank', '-o', 'there'): 'there: exists already',
+    ('torque_crank', '-o', 'x', '--seconds', '1e9'): 'more than 100,000,000',
+    ('torque_crank', '-o', 'x', '--seconds', '-1'): '-1 is not between 0 and 1e+09',
+    ('torque_cranc', '-o', 'x'): 'torque_crank',
+    ('torque_crank', '-o', 'x.csv', '--set', 'loads.efforts.crank_joint.over_time=[[1, 1]]'): (
+        'has one row'
+    ),
+}
+
+
+@pytest.mark.parametrize('typed', REFUSED)
+def test_what_cannot_be_simulated_is_refused_in_a_line(tmp_path, monkeypatch, capsys, typed):
+    monkeypatch.chdir(tmp_path)
+    Path('there').mkdir()
+    try:
+        code = main(['simulate', *typed])
+    except SystemExit as error:
+        code = error.code
+    assert code == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()[-1:]
+    assert REFUSED[typed] in line
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['there']
+
+
+def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path):
+    scene = load_scene('torque_crank')
+    asked = []
+    simulate(scene, tmp_path / 'bag', 10_000, lambda number: asked.append(number) or number < 2000)
+    kept = messages_of(tmp_path / 'bag')
+    assert len(kept) == 2000
+    assert asked == [0, 500, 1000, 1500, 2000]
+    assert main(['replay', str(tmp_path / 'bag')]) == 0
+
+
+def test_a_disk_that_fills_ends_the_run_and_keeps_what_was_written(tmp_path, monkeypatch):
+    class Full(simulated_run.BagWriter):
+        def write(self, topic, log_time, publish_time, data):
+            if log_time > BEGIN + 500_000_000:
+                raise RecordingError(self.folder, 'the disk is full', 'make room')
+            return super().write(topic, log_time, publish_time, data)
+
+    monkeypatch.setattr(simulated_run, 'BagWriter', Full)
+    assert main(['simulate', 'torque_crank', '-o', str(tmp_path / 'bag')]) != 0
+    assert len(messages_of(tmp_path / 'bag')) == 501
