@@ -51,7 +51,7 @@ drive: {sine: {amplitude: 0.7, frequency: 1.5}}
 effects: {velocity: {}, noise: {joints: {rocker_joint: {white: 0.001}}}, markers: {rate: 30}}
 faults:
   stuck: {freeze: {}, at: [0.2, 0.7], seconds: 0.1}
-  jump: {time_jump: {seconds: -0.05}, at: [0.5], seconds: 0.1}
+  jump: {time_jump: {by: -0.05}, at: [0.5], seconds: 0.1}
 """,
     'with ticks that a delay and a dropout withhold': """
 linkage: LINKAGES/four_bar.yaml
