@@ -16,8 +16,8 @@
 """
 Make an FMU of a scene, by PythonFMU3.
 
-The FMU holds the scene, its linkages, PythonFMU3's wrapper and a module of three lines. It does
-not hold Python, nor this package.
+The FMU holds the scene, its linkages, PythonFMU3's wrapper and a module of a few lines. It
+does not hold Python, nor this package.
 """
 
 from __future__ import annotations
@@ -39,15 +39,19 @@ from linkage_ros.scene.scene import Scene
 _MODULE = 'linkage_fmu.py'
 
 # PythonFMU3 finds the class by the text of its line. The module is cached by its name, whichever
-# FMU of the process it came from: so it holds nothing of a scene.
+# FMU of the process it came from: so it holds nothing of a scene. Its import must not fail: the
+# wrapper then ends the whole process by a segmentation fault (0.3.4).
 _SOURCE = f"""\
+from pythonfmu3 import Fmi3Slave
+
 try:
     from linkage_ros.fmu.slave import SceneSlave
-except ModuleNotFoundError as error:
-    raise ImportError(
-        f'{{error.name}} is not installed; the FMU runs in a Python with linkage_ros {__version__}'
-    ) from None
-from pythonfmu3 import Fmi3Slave
+except Exception as error:
+    _REASON = f'linkage_ros {__version__} is needed in this Python: {{error}}'
+
+    class SceneSlave:
+        def __init__(self, **given):
+            raise ImportError(_REASON)
 
 
 class LinkageFmu(SceneSlave, Fmi3Slave):

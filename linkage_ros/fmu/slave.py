@@ -16,12 +16,16 @@
 """
 The scene within an FMU: what PythonFMU3 calls, on the importer's machine.
 
-An exception here ends the instance as fatal. So a step that cannot be done is answered by the
-status `discard`, which leaves the instance as it was.
+An exception that leaves a method of `SceneSlave` may crash the importer: PythonFMU3's wrapper
+(0.3.4) frees the instance, but keeps its pointers. So a step that cannot be done has the status
+`discard`, which leaves the instance as it was, and after a failure all steps have the status
+`error`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 import json
 from pathlib import Path
@@ -31,7 +35,13 @@ from xml.etree.ElementTree import Element
 from linkage_ros import __version__
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import read_regular
-from linkage_ros.fmu.stepped_scene import LinkageOutputs, NO_CRANK, STATUS_NUMBERS, SteppedScene
+from linkage_ros.fmu.stepped_scene import (
+    LARGEST_SEED,
+    LinkageOutputs,
+    NO_CRANK,
+    STATUS_NUMBERS,
+    SteppedScene,
+)
 from linkage_ros.scene.load import parse_scene
 from pythonfmu3 import (
     Boolean,
@@ -142,6 +152,7 @@ class SceneSlave(Fmi3Slave):
         )
         self._inputs = [0.0] * len(self._scene.inputs)
         self._begin: float | None = None
+        self._failed = False
         self._logged: set[str] = set()
         self.time = 0.0
         self._declare()
@@ -245,6 +256,9 @@ class SceneSlave(Fmi3Slave):
         root.set('generationTool', f'linkage_ros {__version__}, {root.get("generationTool")}')
         # The same scene gives the same file.
         root.attrib.pop('generationDateAndTime')
+        seed = root.find("ModelVariables/Int64[@name='seed']")
+        if seed is not None:
+            seed.attrib |= {'min': '0', 'max': str(LARGEST_SEED)}
         simulation = root.find('CoSimulation')
         if simulation is not None:
             simulation.set('fixedInternalStepSize', repr(self._scene.period))
@@ -253,11 +267,14 @@ class SceneSlave(Fmi3Slave):
 
     def exit_initialization_mode(self) -> None:
         """Do the first tick, at the start time."""
-        self._scene.start(self._seed, self._inputs)
-        self._log_rejections()
+        with self._failures_logged():
+            self._scene.start(self._seed, self._inputs)
+            self._log_rejections()
 
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
         """Do the ticks of a step; discard a step that is no whole number of them."""
+        if self._failed:
+            return Fmi3StepResult(status=Fmi3Status.error)
         # PythonFMU3 keeps the start time to itself: the first step begins there.
         begin = current_time if self._begin is None else self._begin
         try:
@@ -266,10 +283,21 @@ class SceneSlave(Fmi3Slave):
             self.log(str(error), Fmi3Status.discard)
             return Fmi3StepResult(status=Fmi3Status.discard)
         self._begin = begin
-        self._scene.step(ticks, self._inputs)
-        self.time = current_time + step_size
-        self._log_rejections()
-        return Fmi3StepResult()
+        with self._failures_logged():
+            self._scene.step(ticks, self._inputs)
+            self.time = current_time + step_size
+            self._log_rejections()
+        return Fmi3StepResult(status=Fmi3Status.error if self._failed else Fmi3Status.ok)
+
+    @contextmanager
+    def _failures_logged(self) -> Iterator[None]:
+        """Log an exception, and let all further steps fail."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001 (the wrapper cannot take any)
+            self._failed = True
+            text = str(error) if isinstance(error, LinkageError) else repr(error)
+            self.log(text, Fmi3Status.error)
 
     def _log_rejections(self) -> None:
         """Log each reason for which samples are rejected, once."""
