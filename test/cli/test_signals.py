@@ -48,6 +48,7 @@ READS = {
     'compile': (['four.yaml', '-o', 'x.c'], PARSE),
     'urdf': (['four.yaml', '-o', 'x.urdf'], PARSE),
     'mjcf': (['four.yaml', '-o', 'x.xml'], PARSE),
+    'fmu': (['four.yaml', '-o', 'x.fmu'], PARSE),
     'scene': (['four.yaml'], PARSE),
     'cost': (['four.yaml'], PARSE),
     'accuracy': (['four.yaml', '-o', 'page'], PARSE),

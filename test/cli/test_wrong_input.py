@@ -88,6 +88,7 @@ READS = {
     'compile': ['compile', '-o', 'x.c', 'FILE'],
     'urdf': ['urdf', 'FILE'],
     'mjcf': ['mjcf', 'FILE'],
+    'fmu': ['fmu', '-o', 'x.fmu', 'FILE'],
     'scene': ['scene', 'FILE'],
     'cost': ['cost', 'FILE'],
     'accuracy': ['accuracy', '-o', 'page', 'FILE'],
