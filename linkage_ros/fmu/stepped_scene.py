@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from math import isfinite
 from typing import NamedTuple
 
@@ -99,6 +100,7 @@ class _Sender:
         member = line.member
         drive, _ = member.drive
         self._fields = _INPUT_FIELDS[drive]
+        self._count = len(member.inputs)
         self._write = JointStateWriter(member.inputs).write
         self.variables = [
             Variable(
@@ -112,12 +114,14 @@ class _Sender:
 
     def message(self, stamp: int, values: Sequence[float]) -> bytes:
         """Return the message of a time, in [ns], with values in the order of the variables."""
-        count = len(values) // len(self._fields)
-        arrays = [values[start : start + count] for start in range(0, len(values), count)]
-        of = dict(zip(self._fields, arrays, strict=True))
+        given = iter(values)
+        of = {field: tuple(islice(given, self._count)) for field in self._fields}
         # A reader of efforts ignores the positions, which every message has.
         return self._write(
-            stamp, of.get('position', [0.0] * count), of.get('velocity', ()), of.get('effort', ())
+            stamp,
+            of.get('position', (0.0,) * self._count),
+            of.get('velocity', ()),
+            of.get('effort', ()),
         )
 
 

@@ -232,8 +232,9 @@ def test_a_format_beside_a_file_is_refused(tmp_path: Path) -> None:
     'typed',
     [
         'solve four_bar -o x.csv', 'draw four_bar -o x.svg', 'compile four_bar -o x.c',
-        'fmu four_bar -o x.fmu', 'urdf four_bar -o x.urdf', 'mjcf four_bar -o x.xml', 'gallery four_bar -o x.yaml',
-        'export my_bag -o x.csv', 'plot my_bag -o x.svg', 'report my_bag -o x.html',
+        'urdf four_bar -o x.urdf', 'mjcf four_bar -o x.xml', 'gallery four_bar -o x.yaml',
+        'fmu four_bar -o x.fmu', 'export my_bag -o x.csv', 'plot my_bag -o x.svg',
+        'report my_bag -o x.html',
         'synthesize --pair 0 0 --pair 30 17 --pair 60 38 -o x.yaml',
     ],
 )  # fmt: skip
