@@ -24,12 +24,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from itertools import islice
 from math import isfinite
 from typing import NamedTuple
 
+from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import PUBLISHED_WITH
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import LinkageError, listed
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
@@ -341,6 +343,13 @@ def _refuse(scene: Scene) -> None:
                 'drive.bag',
                 'the bag does not travel with the scene',
                 'name another drive; topic takes the crank as an input',
+            )
+        topic = getattr(import_module(DRIVES[drive]), 'TOPIC', '')
+        if topic and drive not in _INPUT_FIELDS:
+            raise member.content.error(
+                f'drive.{drive}',
+                f'listens to {topic}, for which an FMU has no inputs',
+                f'name one of {listed(_INPUT_FIELDS)}, or a drive that moves by itself',
             )
         if member.accuracy is not None:
             raise member.content.error(

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import cache
 import json
-from math import nan, sin
+from math import inf, nan, sin
 from pathlib import Path
 import sys
 import tempfile
@@ -32,8 +32,10 @@ from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from linkage_ros import __version__
+from linkage_ros.drives.drive import CrankState
 from linkage_ros.errors import LinkageError
 from linkage_ros.fmu.build import scene_fmu
+from linkage_ros.fmu.stepped_scene import LinkageOutputs
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
@@ -112,13 +114,13 @@ def test_a_slide_is_in_metres_and_has_accelerations_where_the_scene_has(bench):
     assert piston == {'position': 'm', 'velocity': 'm/s', 'acceleration': 'm/s2'}
 
 
-def _crank(number: int) -> tuple[float, float]:
-    """Return angle and rate of a crank that goes to and fro, in [rad] and [rad/s]."""
-    return 1.0 + sin(0.1 * number), 3.0 - 0.01 * number
+TWO = ', '.join(
+    f'{{name: {name}, linkage: ../linkages/{name}.yaml}}' for name in ('four_bar', 'slider_crank')
+)
 
 
 # Scenes that move by themselves, with noise, delays and forces; from samples; by efforts; with
-# faults, several linkages, and sliding inputs.
+# faults, several linkages, and a sliding input.
 @pytest.mark.parametrize(
     ('name', 'settings'),
     [
@@ -130,30 +132,31 @@ def _crank(number: int) -> tuple[float, float]:
         ('bare', ()),
         ('motion', ()),
         ('bare', ('effects.dropout.probability=0.3', 'effects.bias.joints={rocker_joint: 0.1}')),
-        ('bare', ('drive.topic.carry_forward=false', 'rate=300')),
+        ('bare', ('rate=300',)),
         ('bare', ('faults.gone.silence={}', 'faults.gone.at=[0.01]', 'faults.gone.seconds=0.02')),
+        ('two_fingers', (f'linkages=[{TWO}]',)),
+        ('excavator_delay', ('drive={topic: {}}', 'effects={}')),
         ('torque_crank', ()),
-        ('slider_crank', ('drive={}',)),
     ],
 )
 def test_every_output_has_the_bits_of_the_message(name, settings, bench):
     scene = load_scene(name, settings)
     pipeline = Pipeline(scene)
     instance = bench(scene)
+    names = [name for name, v in instance.variables.items() if v.causality == 'input']
     newest: dict[str, float] = {}
     published = 0
     for number in range(60):
         begin, now = (
             SECOND + round(ticks * SECOND / scene.rate) for ticks in (max(number - 1, 0), number)
         )
-        angle, rate = _crank(number)
-        given = {CRANK: angle, CRANK_RATE: rate, TORQUE: 0.01 * angle}
-        inputs = {key: value for key, value in given.items() if key in instance.variables}
+        inputs = {name: _input(name, number) for name in names}
         if number == 0:
             outputs = instance.start(inputs)
         else:
             outputs = instance.step((number - 1) / scene.rate, 1.0 / scene.rate, inputs)
-        _offer(pipeline, inputs, begin)
+        if inputs:
+            assert pipeline.offer(_message(inputs, begin), begin) is None
         if pipeline.injection is not None:
             pipeline.injection.advance(now)
         message = pipeline.tick(now).message
@@ -171,15 +174,33 @@ def test_every_output_has_the_bits_of_the_message(name, settings, bench):
     assert newest
 
 
-def _offer(pipeline: Pipeline, inputs: dict[str, float], now: int) -> None:
-    stamp = divmod(now, SECOND)
-    if CRANK in inputs:
-        message = joint_state(['crank_joint'], [inputs[CRANK]], [inputs[CRANK_RATE]], stamp=stamp)
-    elif TORQUE in inputs:
-        message = joint_state(['crank_joint'], efforts=[inputs[TORQUE]], stamp=stamp)
-    else:
-        return
-    assert pipeline.offer(message, now) is None
+def _input(name: str, number: int) -> float:
+    """Return the value of an input at a step: to and fro, by another angle for each joint."""
+    to_and_fro = 1.0 + 0.1 * sin(0.1 * number + len(name))
+    return {'position': to_and_fro, 'velocity': 3.0 - 0.1 * number, 'effort': 0.01 * to_and_fro}[
+        name.rpartition('.')[2]
+    ]
+
+
+def _message(inputs: dict[str, float], now: int) -> bytes:
+    """Return one message with the inputs of all linkages, as a sender in ROS writes it."""
+    arrays: dict[str, list[float]] = {'position': [], 'velocity': [], 'effort': []}
+    for name, value in inputs.items():
+        arrays[name.rpartition('.')[2]].append(value)
+    joints = dict.fromkeys(name.split('.')[1] for name in inputs)
+    return joint_state(joints, *arrays.values(), stamp=divmod(now, SECOND))
+
+
+def test_a_reading_that_is_not_finite_does_not_come_out():
+    (line,) = Pipeline(load_scene('four_bar')).lines
+    look = line.look(SECOND, CrankState((1.0,), (2.0,), (0.0,), 0))
+    outputs = LinkageOutputs(line)
+    outputs.take(look)
+    good = {field: [*values] for field, values in outputs.values.items()}
+    assert outputs.valid == {'position': True, 'velocity': True}
+    outputs.take(look._replace(reading=look.reading._replace(rates=(nan, 1.0, inf))))
+    assert outputs.valid == {'position': True, 'velocity': False}
+    assert outputs.values == good
 
 
 def test_accelerations_are_those_of_the_pipeline(bench):
@@ -350,6 +371,7 @@ def test_the_same_scene_gives_the_same_bytes_and_names_no_folder(tmp_path, monke
     assert validate_fmu(str(fmu)) == []
     with zipfile.ZipFile(fmu) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
     assert parts['resources/linkage.yaml'] == linkage.read_bytes()
     assert parts['resources/scene.yaml'] == file.read_bytes()
     assert 'binaries/x86_64-linux/my_press_2.so' in parts
