@@ -34,6 +34,7 @@ from fmpy.validation import validate_fmu
 from linkage_ros import __version__
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.errors import LinkageError
+from linkage_ros.fmu import stepped_scene
 from linkage_ros.fmu.build import scene_fmu
 from linkage_ros.fmu.stepped_scene import LinkageOutputs
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -144,6 +145,9 @@ def test_every_output_has_the_bits_of_the_message(name, settings, bench):
     pipeline = Pipeline(scene)
     instance = bench(scene)
     names = [name for name, v in instance.variables.items() if v.causality == 'input']
+    sampled = [member for member in scene.members if member.drive[0] in ('topic', 'torque')]
+    driven = [joint for member in sampled for joint in member.inputs]
+    assert list(dict.fromkeys(name.split('.')[1] for name in names)) == driven
     newest: dict[str, float] = {}
     published = 0
     for number in range(60):
@@ -382,6 +386,7 @@ def test_the_same_scene_gives_the_same_bytes_and_names_no_folder(tmp_path, monke
     ('scene', 'where', 'reason'),
     [
         ('rate: 0', 'rate', 'once|one tick'),
+        ('drive: {bag: {file: a_bag}}', 'drive.bag', 'travel'),
         ('accuracy: 1.0e-9', 'accuracy', 'own solver'),
         ('faults: {clock: {time_jump: {by: 0.5}, at: [1], seconds: 1}}', 'faults.clock', 'clock'),
         ('effects: {own.effect: {}}', 'effects.own.effect', 'module'),
@@ -390,6 +395,12 @@ def test_the_same_scene_gives_the_same_bytes_and_names_no_folder(tmp_path, monke
 def test_a_scene_that_needs_more_than_its_files_is_refused(scene, where, reason):
     with pytest.raises(LinkageError, match=rf'{where}: .*({reason})'):
         scene_fmu(scene_of(scene))
+
+
+def test_a_drive_with_a_message_of_its_own_is_refused(monkeypatch):
+    monkeypatch.delitem(stepped_scene._INPUT_FIELDS, 'torque')
+    with pytest.raises(LinkageError, match=r'drive.torque: listens to crank_commands, .*name one'):
+        scene_fmu(load_scene('torque_crank'))
 
 
 def test_without_pythonfmu3_one_line_says_so(monkeypatch):
