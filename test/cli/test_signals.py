@@ -206,7 +206,7 @@ def test_a_command_ends_while_it_computes(folder, command, number) -> None:
     assert sorted(folder.iterdir()) == before
 
 
-@pytest.mark.parametrize('command', ['solve', 'draw', 'compile', 'urdf', 'mjcf'])
+@pytest.mark.parametrize('command', ['solve', 'draw', 'compile', 'fmu', 'urdf', 'mjcf'])
 def test_a_command_that_is_stopped_while_it_writes_leaves_what_was_there(folder, command) -> None:
     typed, _ = READS[command]
     old = folder / typed[-1]
