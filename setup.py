@@ -71,6 +71,8 @@ DESIGN = ['scipy>=1.11,<2']
 EXPORT = ['pyarrow>=14,<26']
 # `linkage view`: a server for this machine, edits that keep a file's comments, DXF files.
 VIEW = ['aiohttp>=3.9,<4', 'ezdxf>=1.1,<2', 'plotly>=6,<8', 'ruamel.yaml>=0.18,<1']
+# `linkage fmu`: the wrapper between FMI and Python.
+FMU = ['pythonfmu3>=0.3.4,<0.4']
 # Completion of the command line in bash, zsh and fish.
 COMPLETION = ['argcomplete>=3.1,<4']
 # For studies on several machines.
@@ -95,12 +97,15 @@ TEST = [
     'xacro',
     # Checks the robot models.
     'yourdfpy',
+    # Checks and runs FMUs.
+    'fmpy>=0.3.22,<0.4',
     # References for drives and forces: splines, and a rigid-body engine.
     'scipy',
     'mujoco>=3',
     *COMPLETION,
     *DASK,
     *EXPORT,
+    *FMU,
     *VIEW,
 ]
 # Other implementations, to compare the speed. Pinocchio (pin) also checks robot models.
@@ -168,6 +173,7 @@ setup(
         'dask': DASK,
         'docs': DOCS,
         'export': EXPORT,
+        'fmu': FMU,
         'test': TEST,
         'view': VIEW,
         'dev': [

@@ -186,7 +186,9 @@ COMMANDS = {
     'compile': [_FILE, '-o', 'x.c'],
     'urdf': [_FILE],
     'mjcf': [_FILE],
+    'fmu': [_FILE, '-o', 'x.fmu'],
     'scene': [_FILE],
+    'simulate': [_FILE, '--seconds', '0.05', '-o', 'x.csv'],
     'cost': [_FILE, '--ticks', '2'],
     'accuracy': [_FILE, '--quick', '--only', 'effects,dynamics', '-o', 'page'],
     'replay': ['bag', '--scene', _FILE],
@@ -194,7 +196,7 @@ COMMANDS = {
 }
 """Arguments of each command."""
 
-_SCENE = ('view', 'scene', 'cost', 'urdf', 'mjcf', 'accuracy', 'replay', 'run')
+_SCENE = ('view', 'fmu', 'scene', 'simulate', 'cost', 'urdf', 'mjcf', 'accuracy', 'replay', 'run')
 _TABLES = {
     'pairs': b'crank,rocker\n0,0\n30,17\n60,38\n',
     'path': b'0.1;0.2\n0.15;0.25\n0.2;0.2\n0.15;0.1\n0.12;0.1\n',

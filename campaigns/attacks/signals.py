@@ -49,6 +49,7 @@ _COMMANDS = {
     'compile': ['jansen_leg.yaml', '-o', 'x.c'],
     'urdf': ['jansen_leg.yaml', '-o', 'x.urdf'],
     'mjcf': ['jansen_leg.yaml', '-o', 'x.xml'],
+    'fmu': ['jansen_leg.yaml', '-o', 'x.fmu'],
     'scene': ['jansen_leg.yaml'],
     'cost': ['jansen_leg.yaml', '--ticks', '100000'],
     'accuracy': ['jansen_leg.yaml', '--only', 'solving', '-o', 'page'],

@@ -59,6 +59,7 @@ COMMANDS = {
     'draw': 'draw a linkage, and its joints over its range',
     'animate': 'animate a linkage over its range, or a part of a run: GIF, MP4 or SVG',
     'compile': 'write a linkage as source in C, JavaScript or Python that needs nothing else',
+    'fmu': 'write a scene as an FMI 3.0 co-simulation FMU, for test benches without ROS',
     'urdf': 'write a linkage or a scene as URDF, for robot_state_publisher and RViz',
     'mjcf': 'write a linkage or a scene as MJCF, for MuJoCo, with its closed loops',
     'import': 'make a linkage file of a URDF and the pins that close it',

@@ -200,6 +200,7 @@ def test_every_output_file_refuses_a_suffix_that_it_cannot_write(tmp_path: Path)
         ['synthesize', '--draw', 'x.gif'],
         ['mjcf', 'four_bar', '-o', 'x.urdf'],
         ['gallery', 'four_bar', '-o', 'x.txt'],
+        ['fmu', 'four_bar', '-o', 'x.txt'],
     ],
     ids=' '.join,
 )
@@ -232,7 +233,8 @@ def test_a_format_beside_a_file_is_refused(tmp_path: Path) -> None:
     [
         'solve four_bar -o x.csv', 'draw four_bar -o x.svg', 'compile four_bar -o x.c',
         'urdf four_bar -o x.urdf', 'mjcf four_bar -o x.xml', 'gallery four_bar -o x.yaml',
-        'export my_bag -o x.csv', 'plot my_bag -o x.svg', 'report my_bag -o x.html',
+        'fmu four_bar -o x.fmu', 'export my_bag -o x.csv', 'plot my_bag -o x.svg',
+        'report my_bag -o x.html',
         'synthesize --pair 0 0 --pair 30 17 --pair 60 38 -o x.yaml',
     ],
 )  # fmt: skip

@@ -48,7 +48,9 @@ READS = {
     'compile': (['four.yaml', '-o', 'x.c'], PARSE),
     'urdf': (['four.yaml', '-o', 'x.urdf'], PARSE),
     'mjcf': (['four.yaml', '-o', 'x.xml'], PARSE),
+    'fmu': (['four.yaml', '-o', 'x.fmu'], PARSE),
     'scene': (['four.yaml'], PARSE),
+    'simulate': (['four.yaml', '-o', 'x.csv'], PARSE),
     'cost': (['four.yaml'], PARSE),
     'accuracy': (['four.yaml', '-o', 'page'], PARSE),
     'demo': ([], PARSE),
@@ -205,7 +207,7 @@ def test_a_command_ends_while_it_computes(folder, command, number) -> None:
     assert sorted(folder.iterdir()) == before
 
 
-@pytest.mark.parametrize('command', ['solve', 'draw', 'compile', 'urdf', 'mjcf'])
+@pytest.mark.parametrize('command', ['solve', 'draw', 'compile', 'fmu', 'urdf', 'mjcf'])
 def test_a_command_that_is_stopped_while_it_writes_leaves_what_was_there(folder, command) -> None:
     typed, _ = READS[command]
     old = folder / typed[-1]

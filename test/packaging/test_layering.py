@@ -36,7 +36,7 @@ HEIGHTS = (
     ('faults',),
     ('scene',),
     ('pipeline',),
-    ('replay',),
+    ('replay', 'fmu'),
     ('cost', 'accuracy'),
     ('report',),
     ('view',),

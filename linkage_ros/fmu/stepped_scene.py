@@ -1,0 +1,366 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A scene that another program steps: inputs in, so many ticks, outputs.
+
+The clock is that of the other program, counted in ticks: tick n is at n/rate seconds after the
+first. No other clock is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib import import_module
+from itertools import islice
+from math import isfinite
+from typing import NamedTuple
+
+from linkage_ros.drives.drive import DRIVES
+from linkage_ros.effects.stage import PUBLISHED_WITH
+from linkage_ros.errors import LinkageError, listed
+from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import JointStateWriter, Rejection
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageTick, Pipeline
+from linkage_ros.scene.scene import Scene, SceneLinkage
+
+FIRST_TICK = NANOSECONDS
+"""Time of the first tick, in [ns]; not 0, since a sample stamped 0 is rejected as unstamped."""
+
+NO_CRANK = 0
+"""Status where no state of the crank is known; those of `Status` count from 1, in their order."""
+
+STATUS_NUMBERS: Mapping[Status, int] = {status: n for n, status in enumerate(Status, 1)}
+
+LARGEST_SEED = 2**53
+"""As for the key ``seed`` of a scene."""
+
+_INPUT_FIELDS = {'topic': ('position', 'velocity'), 'torque': ('effort',)}
+"""Fields of the messages that a drive reads, by name of the drive."""
+
+_UNITS = {
+    'position': ('rad', 'm'),
+    'velocity': ('rad/s', 'm/s'),
+    'acceleration': ('rad/s2', 'm/s2'),
+    'effort': ('N.m', 'N'),
+}
+"""Units of each field, of a joint that turns and of one that slides."""
+
+_MOST_TICKS = 10_000_000
+"""Most ticks of one step: hours of computing."""
+
+_OF_A_TICK = 1e-3
+"""How far a step may be from whole ticks, in ticks: what rounding of sums of steps takes."""
+
+
+class Variable(NamedTuple):
+    """
+    A number that goes in or comes out.
+
+    Attributes
+    ----------
+    name
+        Topic, joint and field, as ``joint_states.rocker_joint.position``.
+    unit
+        Its unit, as ``rad/s``.
+    description
+        What it is.
+
+    """
+
+    name: str
+    unit: str
+    description: str
+
+
+class _Sender:
+    """
+    Sends the input values of a linkage as the message that its drive reads.
+
+    Parameters
+    ----------
+    line
+        The pipeline of the linkage, whose drive listens to a topic.
+
+    """
+
+    def __init__(self, line: LinkagePipeline) -> None:
+        member = line.member
+        drive, _ = member.drive
+        self._fields = _INPUT_FIELDS[drive]
+        self._count = len(member.inputs)
+        self._write = JointStateWriter(member.inputs).write
+        self.variables = [
+            Variable(
+                f'{line.topic}.{joint}.{field}',
+                _UNITS[field][bool(given.slider)],
+                f'{field} of the input {joint}',
+            )
+            for field in self._fields
+            for joint, given in zip(member.inputs, member.linkage.inputs, strict=True)
+        ]
+
+    def message(self, stamp: int, values: Sequence[float]) -> bytes:
+        """Return the message of a time, in [ns], with values in the order of the variables."""
+        given = iter(values)
+        of = {field: tuple(islice(given, self._count)) for field in self._fields}
+        # A reader of efforts ignores the positions, which every message has.
+        return self._write(
+            stamp,
+            of.get('position', (0.0,) * self._count),
+            of.get('velocity', ()),
+            of.get('effort', ()),
+        )
+
+
+class LinkageOutputs:
+    """
+    The newest reading of a linkage, and whether it is of the last tick.
+
+    Parameters
+    ----------
+    line
+        The pipeline of the linkage.
+
+    """
+
+    def __init__(self, line: LinkagePipeline) -> None:
+        member = line.member
+        self.prefix = f'{member.name}.' if member.name else ''
+        """What its variables that belong to no joint begin with."""
+        turning = line.closure.turning
+        self.variables = {
+            field: [
+                Variable(
+                    f'joint_states.{joint}.{field}',
+                    _UNITS[field][not turns],
+                    f'{field} of {joint}, as its sensor reads it',
+                )
+                for joint, turns in zip(member.joints, turning, strict=True)
+            ]
+            for field in _published(member)
+        }
+        """The variables of each field."""
+        self.values = {field: [0.0] * len(of) for field, of in self.variables.items()}
+        """The newest values of each field, in the order of the variables; 0 before the first."""
+        self.valid = dict.fromkeys(self.variables, False)
+        """Whether the last tick had values of each field."""
+        self.status = NO_CRANK
+        """Status of the linkage at the last tick, as a number."""
+
+    def take(self, look: LinkageTick) -> None:
+        """Take the state of the linkage at a tick."""
+        position, reading = look.position, look.reading
+        self.status = NO_CRANK if position is None else STATUS_NUMBERS[position.status]
+        for field, values in self.values.items():
+            newest: tuple[float, ...] = ()
+            if reading is not None:
+                newest = getattr(reading, _READ_AS[field])
+            self.valid[field] = bool(newest) and all(map(isfinite, newest))
+            if self.valid[field]:
+                values[:] = newest
+
+
+_READ_AS = {
+    'position': 'joints',
+    'velocity': 'rates',
+    'acceleration': 'accelerations',
+    'effort': 'efforts',
+}
+"""Name of each field in a `SensorReading`."""
+
+
+def _published(member: SceneLinkage) -> list[str]:
+    """Return the fields that a linkage publishes."""
+    named = {also for effect in member.effects for also in PUBLISHED_WITH.get(effect, ())}
+    named |= {'position', *member.effects}
+    return [field for field in _UNITS if field in named]
+
+
+class SteppedScene:
+    """
+    A scene that is stepped from outside. To reset it, build it again.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Raises
+    ------
+    FileError
+        The scene cannot be stepped: it has no tick rate, needs further files or modules, or sets
+        its own clock.
+
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        _refuse(scene)
+        self._scene = scene
+        self._pipeline = Pipeline(scene)
+        self._ticks = 0
+        self._senders = [_Sender(line) for line in self._pipeline.lines if line.topic]
+        self.inputs = [variable for sender in self._senders for variable in sender.variables]
+        """What goes in, in order."""
+        self.outputs = [LinkageOutputs(line) for line in self._pipeline.lines]
+        """What comes out of each linkage."""
+        self.rejections: dict[Rejection, int] = {}
+        """How many samples were rejected, by reason."""
+
+    @property
+    def period(self) -> float:
+        """Time between two ticks, in [s]."""
+        return 1.0 / self._scene.rate
+
+    def start(self, seed: int, inputs: Sequence[float]) -> None:
+        """
+        Do the first tick.
+
+        Parameters
+        ----------
+        seed
+            Seed of all random numbers.
+        inputs
+            Values of `inputs` at that time.
+
+        Raises
+        ------
+        LinkageError
+            The seed is out of bounds, or no linkage can be made of it.
+
+        """
+        if not 0 <= seed <= LARGEST_SEED:
+            raise LinkageError('seed', f'{seed} is out of bounds', f'write 0 to {LARGEST_SEED}')
+        if seed != self._scene.seed:
+            self._pipeline = Pipeline(replace(self._scene, seed=seed))
+        self._offer(inputs)
+        self._tick()
+
+    def whole_ticks(self, begin: float, seconds: float) -> int:
+        """
+        Return how many ticks a step takes.
+
+        Parameters
+        ----------
+        begin
+            Begin of the step, in [s] since the first tick.
+        seconds
+            Its length, in [s].
+
+        Raises
+        ------
+        LinkageError
+            The step does not begin where the last one ended, or is no whole number of ticks.
+
+        """
+        rate = self._scene.rate
+        # Written so that NaN is refused too.
+        if not abs(begin * rate - self._ticks) <= _OF_A_TICK:
+            raise LinkageError(
+                f'a step from {begin:.9g} s',
+                f'the last one ended at {self._ticks / rate:.9g} s',
+                'go on from there, or reset',
+            )
+        ticks = seconds * rate
+        if not 0.5 < ticks <= _MOST_TICKS or abs(ticks - round(ticks)) > _OF_A_TICK:
+            raise LinkageError(
+                f'a step of {seconds:.9g} s',
+                f'is not 1 to {_MOST_TICKS} ticks at {rate:g} Hz',
+                f'step by a whole multiple of {self.period:.9g} s',
+            )
+        return round(ticks)
+
+    def step(self, ticks: int, inputs: Sequence[float]) -> None:
+        """
+        Take the values of the inputs at the end of the last step, then do so many ticks.
+
+        Parameters
+        ----------
+        ticks
+            Number of ticks.
+        inputs
+            Values of `inputs`; a drive takes them once, as one message.
+
+        """
+        self._offer(inputs)
+        for _ in range(ticks):
+            self._ticks += 1
+            self._tick()
+
+    def _now(self) -> int:
+        """Return the time of the last tick, in [ns]; lets faults begin and end."""
+        now = FIRST_TICK + round(self._ticks * NANOSECONDS / self._scene.rate)
+        if self._pipeline.injection is not None:
+            self._pipeline.injection.advance(now)
+        return now
+
+    def _offer(self, inputs: Sequence[float]) -> None:
+        now = self._now()
+        first = 0
+        for sender in self._senders:
+            end = first + len(sender.variables)
+            rejection = self._pipeline.offer(sender.message(now, inputs[first:end]), now)
+            first = end
+            if rejection is not None:
+                self.rejections[rejection] = self.rejections.get(rejection, 0) + 1
+
+    def _tick(self) -> None:
+        tick = self._pipeline.tick(self._now())
+        for outputs, look in zip(self.outputs, tick.looks, strict=True):
+            outputs.take(look)
+
+
+def _refuse(scene: Scene) -> None:
+    """Refuse a scene that needs more than its files and a clock from outside."""
+    content = scene.members[0].content
+    if scene.rate == 0.0:
+        raise content.error(
+            'rate', '0 is one tick for every message, and there are none', 'name a rate'
+        )
+    for name, fault in scene.faults.items():
+        if fault.kind == 'time_jump':
+            raise content.error(
+                f'faults.{name}', 'sets the clock, which is that of the importer', 'leave it out'
+            )
+    for member in scene.members:
+        drive, _ = member.drive
+        if drive == 'bag':
+            raise member.content.error(
+                'drive.bag',
+                'the bag does not travel with the scene',
+                'name another drive; topic takes the crank as an input',
+            )
+        topic = getattr(import_module(DRIVES[drive]), 'TOPIC', '')
+        if topic and drive not in _INPUT_FIELDS:
+            raise member.content.error(
+                f'drive.{drive}',
+                f'listens to {topic}, for which an FMU has no inputs',
+                f'name one of {listed(_INPUT_FIELDS)}, or a drive that moves by itself',
+            )
+        if member.accuracy is not None:
+            raise member.content.error(
+                'accuracy',
+                'lets every machine choose its own solver',
+                'name a solver, as linkage accuracy shows them',
+            )
+        for effect in member.effects:
+            if '.' in effect:
+                raise member.content.error(
+                    f'effects.{effect}',
+                    'is a module of your own, which does not travel with the scene',
+                    'leave it out',
+                )
