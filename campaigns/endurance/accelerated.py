@@ -42,8 +42,8 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
 from rosbags.typesys import get_typestore, Stores

@@ -31,11 +31,11 @@ from threading import Event
 from time import monotonic
 from typing import Any
 
-from linkage_ros.bag.definition import message_type
 from linkage_ros.cli.arguments import bounded
 from linkage_ros.errors import clean, did_you_mean, LinkageError, listed, shortened
 from linkage_ros.messages.joint_values import EFFORT, JOINT_STATE, POSITION, RATE, UNITS
 from linkage_ros.node.player import player_node
+from linkage_ros.replay.topic_description import message_type
 from linkage_ros.signals import heeded
 import rclpy
 from rclpy.node import Node

@@ -22,7 +22,6 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.definition import described, message_type
 from linkage_ros.bag.reader import Bag, RUN_FILE
 from linkage_ros.bag.run_events import (
     BEGUN,
@@ -42,6 +41,7 @@ from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.counterfactual import Counterfactual, ReplayEvent
 from linkage_ros.replay.replay import user_effects_here, versions_here
+from linkage_ros.replay.topic_description import described, message_type
 from linkage_ros.scene.scene import Scene
 
 _FLUSHED_EVERY = 50_000

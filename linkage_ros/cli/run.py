@@ -35,8 +35,8 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.node.node import LinkageNode
 from linkage_ros.node.run import run_linkage_node
-from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.replay import recorded_scene, ReplayedTick
 from linkage_ros.replay.verify import (
     beginning_text,

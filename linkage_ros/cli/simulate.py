@@ -12,27 +12,53 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Run a scene as fast as it goes, without ROS, and write a bag or a table of its joints."""
+"""
+Run a scene as fast as it goes, without ROS: once, into a bag or a table, or many times as a study.
+
+A study runs the scene with other seeds and other values of its keys. It writes a table with a row
+for each run, and a picture of the spread over the time.
+"""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Mapping, Sequence
+from math import nan
+from os import cpu_count
 from pathlib import Path
 import sys
 from tempfile import TemporaryDirectory
 from threading import Event
 
-from linkage_ros.cli.arguments import add_set, bounded, SCENE_HELP
+from linkage_ros.cli.arguments import add_set, bounded, PICTURES, SCENE_HELP
 from linkage_ros.cli.export import export
 from linkage_ros.cli.terminal import progress
-from linkage_ros.errors import clean
+from linkage_ros.errors import clean, LinkageError
 from linkage_ros.files.file_access import check_suffix
-from linkage_ros.files.tables import check_kind, KINDS
-from linkage_ros.node.simulated_run import check_simulated, simulate
+from linkage_ros.files.tables import check_kind, KINDS, table_file
+from linkage_ros.messages.joint_values import EFFORT, POSITION, RATE, UNITS
 from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
+from linkage_ros.simulation.run import check_simulated, simulate
+from linkage_ros.simulation.study import (
+    instants_of,
+    Outcome,
+    outcomes,
+    runs_of,
+    Settings,
+    Statistics,
+    Study,
+    Sweep,
+    sweep_of,
+)
 
 EXAMPLE = 'linkage simulate andrews_squeezer --seconds 0.03 -o squeezer.csv'
+
+_MOST_NAMED = 3
+"""Runs that failed and are named."""
+
+_WHOLE = ('run', 'seed', 'ticks', 'messages')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--seconds',
         type=bounded(0.0, 1e9),
         default=10.0,
-        help='duration, in the time of the scene (default 10)',
+        help='duration of a run, in the time of the scene (default 10)',
     )
     parser.add_argument(
         '-o',
@@ -50,43 +76,55 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar='OUTPUT',
-        help='folder of a new bag; or a table of the joints: OUTPUT.csv or OUTPUT.parquet',
+        help='folder of a new bag; or a table of the joints, OUTPUT.csv or OUTPUT.parquet; of a '
+        'study a table of its runs, or a picture of the spread, OUTPUT.png, .svg or .pdf',
     )
     add_set(parser)
+    study = parser.add_argument_group('a study')
+    study.add_argument(
+        '--seeds', type=bounded(1, 1e12, int), default=1, help='number of seeds, each in a run'
+    )
+    study.add_argument(
+        '--sweep',
+        action='append',
+        default=[],
+        metavar='KEY=VALUES',
+        help='run with each value of a key of the scene: KEY=LOW:HIGH:N or KEY=a,b,c; of several '
+        'all combinations',
+    )
+    study.add_argument('--picture', type=Path, help='the picture, beside a table')
+    study.add_argument(
+        '--workers', type=bounded(1, 1024, int), help='processes (default: one a processor)'
+    )
+    study.add_argument('--dask', metavar='ADDRESS', default='', help='scheduler whose workers run')
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Simulate; return 1 if a signal stopped it."""
+    sweeps = [sweep_of(text) for text in arguments.sweep]
+    if arguments.seeds > 1 or sweeps:
+        return _study(arguments, sweeps, stop)
+    for given, option in (
+        (arguments.picture, '--picture'),
+        (arguments.workers, '--workers'),
+        (arguments.dask, '--dask'),
+    ):
+        if given:
+            raise LinkageError(option, 'is for a study', 'add --seeds or --sweep')
     output: Path = arguments.output
     if output.suffix:
         check_suffix(output, KINDS)
         check_kind(output)
     scene = load_scene(arguments.scene, arguments.set)
     ticks = check_simulated(scene, arguments.seconds)
-    done = 0
-
-    def write(folder: Path) -> dict[str, int]:
-        with progress('ticks') as advance:
-
-            def goes_on(number: int) -> bool:
-                nonlocal done
-                done = number
-                advance(number, ticks)
-                return not stop.is_set()
-
-            counts = simulate(scene, folder, ticks, goes_on)
-        if stop.is_set():
-            print(f'linkage simulate: stopped after {done:,} of {ticks:,} ticks', file=sys.stderr)
-        return counts
-
     if not output.suffix:
-        counts = write(output)
+        counts = _simulated(scene, output, ticks, stop)
         parts = ', '.join(f'{count} on {clean(name)}' for name, count in counts.items() if count)
         print(f'{output}: {parts or "no messages"}')
         return int(stop.is_set())
     with TemporaryDirectory() as folder:
         bag = Path(folder) / 'run'
-        write(bag)
+        _simulated(scene, bag, ticks, stop)
         if stop.is_set():
             return 1
         try:
@@ -96,3 +134,129 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             return 1
     print(f'{output}: {found.rows} rows, {4 + len(found.keys)} columns')
     return 0
+
+
+def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str, int]:
+    """Run a scene into a bag, and return its counts; say so if a signal stopped it."""
+    done = 0
+    with progress('ticks') as advance:
+
+        def goes_on(number: int) -> bool:
+            nonlocal done
+            done = number
+            advance(number, ticks)
+            return not stop.is_set()
+
+        counts = simulate(scene, folder, ticks, goes_on)
+    if stop.is_set():
+        print(f'linkage simulate: stopped after {done:,} of {ticks:,} ticks', file=sys.stderr)
+    return counts
+
+
+def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) -> int:
+    """Run a study; return 1 if a signal stopped it, or no run succeeded."""
+    output: Path = arguments.output
+    check_suffix(output, (*KINDS, *PICTURES))
+    pictures = [file for file in (output, arguments.picture) if file and file.suffix not in KINDS]
+    if pictures:
+        check_suffix(pictures[-1], PICTURES)
+        from linkage_ros.drawing.painting import settings  # local import: only for a picture
+
+        settings()  # without matplotlib, say so before the study is run
+    if output.suffix in KINDS:
+        check_kind(output)
+    scene = load_scene(arguments.scene, arguments.set)
+    ticks = check_simulated(scene, arguments.seconds)
+    runs = runs_of(sweeps, arguments.seeds, scene.seed)
+    instants = instants_of(len(runs), len(scene.joints), ticks)
+    study = Study(scene.name, scene.files, scene.folder, arguments.seconds, instants)
+    found: dict[int, Outcome] = {}
+    with progress('runs') as advance:
+        workers = arguments.workers or cpu_count() or 1
+        for number, outcome in outcomes(study, runs, min(workers, len(runs)), arguments.dask):
+            found[number] = outcome
+            advance(len(found), len(runs))
+            if stop.is_set():
+                print('linkage simulate: stopped; nothing was written', file=sys.stderr)
+                return 1
+    failed = [(runs[number], found[number].failure) for number in sorted(found)
+              if found[number].failure]  # fmt: skip
+    for given, failure in failed[:_MOST_NAMED]:
+        print(f'linkage simulate: {_told(given)}: {failure}', file=sys.stderr)
+    if failed:
+        print(f'linkage simulate: {len(failed)} of {len(runs)} runs failed', file=sys.stderr)
+    if len(failed) == len(runs):
+        return 1
+    if output.suffix in KINDS:
+        heads, rows = _table(scene, runs, found)
+        with table_file(output, heads, _WHOLE) as write:
+            write(rows)
+        print(f'{output}: {len(rows)} runs, {len(heads)} columns')
+    for picture in pictures:
+        _draw(scene, arguments.seconds, found, picture)
+        print(picture)
+    return 0
+
+
+def _told(settings: Settings) -> str:
+    return ', '.join(f'{key}={value:g}' if key != 'seed' else f'seed={value}'
+                     for key, value in settings)  # fmt: skip
+
+
+def _turning(scene: Scene) -> dict[str, bool]:
+    """Return whether each joint turns, by its name in messages."""
+    return {
+        joint: turns
+        for member in scene.members
+        for joint, turns in zip(member.joints, member.closure.turning, strict=True)
+    }
+
+
+def _table(
+    scene: Scene, runs: Sequence[Settings], found: Mapping[int, Outcome]
+) -> tuple[list[str], list[list[float | int | None]]]:
+    """Return headings and rows of the table of runs; a run that failed has no numbers."""
+    keys = [key for key, _ in runs[0]]
+    columns = list(dict.fromkeys(key for one in found.values() for key in one.statistics))
+    heads = ['run', *keys, 'ticks', 'messages', *_headings(scene, columns)]
+    nothing = Statistics(nan, nan, nan, nan)
+    rows: list[list[float | int | None]] = []
+    for number, settings in enumerate(runs):
+        outcome = found[number]
+        row: list[float | int | None] = [number + 1, *(value for _, value in settings)]
+        row += [outcome.ticks, outcome.messages]
+        for column in columns:
+            row += outcome.statistics.get(column, nothing)
+        rows.append(row)
+    return heads, rows
+
+
+def _headings(scene: Scene, columns: Sequence[str]) -> Iterator[str]:
+    """Yield the headings of the statistics, each with its unit."""
+    turning = _turning(scene)
+    for column in columns:
+        joint, _, quantity = column.partition(' ')
+        kind = {'': POSITION, 'rate': RATE, 'effort': EFFORT}[quantity]
+        angular, linear = UNITS[kind]
+        unit = angular if turning[joint] else linear
+        for name in Statistics._fields:
+            yield f'{column} {name} [{unit}]'
+
+
+def _draw(scene: Scene, seconds: float, found: Mapping[int, Outcome], picture: Path) -> None:
+    """Draw the spread of the runs that succeeded."""
+    from linkage_ros.simulation.spread import draw_spread, JointSpread  # local import: matplotlib
+    import numpy as np  # local import: as above
+
+    good = [found[number] for number in sorted(found) if not found[number].failure]
+    turning = _turning(scene)
+    joints = [
+        JointSpread(
+            joint,
+            'rad' if turning[joint] else 'm',
+            np.array([outcome.positions[number] for outcome in good]),
+        )
+        for number, joint in enumerate(scene.joints)
+    ]
+    title = f'{scene.name}: {len(good)} runs of {seconds:g} s'
+    draw_spread(title, seconds, joints, picture)

@@ -22,9 +22,9 @@ from contextlib import suppress
 import re
 from typing import Any
 
-from linkage_ros.bag.definition import described, message_type
 from linkage_ros.bag.topic import INFINITE, QosProfile, Topic
 from linkage_ros.errors import LinkageError, quoted
+from linkage_ros.replay.topic_description import described, message_type
 from linkage_ros.resources import share_folders
 from rclpy.node import Node
 from rclpy.publisher import Publisher

@@ -38,8 +38,8 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import head_of, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.run_recording import RunSnapshots
-from linkage_ros.node.tick_loop import Counts, TickLoop
 from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageTick
+from linkage_ros.pipeline.tick_loop import Counts, TickLoop
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 if TYPE_CHECKING:

@@ -48,8 +48,8 @@ from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE, nearne
 from linkage_ros.node.real_time import RealTime, standstill
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
-from linkage_ros.node.tick_loop import Pace, TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.tick_loop import Pace, TickLoop
 from linkage_ros.replay.replay import own_joint_states
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.notes import scene_notes

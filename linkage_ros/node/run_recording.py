@@ -36,8 +36,8 @@ from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
-from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import LinkagePipeline
+from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.run_files import attachments, EXTRA, scene_files
 from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger

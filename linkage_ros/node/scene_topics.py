@@ -21,15 +21,15 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.bag.definition import message_type
 from linkage_ros.bag.topic import Topic
 from linkage_ros.messages.single_values import text_message
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.run_recording import DESCRIPTION
-from linkage_ros.node.tick_loop import RecordedTopics, Take
 from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.tick_loop import RecordedTopics, Take
 from linkage_ros.replay.replay import announced_text, change_text
 from linkage_ros.replay.run_files import EXTRA, scene_files
+from linkage_ros.replay.topic_description import message_type
 from linkage_ros.scene.scene import Scene
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node

@@ -25,10 +25,10 @@ import sys
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.cli.main import main
 from linkage_ros.errors import RecordingError
-from linkage_ros.node import simulated_run
-from linkage_ros.node.simulated_run import BEGIN, simulate
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
+from linkage_ros.simulation import run as simulated_run
+from linkage_ros.simulation.run import BEGIN, simulate
 import pytest
 
 SQUEEZER = str(Path(__file__).parents[2] / 'config' / 'scenes' / 'andrews_squeezer.yaml')

@@ -21,8 +21,8 @@ from linkage_ros.faults.freeze import FreezeParameters
 from linkage_ros.faults.injection import Change, Injection
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
-from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.tick_loop import TickLoop
 import pytest
 
 from ..support.scenes import scene_of

@@ -21,8 +21,8 @@ from math import pi, tau
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.node.diagnostics import DiagnosticsSummary, Snapshot, Warnings
-from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.scene.load import parse_scene
 import pytest
 from rosbags.typesys import get_typestore, Stores

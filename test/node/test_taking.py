@@ -24,8 +24,8 @@ from itertools import count
 
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.replay import own_joint_states
 from linkage_ros.scene.load import parse_scene
 import pytest

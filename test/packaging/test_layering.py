@@ -37,6 +37,7 @@ HEIGHTS = (
     ('scene',),
     ('pipeline',),
     ('replay', 'fmu'),
+    ('simulation',),
     ('cost', 'accuracy'),
     ('report',),
     ('view',),

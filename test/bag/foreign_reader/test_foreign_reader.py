@@ -28,7 +28,6 @@ from textwrap import dedent
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from linkage_ros.bag.definition import message_type
 from linkage_ros.bag.metadata import UNFINISHED_DATA
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.storage import Storage
@@ -38,10 +37,11 @@ from linkage_ros.cost import feed
 from linkage_ros.messages.single_values import text_message
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.run_recording import RunRecording
-from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.replay import change_text
 from linkage_ros.replay.run_files import EXTRA
+from linkage_ros.replay.topic_description import message_type
 from linkage_ros.scene.load import load_scene
 import numpy as np
 import pytest

@@ -28,7 +28,6 @@ from math import floor
 from pathlib import Path
 from typing import Any, cast, TYPE_CHECKING
 
-from linkage_ros.bag.definition import described, message_type
 from linkage_ros.bag.recorder import Recorder
 from linkage_ros.bag.run_events import WITH_THE_RUN
 from linkage_ros.bag.topic import QosProfile, Topic
@@ -36,10 +35,11 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.single_values import text_message
-from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.replay import change_text
 from linkage_ros.replay.run_files import attachments, EXTRA, scene_files
+from linkage_ros.replay.topic_description import described, message_type
 from linkage_ros.scene.scene import Scene
 
 if TYPE_CHECKING:

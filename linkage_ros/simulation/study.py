@@ -1,0 +1,368 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A study: a scene run many times, with other seeds and other values of its keys.
+
+A run depends on its scene alone, so that a study gives the same numbers on one processor, on many,
+and on the workers of a Dask scheduler. Each run is reduced where it runs: to a few numbers for
+each joint, and to its positions at some instants. So memory is bounded by the number of runs, not
+by their length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
+from functools import partial
+from itertools import product
+from math import inf, isfinite, sqrt
+from typing import NamedTuple
+
+from linkage_ros.effects.stage import SensorReading
+from linkage_ros.errors import LinkageError, quoted
+from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline
+from linkage_ros.pipeline.straight_tick import Numbers, Seen
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.simulation.run import check_simulated, times
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_RUNS = 100_000
+_MOST_VALUES = 20_000_000
+_MOST_INSTANTS, _FEWEST_INSTANTS = 200, 20
+_BLOCK = 4096
+QUANTITIES = ('', ' rate', ' effort')
+"""What a reading has of a joint: its position, its rate, its effort."""
+
+Settings = tuple[tuple[str, float], ...]
+
+
+class Sweep(NamedTuple):
+    """
+    A key of a scene and the values that it takes.
+
+    Attributes
+    ----------
+    key
+        As for ``--set``.
+    values
+        The values.
+
+    """
+
+    key: str
+    values: tuple[float, ...]
+
+
+class Study(NamedTuple):
+    """
+    What all runs of a study share.
+
+    Attributes
+    ----------
+    name, files, folder
+        The scene; see `linkage_ros.scene.load.parse_scene`.
+    seconds
+        Duration of a run, in [s].
+    instants
+        Number of instants at which positions are kept.
+
+    """
+
+    name: str
+    files: Mapping[str, bytes]
+    folder: str
+    seconds: float
+    instants: int
+
+
+class Statistics(NamedTuple):
+    """
+    One quantity of a joint over a run.
+
+    Attributes
+    ----------
+    least, most, mean, rms
+        In [rad] or [m], or per second, or [N·m] or [N]; not a number without a message.
+
+    """
+
+    least: float
+    most: float
+    mean: float
+    rms: float
+
+
+class Outcome(NamedTuple):
+    """
+    A run of a study.
+
+    Attributes
+    ----------
+    failure
+        Why it did not run; '' if it did.
+    ticks, messages
+        Number of ticks, and of those that published a joint state.
+    statistics
+        Under the heading of a quantity, in the order of the joints.
+    positions
+        Of each joint at the instants, in [rad] or [m]; not a number where nothing was published.
+
+    """
+
+    failure: str
+    ticks: int
+    messages: int
+    statistics: Mapping[str, Statistics]
+    positions: NDArray[np.float64]
+
+
+def sweep_of(text: str) -> Sweep:
+    """
+    Read KEY=LOW:HIGH:N or KEY=a,b,c.
+
+    Raises
+    ------
+    LinkageError
+        It is neither.
+
+    """
+    key, equals, values = text.partition('=')
+    low, *rest = values.split(':')
+    try:
+        if not key or not equals:
+            raise ValueError
+        if rest:
+            high, count = float(rest[0]), int(rest[1])
+            if len(rest) > 2 or count < 2:
+                raise ValueError
+            if count > MOST_RUNS:
+                raise _too_many(count)
+            first = float(low)
+            step = (high - first) / (count - 1)
+            found = (*(first + step * number for number in range(count - 1)), high)
+        else:
+            found = tuple(map(float, values.split(',')))
+        if not all(map(isfinite, found)):
+            raise ValueError
+    except (ValueError, IndexError):
+        raise LinkageError(
+            f'--sweep {quoted(text)}',
+            'is neither KEY=LOW:HIGH:N nor KEY=a,b,c',
+            'write numbers, as rate=100,1000 or loads.drive_inertia=1e-4:1e-3:10',
+        ) from None
+    if len(set(found)) < len(found):
+        raise LinkageError(f'--sweep {quoted(text)}', 'names a value twice', 'name each once')
+    return Sweep(key, found)
+
+
+def _too_many(count: int) -> LinkageError:
+    return LinkageError(
+        'the study', f'has {count:,} runs, more than {MOST_RUNS:,}', 'take fewer values or seeds'
+    )
+
+
+def runs_of(sweeps: Sequence[Sweep], seeds: int, seed: int) -> list[Settings]:
+    """
+    Return the settings of each run: every combination of the values, with every seed.
+
+    Raises
+    ------
+    LinkageError
+        There are too many, or a key is swept twice.
+
+    """
+    keys = [sweep.key for sweep in sweeps]
+    for key in keys:
+        if keys.count(key) > 1 or (key == 'seed' and seeds > 1):
+            raise LinkageError(f'--sweep {key}', 'is set twice', 'sweep each key once')
+    count = max(seeds, 1)
+    for sweep in sweeps:
+        count *= len(sweep.values)
+    if count > MOST_RUNS:
+        raise _too_many(count)
+    drawn = [('seed', [seed + number for number in range(seeds)])] if seeds > 1 else []
+    axes = [*((sweep.key, sweep.values) for sweep in sweeps), *drawn]
+    return [
+        tuple(zip([key for key, _ in axes], values, strict=True))
+        for values in product(*(values for _, values in axes))
+    ]
+
+
+def instants_of(runs: int, joints: int, ticks: int) -> int:
+    """Return at how many instants a study of this size keeps positions."""
+    room = _MOST_VALUES // max(1, runs * joints)
+    return min(ticks, max(_FEWEST_INSTANTS, min(_MOST_INSTANTS, room)))
+
+
+def run_one(study: Study, settings: Settings) -> Outcome:
+    """Run a study's scene with settings; a scene that cannot run is an outcome, not an error."""
+    try:
+        written = [f'{key}={value!r}' for key, value in settings]
+        scene = parse_scene(
+            study.name, study.name, study.files, study.folder,
+            trust_effects=True, settings=written,
+        )  # fmt: skip
+        ticks = check_simulated(scene, study.seconds)
+        pipeline = Pipeline(scene)
+    except LinkageError as error:
+        return Outcome(str(error), 0, 0, {}, np.empty((0, 0)))
+    return _reduced(pipeline, times(scene, ticks), study.instants)
+
+
+def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
+    """Tick a pipeline, and keep of it what a study needs."""
+    lines, injection = pipeline.lines, pipeline.injection
+    joints = [line.member.joints for line in lines]
+    firsts = [sum(map(len, joints[:number])) for number in range(len(joints))]
+    reduced = {
+        (number, quantity): _Reduction(len(joints[number]))
+        for number in range(len(lines))
+        for quantity in QUANTITIES
+    }
+    kept = np.full((sum(map(len, joints)), instants), np.nan)
+    last = max(1, instants - 1)
+    wanted = {round(number * (len(at) - 1) / last): number for number in range(instants)}
+    messages = 0
+    for number, time in enumerate(at):
+        now = time
+        if injection is not None:
+            injection.advance(time)
+            now = injection.clock(time)
+        tick = pipeline.tick(now)
+        messages += bool(tick.message)
+        place = wanted.get(number)
+        for which, seen in enumerate(tick.seen):
+            reading = _reading(seen)
+            if reading is None:
+                continue
+            values = (reading.joints, reading.rates, reading.efforts)
+            for quantity, of_all in zip(QUANTITIES, values, strict=True):
+                if of_all:
+                    reduced[which, quantity].add(of_all)
+            if place is not None:
+                kept[firsts[which] : firsts[which] + len(reading.joints), place] = reading.joints
+    statistics = {
+        f'{joint}{quantity}': one
+        for (which, quantity), reduction in reduced.items()
+        for joint, one in zip(joints[which], reduction.statistics(), strict=False)
+    }
+    return Outcome('', len(at), messages, statistics, kept)
+
+
+def _reading(seen: LinkageTick | Seen | Numbers) -> SensorReading | None:
+    """Return the reading of a linkage at a tick; None without one."""
+    if isinstance(seen, LinkageTick | Seen):
+        return seen.reading
+    _, numbers, _ = seen
+    return None if numbers is None else SensorReading(*numbers)
+
+
+class _Reduction:
+    """
+    Least, greatest and mean values of many rows, in little memory.
+
+    Parameters
+    ----------
+    width
+        Number of values of a row.
+
+    """
+
+    def __init__(self, width: int) -> None:
+        self._rows: list[Sequence[float]] = []
+        self._count = 0
+        self._least, self._most = np.full(width, inf), np.full(width, -inf)
+        self._sum, self._squares = np.zeros(width), np.zeros(width)
+
+    def add(self, row: Sequence[float]) -> None:
+        """Take a row."""
+        self._rows.append(row)
+        if len(self._rows) == _BLOCK:
+            self._flush()
+
+    def statistics(self) -> list[Statistics]:
+        """Return the statistics of each column; none without rows."""
+        self._flush()
+        if not self._count:
+            return []
+        columns = zip(self._least, self._most, self._sum, self._squares, strict=True)
+        return [
+            Statistics(
+                float(least), float(most), float(total) / self._count,
+                sqrt(float(squares) / self._count),
+            )
+            for least, most, total, squares in columns
+        ]  # fmt: skip
+
+    def _flush(self) -> None:
+        if not self._rows:
+            return
+        block = np.array(self._rows)
+        self._count += len(block)
+        self._least = np.minimum(self._least, block.min(axis=0))
+        self._most = np.maximum(self._most, block.max(axis=0))
+        self._sum += block.sum(axis=0)
+        self._squares += (block * block).sum(axis=0)
+        self._rows.clear()
+
+
+def outcomes(
+    study: Study, runs: Sequence[Settings], workers: int, dask: str = ''
+) -> Iterator[tuple[int, Outcome]]:
+    """
+    Yield the number of each run and its outcome, in the order in which they end.
+
+    Parameters
+    ----------
+    study, runs
+        The study and the settings of its runs.
+    workers
+        Number of processes here.
+    dask
+        Address of a Dask scheduler whose workers run them instead; '' for none.
+
+    Raises
+    ------
+    LinkageError
+        The workers failed.
+
+    """
+    work = partial(_numbered, study)
+    parts = enumerate(runs)
+    if dask:
+        from linkage_ros.synthesis.study import results_of  # local import: only with Dask
+
+        with closing(results_of(work, lambda _threads: parts, dask)) as results:
+            yield from (result for _, result in results)
+    elif workers == 1:
+        yield from map(work, parts)
+    else:
+        with ProcessPoolExecutor(workers) as pool:
+            try:
+                yield from pool.map(work, parts, chunksize=max(1, len(runs) // (8 * workers)))
+            except BrokenProcessPool:
+                raise LinkageError(
+                    'the study', 'a process of it was killed', 'take fewer --workers or runs'
+                ) from None
+            finally:
+                pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _numbered(study: Study, part: tuple[int, Settings]) -> tuple[int, Outcome]:
+    number, settings = part
+    return number, run_one(study, settings)
