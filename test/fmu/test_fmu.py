@@ -422,10 +422,11 @@ def test_a_seed_out_of_bounds_fails_every_step(seed, bench):
 
 
 def test_without_this_package_the_fmu_says_what_it_needs(tmp_path, monkeypatch):
+    file = _opened('bare', tmp_path)
     monkeypatch.setitem(sys.modules, 'linkage_ros.fmu.slave', None)
     logged: list[tuple[int, str]] = []
     with pytest.raises(Exception, match='instantiate'):
-        Bench(_opened('bare', tmp_path), tmp_path / 'extracted', logged)
+        Bench(file, tmp_path / 'extracted', logged)
     ((_, text),) = logged
     assert f'linkage_ros {__version__} is needed in this Python' in text
 
