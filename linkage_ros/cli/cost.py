@@ -86,6 +86,14 @@ EVERY_DRIVE = {
 }
 """Every drive with its parameters, moving the shipped four-bar."""
 
+EVERY_LOAD = {
+    'joint_springs': '{rocker_joint: {stiffness: 0.01, free: 1.5}}',
+    'stops': '{rocker_joint: {stiffness: 50}}',
+    'efforts': '{rocker_joint: {over_position: [[1, 0], [1.5, 0.01], [2, 0]]}}',
+    'forces': '{coupler.P: {direction: [0, -1], constant: 0.1}}',
+}
+"""Every load on joints and points, on the shipped four-bar; its rocker gets limits."""
+
 EVERY_FAULT = {
     'time_jump': '{by: 1.0}',
     'not_a_number': '{}',
@@ -107,7 +115,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     one.add_argument(
         '--all',
         action='store_true',
-        help='every effect, drive and fault, alone, on the four-bar that is shipped',
+        help='every effect, drive, load and fault, alone, on the four-bar that is shipped',
     )
     parser.add_argument(
         '--ticks',
@@ -161,12 +169,15 @@ class Costs(NamedTuple):
         What each drive takes beyond the topic drive; empty unless all are measured.
     faults
         What each fault takes while it is not injected; empty unless all are measured.
+    loads
+        What each load takes under the torque drive; empty unless all are measured.
 
     """
 
     scene: SceneCost
     drives: Mapping[str, Times] = MappingProxyType({})
     faults: Mapping[str, Times] = MappingProxyType({})
+    loads: Mapping[str, Times] = MappingProxyType({})
 
 
 def all_effects(
@@ -174,15 +185,12 @@ def all_effects(
     stopped: Callable[[], bool] = lambda: False,
     advance: ProgressCallback = lambda _done, _of: None,
 ) -> Costs | None:
-    """Measure every effect, drive and fault alone on the four-bar; return None if stopped."""
+    """Measure all effects, drives, loads and faults on the four-bar; return None if stopped."""
 
-    def first(done: int, of: int) -> None:
-        advance(done, 2 * of)
+    def part(number: int) -> ProgressCallback:
+        return lambda done, of: advance(number * of + done, 3 * of)
 
-    def second(done: int, of: int) -> None:
-        advance(of + done, 2 * of)
-
-    cost = measure(every_effect(), ticks, leave_out=False, stopped=stopped, progress=first)
+    cost = measure(every_effect(), ticks, leave_out=False, stopped=stopped, progress=part(0))
     if cost is None:
         return None
     with TemporaryDirectory() as folder:
@@ -191,10 +199,13 @@ def all_effects(
         drives = {name: _of_four_bar(_with_drive(name), folder) for name in EVERY_DRIVE}
         del drives['topic']
         faults = {name: _of_four_bar(_with_fault(name)) for name in EVERY_FAULT}
-        found = compare(bare, {**drives, **faults}, ticks, stopped=stopped, progress=second)
-    if found is None:
+        found = compare(bare, {**drives, **faults}, ticks, stopped=stopped, progress=part(1))
+    loaded = {name: _of_four_bar(_with_load(name)) for name in EVERY_LOAD}
+    under_torque = _of_four_bar(_with_drive('torque'))
+    loads = compare(under_torque, loaded, ticks, stopped=stopped, progress=part(2))
+    if found is None or loads is None:
         return None
-    return Costs(cost, {name: found[name] for name in drives}, {n: found[n] for n in faults})
+    return Costs(cost, {n: found[n] for n in drives}, {n: found[n] for n in faults}, loads)
 
 
 def account_of(costs: Costs) -> dict[str, Any]:
@@ -217,6 +228,7 @@ def account_of(costs: Costs) -> dict[str, Any]:
             for effect in cost.effects
         ],
         'drives': {name: _times_account(times) for name, times in costs.drives.items()},
+        'loads': {name: _times_account(times) for name, times in costs.loads.items()},
         'faults': {name: _times_account(times) for name, times in costs.faults.items()},
     }
 
@@ -232,12 +244,19 @@ def every_effect() -> Scene:
 
 def _of_four_bar(text: str, folder: str = '') -> Scene:
     linkage = shipped('linkages/four_bar.yaml').read_bytes()
+    if 'stops: ' in text:
+        linkage = linkage.replace(b'child: rocker}', b'child: rocker, limits: [0.5, 2.6]}')
     return parse_scene(ALL, ALL, {SCENE_FILE: text.encode(), LINKAGE_FILE: linkage}, folder)
 
 
 def _with_drive(name: str) -> str:
     """Return a scene of one drive; all publish the input, as every drive but a topic does."""
     return f'linkage: four_bar.yaml\npublish_input: true\ndrive: {{{name}: {EVERY_DRIVE[name]}}}\n'
+
+
+def _with_load(name: str) -> str:
+    """Return a scene of one load, under torque."""
+    return f'{_with_drive("torque")}loads: {{{name}: {EVERY_LOAD[name]}}}\n'
 
 
 def _with_fault(name: str) -> str:
@@ -282,7 +301,7 @@ def table_of_scene(title: str, cost: SceneCost, ticks: int) -> Table:
 
 
 def table_of_all(costs: Costs, ticks: int) -> Table:
-    """Return the table of all effects, drives and faults, each alone beside the bare scene."""
+    """Return the table of all effects, drives, loads and faults, each alone."""
     cost = costs.scene
     rows = [
         (
@@ -295,6 +314,7 @@ def table_of_all(costs: Costs, ticks: int) -> Table:
     ]
     for found, beside in (
         (costs.drives, 'in the place of topic'),
+        (costs.loads, 'under torque'),
         (costs.faults, 'not injected'),
     ):
         rows += [
@@ -303,7 +323,7 @@ def table_of_all(costs: Costs, ticks: int) -> Table:
         ]
     bare = f'{cost.bare.median:.2f}', f'{cost.bare.p99:.2f}', '1.00'
     return Table(
-        f'Every effect, drive and fault, alone, on the four-bar: {ticks} ticks each',
+        f'Every effect, drive, load and fault, alone, on the four-bar: {ticks} ticks each',
         ('', '>median [µs]', '>p99 [µs]', '>in bare ticks', 'with'),
         [('a tick without effects', *bare, ''), *rows],
     )

@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields
 from importlib.util import module_from_spec, spec_from_file_location
 from itertools import islice
 import json
@@ -38,6 +39,7 @@ from linkage_ros.cost import (
     Variants,
 )
 from linkage_ros.drives.drive import DRIVES
+from linkage_ros.dynamics.loads import AppliedLoads
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import LinkageError
 from linkage_ros.faults.fault import FAULTS
@@ -64,6 +66,7 @@ EVERYTHING = [
     'a tick without effects',
     *EFFECTS,
     *(drive for drive in DRIVES if drive != 'topic'),
+    *command.EVERY_LOAD,
     *FAULTS,
 ]
 """The rows of the table of all: the bare tick is one by the topic drive."""
@@ -264,7 +267,7 @@ def test_json_of_a_scene_has_the_documented_keys_in_microseconds(capsys):
     assert account['ticks'] == FEW
     assert set(account['whole_tick']) == {'median_us', 'p99_us', 'low_us', 'high_us'}
     assert account['whole_tick']['median_us'] > 0.0
-    assert (account['drives'], account['faults']) == ({}, {})
+    assert (account['drives'], account['loads'], account['faults']) == ({}, {}, {})
     scene = load_scene(CONFIG / 'scenes' / 'demo.yaml')
     assert set(scene.members[0].effects) <= {effect['name'] for effect in account['effects']}
 
@@ -289,6 +292,7 @@ def test_all_means_all():
     (member,) = command.every_effect().members
     assert list(member.effects) == list(EFFECTS)
     assert list(command.EVERY_DRIVE) == list(DRIVES)
+    assert list(command.EVERY_LOAD) == [entry.name for entry in fields(AppliedLoads)]
     assert list(command.EVERY_FAULT) == list(FAULTS)
     table = command.table_of_all(command.all_effects(FEW), FEW)
     assert [row[0] for row in table.rows] == EVERYTHING
