@@ -53,7 +53,7 @@ from linkage_ros.simulation.study import (
     sweep_of,
 )
 
-EXAMPLE = 'linkage simulate andrews_squeezer --seconds 0.03 -o squeezer.csv'
+EXAMPLE = 'linkage simulate torque_crank --seconds 1 -o my_run.csv'
 
 _MOST_NAMED = 3
 """Runs that failed and are named."""

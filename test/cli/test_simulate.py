@@ -25,14 +25,12 @@ import sys
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.cli.main import main
 from linkage_ros.errors import RecordingError
+from linkage_ros.messages.joint_state import JointStateReader
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from linkage_ros.simulation import run as simulated_run
 from linkage_ros.simulation.run import BEGIN, simulate
 import pytest
-
-SQUEEZER = str(Path(__file__).parents[2] / 'config' / 'scenes' / 'andrews_squeezer.yaml')
-
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 
@@ -94,15 +92,21 @@ def test_ticks_are_those_of_the_pipeline_at_whole_nanoseconds(tmp_path):
     assert found == expected
 
 
-def test_the_squeezer_comes_out_as_the_test_set_says(tmp_path):
-    # Test Set for IVP Solvers, Bari, "Andrews' squeezing mechanism", after 0.03 s.
-    file = tmp_path / 'squeezer.csv'
-    assert main(['simulate', SQUEEZER, '--seconds', '0.03', '-o', str(file)]) == 0
+def test_a_table_has_the_ticks_of_the_bag(tmp_path):
+    file = tmp_path / 'run.csv'
+    assert main(['simulate', 'torque_crank', '--seconds', '0.03', '-o', str(file)]) == 0
+    assert (
+        main(['simulate', 'torque_crank', '--seconds', '0.03', '-o', str(tmp_path / 'bag')]) == 0
+    )
+    reader = JointStateReader(['crank_joint'])
+    states = [reader.read(data) for *_, data in messages_of(tmp_path / 'bag')]
     with file.open(newline='') as lines:
-        *_, last = csv.DictReader(lines)
-    assert float(last['time [s]']) == 0.03
-    assert float(last['beta [rad]']) == pytest.approx(15.81077119629904, abs=1e-8)
-    assert float(last['epsilon [rad]']) == pytest.approx(1.048080741042263, abs=1e-8)
+        rows = list(csv.DictReader(lines))
+    assert len(rows) == 31
+    assert float(rows[-1]['time [s]']) == 0.03
+    for row, state in zip(rows, states, strict=True):
+        assert float(row['crank_joint [rad]']) == state.angles[0]
+        assert float(row['crank_joint rate [rad/s]']) == state.rates[0]
 
 
 def test_nothing_of_rclpy_is_imported(tmp_path):

@@ -34,15 +34,13 @@ from linkage_ros.dynamics.loads import (
 )
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene
 import pytest
 from scipy.integrate import solve_ivp
 
 from .loaded import closed, everywhere, STATES, swing
 from ..support.scenes import PENDULUM, pipeline_of
 
-SCENES = Path(__file__).parents[2] / 'config' / 'scenes'
+LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 MS = 1_000_000
 BEGIN = 1_700_000_000_000 * MS
 INERTIA = 0.05 + 2.0 * 0.3**2
@@ -326,10 +324,21 @@ SQUEEZED = {
 }  # fmt: skip
 
 
-def test_the_squeezer_ends_where_the_test_set_says():
-    scene = load_scene(SCENES / 'andrews_squeezer.yaml')
-    (line,) = Pipeline(scene).lines
-    for tick in range(301):
-        seen = line.see(BEGIN + tick * MS // 10)
-    found = dict(zip(scene.joints, seen.reading.joints, strict=True))
+SQUEEZER = """
+rate: 1000
+drive: {torque: {start: -0.0617138900142764, method: METHOD, step: STEP}}
+loads:
+  springs: {spring: {from: ground.C, to: K3.D, stiffness: 4530, free_length: 0.07785}}
+  efforts: {beta: {constant: 0.033}}
+"""
+
+
+@pytest.mark.parametrize(('method', 'step'), [('rk4', '1.0e-5'), ('gauss_legendre', '1.0e-4')])
+def test_the_squeezer_ends_where_the_test_set_says(method, step):
+    text = SQUEEZER.replace('METHOD', method).replace('STEP', step)
+    linkage = (LINKAGES / 'andrews_squeezer.yaml').read_bytes()
+    (line,) = pipeline_of(text, linkage).lines
+    for tick in range(31):
+        seen = line.see(BEGIN + tick * MS)
+    found = dict(zip(line.member.joints, seen.reading.joints, strict=True))
     assert found == pytest.approx(SQUEEZED, abs=1e-8)
