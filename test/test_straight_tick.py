@@ -134,6 +134,29 @@ def test_both_publish_the_same_forces(file):
         check(text, f'{DRIVES["carried"]}\n{scene}', looked=20)
 
 
+@pytest.mark.parametrize('name', ['four_bar', 'five_bar'])
+def test_both_carry_an_estimated_acceleration(name):
+    file = ROOT / 'config' / 'linkages' / f'{name}.yaml'
+    drive = 'rate: 100\ndrive: {topic: {acceleration: differenced, cutoff: 20}}'
+    check(file.read_bytes(), f'{drive}\neffects: {{velocity: {{}}, acceleration: {{}}}}')
+
+
+@pytest.mark.parametrize('effects', FORCES)
+def test_both_bear_the_same_loads_on_joints_and_points(effects):
+    linkage = (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes()
+    friction = '{B: {coulomb: 0.1, breakaway: 0.2, stribeck: 1}}, holds: true'
+    effects = f'{effects[:-1]}, friction: {{joints: {friction}}}}}'
+    loads = """
+publish_input: true
+loads:
+  joint_springs: {rocker_joint: {stiffness: 0.3, free: 1.5, damping: 0.01}}
+  efforts:
+    rocker_joint: {over_position: [[1, 0], [1.5, 0.2], [2, 0]], over_rate: [[-9, 1], [9, 2]]}
+  forces: {coupler.P: {direction: [1, -1], frame: link, constant: 2}}
+"""
+    check(linkage, f'{DRIVES["carried"]}\n{loads}effects: {effects}')
+
+
 def test_a_spring_whose_ends_meet_is_left_to_the_plain_steps():
     linkage, _ = with_masses(ROOT / 'config' / 'linkages' / 'four_bar.yaml')
     # Where the crank is along the ground, as it is at the first tick.

@@ -13,15 +13,27 @@
 # limitations under the License.
 
 
-"""Drive from a topic: the newest measured sample, extrapolated by its rate."""
+"""
+Drive from a topic: the newest measured sample, extrapolated by its rate.
+
+A JointState has no accelerations. With ``acceleration: differenced`` they come from the rates of
+the samples: their backward difference d = (ω − ω₋₁)/Δt, and behind it a low-pass of order one,
+
+    α ← α + (1 − e^(−2π·cutoff·Δt))·(d − α)
+
+which is exact for a d that is held over the time Δt between both stamps. The difference lags by
+half an interval, the low-pass by 1/(2π·cutoff) (A. V. Oppenheim, R. W. Schafer, Discrete-Time
+Signal Processing, 3rd ed., 2010, ch. 7).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import expm1, isfinite, tau
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
-from linkage_ros.files.parameters import flag, number
+from linkage_ros.errors import DefinitionError
+from linkage_ros.files.parameters import choice, flag, number
 from linkage_ros.generated_code import Lines
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
@@ -54,6 +66,14 @@ class TopicParameters:
         least=0.0,
         most=3600.0,
     )
+    acceleration: str = choice(
+        "the crank's acceleration: zero, or the differences of the samples' rates",
+        ('zero', 'differenced'),
+        'zero',
+    )
+    cutoff: float = number(
+        'of the low-pass behind the differences; 0: none', 0.0, unit='Hz', least=0.0, most=1e6
+    )
 
 
 PARAMETERS = TopicParameters
@@ -65,7 +85,19 @@ def reader(context: Context) -> Reader:
 
 
 def build(parameters: TopicParameters, context: Context) -> TopicDrive:
-    """Build the drive."""
+    """
+    Build the drive.
+
+    Raises
+    ------
+    DefinitionError
+        A low-pass has nothing to filter.
+
+    """
+    if parameters.cutoff and parameters.acceleration == 'zero':
+        raise DefinitionError(
+            'drive.topic.cutoff', 'filters nothing', 'add acceleration: differenced'
+        )
     return TopicDrive(parameters, context.needs_rate)
 
 
@@ -76,8 +108,8 @@ class TopicDrive(Drive):
     """
     Drive that keeps the newest good sample only.
 
-    A JointState has no accelerations: those of the crank state are 0, as the extrapolation at
-    constant rate implies.
+    The crank's acceleration is 0, as the extrapolation at constant rate implies. If it is
+    estimated, the crank is carried forward with it, rates included.
 
     Parameters
     ----------
@@ -89,18 +121,28 @@ class TopicDrive(Drive):
 
     """
 
-    __slots__ = ('_carry_forward', '_max_lead', '_needs_rate', 'max_age', 'sample')
+    __slots__ = (
+        '_bend',
+        '_carry_forward',
+        '_estimate',
+        '_max_lead',
+        '_needs_rate',
+        'max_age',
+        'sample',
+    )
 
     max_age: int
     """Age of the newest sample above which there is no crank state, in [ns]."""
     sample: tuple[int, _Values, _Values, _Values] | None
-    """The newest good sample: its stamp, in [ns], angles, rates, and zeros as accelerations."""
+    """The newest good sample: its stamp, in [ns], angles, rates, and accelerations."""
 
     def __init__(self, use: TopicParameters, needs_rate: bool) -> None:
         self._carry_forward = use.carry_forward
         self.max_age = round(use.max_age * NANOSECONDS)
         self._max_lead = round(use.max_lead * NANOSECONDS)
-        self._needs_rate = needs_rate or use.carry_forward
+        self._estimate = use.acceleration == 'differenced'
+        self._bend = -tau * use.cutoff
+        self._needs_rate = needs_rate or use.carry_forward or self._estimate
         self.sample = None
 
     @property
@@ -136,25 +178,48 @@ class TopicDrive(Drive):
             return Rejection.STAMP_FUTURE
         if self.sample is not None and stamp < self.sample[0]:
             return Rejection.STAMP_OLD
-        self.sample = (stamp, angles, rates, zeros)
+        self.sample = (stamp, angles, rates, self._bent(stamp, rates) if self._estimate else zeros)
         return None
+
+    def _bent(self, stamp: int, rates: _Values) -> _Values:
+        """Return the accelerations at a new sample; 0 at the first one, and after a gap."""
+        if self.sample is None or stamp - self.sample[0] > self.max_age:
+            return (0.0,) * len(rates)
+        before, _, earlier, bent = self.sample
+        if stamp == before:
+            return bent
+        seconds = (stamp - before) * 1e-9
+        share = -expm1(self._bend * seconds) if self._bend else 1.0
+        found = tuple(
+            [
+                a + share * ((rate - old) / seconds - a)
+                for rate, old, a in zip(rates, earlier, bent, strict=True)
+            ]
+        )
+        return found if all(-LARGEST <= a <= LARGEST for a in found) else (0.0,) * len(rates)
 
     def state(self, now: int) -> CrankState | None:
         """Return the crank state at a time, in [ns]; None if the newest sample is too old."""
         if self.sample is None:
             return None
-        stamp, angles, rates, zeros = self.sample
+        stamp, angles, rates, accelerations = self.sample
         age = now - stamp
         if age > self.max_age:
             return None
-        if self._carry_forward:
+        if self._carry_forward and self._estimate:
+            seconds = age * 1e-9
+            half = 0.5 * seconds
+            three = [*zip(angles, rates, accelerations, strict=True)]
+            angles = tuple([q + (w + a * half) * seconds for q, w, a in three])
+            rates = tuple([w + a * seconds for _, w, a in three])
+        elif self._carry_forward:
             seconds = age * 1e-9
             if len(angles) == 1:  # a loop over one takes five times as long
                 angles = (angles[0] + rates[0] * seconds,)
             else:
                 pairs = zip(angles, rates, strict=True)
                 angles = tuple([angle + rate * seconds for angle, rate in pairs])
-        return CrankState(angles, rates, zeros, age)
+        return CrankState(angles, rates, accelerations, age)
 
     def straight(self, inputs: int, leave: str) -> Lines:
         """Return `state` as generated lines, without a function call."""
@@ -166,7 +231,19 @@ class TopicDrive(Drive):
             f'if age > {self.max_age}:',
             f'    {leave}',
         ]
-        if self._carry_forward:
+        if self._carry_forward and self._estimate:
+            carried = [
+                f'angles[{i}] + (rates[{i}] + accelerations[{i}] * half) * seconds,'
+                for i in range(inputs)
+            ]
+            faster = [f'rates[{i}] + accelerations[{i}] * seconds,' for i in range(inputs)]
+            lines += [
+                'seconds = age * 1e-9',
+                'half = 0.5 * seconds',
+                f'angles = ({" ".join(carried)})',
+                f'rates = ({" ".join(faster)})',
+            ]
+        elif self._carry_forward:
             carried = [f'angles[{i}] + rates[{i}] * seconds,' for i in range(inputs)]
             lines += ['seconds = age * 1e-9', f'angles = ({" ".join(carried)})']
         return Lines(lines, {'drive': self})

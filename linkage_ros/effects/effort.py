@@ -18,7 +18,7 @@ Effort of the drive for the motion, by virtual work (inverse dynamics).
 
 It covers the inertia of links and drive, gravity, springs and friction: see
 `linkage_ros.dynamics.mechanics` for the equation and its source. It uses the crank's acceleration
-from the drive; a topic has none, so there it counts as 0. Under the torque drive, the effort is
+from the drive; that of a topic counts as 0 unless it is estimated. Under the torque drive, the effort is
 the one that causes the motion; where the linkage sticks or rests at a stop, this is not the
 commanded one.
 
