@@ -22,6 +22,7 @@ from importlib import import_module
 import re
 
 from linkage_ros.drives.drive import DRIVES
+from linkage_ros.dynamics.loads import JointFriction
 from linkage_ros.effects.backlash import BacklashParameters
 from linkage_ros.effects.bias import BiasParameters
 from linkage_ros.effects.clearance import ClearanceParameters
@@ -29,7 +30,7 @@ from linkage_ros.effects.compliance import ComplianceParameters
 from linkage_ros.effects.delay import DelayParameters
 from linkage_ros.effects.dropout import DropoutParameters
 from linkage_ros.effects.encoder import EncoderParameters, JointEncoder
-from linkage_ros.effects.friction import FrictionParameters, OneJoint
+from linkage_ros.effects.friction import FrictionParameters
 from linkage_ros.effects.jitter import JitterParameters
 from linkage_ros.effects.noise import JointNoise, NoiseParameters
 from linkage_ros.effects.rate_limit import RateLimitParameters
@@ -62,7 +63,11 @@ READ = [
         # B is a pin too: of the rod and the block that the slot in the cylinder stands for.
         '{joints: {A: {viscous: 0.002}, B: {coulomb: 0.1}, cylinder: {viscous: 3, coulomb: 4}}}',
         FrictionParameters(
-            {'A': OneJoint(0.002), 'B': OneJoint(0.0, 0.1), 'cylinder': OneJoint(3.0, 4.0)}
+            {
+                'A': JointFriction(0.002),
+                'B': JointFriction(0.0, 0.1),
+                'cylinder': JointFriction(3.0, 4.0),
+            }
         ),
     ),
     (

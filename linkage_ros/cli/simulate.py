@@ -73,9 +73,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         '--output',
-        type=Path,
+        type=_output,
         required=True,
-        metavar='OUTPUT',
+        metavar='FOLDER|OUTPUT',
         help='folder of a new bag; or a table of the joints, OUTPUT.csv or OUTPUT.parquet; of a '
         'study a table of its runs, or a picture of the spread, OUTPUT.png, .svg or .pdf',
     )
@@ -97,6 +97,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--workers', type=bounded(1, 1024, int), help='processes (default: one a processor)'
     )
     study.add_argument('--dask', metavar='ADDRESS', default='', help='scheduler whose workers run')
+
+
+def _output(text: str) -> Path:
+    """Read the name of a folder, which has no suffix, or of a table or picture."""
+    file = Path(text)
+    if file.suffix:
+        check_suffix(file, (*KINDS, *PICTURES))
+    return file
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
@@ -156,7 +164,7 @@ def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str,
 def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) -> int:
     """Run a study; return 1 if a signal stopped it, or no run succeeded."""
     output: Path = arguments.output
-    check_suffix(output, (*KINDS, *PICTURES))
+    check_suffix(output, (*KINDS, *PICTURES))  # not a folder
     pictures = [file for file in (output, arguments.picture) if file and file.suffix not in KINDS]
     if pictures:
         check_suffix(pictures[-1], PICTURES)

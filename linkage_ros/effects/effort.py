@@ -18,9 +18,9 @@ Effort of the drive for the motion, by virtual work (inverse dynamics).
 
 It covers the inertia of links and drive, gravity, springs and friction: see
 `linkage_ros.dynamics.mechanics` for the equation and its source. It uses the crank's acceleration
-from the drive; that of a topic counts as 0 unless it is estimated. Under the torque drive, the effort is
-the one that causes the motion; where the linkage sticks or rests at a stop, this is not the
-commanded one.
+from the drive; that of a topic counts as 0 unless it is estimated. Under the torque drive, the
+effort is the one that causes the motion; where the linkage sticks or rests at a stop, this is not
+the commanded one.
 
 After backlash, a motor that moves within the play pushes nothing. Friction holds the crank, and
 the effort of that drive is for its own inertia only: drive_inertia·φ̈, with φ̈ of the motor.

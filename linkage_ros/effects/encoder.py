@@ -41,7 +41,12 @@ with Δt the time since its last reading: at the last tick, or at the last sampl
 They are 0 at its first reading, and unchanged if no time has passed. They are whole multiples of
 q/Δt (R. H. Brown, S. C. Schneider and M. G. Mulligan, Analysis of algorithms for velocity
 estimation from discrete position versus time data, IEEE Transactions on Industrial Electronics 39,
-1992). Turns and the step of y at the index mark are no motion, and not part of them. ``exact``
+1992), unless a driver smooths them by a low-pass of order one with the frequency ``cutoff``::
+
+    v ← v + (1 − e^(−2π·cutoff·Δt))·(d − v)
+
+which is exact for a difference d that is held over Δt. Turns and the step of y at the index mark
+are no motion, and not part of them. ``exact``
 leaves the rates unchanged. A reading without rates gets none. Accelerations, efforts, and joints
 without an encoder are unchanged.
 """
@@ -50,7 +55,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import floor, tau
+from math import expm1, floor, tau
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Sensor, SensorReading
@@ -86,6 +91,13 @@ class EncoderParameters:
         ('differenced', 'exact'),
         'differenced',
     )
+    cutoff: float = number(
+        'of a low-pass of order one behind the differences; 0: none',
+        0.0,
+        unit='Hz',
+        least=0.0,
+        most=1e6,
+    )
 
 
 PARAMETERS = EncoderParameters
@@ -98,9 +110,13 @@ def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
     Raises
     ------
     DefinitionError
-        An absolute encoder has ``index: false``.
+        An absolute encoder has ``index: false``, or a low-pass has no differences to smooth.
 
     """
+    if parameters.cutoff and parameters.rates == 'exact':
+        raise DefinitionError(
+            'effects.encoder.cutoff', 'smooths differences', 'leave it or rates: exact out'
+        )
     counters = []
     for place, (joint, turns) in enumerate(
         zip(context.joints, context.closure.turning, strict=True)
@@ -122,7 +138,7 @@ def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
                 else f'{joint} is a slide and has no turns',
                 'leave it out',
             )
-        counters.append((place, Counter(encoder, turns)))
+        counters.append((place, Counter(encoder, turns, parameters.cutoff)))
     return Encoder(tuple(counters), parameters.rates == 'differenced')
 
 
@@ -136,18 +152,22 @@ class Counter:
         Parameters of the encoder.
     turns
         Whether the joint is an angle.
+    cutoff
+        Of the low-pass of its rate, in [Hz]; 0 for none.
 
     """
 
     __slots__ = (
-        '_begin', '_counts', '_encoder', '_in_a_turn', '_last', '_read', '_span', '_turns', 'rate',
+        '_begin', '_counts', '_cutoff', '_encoder', '_in_a_turn', '_last', '_read', '_span',
+        '_turns', 'rate',
     )  # fmt: skip
 
     rate: float
     """Rate that a driver computes from the counts, in [rad/s] or [m/s]."""
 
-    def __init__(self, encoder: JointEncoder, turns: bool) -> None:
+    def __init__(self, encoder: JointEncoder, turns: bool, cutoff: float = 0.0) -> None:
         self._encoder = encoder
+        self._cutoff = cutoff
         self._turns = turns
         self._in_a_turn = turns and not (encoder.incremental or encoder.multi_turn)
         # Counts and the range of n counts: (k*tau)/n is more exact than k times a rounded
@@ -177,7 +197,10 @@ class Counter:
         """Return the rate that a driver computes, so many [ns] after its last reading."""
         if self._read is not None and self._last is not None and elapsed > 0:
             moved = self._last - self._read
-            self.rate = moved * self._span / (self._counts * elapsed * 1e-9)
+            rate = moved * self._span / (self._counts * elapsed * 1e-9)
+            if self._cutoff:
+                rate = self.rate - expm1(-tau * self._cutoff * elapsed * 1e-9) * (rate - self.rate)
+            self.rate = rate
         self._read = self._last
         return self.rate
 

@@ -255,7 +255,8 @@ def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
                 if of_all:
                     reduced[which, quantity].add(of_all)
             if place is not None:
-                kept[firsts[which] : firsts[which] + len(reading.joints), place] = reading.joints
+                rows = slice(firsts[which], firsts[which] + len(reading.joints))
+                kept[rows, place] = reading.joints
     statistics = {
         f'{joint}{quantity}': one
         for (which, quantity), reduction in reduced.items()

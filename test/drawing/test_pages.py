@@ -137,6 +137,8 @@ def test_a_scene_is_a_scene_and_has_what_its_section_is_about(section):
     (member,) = scene.members
     if section.name == 'Faults':
         assert {fault.kind for fault in scene.faults.values()} == set(FAULTS)
+    elif section.name == 'loads':
+        assert member.loads.applied
     else:
         assert section.name in (member.drive[0], *member.effects)
 
@@ -144,7 +146,7 @@ def test_a_scene_is_a_scene_and_has_what_its_section_is_about(section):
 def test_the_page_says_what_each_is_held_against_and_where():
     section = BY_NAME['What each is held against']
     rows = [line.strip('| ').split(' | ') for line in section.text.splitlines() if line[:1] == '|']
-    assert [name for name, _, _ in rows[2:]] == [*DRIVES, *EFFECTS, *FAULTS]
+    assert [name for name, _, _ in rows[2:]] == [*DRIVES, 'loads', *EFFECTS, *FAULTS]
     for name, _, tests in rows[2:]:
         files = re.findall(r'\]\(\.\./(test/\S+\.py)\)', tests)
         texts = [(ROOT / file).read_text('utf-8') for file in files]
@@ -152,7 +154,7 @@ def test_the_page_says_what_each_is_held_against_and_where():
 
 
 def test_every_drive_and_effect_has_a_scene_and_the_faults_have_one_together():
-    assert [section.name for section in DRAWN] == [*DRIVES, *EFFECTS, 'Faults']
+    assert [section.name for section in DRAWN] == [*DRIVES, *EFFECTS, 'Faults', 'loads']
 
 
 @pytest.mark.parametrize('section', DRAWN, ids=lambda section: section.name)

@@ -17,7 +17,7 @@
 
 from fractions import Fraction
 from itertools import pairwise
-from math import floor, isclose, pi, tau, ulp
+from math import exp, floor, isclose, pi, tau, ulp
 
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -31,11 +31,11 @@ from .sensors import ANGLES, BEGIN, context, MS, published, reading, SLIDE
 EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')
 
 
-def angle_encoder(rates='differenced', **parameters):
+def angle_encoder(rates='differenced', cutoff=0.0, **parameters):
     """Return the encoder of rocker_joint, the second of two angles; turns are counted."""
     parameters.setdefault('multi_turn', not parameters.get('incremental', False))
     joints = {'rocker_joint': JointEncoder(**parameters)}
-    return encoder.sensor(EncoderParameters(joints, rates), context(ANGLES))
+    return encoder.sensor(EncoderParameters(joints, rates, cutoff), context(ANGLES))
 
 
 def slide_encoder(**parameters):
@@ -207,6 +207,21 @@ def test_the_step_at_the_index_mark_is_no_motion():
     angles = [eighth * tau / 8 for eighth in (5.5, 6.5, 7.5, 8.5, 9.5)]
     found = speeds(sensor, angles, [BEGIN + i * MS for i in range(5)])
     assert [rate for _, rate in found] == pytest.approx([0.0, *[1000 * tau / 8] * 4])
+
+
+def test_a_low_pass_smooths_the_rates_as_an_exponential():
+    # The joint begins to turn by 5 counts a ms; readings come at irregular times.
+    sensor = angle_encoder(cutoff=30.0, counts=1000)
+    times = [0, 1, 2, 3, 5, 6, 10, 30]
+    angles = [(5 * max(0, ms - 2) + 0.5) * tau / 1000 for ms in times]
+    found = speeds(sensor, angles, [BEGIN + ms * MS for ms in times])
+    expected = [5000 * tau / 1000 * (1.0 - exp(-tau * 30e-3 * max(0, ms - 2))) for ms in times]
+    assert [rate for _, rate in found] == pytest.approx(expected)
+
+
+def test_a_low_pass_of_exact_rates_is_refused():
+    with pytest.raises(DefinitionError, match='cutoff: smooths differences'):
+        angle_encoder(rates='exact', cutoff=5.0, counts=8)
 
 
 def test_exact_rates_pass_as_they_come():

@@ -16,10 +16,11 @@
 """Noise: as strong as it says, each of its own, and the same again from the same seed."""
 
 from itertools import accumulate, cycle, islice, pairwise
-from math import sqrt
+from math import exp, sqrt
 
 from linkage_ros.effects import noise
 from linkage_ros.effects.noise import JointNoise, NoiseParameters
+from linkage_ros.errors import DefinitionError
 import pytest
 
 from .sensors import BEGIN, context, likely, MS, published, reading, SLIDE
@@ -105,6 +106,58 @@ def test_white_and_walk_add_up():
     alone = [values(noisy({'rocker_joint': kind})) for kind in (white, walk)]
     summed = [a + b for a, b in zip(*alone, strict=True)]
     assert values(noisy({'rocker_joint': both})) == summed
+
+
+@pytest.mark.parametrize('times', [REGULAR, IRREGULAR])
+def test_a_drift_has_its_deviation_at_any_time_and_forgets_by_its_correlation_time(times):
+    # What is new at each reading is white: d₂ − φ·d₁, of variance s²·(1 − φ²).
+    noise = JointNoise(drift=0.02, correlation_time=0.05)
+    drifted = values(noisy({'rocker_joint': noise}, times))
+    new = [drifted[0] / 0.02]
+    for (before, one), (now, other) in pairwise(zip(times, drifted, strict=True)):
+        kept = exp(-(now - before) * 1e-9 / 0.05)
+        if now > before:
+            new.append((other - kept * one) / (0.02 * sqrt(1.0 - kept * kept)))
+        else:
+            assert other == one
+    assert_white(new, 1.0)
+
+
+def test_drifts_of_many_seeds_spread_as_much_at_the_first_reading_as_later():
+    noise = {'rocker_joint': JointNoise(drift=0.5, correlation_time=0.01)}
+    runs = [values(noisy(noise, REGULAR[:30], seed=f'{seed}')) for seed in range(1000)]
+    for reading_number in (0, 3, 29):
+        assert likely(squares([run[reading_number] for run in runs], 0.5), 1000)
+
+
+def test_a_density_is_white_noise_of_the_root_of_the_rate():
+    # The context of these tests ticks at 1 kHz.
+    assert_white(values(noisy({'rocker_joint': JointNoise(density=1e-3)})), 1e-3 * sqrt(1000.0))
+
+
+def test_the_noise_of_efforts_is_in_the_efforts_only():
+    where = context(seed='seed')
+    sensor = noise.sensor(NoiseParameters({'rocker_joint': JointNoise(effort_white=0.3)}), where)
+    found = [sensor(now, reading(now, 0.0, 0.0)._replace(efforts=(0.0, 0.0))) for now in REGULAR]
+    assert_white([read.efforts[1] for read in found], 0.3)
+    assert {read.joints for read in found} == {(0.0, 0.0)}
+    assert sensor(BEGIN, reading(BEGIN, 0.0, 0.0)).efforts == ()
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'line'),
+    [
+        (
+            {'white': 0.1, 'density': 0.1},
+            'density: is white noise too; leave white or density out',
+        ),
+        ({'drift': 0.1}, 'drift: needs correlation_time; write correlation_time too'),
+        ({'correlation_time': 0.1}, 'correlation_time: needs drift; write drift too'),
+    ],
+)
+def test_parameters_that_do_not_go_together_are_refused(parameters, line):
+    with pytest.raises(DefinitionError, match=line):
+        noisy({'rocker_joint': JointNoise(**parameters)}, [])
 
 
 def test_what_one_joint_has_does_not_change_the_other():
