@@ -53,6 +53,9 @@ _MADE_UP = NANOSECONDS
 
 _NEVER = 1 << 63
 
+_SAMPLES = 90
+"""Intervals of the range over which the least inertia is looked for."""
+
 _LEAST_RESISTANCE = 1e-9
 """Smaller resistances count as none, in [Ω]."""
 
@@ -200,8 +203,13 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             f'at {parameters.start:g} nothing can be moved: a toggle, or no inertia',
             'start elsewhere',
         )
+    low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
+    if motor:
+        places = (low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
+        found = [start.terms, *filter(None, map(mechanics.equation, places))]
+        least = min(terms.inertia for terms in found if terms.inertia > 0.0)
+        motor.check_step(least, parameters.method, parameters.step)
     if mechanics.applied:
-        low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
         mechanics.applied.check_step(
             lambda value: terms.inertia if (terms := mechanics.equation(value)) else 0.0,
             (low, high),

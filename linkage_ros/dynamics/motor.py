@@ -42,6 +42,7 @@ from itertools import combinations, pairwise
 from math import copysign, inf
 
 from linkage_ros.dynamics.laws import LawTerm
+from linkage_ros.dynamics.longest_step import check_step
 from linkage_ros.dynamics.mechanics import Terms
 from linkage_ros.dynamics.motion import LARGEST, OneFreedom
 
@@ -156,6 +157,34 @@ class Motor:
         """
         law = self.law(command)
         return replace(mechanism, laws=(*mechanism.laws[:-1], law)), 0.0, law.holding
+
+    def check_step(self, inertia: float, method: str, step: float) -> None:
+        """
+        Refuse a motor whose rate follows the voltage faster than the integration can.
+
+        Parameters
+        ----------
+        inertia
+            The least inertia of the equation of motion, in [kg·m²] or [kg].
+        method, step
+            The method of integration, by name, and its step, in [s].
+
+        Raises
+        ------
+        DefinitionError
+            The remedy is the longest step that carries it.
+
+        """
+        if self.command == 'voltage' or self._supply():
+            damping = -self._falling() * self.constant * self.ratio / self.backward
+            check_step(
+                'drive.torque.motor',
+                damping / inertia,
+                method,
+                step,
+                'it follows its voltage too fast',
+                'add the inertia of its rotor to loads.drive_inertia',
+            )
 
     def law(self, command: float) -> MotorLaw:
         """Return the effort over the rate of the input, under a command."""

@@ -24,7 +24,7 @@ from math import exp, log2
 from linkage_ros.drives.drive import Context
 from linkage_ros.drives.torque import build, MotorParameters, TorqueParameters
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, Loads
-from linkage_ros.errors import FileError
+from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.messages.joint_state import EffortCommand
 import pytest
 from scipy.integrate import solve_ivp
@@ -332,6 +332,10 @@ WRONG = {
     ),
     'a negative ratio': ('torque_constant: 1.0, ratio: -3.0', r'motor\.ratio: .*-3'),
     'no constant': ('ratio: 3.0', r'motor.*torque_constant'),
+    'a step that is too long': (
+        'torque_constant: 1.0, command: voltage, resistance: 0.1',
+        r'motor: it follows its voltage too fast for a step of 0\.001 s: .*/s there; ',
+    ),
     'another command': ('torque_constant: 1.0, command: power', r'motor\.command: .*voltage'),
 }  # fmt: skip
 
@@ -342,3 +346,12 @@ def test_what_is_wrong_has_its_line(name):
     with pytest.raises(FileError, match=line) as raised:
         scene(f'{{motor: {{{motor}}}}}')
     assert '\n' not in str(raised.value)
+
+
+@pytest.mark.parametrize(('method', 'carried'), [('rk4', 2.5), ('gauss_legendre', 1.5)])
+def test_the_longest_step_is_a_multiple_of_the_time_constant(method, carried):
+    fast = {'resistance': RESISTANCE / 10, 'back_efficiency': 0.5}
+    longest = carried * TIME_CONSTANT / 10 * 0.5
+    drive(fast, method=method, step=0.999 * longest)
+    with pytest.raises(DefinitionError, match='too fast'):
+        drive(fast, method=method, step=1.001 * longest)
