@@ -19,12 +19,14 @@ Where a motion is to be in closed form, the links weigh next to nothing, and the
 The motor has k·N = 1, so a current of 1 A gives 1 N·m at the input without losses.
 """
 
+from dataclasses import replace
 from math import exp, log2
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.drives.torque import build, MotorParameters, TorqueParameters
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, Loads
 from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import EffortCommand
 import pytest
 from scipy.integrate import solve_ivp
@@ -144,6 +146,20 @@ def test_without_a_command_the_motor_is_switched_off():
     *_, (_, _, rate, acceleration) = under(built, 0.0, 300)
     assert rate == pytest.approx(run_up(0.1, 0.0, 5.0)[1], rel=1e-9)
     assert acceleration == 0.0
+
+
+def with_effort_limit(most):
+    (given,) = WHEEL.linkage.inputs
+    limited = replace(given, limits=replace(given.limits, effort=most))
+    return Closure(replace(WHEEL.linkage, inputs=(limited,)))
+
+
+@pytest.mark.parametrize(('command', 'value'), [('effort', 5.0), ('current', 9.0)])
+def test_the_effort_limit_of_the_input_is_kept_behind_the_gear(command, value):
+    built = drive({'command': command, **LOSSES}, with_effort_limit(2.0))
+    _, (_, _, _, acceleration), *_ = under(built, value)
+    assert acceleration * INERTIA == pytest.approx(2.0, rel=1e-9)
+    assert built.saturated == (command == 'effort')
 
 
 @pytest.mark.parametrize(
