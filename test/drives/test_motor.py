@@ -20,11 +20,14 @@ The motor has k·N = 1, so a current of 1 A gives 1 N·m at the input without lo
 """
 
 from dataclasses import replace
-from math import exp, log2
+from math import copysign, exp, log2, log10
 
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context
 from linkage_ros.drives.torque import build, MotorParameters, TorqueParameters
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, Loads
+from linkage_ros.dynamics.motor import Motor
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import EffortCommand
@@ -149,8 +152,8 @@ def test_without_a_command_the_motor_is_switched_off():
 
 
 def with_effort_limit(most):
-    (given,) = WHEEL.linkage.inputs
-    limited = replace(given, limits=replace(given.limits, effort=most))
+    (crank,) = WHEEL.linkage.inputs
+    limited = replace(crank, limits=replace(crank.limits, effort=most))
     return Closure(replace(WHEEL.linkage, inputs=(limited,)))
 
 
@@ -371,3 +374,40 @@ def test_the_longest_step_is_a_multiple_of_the_time_constant(method, carried):
     drive(fast, method=method, step=0.999 * longest)
     with pytest.raises(DefinitionError, match='too fast'):
         drive(fast, method=method, step=1.001 * longest)
+
+
+def positive(least, most):
+    return st.floats(log10(least), log10(most)).map(lambda exponent: 10.0**exponent)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    command=st.sampled_from(['effort', 'current', 'voltage']),
+    value=st.floats(-100.0, 100.0),
+    parameters=st.tuples(
+        positive(1e-3, 1.0), positive(1e-2, 10.0), positive(0.1, 300.0), positive(0.01, 1.0),
+        positive(0.01, 1.0), positive(0.1, 1e3), positive(0.1, 1e3),
+    ),
+    rate=st.floats(-1e4, 1e4),
+)  # fmt: skip
+def test_its_segments_follow_the_equation(command, value, parameters, rate):
+    k, resistance, ratio, forward, backward, most, supply = parameters
+    motor = Motor(k, resistance, ratio, forward, backward, most, supply, command)
+    law = motor.law(value)
+    emf = k * ratio * rate
+    if command == 'voltage':
+        current = (min(max(value, -supply), supply) - emf) / resistance
+    else:
+        current = value if command == 'current' else value / (k * ratio * forward)
+    current = min(max(current, -most), most)
+    current = min(max(current, (-supply - emf) / resistance), (supply - emf) / resistance)
+    known = k * ratio * current * (forward if current * rate >= 0.0 else 1.0 / backward)
+    segment = law.segment(0.0, rate, 0.0)
+    assert law.margin(segment, 0.0, rate, 0.0) >= 0.0
+    found = law.force(segment, 0.0, rate, 0.0)
+    if rate:
+        found -= copysign(law.holding, rate)
+        rounding = k * ratio / backward * (supply + abs(emf)) / resistance
+        assert found == pytest.approx(known, rel=1e-9, abs=1e-12 * rounding + 1e-9 * law.holding)
+    else:
+        assert abs(found - k * ratio * current * forward) <= law.holding * (1.0 + 1e-9) + 1e-12
