@@ -253,6 +253,12 @@ def test_a_scene_with_one_drive_has_no_other(tmp_path, bare, drive):
     assert 'numpy' not in look.modules
 
 
+def test_a_motor_is_made_where_it_is_asked_for_alone(tmp_path):
+    for motor, there in (('', False), ('motor: {torque_constant: 1.0}', True)):
+        look = Look(tmp_path, f'drive: {{torque: {{{motor}}}}}')
+        assert ('linkage_ros.dynamics.motor' in look.modules) == there
+
+
 @pytest.mark.parametrize('fault', FAULT_SCENES)
 def test_a_scene_with_one_fault_has_no_other(tmp_path, fault):
     drive = 'drive: {topic: {}}\n' if fault == 'not_a_number' else BARE

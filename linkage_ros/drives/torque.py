@@ -20,23 +20,31 @@ Time is divided into equal steps from the first tick on. A step is divided again
 arrives or expires, since the force changes there. So the motion depends only on the commands and
 their times, not on when the state is read: the state between two steps comes from a shorter step
 of the same method, which is then discarded.
+
+With a motor (`linkage_ros.dynamics.motor`) a command is an effort, a current or a voltage, and the
+effort follows from it and the rate. A command that is delayed waits until its time.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from math import copysign, inf, isfinite, pi
+from typing import TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, number
+from linkage_ros.files.parameters import choice, number, option
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import without_limits
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.messages.joint_state import EffortCommand, JointEffortReader, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
+
+if TYPE_CHECKING:
+    from linkage_ros.dynamics.motor import Motor
 
 TOPIC = 'crank_commands'
 
@@ -44,6 +52,54 @@ _MADE_UP = NANOSECONDS
 """Time that one tick integrates at most, in [ns]; two periods if these are longer."""
 
 _NEVER = 1 << 63
+
+_SAMPLES = 90
+"""Intervals of the range over which the least inertia is looked for."""
+
+_LEAST_RESISTANCE = 1e-9
+"""Smaller resistances count as none, in [Ω]."""
+
+_Acting = tuple[OneFreedom, float, float]
+"""What acts by a command: the mechanism, the force on its input, and the brake."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotorParameters:
+    """A DC motor with a gear drives the input."""
+
+    torque_constant: float = number(
+        'of torque over current, and of voltage over rate', unit='N·m/A', least=1e-9, most=1e6
+    )
+    resistance: float = number('of the winding', 0.0, unit='Ω', least=0.0, most=1e6)
+    ratio: float = number(
+        'turns of the motor for one of the input',
+        1.0,
+        unit='rad/rad or rad/m',
+        least=1e-9,
+        most=1e6,
+    )
+    efficiency: float = number(
+        'of the gear while the motor drives the input', 1.0, least=1e-3, most=1.0
+    )
+    back_efficiency: float = number(
+        'of the gear while the input drives the motor', 1.0, least=1e-3, most=1.0
+    )
+    torque: float = number(
+        'most that the motor gives, before the gear', LARGEST, unit='N·m', above=0.0, most=LARGEST
+    )
+    current: float = number('most in the winding', LARGEST, unit='A', above=0.0, most=LARGEST)
+    voltage: float = number('of the supply', LARGEST, unit='V', above=0.0, most=LARGEST)
+    command: str = choice(
+        'the number in the message: torque or force at the input, current or voltage',
+        ('effort', 'current', 'voltage'),
+        'effort',
+    )
+    delay: float = number(
+        'from the arrival of a command until it acts', 0.0, unit='s', least=0.0, most=1.0
+    )
+    quantum: float = number(
+        'step to which a command is rounded, in its unit; 0: none', 0.0, least=0.0, most=LARGEST
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +132,9 @@ class TorqueParameters:
         1e-3,
         above=0.0,
         most=0.49,
+    )
+    motor: MotorParameters | None = option(  # noqa: RUF009 (a field, as the others are)
+        'the motor at the input; without, the command acts on the input itself', MotorParameters
     )
 
 
@@ -130,6 +189,13 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         parameters.restitution,
         mechanics.laws,
     )
+    most = closure.linkage.inputs[0].limits.effort
+    motor = None
+    if parameters.motor is not None:
+        motor = _motor(parameters.motor, most)
+        motion = motor.mounted(motion)
+        if parameters.motor.command != 'effort':
+            most = LARGEST
     start = motion.at(parameters.start, parameters.rate)
     if start is None:
         raise DefinitionError(
@@ -137,8 +203,13 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             f'at {parameters.start:g} nothing can be moved: a toggle, or no inertia',
             'start elsewhere',
         )
+    low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
+    if motor:
+        places = (low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
+        found = [start.terms, *filter(None, map(mechanics.equation, places))]
+        least = min(terms.inertia for terms in found if terms.inertia > 0.0)
+        motor.check_step(least, parameters.method, parameters.step)
     if mechanics.applied:
-        low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
         mechanics.applied.check_step(
             lambda value: terms.inertia if (terms := mechanics.equation(value)) else 0.0,
             (low, high),
@@ -147,8 +218,35 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         )
     # A scene with slow ticks must not skip time between them.
     period = round(NANOSECONDS / context.rate) if context.rate else 0
-    most = closure.linkage.inputs[0].limits.effort
-    return TorqueDrive(motion, start, parameters, max(_MADE_UP, 2 * period), min(most, LARGEST))
+    made_up = max(_MADE_UP, 2 * period)
+    return TorqueDrive(motion, start, parameters, made_up, min(most, LARGEST), motor)
+
+
+def _motor(given: MotorParameters, most: float) -> Motor:
+    """Return the motor of an input that bears an effort of at most ``most``."""
+    from linkage_ros.dynamics.motor import Motor  # local import: only with a motor
+
+    voltage = given.command == 'voltage' or given.voltage < LARGEST
+    if voltage and given.resistance < _LEAST_RESISTANCE:
+        raise DefinitionError(
+            'drive.torque.motor.resistance',
+            f'it is {given.resistance:g} Ω, and a voltage would give any current',
+            "write the winding's, or command an effort or a current without a limit of voltage",
+        )
+    return Motor(
+        given.torque_constant,
+        given.resistance,
+        given.ratio,
+        given.efficiency,
+        given.back_efficiency,
+        min(
+            given.current,
+            given.torque / given.torque_constant,
+            most / (given.torque_constant * given.ratio * given.efficiency),
+        ),
+        given.voltage,
+        given.command,
+    )
 
 
 def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]:
@@ -194,22 +292,30 @@ class TorqueDrive(Drive):
     made_up
         Longest time that one tick integrates, in [ns].
     most
-        Greatest effort in either direction, in [N·m] or [N]; commands are clipped to it.
+        Greatest command in either direction, in [N·m] or [N], or of a motor in [A] or [V];
+        commands are clipped to it.
+    motor
+        The motor that is mounted on the mechanism; None if there is none.
 
     """
 
     __slots__ = (
+        '_acting',
         '_begun',
         '_boundary',
-        '_force',
+        '_delay',
+        '_due',
         '_idle',
         '_made_up',
         '_mechanism',
         '_most',
         '_motion',
+        '_motor',
+        '_quantum',
         '_step',
         '_time',
         '_until',
+        '_waiting',
         'lost',
         'max_age',
         'saturated',
@@ -232,14 +338,19 @@ class TorqueDrive(Drive):
         use: TorqueParameters,
         made_up: int,
         most: float = LARGEST,
+        motor: Motor | None = None,
     ) -> None:
         self._mechanism = mechanism
         self._motion = start
         self._step = round(use.step * NANOSECONDS)
         self._made_up = made_up
-        self._idle = self._force = (0.0, use.brake)
+        self._idle = self._acting = (mechanism, 0.0, use.brake)
         self._time = self._boundary = self._begun = -1
-        self._until = _NEVER
+        self._until = self._due = _NEVER
+        self._motor = motor
+        self._delay = round(use.motor.delay * NANOSECONDS) if use.motor else 0
+        self._quantum = use.motor.quantum if use.motor else 0.0
+        self._waiting: deque[tuple[int, _Acting]] = deque()
         self.max_age = round(use.timeout * NANOSECONDS)
         self._most = most
         self.stamp = self.lost = self.saturated = 0
@@ -264,14 +375,22 @@ class TorqueDrive(Drive):
         if not -self._most <= effort <= self._most:
             effort = copysign(self._most, effort)
             self.saturated += 1
-        force = (effort, 0.0)
+        acting = (self._mechanism, effort, 0.0)
+        if self._motor:
+            if self._quantum:
+                effort = round(effort / self._quantum) * self._quantum
+            acting = self._motor.driven(self._mechanism, effort)
+        self.stamp = now
+        if self._delay:
+            self._waiting.append((now + self._delay, acting))
+            self._due = self._waiting[0][0]
+            return None
         if self._time >= 0:
             self._advance(now)
-            if force != self._force and now > self._time:
+            if acting != self._acting and now > self._time:
                 self._go_to(now)
-        self._force = force
+        self._acting = acting
         self._until = now + self.max_age
-        self.stamp = now
         return None
 
     def state(self, now: int) -> CrankState:
@@ -280,12 +399,13 @@ class TorqueDrive(Drive):
             self._time = self._begun = now
             self._boundary = now + self._step
         self._advance(now)
-        motion, force, time = self._motion, self._force, (self._time - self._begun) * 1e-9
+        motion, time = self._motion, (self._time - self._begun) * 1e-9
+        mechanism, force, brake = self._acting
         if now > self._time:
             seconds = (now - self._time) * 1e-9
-            motion = self._mechanism.advance(motion, seconds, *force, time)
+            motion = mechanism.advance(motion, seconds, force, brake, time)
             time += seconds
-        acceleration = self._mechanism.acceleration(motion, *force, time)
+        acceleration = mechanism.acceleration(motion, force, brake, time)
         return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
 
     def _advance(self, now: int) -> None:
@@ -296,16 +416,21 @@ class TorqueDrive(Drive):
             self._time += left_out
             self._boundary += left_out
             self.lost += left_out
-        while (end := min(self._boundary, self._until)) <= now:
+        while (end := min(self._boundary, self._until, self._due)) <= now:
             self._go_to(end)
             if end == self._until:
-                self._force, self._until = self._idle, _NEVER
+                self._acting, self._until = self._idle, _NEVER
             if end == self._boundary:
                 self._boundary += self._step
+            if end == self._due:
+                self._acting = self._waiting.popleft()[1]
+                self._until = end + self.max_age
+                self._due = self._waiting[0][0] if self._waiting else _NEVER
 
     def _go_to(self, end: int) -> None:
         """Integrate a step, or the rest of one."""
         if end > self._time:
             seconds, time = (end - self._time) * 1e-9, (self._time - self._begun) * 1e-9
-            self._motion = self._mechanism.advance(self._motion, seconds, *self._force, time)
+            mechanism, force, brake = self._acting
+            self._motion = mechanism.advance(self._motion, seconds, force, brake, time)
             self._time = end

@@ -24,9 +24,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from math import hypot, inf, sqrt, tau
+from math import hypot, sqrt, tau
 from typing import NamedTuple
 
+from linkage_ros.dynamics import longest_step
 from linkage_ros.dynamics.laws import Contact, Law, LawTerm, Table
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, JointSpring, PointLoad, SoftStop
 from linkage_ros.errors import DefinitionError
@@ -35,18 +36,8 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
 from linkage_ros.kinematics.results import Position, Velocity
 
-_CARRIED = {'semi_implicit_euler': 1.5, 'rk4': 2.5, 'gauss_legendre': 1.5}
-"""
-Greatest |s|·h of a motion e^{s·t} for a step h.
-
-The explicit methods are stable up to 2 and 2.78 (E. Hairer, G. Wanner, Solving Ordinary
-Differential Equations II, 2nd ed., 1996, IV.2); the stages of the implicit one converge.
-"""
-
 _SAMPLES = 90
 """Intervals of the range over which the stiffest place is looked for."""
-
-SHORTEST_STEP = 1e-6
 
 
 class JointCoordinate(NamedTuple):
@@ -268,18 +259,14 @@ class AppliedForces:
             if fastest > worst:
                 worst = fastest
                 blamed = max(touched, key=lambda key: yielding[key].stiffness * touched[key] ** 2)
-        carried = _CARRIED[method] / worst if worst else inf
-        if step > carried:
-            whole = (
-                f'{carried:.1e}' if float(f'{carried:.1e}') <= carried else f'{0.95 * carried:.1e}'
-            )
-            raise DefinitionError(
-                f'loads.{blamed}',
-                f'it is too stiff for a step of {step:g} s: motion changes at {worst:.3g}/s there',
-                f'write a step of {whole} s or less in drive.torque'
-                if carried >= SHORTEST_STEP
-                else 'write a smaller stiffness or damping',
-            )
+        longest_step.check_step(
+            f'loads.{blamed}',
+            worst,
+            method,
+            step,
+            'it is too stiff',
+            'write a smaller stiffness or damping',
+        )
 
     def _sampled(
         self, inertia: Callable[[float], float], between: tuple[float, float]

@@ -458,6 +458,11 @@ def group(meaning: str, of: Any) -> Any:
     return field(default_factory=of, metadata={_KEY: Group(meaning, of)})
 
 
+def option(meaning: str, of: Any) -> Any:
+    """Declare a section of parameters; if absent, None."""
+    return _declared(Group(meaning, of), None)
+
+
 def _declared(kind: Kind, default: Any) -> Any:
     return field(default=default, metadata={_KEY: kind})
 
@@ -561,7 +566,11 @@ def parameters_schema(of: Any) -> Schema:
         summary(of),
         {
             entry.name: kind.schema()
-            | ({} if is_required(entry) else {'default': default_of(entry)})
+            | (
+                {}
+                if is_required(entry) or entry.default is None
+                else {'default': default_of(entry)}
+            )
             for entry, kind in entries
         },
         required=tuple(entry.name for entry, _ in entries if is_required(entry)),

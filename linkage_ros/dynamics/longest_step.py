@@ -1,0 +1,69 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The longest step of an integration: beyond it a stiff load makes the motion grow without end."""
+
+from __future__ import annotations
+
+from math import inf
+
+from linkage_ros.errors import DefinitionError
+
+_CARRIED = {'semi_implicit_euler': 1.5, 'rk4': 2.5, 'gauss_legendre': 1.5}
+"""
+Greatest |s|·h of a motion e^{s·t} for a step h.
+
+The explicit methods are stable up to 2 and 2.78 (E. Hairer, G. Wanner, Solving Ordinary
+Differential Equations II, 2nd ed., 1996, IV.2); the stages of the implicit one converge.
+"""
+
+_SHORTEST = 1e-6
+
+
+def check_step(
+    where: str, fastest: float, method: str, step: float, fault: str, otherwise: str
+) -> None:
+    """
+    Refuse what is too stiff for the step of the integration.
+
+    Parameters
+    ----------
+    where
+        Key of what is stiff.
+    fastest
+        The greatest |s| of the motion e^{s·t} that it causes, in [1/s].
+    method, step
+        The method of integration, by name, and its step, in [s].
+    fault
+        What is wrong with it, as 'it is too stiff'.
+    otherwise
+        The remedy if no step is short enough.
+
+    Raises
+    ------
+    DefinitionError
+        The step is too long; the remedy is the longest one.
+
+    """
+    carried = _CARRIED[method] / fastest if fastest else inf
+    if step > carried:
+        whole = f'{carried:.1e}' if float(f'{carried:.1e}') <= carried else f'{0.95 * carried:.1e}'
+        raise DefinitionError(
+            where,
+            f'{fault} for a step of {step:g} s: motion changes at {fastest:.3g}/s there',
+            f'write a step of {whole} s or less in drive.torque'
+            if carried >= _SHORTEST
+            else otherwise,
+        )

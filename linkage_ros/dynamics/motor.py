@@ -1,0 +1,271 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A DC motor with a gear: what it gives at the input, as a law over the input's rate.
+
+The current follows the voltage at once (no inductance). With the torque constant k, the resistance
+R, the ratio N and the rate of the motor ω = N·q̇::
+
+    i = V/R − k·ω/R,  i,  or  τ/(k·N·η)       for a command of voltage V, current i or effort τ
+    i within ±iₘ, then within (±U − k·ω)/R    the amplifier's limit, then that of its supply U
+    T = k·i
+    Q = N·T·η  if T·ω ≥ 0,  N·T/ηᵦ otherwise  at the input
+
+The efficiencies are those of the gear while power flows to the input, η, and from it, ηᵦ
+(H. Giberti, S. Cinquemani, G. Legnani, Effects of transmission mechanical characteristics on the
+choice of a motor-reducer, Mechatronics 20, 2010; for the motor itself: A. Hughes, B. Drury,
+Electric Motors and Drives, 4th ed., 2013, ch. 3). At rest the motor holds any load between both
+values of Q: this is friction of N·|T|·(1/ηᵦ − η)/2 about their middle.
+
+In each segment of the rate, Q is linear. Segments end where a limit begins or ceases to act and,
+unless both efficiencies are 1, where T or ω changes sign. There the integrator cuts its step.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
+from math import copysign, inf
+
+from linkage_ros.dynamics.laws import LawTerm
+from linkage_ros.dynamics.longest_step import check_step
+from linkage_ros.dynamics.mechanics import Terms
+from linkage_ros.dynamics.motion import LARGEST, OneFreedom
+
+_AT_INPUT = LawTerm(1.0, 0.0, 1.0)
+_RESTING = -1
+
+Line = tuple[float, float]
+"""A function of the rate, by its value at a rate of 0 and its slope."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotorLaw:
+    """
+    The effort of a motor under one command, over the rate of the input.
+
+    Attributes
+    ----------
+    ends
+        The rates between its segments, in [rad/s] or [m/s], in order.
+    lines
+        The effort in each segment, in [N·m] or [N], without the friction in the gear that acts at
+        rest too.
+    resting
+        The effort at rest, without this friction.
+    holding
+        This friction: the most that the gear holds at rest.
+
+    """
+
+    ends: tuple[float, ...] = ()
+    lines: tuple[Line, ...] = ((0.0, 0.0),)
+    resting: float = 0.0
+    holding: float = 0.0
+
+    def segment(self, _value: float, rate: float, _time: float) -> int:
+        """Return how many ends a rate has passed; -1 at rest."""
+        return bisect_right(self.ends, rate) if rate else _RESTING
+
+    def margin(self, segment: int, _value: float, rate: float, _time: float) -> float:
+        """Return the distance from the nearer end; infinity for a motor that stands."""
+        if segment == _RESTING:
+            return inf
+        below = rate - self.ends[segment - 1] if segment else inf
+        above = self.ends[segment] - rate if segment < len(self.ends) else inf
+        return min(below, above)
+
+    def force(self, segment: int, _value: float, rate: float, _time: float) -> float:
+        """Return the effort by the line of a segment."""
+        return self.resting if segment == _RESTING else _at(self.lines[segment], rate)
+
+
+_OFF = MotorLaw()
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """
+    A DC motor with a gear, and its amplifier.
+
+    Attributes
+    ----------
+    constant
+        k, in [N·m/A] or [V·s/rad].
+    resistance
+        R, in [Ω]; 0 only without commands of voltage and without a limit of it.
+    ratio
+        N, in [rad/rad] or [rad/m].
+    forward, backward
+        η and ηᵦ.
+    most
+        iₘ, in [A].
+    supply
+        U, in [V].
+    command
+        What is commanded: 'effort' in [N·m] or [N], 'current' in [A], or 'voltage' in [V].
+
+    """
+
+    constant: float
+    resistance: float
+    ratio: float
+    forward: float
+    backward: float
+    most: float
+    supply: float
+    command: str
+
+    def mounted(self, mechanism: OneFreedom) -> OneFreedom:
+        """Return a mechanism with this motor at its input, switched off: without a current."""
+        return replace(mechanism, terms=_with_motor(mechanism.terms), laws=(*mechanism.laws, _OFF))
+
+    def driven(self, mechanism: OneFreedom, command: float) -> tuple[OneFreedom, float, float]:
+        """
+        Return a mechanism with this motor under a command.
+
+        Parameters
+        ----------
+        mechanism
+            The mechanism on which the motor is mounted.
+        command
+            The command, in the unit of ``command``.
+
+        Returns
+        -------
+        mechanism
+            The mechanism under this command.
+        force
+            Further force on the input: 0, since the motor is a law.
+        holding
+            Friction of the gear that acts at rest too, as a brake, in [N·m] or [N].
+
+        """
+        law = self.law(command)
+        return replace(mechanism, laws=(*mechanism.laws[:-1], law)), 0.0, law.holding
+
+    def check_step(self, inertia: float, method: str, step: float) -> None:
+        """
+        Refuse a motor whose rate follows the voltage faster than the integration can.
+
+        Parameters
+        ----------
+        inertia
+            The least inertia of the equation of motion, in [kg·m²] or [kg].
+        method, step
+            The method of integration, by name, and its step, in [s].
+
+        Raises
+        ------
+        DefinitionError
+            The remedy is the longest step that carries it.
+
+        """
+        if self.command == 'voltage' or self._supply():
+            damping = -self._falling() * self.constant * self.ratio / self.backward
+            check_step(
+                'drive.torque.motor',
+                damping / inertia,
+                method,
+                step,
+                'it follows its voltage too fast',
+                'add the inertia of its rotor to loads.drive_inertia',
+            )
+
+    def law(self, command: float) -> MotorLaw:
+        """Return the effort over the rate of the input, under a command."""
+        wanted, supply = self._wanted(command), self._supply()
+        limits: list[Line] = [(-self.most, 0.0), (self.most, 0.0), *supply]
+        lossy = self.forward < 1.0 or self.backward < 1.0
+        found = {_crossing(*pair) for pair in combinations([wanted, *limits], 2)}
+        if lossy:
+            found |= {0.0, *(_crossing(line, (0.0, 0.0)) for line in (wanted, *limits))}
+        rates = sorted(rate for rate in found if abs(rate) <= LARGEST)
+        still = _at(self._current(wanted, supply, 0.0), 0.0)
+        to_input = self.ratio * self.constant
+        holding = 0.5 * to_input * abs(still) * (1.0 / self.backward - self.forward)
+        ends: list[float] = []
+        lines: list[Line] = []
+        begins = [-inf, *rates]
+        for begin, at in zip(begins, _between(rates), strict=True):
+            start, slope = self._current(wanted, supply, at)
+            drives = (start + slope * at) * at >= 0.0
+            factor = to_input * (self.forward if drives else 1.0 / self.backward)
+            line = factor * start + copysign(holding, at), factor * slope
+            if not lines or line != lines[-1]:
+                lines.append(line)
+                ends.append(begin)
+        resting = 0.5 * to_input * still * (1.0 / self.backward + self.forward)
+        return MotorLaw(tuple(ends[1:]), tuple(lines), resting, holding)
+
+    def _wanted(self, command: float) -> Line:
+        """Return the current that a command asks for, in [A]."""
+        if self.command == 'voltage':
+            voltage = min(max(command, -self.supply), self.supply)
+            return voltage / self.resistance, self._falling()
+        if self.command == 'current':
+            return command, 0.0
+        return command / (self.constant * self.ratio * self.forward), 0.0
+
+    def _supply(self) -> tuple[Line, ...]:
+        """Return the least and the greatest current by the supply; none if it has no limit."""
+        if self.supply >= LARGEST:
+            return ()
+        most = self.supply / self.resistance
+        return (-most, self._falling()), (most, self._falling())
+
+    def _falling(self) -> float:
+        return -self.constant * self.ratio / self.resistance
+
+    def _current(self, wanted: Line, supply: tuple[Line, ...], rate: float) -> Line:
+        """Return the line that the current follows about a rate of the input."""
+        current = wanted
+        if abs(_at(wanted, rate)) > self.most:
+            current = copysign(self.most, _at(wanted, rate)), 0.0
+        for side, limit in zip((-1.0, 1.0), supply, strict=False):
+            if side * (_at(current, rate) - _at(limit, rate)) > 0.0:
+                current = limit
+        return current
+
+
+def _with_motor(terms: Callable[[float], Terms | None]) -> Callable[[float], Terms | None]:
+    """Return an equation of motion with the motor's law after all others."""
+
+    def equation(value: float) -> Terms | None:
+        there = terms(value)
+        return None if there is None else there._replace(laws=(*there.laws, _AT_INPUT))
+
+    return equation
+
+
+def _at(line: Line, rate: float) -> float:
+    start, slope = line
+    return start + slope * rate
+
+
+def _crossing(one: Line, other: Line) -> float:
+    """Return the rate at which two lines cross; infinity if they are parallel."""
+    slope = one[1] - other[1]
+    return (other[0] - one[0]) / slope if slope else inf
+
+
+def _between(rates: list[float]) -> list[float]:
+    """Return a rate before, between and after some rates in order."""
+    if not rates:
+        return [0.0]
+    inner = [0.5 * (low + high) for low, high in pairwise(rates)]
+    return [rates[0] - 1.0, *inner, rates[-1] + 1.0]
