@@ -51,6 +51,31 @@ faults:
   stuck: {freeze: {}, at: [0.2, 0.7], seconds: 0.1}
   jump: {time_jump: {by: -0.05}, at: [0.5], seconds: 0.1}
 """,
+    'with all of a bench together': """
+linkage: limited.yaml
+rate: 250
+drive:
+  torque:
+    start: 1.0
+    rate: 12
+    motor: {torque_constant: 0.02, resistance: 1.5, ratio: 10, efficiency: 0.8, command: voltage}
+loads:
+  gravity: [0, -9.81]
+  drive_inertia: 1.0e-3
+  joint_springs: {coupler_joint: {stiffness: 0.02, free: -1, damping: 1.0e-4}}
+  stops: {rocker_joint: {stiffness: 40, damping: 0.02}}
+  efforts: {crank_joint: {over_time: [[0, 0], [0.5, 0.2]], over_rate: [[-30, 0.1], [30, -0.1]]}}
+  forces: {coupler.P: {direction: [0, -1], constant: 0.3, over_position: [[0, 0], [3, 1]]}}
+effects:
+  velocity: {}
+  effort: {}
+  pin_forces: {}
+  friction: {joints: {B: {coulomb: 0.002, breakaway: 0.004, stribeck: 2}}}
+  noise:
+    joints:
+      rocker_joint: {density: 1.0e-5, drift: 0.001, correlation_time: 0.2, effort_white: 0.01}
+  encoder: {joints: {crank_joint: {counts: 4096, multi_turn: true}}, cutoff: 40}
+""",
     'with ticks that a delay and a dropout withhold': """
 linkage: LINKAGES/four_bar.yaml
 rate: 100
@@ -66,6 +91,9 @@ def test_a_replay_of_the_bag_gives_the_same_bytes(tmp_path, monkeypatch, capsys,
     text = SCENES[name]
     if '\n' in text:
         Path('scene.yaml').write_text(text.replace('LINKAGES', str(LINKAGES)))
+        four_bar = (LINKAGES / 'four_bar.yaml').read_text()
+        free, limited = 'child: rocker}', 'child: rocker, limits: [1.1, 2.1]}'
+        Path('limited.yaml').write_text(four_bar.replace(free, limited))
     scene = 'scene.yaml' if '\n' in text else text
     assert main(['simulate', scene, '--seconds', '1.2', '-o', 'bag']) == 0
     assert main(['replay', 'bag']) == 0
