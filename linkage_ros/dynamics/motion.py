@@ -253,23 +253,24 @@ class OneFreedom:
         """
         left = seconds
         pieces = kinks = 0
+        now, push, laws = time, force, self.laws
         while pieces < _PIECES:
-            now = time + (seconds - left)
-            push = force
-            if self.laws:
-                push += self._applied(motion.terms, motion.rate, now)
+            if laws:
+                now = time + (seconds - left)
+                push = force + self._applied(motion.terms, motion.rate, now)
             sense = self._sense(motion, push, brake)
             if sense == 0.0:
-                held = self._held(motion, left, force, brake, now) if self.laws else left
+                held = self._held(motion, left, force, brake, now) if laws else left
                 left -= held
                 if left <= seconds * NARROW:
                     return motion
                 pieces += 1
                 continue
-            sticks = motion.terms.coulomb + motion.terms.breakaway + brake > 0.0
+            terms = motion.terms
+            sticks = terms.coulomb + terms.breakaway + brake > 0.0
             cuts = kinks < _KINKS
-            slips = motion.terms.slips if cuts else ()
-            segments = self._segments(motion, now, sense) if cuts else ()
+            slips = terms.slips if cuts else ()
+            segments = self._segments(motion, now, sense) if laws and cuts else ()
             reach = self._reach(motion, now, force, sense * brake, sense, slips, segments)
             length = left
             reached = reach(length)
