@@ -30,23 +30,26 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from math import copysign, inf, isfinite, pi
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
+from linkage_ros.dynamics.motion import LARGEST, OneFreedom
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, number, option
+from linkage_ros.files.parameters import choice, number, option, whole
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import without_limits
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.messages.joint_state import EffortCommand, JointEffortReader, Rejection
+from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.layout import NANOSECONDS
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.motor import Motor
 
 TOPIC = 'crank_commands'
+EXTRA_TOPIC, EXTRA_MESSAGE = '~/motor', JOINT_STATE
+"""The topic of the motor's encoder, if the motor is published."""
 
 _MADE_UP = NANOSECONDS
 """Time that one tick integrates at most, in [ns]; two periods if these are longer."""
@@ -59,7 +62,7 @@ _SAMPLES = 90
 _LEAST_RESISTANCE = 1e-9
 """Smaller resistances count as none, in [Ω]."""
 
-_Acting = tuple[OneFreedom, float, float]
+_Acting = tuple[Any, float, float]
 """What acts by a command: the mechanism, the force on its input, and the brake."""
 
 
@@ -103,6 +106,30 @@ class MotorParameters:
 
 
 @dataclass(frozen=True, slots=True)
+class PlayParameters:
+    """Play between the motor and the crank, each with an inertia of its own."""
+
+    width: float = number(
+        'by which the motor turns against the crank', unit='rad or m', above=0.0, most=100.0
+    )
+    inertia: float = number(
+        "the motor's, seen at the input", unit='kg·m² or kg', above=0.0, most=LARGEST
+    )
+    restitution: float = number(
+        'ratio of the relative rates after and before they meet', 0.0, least=0.0, most=1.0
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class MotorEncoderParameters:
+    """The encoder on the motor's shaft, on ~/motor."""
+
+    counts: int = whole(
+        'counts in a turn of the motor; 0: exact readings', 0, unit='1/turn', least=0, most=2**32
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class TorqueParameters:
     """Hardware in the loop: the effort commanded on crank_commands moves the linkage's masses."""
 
@@ -135,6 +162,12 @@ class TorqueParameters:
     )
     motor: MotorParameters | None = option(  # noqa: RUF009 (a field, as the others are)
         'the motor at the input; without, the command acts on the input itself', MotorParameters
+    )
+    play: PlayParameters | None = option(  # noqa: RUF009 (as above)
+        'play between motor and crank; without, they are one', PlayParameters
+    )
+    motor_encoder: MotorEncoderParameters | None = option(  # noqa: RUF009 (as above)
+        'publishes the motor, as its own encoder reads it, on ~/motor', MotorEncoderParameters
     )
 
 
@@ -178,7 +211,7 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         )
     mechanics = context.mechanics
     yielding = mechanics.loads.applied.stops
-    motion = OneFreedom(
+    motion: Any = OneFreedom(
         mechanics.equation,
         METHODS[parameters.method].step,
         _stops(
@@ -189,6 +222,11 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         parameters.restitution,
         mechanics.laws,
     )
+    if parameters.play is not None:
+        from linkage_ros.dynamics.two_masses import TwoMasses  # local import: only with play
+
+        play = parameters.play
+        motion = TwoMasses.of(motion, play.inertia, play.width, play.restitution)
     most = closure.linkage.inputs[0].limits.effort
     motor = None
     if parameters.motor is not None:
@@ -206,8 +244,10 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
     if motor:
         places = (low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
-        found = [start.terms, *filter(None, map(mechanics.equation, places))]
-        least = min(terms.inertia for terms in found if terms.inertia > 0.0)
+        moved = [terms.inertia for terms in map(mechanics.equation, places) if terms]
+        least = min([value for value in moved if value > 0.0], default=inf)
+        if parameters.play is not None:
+            least = parameters.play.inertia
         motor.check_step(least, parameters.method, parameters.step)
     if mechanics.applied:
         mechanics.applied.check_step(
@@ -220,6 +260,16 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     period = round(NANOSECONDS / context.rate) if context.rate else 0
     made_up = max(_MADE_UP, 2 * period)
     return TorqueDrive(motion, start, parameters, made_up, min(most, LARGEST), motor)
+
+
+def writer(parameters: TorqueParameters, context: Context, drive: TorqueDrive) -> Any:
+    """Build the writer of ~/motor; None if the motor is not published."""
+    if parameters.motor_encoder is None:
+        return None
+    from linkage_ros.drives.motor_encoder import MotorEncoder  # local import: only if published
+
+    name = f'{context.inputs_in_messages[0]}_motor'
+    return MotorEncoder(name, parameters.motor_encoder.counts, lambda: drive.motor)
 
 
 def _motor(given: MotorParameters, most: float) -> Motor:
@@ -284,9 +334,9 @@ class TorqueDrive(Drive):
     Parameters
     ----------
     mechanism
-        The equation of motion.
+        What moves: `OneFreedom`, or `linkage_ros.dynamics.two_masses.TwoMasses`.
     start
-        State at the first tick.
+        Its state at the first tick.
     use
         Step size, and the effort without a valid command.
     made_up
@@ -312,6 +362,7 @@ class TorqueDrive(Drive):
         '_motion',
         '_motor',
         '_quantum',
+        '_shown',
         '_step',
         '_time',
         '_until',
@@ -333,15 +384,15 @@ class TorqueDrive(Drive):
 
     def __init__(
         self,
-        mechanism: OneFreedom,
-        start: Motion,
+        mechanism: Any,
+        start: Any,
         use: TorqueParameters,
         made_up: int,
         most: float = LARGEST,
         motor: Motor | None = None,
     ) -> None:
         self._mechanism = mechanism
-        self._motion = start
+        self._motion = self._shown = start
         self._step = round(use.step * NANOSECONDS)
         self._made_up = made_up
         self._idle = self._acting = (mechanism, 0.0, use.brake)
@@ -406,7 +457,15 @@ class TorqueDrive(Drive):
             motion = mechanism.advance(motion, seconds, force, brake, time)
             time += seconds
         acceleration = mechanism.acceleration(motion, force, brake, time)
+        self._shown = motion
         return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
+
+    @property
+    def motor(self) -> tuple[float, float]:
+        """Angle and rate of the motor at the last state, before its gear, in [rad]."""
+        motor = getattr(self._shown, 'motor', self._shown)
+        ratio = self._motor.ratio if self._motor else 1.0
+        return ratio * motor.value, ratio * motor.rate
 
     def _advance(self, now: int) -> None:
         """Integrate all steps that end by a time, in [ns]."""

@@ -205,6 +205,10 @@ class OneFreedom:
     restitution: float = 0.0
     laws: tuple[Law, ...] = ()
 
+    def driven_by(self, change: Callable[[OneFreedom], OneFreedom]) -> OneFreedom:
+        """Return it with a change of what its motor moves: all of it."""
+        return change(self)
+
     def at(self, value: float, rate: float) -> Motion | None:
         """Return a state, or None if it cannot exist."""
         low, high = self.stops

@@ -40,11 +40,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from math import copysign, inf
+from typing import TypeVar
 
 from linkage_ros.dynamics.laws import LawTerm
 from linkage_ros.dynamics.longest_step import check_step
 from linkage_ros.dynamics.mechanics import Terms
 from linkage_ros.dynamics.motion import LARGEST, OneFreedom
+from linkage_ros.dynamics.two_masses import TwoMasses
+
+Driven = TypeVar('Driven', OneFreedom, TwoMasses)
 
 _AT_INPUT = LawTerm(1.0, 0.0, 1.0)
 _RESTING = -1
@@ -130,11 +134,13 @@ class Motor:
     supply: float
     command: str
 
-    def mounted(self, mechanism: OneFreedom) -> OneFreedom:
+    def mounted(self, mechanism: Driven) -> Driven:
         """Return a mechanism with this motor at its input, switched off: without a current."""
-        return replace(mechanism, terms=_with_motor(mechanism.terms), laws=(*mechanism.laws, _OFF))
+        return mechanism.driven_by(
+            lambda moved: replace(moved, terms=_with_motor(moved.terms), laws=(*moved.laws, _OFF))
+        )
 
-    def driven(self, mechanism: OneFreedom, command: float) -> tuple[OneFreedom, float, float]:
+    def driven(self, mechanism: Driven, command: float) -> tuple[Driven, float, float]:
         """
         Return a mechanism with this motor under a command.
 
@@ -156,7 +162,8 @@ class Motor:
 
         """
         law = self.law(command)
-        return replace(mechanism, laws=(*mechanism.laws[:-1], law)), 0.0, law.holding
+        under = mechanism.driven_by(lambda moved: replace(moved, laws=(*moved.laws[:-1], law)))
+        return under, 0.0, law.holding
 
     def check_step(self, inertia: float, method: str, step: float) -> None:
         """

@@ -31,8 +31,8 @@ effect of other inputs. Its motor then moves alone, and `effort` is the effort f
 inertia (see `CrankBehindPlay`). Where the motor pushes, it bears all of these. Without play, at
 b = 0, it always pushes.
 
-Under the torque drive a scene with backlash is refused: motor and crank would be two masses that
-meet and part, and the equation of motion has one.
+Under the torque drive a scene with backlash is refused: there motor and crank are two masses that
+meet and part, which is `play` of that drive (`linkage_ros.dynamics.two_masses`).
 
 The model depends on the path and not on the speed, so motion between two ticks is lost: a motor
 that goes back and forth between them has moved nothing. A rotating motor may be given as a wrapped

@@ -286,11 +286,25 @@ class LinkagePipeline:
         self._sensors = [SensorStage.of(sensor) for sensor in (*running, *behind)]
         # Messages.
         self.extras = [
-            _extra(effect, effect.writer(given[effect.name], context), member.name)
+            _output(
+                effect.name,
+                effect.topic,
+                effect.message,
+                effect.writer(given[effect.name], context),
+                member.name,
+                of_reading=effect.of_reading,
+            )
             for effect in effects
             if effect.writer is not None and effect.name in named
         ]
         """The topics beside the joint states."""
+        if (of_drive := getattr(drive_module, 'writer', None)) is not None:
+            written = of_drive(drive_parameters, context, self.drive)
+            if written is not None:
+                topic, message = drive_module.EXTRA_TOPIC, drive_module.EXTRA_MESSAGE
+                self.extras.append(
+                    _output(drive, topic, message, written, member.name, of_reading=True)
+                )
 
         self._read_behind = partial(self._read, first=len(running)) if behind else None
         self._straight: Straight | None = None
@@ -466,10 +480,11 @@ def _between_readings(member: SceneLinkage, named: set[str], moves_by_rates: boo
     return set() if moves_by_rates else mixing
 
 
-def _extra(effect: Effect, writer: Any, member: str) -> AuxiliaryOutput:
-    topic = f'~/{member}/{effect.topic[2:]}' if member else effect.topic
-    written = WriterStage.of(writer, of_reading=effect.of_reading)
-    return AuxiliaryOutput(effect.name, topic, effect.message, written)
+def _output(
+    name: str, topic: str, message: str, writer: Any, member: str, *, of_reading: bool
+) -> AuxiliaryOutput:
+    within = f'~/{member}/{topic[2:]}' if member else topic
+    return AuxiliaryOutput(name, within, message, WriterStage.of(writer, of_reading=of_reading))
 
 
 def _without_rates(_now: int, reading: SensorReading) -> SensorReading:

@@ -366,8 +366,8 @@ def _member(
     if drive == 'torque' and 'backlash' in effects:
         raise effects.error(
             'backlash',
-            'needs a model of motor and crank as two masses, and torque moves them as one',
-            'leave backlash out, or name another drive than torque',
+            'is a play without masses, and torque moves masses',
+            'write drive.torque.play: {width: …, inertia: …} instead',
         )
     parts = parts_of(linkage)
     kinds = {bool(given.slider) for given in linkage.inputs}

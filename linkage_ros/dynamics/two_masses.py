@@ -1,0 +1,222 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A motor and a crank with play between them, each with its own inertia.
+
+The motor, at the angle φ, and the crank, at q, move apart within the play: |φ − q| ≤ p/2. The
+motor has the inertia J, the drive's force and its brake; the crank has the rest of the mechanism::
+
+    J·φ̈ = τ − B·sign(φ̇)          I(q)·q̈ + ½·I'(q)·q̇² + … = 0          within the play
+    (I(q) + J)·q̈ + ½·I'(q)·q̇² + … = τ − B·sign(q̇)                       where they touch
+
+At an end of the play they meet. Newton's law of impact with the restitution e keeps the momentum
+J·φ̇ + I·q̇ and turns the relative rate r = φ̇ − q̇ into −e·r. If they stay together they move as
+one, as long as each alone would press on the other: on the side s = ±1 while s·(φ̈ − q̈) ≥ 0, both
+as if they were apart. The integrator finds the instants of meeting and of parting and cuts its
+step there (M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash - a survey,
+Automatica 38, 2002; for impacts D. E. Stewart, Rigid-Body Dynamics with Friction and Impact, SIAM
+Review 42, 2000).
+
+Friction in the joints takes no part in an impact. A stop of the mechanism that is reached while
+motor and crank touch stops both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import copysign
+from typing import NamedTuple
+
+from linkage_ros.dynamics.mechanics import Terms
+from linkage_ros.dynamics.motion import last_before, Motion, NARROW, OneFreedom
+
+_PIECES = 50
+"""Most pieces of a step; after these both move as one."""
+
+_BOUNCES = 20
+"""Most bounces in a step: with more they come to rest against each other anyway."""
+
+_SLOW = 1e-9
+"""Slower meetings, as a fraction of both rates, are without a bounce."""
+
+
+class PlayMotion(NamedTuple):
+    """
+    A state of motor and crank.
+
+    Attributes
+    ----------
+    crank, motor
+        Their states, each with its own equation of motion.
+    side
+        1 if the motor touches the crank so that it pushes it forward, -1 backward, 0 in between.
+    ahead
+        The time since the start of the step, in [s].
+
+    """
+
+    crank: Motion
+    motor: Motion
+    side: int = 0
+    ahead: float = 0.0
+
+    @property
+    def value(self) -> float:
+        """The crank's value, in [rad] or [m]."""
+        return self.crank.value
+
+    @property
+    def rate(self) -> float:
+        """The crank's rate, in [rad/s] or [m/s]."""
+        return self.crank.rate
+
+
+@dataclass(frozen=True, slots=True)
+class TwoMasses:
+    """
+    A motor that drives a mechanism of one input through play.
+
+    Attributes
+    ----------
+    crank
+        The mechanism without its motor.
+    motor
+        The motor alone.
+    joined
+        Both as one.
+    half
+        Half of the play, in [rad] or [m].
+    restitution
+        Ratio of the relative rates after and before a meeting, 0 to 1.
+
+    """
+
+    crank: OneFreedom
+    motor: OneFreedom
+    joined: OneFreedom
+    half: float
+    restitution: float
+
+    @classmethod
+    def of(cls, crank: OneFreedom, inertia: float, play: float, restitution: float) -> TwoMasses:
+        """Return a mechanism behind the play of a motor of this inertia, in [kg·m²] or [kg]."""
+        alone = Terms(inertia, 0.0, 0.0, 0.0, 0.0)
+
+        def together(value: float) -> Terms | None:
+            terms = crank.terms(value)
+            return None if terms is None else terms._replace(inertia=terms.inertia + inertia)
+
+        motor = OneFreedom(lambda _value: alone, crank.step)
+        return cls(crank, motor, replace(crank, terms=together), 0.5 * play, restitution)
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """Lower and upper stop of the crank, in [rad] or [m]."""
+        return self.crank.stops
+
+    def driven_by(self, change: Callable[[OneFreedom], OneFreedom]) -> TwoMasses:
+        """Return it with a change of what its motor moves: itself, and both as one."""
+        return replace(self, motor=change(self.motor), joined=change(self.joined))
+
+    def at(self, value: float, rate: float) -> PlayMotion | None:
+        """Return a state with the motor in the middle of the play, or None if there is none."""
+        crank, motor = self.crank.at(value, rate), self.motor.at(value, rate)
+        return None if crank is None or motor is None else PlayMotion(crank, motor)
+
+    def acceleration(
+        self, motion: PlayMotion, force: float, brake: float = 0.0, time: float = 0.0
+    ) -> float:
+        """Return q̈ of the crank; the parameters are those of `OneFreedom.advance`."""
+        if not motion.side:
+            return self.crank.acceleration(motion.crank, 0.0, 0.0, time)
+        return self.joined.acceleration(self._as_one(motion.crank), force, brake, time)
+
+    def advance(
+        self,
+        motion: PlayMotion,
+        seconds: float,
+        force: float,
+        brake: float = 0.0,
+        time: float = 0.0,
+    ) -> PlayMotion:
+        """Advance a state by one step; the parameters are those of `OneFreedom.advance`."""
+        left, bounces = seconds, 0
+        for _ in range(_PIECES):
+            now = time + (seconds - left)
+            motion = motion._replace(ahead=0.0)
+            if motion.side and self._pressed(motion, force, brake, now) < 0.0:
+                motion = motion._replace(side=0)
+            begin, side = motion, motion.side
+
+            def reach(ahead: float, begin: PlayMotion = begin, now: float = now) -> PlayMotion:
+                return self._moved(begin, ahead, force, brake, now)
+
+            def margin(state: PlayMotion, side: int = side, now: float = now) -> float:
+                if side:
+                    return self._pressed(state, force, brake, now + state.ahead)
+                return self.half - abs(state.motor.value - state.crank.value)
+
+            end = reach(left)
+            if margin(end) >= 0.0:
+                return end
+            length, _, _ = last_before(reach, margin, begin, left, end)
+            beyond = reach(length)
+            left -= length
+            if side:
+                motion = beyond._replace(side=0)
+            else:
+                motion = self._met(beyond, bounces < _BOUNCES)
+                bounces += not motion.side
+            if left <= seconds * NARROW:
+                return motion
+        together = self._met(motion, False)
+        return self._moved(together, left, force, brake, time + (seconds - left))
+
+    def _moved(
+        self, motion: PlayMotion, seconds: float, force: float, brake: float, now: float
+    ) -> PlayMotion:
+        """Return the state after some seconds in which they neither meet nor part."""
+        side = motion.side
+        if not side:
+            crank = self.crank.advance(motion.crank, seconds, 0.0, 0.0, now)
+            motor = self.motor.advance(motion.motor, seconds, force, brake, now)
+            return PlayMotion(crank, motor, 0, seconds)
+        end = self.joined.advance(self._as_one(motion.crank), seconds, force, brake, now)
+        crank = end._replace(terms=self.crank.terms(end.value) or motion.crank.terms)
+        motor = motion.motor._replace(value=end.value + side * self.half, rate=end.rate)
+        return PlayMotion(crank, motor, side, seconds)
+
+    def _as_one(self, crank: Motion) -> Motion:
+        """Return the state of both as one."""
+        return crank._replace(terms=self.joined.terms(crank.value) or crank.terms)
+
+    def _pressed(self, motion: PlayMotion, force: float, brake: float, time: float) -> float:
+        """Return how fast they would press on each other if they were apart."""
+        motor = self.motor.acceleration(motion.motor, force, brake, time)
+        return motion.side * (motor - self.crank.acceleration(motion.crank, 0.0, 0.0, time))
+
+    def _met(self, motion: PlayMotion, bounces: bool) -> PlayMotion:
+        """Return the state after a meeting."""
+        crank, motor = motion.crank, motion.motor
+        side = int(copysign(1.0, motor.value - crank.value))
+        closing = motor.rate - crank.rate
+        own, other = motor.terms.inertia, crank.terms.inertia
+        common = (own * motor.rate + other * crank.rate) / (own + other)
+        slow = side * closing <= _SLOW * (abs(motor.rate) + abs(crank.rate))
+        back = self.restitution * closing / (own + other) if bounces and not slow else 0.0
+        motor = motor._replace(value=crank.value + side * self.half, rate=common - other * back)
+        crank = crank._replace(rate=common + own * back)
+        return PlayMotion(crank, motor, 0 if back else side, motion.ahead)
