@@ -18,12 +18,14 @@ Rate limit: the sensor is slower than the ticks, and samples at its own rate.
 
 Counted from the first tick t₀, its k-th sample is due at::
 
-    t_k = t₀ + ⌊k·10⁹/f + ½⌋ ns
+    t_k = t₀ + p + ⌊k·10⁹/f + ½⌋ ns
 
-in integers, where f is the exact fraction of the double: nothing drifts, however long it runs. A
-sample is the reading at the first tick at or after t_k. It is not interpolated to t_k, so that the
-counts of an encoder stay whole. It is held until the next one (a zero-order hold; K. J. Åström and
-B. Wittenmark, Computer-Controlled Systems, 3rd ed., 1997).
+in integers, where f is the exact fraction of the doubles ``rate``·(1 + ``ppm``/10⁶): nothing
+drifts, however long it runs. p, ``phase``, is when its first sample is due, and ``ppm`` the error
+of its clock; before the first sample nothing is published. A sample is the reading at the first
+tick at or after t_k. It is not interpolated to t_k, so that the counts of an encoder stay whole.
+It is held until the next one (a zero-order hold; K. J. Åström and B. Wittenmark,
+Computer-Controlled Systems, 3rd ed., 1997).
 
 After an `encoder`, the driver reads the counts with each sample: differenced rates cover the time
 between two samples.
@@ -36,6 +38,7 @@ once.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context
@@ -55,6 +58,12 @@ class RateLimitParameters:
         'between two samples: repeat the last one at every tick, or publish nothing',
         ('repeat', 'silent'),
         'repeat',
+    )
+    phase: float = number(
+        'time of the first sample, from the first tick on', 0.0, unit='s', least=0.0, most=3600.0
+    )
+    ppm: float = number(
+        "by which the sensor's clock runs fast, in millionths", 0.0, least=-1e5, most=1e5
     )
 
 
@@ -77,15 +86,17 @@ class RateLimit:
 
     """
 
-    __slots__ = ('_begin', '_due', '_encoder', '_held', '_per', '_repeat', '_unit')
+    __slots__ = ('_begin', '_due', '_encoder', '_held', '_per', '_phase', '_repeat', '_unit')
 
     def __init__(self, use: RateLimitParameters) -> None:
         # f = numerator/denominator, and the k-th sample is due after ⌊(k·per + unit)/(2·unit)⌋ ns.
-        self._unit, denominator = use.rate.as_integer_ratio()
-        self._per = 2_000_000_000 * denominator
+        rate = Fraction(use.rate) * (1 + Fraction(use.ppm) / 1_000_000)
+        self._unit = rate.numerator
+        self._per = 2_000_000_000 * rate.denominator
+        self._phase = round(use.phase * 1e9)
         self._repeat = use.hold == 'repeat'
         self._held: SensorReading | None = None
-        self._begin = self._due = 0
+        self._begin = self._due = -1
         self._encoder: Encoder | None = None
 
     def read_by(self, encoder: Encoder) -> None:
@@ -96,10 +107,10 @@ class RateLimit:
     def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
         """Return the held sample; None if it is not repeated."""
         held = self._held
-        if held is None:
-            self._begin = now
-        elif now < self._due:
-            if not self._repeat:
+        if self._begin < 0:
+            self._begin = self._due = now + self._phase
+        if now < self._due:
+            if held is None or not self._repeat:
                 return None
             return restamped(held, reading.stamp)
         unit, per = self._unit, self._per

@@ -15,17 +15,21 @@
 
 """Bias: what is read of a joint is off by a constant, and nothing else is."""
 
+from hypothesis import given
+from hypothesis import strategies as st
 from linkage_ros.effects import bias
-from linkage_ros.effects.bias import BiasParameters
+from linkage_ros.effects.bias import BiasParameters, EccentricDisc
+from linkage_ros.errors import DefinitionError
+from mpmath import mp
 import pytest
 
-from .sensors import BEGIN, context, MS, published, reading, SLIDE
+from .sensors import ANGLES, BEGIN, context, likely, MS, published, reading, SLIDE
 
 
 @pytest.mark.parametrize(
     ('biases', 'expected'),
     [
-        ({}, (1.0, 2.0)),
+        ({'rocker_joint': 0.0}, (1.0, 2.0)),
         ({'rocker_joint': 0.25}, (1.0, 2.25)),
         ({'rocker_joint': -3.0, 'coupler_joint': 0.5}, (1.5, -1.0)),
     ],
@@ -53,3 +57,61 @@ def test_a_scene_publishes_biased_joints_and_true_rates():
     for i, off in zip(ideal, published('bias: {joints: {coupler_joint: 0.5}}'), strict=True):
         assert off.joints == (i.joints[0] + 0.5, i.joints[1])
         assert off.rates == i.rates
+
+
+def test_the_zero_is_drawn_once_from_the_seed():
+    # Over seeds it spreads by its deviation; in a run it stays.
+    drawn = []
+    for seed in range(2000):
+        parameters = BiasParameters({'rocker_joint': 5.0}, deviations={'rocker_joint': 0.25})
+        sensor = bias.sensor(parameters, context(seed=f'{seed}'))
+        first, later = (sensor(BEGIN + ms * MS, reading(BEGIN, 1.0, 2.0)).joints for ms in (0, 9))
+        assert first == later
+        assert first[0] == 1.0
+        drawn.append((first[1] - 7.0) / 0.25)
+    assert likely(sum(number**2 for number in drawn), 2000)
+    assert likely(sum(drawn) ** 2 / 2000, 1)
+
+
+@pytest.mark.parametrize(
+    ('kind', 'field', 'expected'),
+    [('rates', 'rates', (3.0, 4.5)), ('efforts', 'efforts', (5.0, 6.5))],
+)
+def test_rates_and_efforts_have_a_bias_of_their_own(kind, field, expected):
+    sensor = bias.sensor(BiasParameters(**{kind: {'rocker_joint': 0.5}}), context())
+    rest = {'rates': (3.0, 4.0), 'efforts': (5.0, 6.0)}
+    found = sensor(BEGIN, reading(BEGIN, 1.0, 2.0, **rest))
+    assert found == reading(BEGIN, 1.0, 2.0, **{**rest, field: expected})
+    assert sensor(BEGIN, reading(BEGIN, 1.0, 2.0)) == reading(BEGIN, 1.0, 2.0)
+
+
+@given(st.floats(-20.0, 20.0), st.floats(-9.0, 9.0), st.floats(-0.1, 0.1), st.floats(-4.0, 4.0))
+def test_scale_and_disc_change_the_rate_as_they_change_the_angle(angle, rate, scale, phase):
+    # The rate that is read is the slope of what is read, by mpmath.
+    parameters = BiasParameters(
+        scales={'rocker_joint': scale},
+        eccentricities={'rocker_joint': EccentricDisc(0.01, phase)},
+    )
+    sensor = bias.sensor(parameters, context())
+    found = sensor(BEGIN, reading(BEGIN, 1.0, angle, rates=(7.0, rate)))
+
+    def read(x):
+        return x + scale * x + mp.mpf(0.01) * mp.sin(x - phase)
+
+    with mp.workdps(40):
+        assert found.joints[1] == pytest.approx(float(read(mp.mpf(angle))), rel=1e-14, abs=1e-15)
+        slope = mp.diff(read, mp.mpf(angle))
+        assert found.rates[1] == pytest.approx(float(slope * mp.mpf(rate)), rel=1e-12, abs=1e-13)
+    assert (found.joints[0], found.rates[0]) == (1.0, 7.0)
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'where', 'line'),
+    [
+        (BiasParameters(), ANGLES, 'names no joint'),
+        (BiasParameters(eccentricities={'rod_slide': EccentricDisc(0.1)}), SLIDE, 'has no disc'),
+    ],
+)
+def test_what_has_no_error_is_refused(parameters, where, line):
+    with pytest.raises(DefinitionError, match=line):
+        bias.sensor(parameters, context(where))

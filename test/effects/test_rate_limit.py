@@ -106,3 +106,22 @@ def test_a_scene_holds_readings_or_is_silent_between_samples():
         assert held == ideal[n // 10 * 10]._replace(stamp=BEGIN + n * MS)
     silent = published('rate_limit: {rate: 100, hold: silent}')
     assert silent == [read if n % 10 == 0 else None for n, read in enumerate(ideal)]
+
+
+def test_a_sensor_begins_when_its_own_first_sample_is_due():
+    # 100 samples a second from 3.5 ms on; ticks each ms. Before there is nothing to read.
+    sensor = rate_limit.sensor(RateLimitParameters(100.0, phase=0.0035), context())
+    found = [sensor(BEGIN + ms * MS, reading(BEGIN + ms * MS, ms)) for ms in range(30)]
+    assert found[:4] == [None] * 4
+    assert [each.joints[0] for each in found[4:]] == [4] * 10 + [14] * 10 + [24] * 6
+
+
+@given(st.floats(-1000.0, 1000.0), st.integers(1, 10**9))
+def test_a_clock_that_runs_fast_is_as_fast_to_the_nanosecond(ppm, k):
+    sensor = rate_limit.sensor(RateLimitParameters(250.0, ppm=ppm), context())
+    rate = Fraction(250) * (1 + Fraction(ppm) / 10**6)
+    due = floor(k * Fraction(10**9) / rate + Fraction(1, 2))
+    before = floor((k - 1) * Fraction(10**9) / rate + Fraction(1, 2))
+    times = [0, before, due - 1, due]
+    found = [sensor(BEGIN + t, reading(BEGIN + t, t)).joints[0] for t in times]
+    assert found == [0, before, before, due]
