@@ -115,18 +115,21 @@ demo: $(DEMO)
 # has its own ROS domain; it mostly waits, so the other tests run beside these, at the lowest
 # priority. Tests that measure nodes come after those with nodes, one at a time. Of these kinds only
 # files with such tests are collected.
-# Tests that fail beside others run again, one at a time, as by `colcon test --retest-until-pass 1`:
+# Tests that fail there run again at the end, one at a time, as by `colcon test --retest-until-pass 1`:
 # on a busy machine a test may wait in vain. Both outcomes are printed.
 PYTEST := $(BIN)/python -m pytest --durations 25
-tests = { $(PYTEST) -o cache_dir=build/pytest_$(1) $(2) || { [ $$? = 1 ] && \
-  echo 'make: the tests that failed run again, one at a time' && \
-  $(PYTEST) -o cache_dir=build/pytest_$(1) --last-failed; }; }
+tests = { $(PYTEST) -o cache_dir=build/pytest_$(1) $(2) || { [ $$? = 1 ] && [ -n '$(RUN_AGAIN)' ]; }; }
 BY_FILE := --dist loadfile --no-loadscope-reorder
 marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)' test)
 test: $(STAMP)
-	@status=0; \
+	@status=0; rm -rf build/pytest_*; \
 	$(BIN)/python test/node_packages.py || status=$$?; \
-	$(MAKE) --no-print-directory --keep-going --jobs 2 test_nodes lint test_rest || status=$$?; \
+	$(MAKE) --no-print-directory --keep-going --jobs 2 RUN_AGAIN=1 test_nodes lint test_rest || \
+	  status=$$?; \
+	for failed in $$(grep -ls true build/pytest_*/v/cache/lastfailed); do \
+	  echo 'make: tests that failed beside others run again, one at a time'; \
+	  $(PYTEST) -o cache_dir=$${failed%/v/cache/lastfailed} --last-failed || status=$$?; \
+	done; \
 	exit $$status
 
 # What it prints comes at its end, as a whole.

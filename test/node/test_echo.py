@@ -69,15 +69,16 @@ def test_joint_states_are_printed_as_yaml_with_their_units(say, echo):
         assert message['effort'] == []
     assert 'position: [0.5, -1.25]  # rad or m\n' in first
     assert 'velocity: [2.0, 0.0]  # rad/s or m/s\n' in first
+    # A machine that is busy may take more than 2 s to discover it, which is a line of its own.
     assert re.fullmatch(
-        r'linkage echo: /joint_states: 2 messages, [\d.]+ Hz, period [\d.]+ to [\d.]+ ms\n',
-        answer.stderr,
+        r'linkage echo: /joint_states: 2 messages, [\d.]+ Hz, period [\d.]+ to [\d.]+ ms',
+        answer.stderr.splitlines()[-1],
     )
 
 
 def test_the_rate_is_printed_instead_of_messages(say, echo):
     say('/words', String(data='x'))
-    answer = echo('words', '--rate', '--seconds', '3')
+    answer = echo('words', '--rate', '--seconds', '6')
     assert answer.returncode == 0, answer.stderr
     lines = answer.stdout.splitlines()
     assert lines
