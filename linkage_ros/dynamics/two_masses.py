@@ -75,12 +75,12 @@ class PlayMotion(NamedTuple):
 
     @property
     def value(self) -> float:
-        """The crank's value, in [rad] or [m]."""
+        """Return the crank's value, in [rad] or [m]."""
         return self.crank.value
 
     @property
     def rate(self) -> float:
-        """The crank's rate, in [rad/s] or [m/s]."""
+        """Return the crank's rate, in [rad/s] or [m/s]."""
         return self.crank.rate
 
 

@@ -174,7 +174,7 @@ def by_scipy(mechanics, restitution, times, force):
     found = []
     while True:
         if side:
-            slopes = lambda t, y: [y[1], together(t, *y[:2]), y[1], together(t, *y[:2])]  # noqa: E731
+            slopes = lambda t, y: [y[1], together(t, *y[:2])] * 2  # noqa: E731
             event = lambda t, y, s=side: s * (force(t) / MOTOR - alone(*y[:2]))  # noqa: E731
             event.direction = -1
             events = [event]

@@ -40,7 +40,7 @@ needs = {
 }
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Werror', '-ffp-contract=off')
 NUMBERS = list(STATUSES)
-COUNT = int(os.environ.get('LINKAGE_STATES', '600'))
+COUNT = int(os.environ.get('LINKAGE_STATES', '400'))
 """States of each linkage; `make compiled` takes 100,000."""
 
 State = tuple[float, ...]
