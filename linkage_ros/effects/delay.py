@@ -39,18 +39,29 @@ With ``stamp: arrival`` the message has the stamp of its tick, as from a driver 
 the delay; with ``measured`` the time of measurement, t − d, or that of the reading.
 
 The line holds the readings of the last d: 1000 for a second at 1 kHz.
+
+With ``spread``, v, the latency of each reading is random: d + v·u, with u uniform in [0, 1], or
+with the mean 1 if ``distribution`` is exponential (cut off at 20). Then readings are messages from
+the beginning. With ``reorder`` a message may overtake others, as over several paths or by UDP;
+else it arrives with the one before it at the earliest, as over TCP. With the probability
+``duplicates`` a message arrives a second time, after a latency of its own. One message arrives at
+a tick; others that are due wait for the next ticks. (On latencies in networked control: J.
+Nilsson, Real-Time Control Systems with Delays, 1998.)
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from random import Random
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
 from linkage_ros.effects.stage import restamped, SensorReading
-from linkage_ros.files.parameters import choice, number
+from linkage_ros.errors import DefinitionError
+from linkage_ros.files.parameters import choice, flag, number
 
 _AUTOMATIC = 'automatic'
 
@@ -71,6 +82,21 @@ class DelayParameters:
         ('arrival', 'measured'),
         'arrival',
     )
+    spread: float = number(
+        'random part of the latency: its most, or its mean', 0.0, unit='s', least=0.0, most=10.0
+    )
+    distribution: str = choice(
+        'distribution of the random part', ('uniform', 'exponential'), 'uniform'
+    )
+    reorder: bool = flag('a message may overtake others', False)
+    duplicates: float = number(
+        'probability that a message arrives twice', 0.0, least=0.0, most=1.0
+    )
+
+    @property
+    def random(self) -> bool:
+        """Whether the line carries messages with random latencies."""
+        return bool(self.spread or self.duplicates)
 
 
 PARAMETERS = DelayParameters
@@ -78,13 +104,35 @@ PARAMETERS = DelayParameters
 
 def interpolates(parameters: DelayParameters, named: Collection[str]) -> bool:
     """Return whether readings are interpolated, given the effects of the scene."""
+    if parameters.random:
+        return False
     if parameters.between == _AUTOMATIC:
         return 'encoder' not in named
     return parameters.between == 'interpolated'
 
 
-def sensor(parameters: DelayParameters, context: Context) -> Delay:
-    """Build the sensor."""
+def sensor(parameters: DelayParameters, context: Context) -> Delay | RandomDelay:
+    """
+    Build the sensor.
+
+    Raises
+    ------
+    DefinitionError
+        Readings of random latency are to be interpolated, or to overtake without a spread.
+
+    """
+    if parameters.random and parameters.between == 'interpolated':
+        raise DefinitionError(
+            'effects.delay.between',
+            'interpolated takes one latency for all readings',
+            'leave it out, or spread and duplicates',
+        )
+    if parameters.reorder and not parameters.spread:
+        raise DefinitionError(
+            'effects.delay.reorder', 'nothing overtakes without a spread', 'write spread too'
+        )
+    if parameters.random:
+        return RandomDelay(parameters, context.random('delay'))
     return Delay(parameters, interpolates(parameters, context.effects), context.moves_by_rates)
 
 
@@ -167,3 +215,65 @@ class Delay:
         if self._on_the_way and self._on_the_way[0][0] <= due:
             return self._on_the_way.popleft()[1]
         return None
+
+
+_LONGEST = 20.0
+"""Largest exponential latency, in its mean: one of 5e8 is longer."""
+
+
+class RandomDelay:
+    """
+    A line of messages with random latencies.
+
+    Parameters
+    ----------
+    use
+        Parameters of the effect.
+    random
+        The generator.
+
+    """
+
+    __slots__ = ('_count', '_delay', '_draw', '_duplicates', '_latest', '_measured', '_random',
+                 '_reorder', '_way', 'gap_begins')  # fmt: skip
+
+    def __init__(self, use: DelayParameters, random: Random) -> None:
+        self._delay, spread = round(use.seconds * 1e9), use.spread * 1e9
+        self._random = random.random
+        self._draw: Callable[[], int] = (
+            (lambda: round(spread * random.random()))
+            if use.distribution == 'uniform'
+            else (lambda: round(spread * min(random.expovariate(1.0), _LONGEST)))
+        )
+        self._reorder, self._duplicates = use.reorder, use.duplicates
+        self._measured = use.stamp == 'measured'
+        self._way: list[tuple[int, int, SensorReading]] = []
+        """Messages on the way: when each arrives, in [ns], and its number."""
+        self._count = self._latest = 0
+        self.gap_begins = False
+
+    def __call__(self, now: int, reading: SensorReading | None) -> SensorReading | None:
+        """Return the arriving message; None as `reading` means that the sensor is silent."""
+        if reading is not None:
+            self._send(now, reading)
+            if self._duplicates and self._random() < self._duplicates:
+                self._send(now, reading)
+        if not self._way or self._way[0][0] > now:
+            return None
+        _, _, found = heappop(self._way)
+        return found if self._measured else restamped(found, now)
+
+    def gap(self, now: int) -> SensorReading | None:
+        """Return the arriving message at a time, in [ns], at which the linkage has no pose."""
+        return self(now, None)
+
+    def silence(self, now: int, gap: bool) -> SensorReading | None:
+        """Return the arriving message where a sensor before is silent, or in a gap."""
+        return self.gap(now) if gap else self(now, None)
+
+    def _send(self, now: int, reading: SensorReading) -> None:
+        arrives = now + self._delay + self._draw()
+        if not self._reorder:
+            arrives = self._latest = max(arrives, self._latest)
+        heappush(self._way, (arrives, self._count, reading))
+        self._count += 1

@@ -18,14 +18,16 @@ from fractions import Fraction
 from functools import partial
 from math import cos, sin
 
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.effects import delay
 from linkage_ros.effects.delay import DelayParameters
 from linkage_ros.effects.history import History
+from linkage_ros.errors import DefinitionError
 import pytest
+from scipy.stats import expon, kstest, uniform
 
-from .sensors import ANGLES, BEGIN, context, MS, published, reading
+from .sensors import ANGLES, BEGIN, context, likely, MS, published, reading
 
 # Delay: exact to the nanosecond, no value before the first, and no more history than needed.
 
@@ -372,3 +374,84 @@ def test_while_time_stands_the_last_reading_counts_and_none_pile_up():
     assert len(history) == 2
     assert history.newest(BEGIN + MS, -1).joints == (999.0,)
     assert history.between(BEGIN + MS // 2).joints == (499.5,)
+
+
+# Random latencies. One message arrives at a tick; ticks are fine against the latencies here.
+
+TICK = 10_000  # ns
+
+
+def arrivals(count, *, every=1000, seed='seed', **parameters):
+    """Return what was sent and what arrived when: (message, time in ns), a tick each 10 µs."""
+    sensor = delay.sensor(DelayParameters(**parameters), context(seed=seed))
+    sent, arrived, number = {}, [], 0
+    while len(sent) < count or sensor._way:
+        now = BEGIN + number * TICK
+        if number % every == 0 and len(sent) < count:
+            sent[float(len(sent))] = now
+            found = sensor(now, reading(now, float(len(sent) - 1)))
+        else:
+            found = sensor.silence(now, gap=False)
+        if found is not None:
+            arrived.append((found.joints[0], now))
+        number += 1
+    return sent, arrived
+
+
+@pytest.mark.parametrize(
+    ('distribution', 'expected'), [('uniform', uniform), ('exponential', expon)]
+)
+def test_latencies_are_distributed_as_they_are_said_to_be(distribution, expected):
+    sent, arrived = arrivals(
+        800, every=3, seconds=0.002, spread=0.004, distribution=distribution, reorder=True
+    )
+    latencies = [(now - sent[message]) * 1e-9 for message, now in arrived]
+    # A tick later at the most, and one more for each message that waits.
+    assert kstest([(each - 0.002) / 0.004 for each in latencies], expected.cdf).statistic < 0.08
+    assert min(latencies) >= 0.002
+
+
+@given(
+    st.sampled_from(['uniform', 'exponential']),
+    st.booleans(),
+    st.floats(0.0001, 0.003),
+    st.integers(1, 30),
+)
+@settings(max_examples=25)
+def test_each_message_arrives_once(distribution, reorder, spread, every):
+    sent, arrived = arrivals(
+        40, every=every, seconds=0.0005, spread=spread, distribution=distribution, reorder=reorder
+    )
+    messages = [message for message, _ in arrived]
+    assert sorted(messages) == sorted(sent)
+    assert all(now >= sent[message] + 500_000 for message, now in arrived)
+    if not reorder:
+        assert messages == sorted(messages)
+
+
+def test_with_reordering_messages_overtake_and_tell_when_they_were_measured():
+    _, arrived = arrivals(200, every=10, seconds=0.0, spread=0.002, reorder=True)
+    messages = [message for message, _ in arrived]
+    assert messages != sorted(messages)
+    sensor = delay.sensor(DelayParameters(0.0, stamp='measured', spread=0.001), context())
+    assert sensor(BEGIN, reading(BEGIN, 1.0)) is None
+    assert sensor.silence(BEGIN + MS, gap=False).stamp == BEGIN
+
+
+def test_duplicates_come_as_often_as_they_are_said_to():
+    sent, arrived = arrivals(2000, every=2, seconds=0.0001, duplicates=0.1)
+    extra = len(arrived) - len(sent)
+    assert likely((extra - 200) ** 2 / (2000 * 0.1 * 0.9), 1)
+    assert {message for message, _ in arrived} == {*sent}
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'line'),
+    [
+        ({'spread': 0.1, 'between': 'interpolated'}, 'interpolated takes one latency'),
+        ({'reorder': True}, 'nothing overtakes without a spread'),
+    ],
+)
+def test_what_random_latencies_exclude_is_refused(parameters, line):
+    with pytest.raises(DefinitionError, match=line):
+        delayed(0.01, **parameters)
