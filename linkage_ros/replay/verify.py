@@ -46,7 +46,8 @@ IDENTICAL, DIFFERENT, UNDECIDED = 'identical', 'different', 'cannot be told'
 _NEVER_FOUND_AGAIN = ('rate_limit', 'noise', 'jitter', 'dropout')
 """
 Effects whose state is not recovered: random generators, and the time of the first tick. So for an
-incremental encoder, which counts from power-on, and for markers with a trail.
+incremental encoder, which counts from power-on, for a low-pass, which never forgets to the last
+bit, for random latencies, for loads over the time, and for markers with a trail.
 """
 
 
@@ -164,12 +165,23 @@ def turning_joints(scene: Scene) -> dict[str, bool]:
 
 
 def _lost(scene: Scene) -> tuple[str, ...]:
-    named = [member.drive[0] for member in scene.members if member.drive[0] != 'topic']
+    named = []
     for member in scene.members:
+        drive, parameters = member.drive
+        if drive != 'topic' or parameters.cutoff:
+            named.append(drive)
+    for member in scene.members:
+        if member.loads is not None and member.loads.applied.timed:
+            named.append('loads')
         named += [effect for effect in member.effects if effect in _NEVER_FOUND_AGAIN]
         encoder = member.effects.get('encoder')
-        if encoder and any(each.incremental for each in encoder.joints.values()):
+        if encoder and (
+            encoder.cutoff or any(each.incremental for each in encoder.joints.values())
+        ):
             named.append('encoder')
+        delay = member.effects.get('delay')
+        if delay and delay.random:
+            named.append('delay')
         markers = member.effects.get('markers')
         if markers and markers.trace:
             named.append('markers')
