@@ -44,9 +44,9 @@ With ``spread``, v, the latency of each reading is random: d + v·u, with u unif
 with the mean 1 if ``distribution`` is exponential (cut off at 20). Then readings are messages from
 the beginning. With ``reorder`` a message may overtake others, as over several paths or by UDP;
 else it arrives with the one before it at the earliest, as over TCP. With the probability
-``duplicates`` a message arrives a second time, after a latency of its own. One message arrives at
-a tick; others that are due wait for the next ticks. (On latencies in networked control: J.
-Nilsson, Real-Time Control Systems with Delays, 1998.)
+``duplicates`` a message arrives a second time, after a latency of its own. Of several that arrive
+between two ticks the last one is published. (On latencies in networked control: J. Nilsson,
+Real-Time Control Systems with Delays, 1998.)
 """
 
 from __future__ import annotations
@@ -258,10 +258,10 @@ class RandomDelay:
             self._send(now, reading)
             if self._duplicates and self._random() < self._duplicates:
                 self._send(now, reading)
-        if not self._way or self._way[0][0] > now:
-            return None
-        _, _, found = heappop(self._way)
-        return found if self._measured else restamped(found, now)
+        found: SensorReading | None = None
+        while self._way and self._way[0][0] <= now:
+            _, _, found = heappop(self._way)
+        return found if found is None or self._measured else restamped(found, now)
 
     def gap(self, now: int) -> SensorReading | None:
         """Return the arriving message at a time, in [ns], at which the linkage has no pose."""

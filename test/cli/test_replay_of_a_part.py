@@ -44,7 +44,7 @@ RINGS = {
     'play, which is passed': ('backlash: {play: 0.01}', 0, 'identical', ''),
     'random numbers': (NOISE, 1, 'cannot be told', 'noise'),
     'random latencies': (
-        'velocity: {}, delay: {seconds: 0.002, spread: 0.004, stamp: measured}', 1, 'cannot be told', 'delay',
+        'velocity: {}, delay: {seconds: 0.002, spread: 0.004}', 1, 'cannot be told', 'delay',
     ),
     'a low-pass': (
         'velocity: {}, encoder: {joints: {rocker_joint: {counts: 4096}}, cutoff: 5}',
