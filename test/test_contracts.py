@@ -32,6 +32,7 @@ from linkage_ros.effects.dropout import DropoutParameters
 from linkage_ros.effects.encoder import EncoderParameters, JointEncoder
 from linkage_ros.effects.friction import FrictionParameters
 from linkage_ros.effects.jitter import JitterParameters
+from linkage_ros.effects.measuring_range import JointRange, MeasuringRangeParameters
 from linkage_ros.effects.noise import JointNoise, NoiseParameters
 from linkage_ros.effects.rate_limit import RateLimitParameters
 from linkage_ros.effects.stage import EFFECTS, NEEDS
@@ -97,6 +98,12 @@ READ = [
         ),
     ),
     (
+        'measuring_range',
+        'four_bar',
+        '{joints: {rocker_joint: {low: -1, high: 2, rate: 3, effort: 4}}}',
+        MeasuringRangeParameters({'rocker_joint': JointRange(-1.0, 2.0, 3.0, 4.0)}),
+    ),
+    (
         'encoder',
         'four_bar',
         '{joints: {rocker_joint: {counts: 4096}}}',
@@ -160,6 +167,12 @@ REFUSED_EFFECTS = {
         ('{joints: {rocker_joint: {whte: 1}}}', 'whte: unknown key'),
         ('{joints: {crank: {white: 1}}}', "there is no joint 'crank'"),
         ('{joints: {rocker_joint: 0.1}}', 'joints.rocker_joint'),
+    ],
+    'measuring_range': [
+        ('{}', 'joints'),
+        ('{joints: {rocker: {low: 0}}}', "there is no joint 'rocker'"),
+        ('{joints: {rocker_joint: {low: 2, high: 1}}}', 'low 2 is not below high 1'),
+        ('{joints: {rocker_joint: {rate: -1}}}', 'at least 0'),
     ],
     'encoder': [
         ('{}', 'joints'),

@@ -86,6 +86,7 @@ SCENES = {
     'jitter': Expected('{seconds: 0.001}', ('velocity',)),
     'bias': Expected('{joints: {rocker_joint: 0.1}}'),
     'noise': Expected('{joints: {rocker_joint: {white: 0.001}}}'),
+    'measuring_range': Expected('{joints: {rocker_joint: {high: 2}}}'),
     'encoder': Expected('{joints: {rocker_joint: {counts: 4096}}}'),
     'rate_limit': Expected('{rate: 100}'),
     'dropout': Expected('{probability: 0.1}'),

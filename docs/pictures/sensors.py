@@ -170,6 +170,7 @@ PICTURES = {
     'jitter': jitter,
     'bias': bias,
     'noise': noise,
+    'measuring_range': bias,
     'encoder': encoder,
     'rate_limit': rate_limit,
     'dropout': dropout,

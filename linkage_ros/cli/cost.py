@@ -63,6 +63,7 @@ effects:
   jitter: {seconds: 1.0e-4}
   bias: {joints: {rocker_joint: 0.01}}
   noise: {joints: {rocker_joint: {white: 0.001, walk: 0.001, rate_white: 0.01}}}
+  measuring_range: {joints: {rocker_joint: {low: 1.0, high: 2.2}}}
   encoder: {joints: {rocker_joint: {counts: 4096}}}
   rate_limit: {rate: 500}
   dropout: {probability: 0.1, burst: 3}

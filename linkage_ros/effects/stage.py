@@ -85,6 +85,7 @@ EFFECTS = {
     'jitter': 'linkage_ros.effects.jitter',
     'bias': 'linkage_ros.effects.bias',
     'noise': 'linkage_ros.effects.noise',
+    'measuring_range': 'linkage_ros.effects.measuring_range',
     'encoder': 'linkage_ros.effects.encoder',
     'rate_limit': 'linkage_ros.effects.rate_limit',
     'dropout': 'linkage_ros.effects.dropout',
