@@ -103,7 +103,7 @@ class JointLoad:
         'constant part', 0.0, unit=_EFFORT, least=-GREATEST_LOAD, most=GREATEST_LOAD
     )
     over_time: tuple[tuple[float, float], ...] = rows(
-        'part over the time since the first tick',
+        'part over the time since the first pose',
         ('time [s]', f'effort [{_EFFORT}]'),
         default=(),
         most=GREATEST_LOAD,
@@ -132,7 +132,7 @@ class PointLoad:
         'constant part', 0.0, unit='N', least=-GREATEST_LOAD, most=GREATEST_LOAD
     )
     over_time: tuple[tuple[float, float], ...] = rows(
-        'part over the time since the first tick',
+        'part over the time since the first pose',
         ('time [s]', 'force [N]'),
         default=(),
         most=GREATEST_LOAD,

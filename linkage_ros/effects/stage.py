@@ -138,7 +138,7 @@ class MechanismState(NamedTuple):
     shift
         Displacement of the published joints under load, in [rad] or [m]; empty for none.
     seconds
-        Time since the first tick, in [s].
+        Time since the first pose, in [s]; 0 if no load changes with it.
 
     """
 

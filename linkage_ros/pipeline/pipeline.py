@@ -347,8 +347,6 @@ class LinkagePipeline:
 
     def look(self, now: int, crank: CrankState | None) -> LinkageTick:
         """Return the state of the linkage, given the crank state."""
-        if self._timed and self._first < 0:
-            self._first = now
         if crank is None:
             return LinkageTick(None, None, None, self._read_gap(now))
         position = self._close(*crank.angles)
@@ -356,6 +354,9 @@ class LinkagePipeline:
             position = fault(position)
         if not position.joints:
             return LinkageTick(crank, position, None, self._read_gap(now))
+        if self._timed and self._first < 0:
+            # A bag does not know of ticks before the first pose.
+            self._first = now
         motion = self._moved(crank, position, (now - self._first) * 1e-9 if self._timed else 0.0)
         return LinkageTick(crank, position, motion, self._read(now, self._observed(now, motion)))
 

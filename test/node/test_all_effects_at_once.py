@@ -57,7 +57,7 @@ ALL_EFFECTS = f"""effects:
   friction:
     joints:
       O2: {{viscous: 1.0e-4, coulomb: 0.002}}
-      A: {{coulomb: 0.001}}
+      A: {{coulomb: 0.001, breakaway: 0.002, stribeck: 1.5}}
       B: {{viscous: 1.0e-4, coulomb: 0.001}}
       O4: {{coulomb: 0.002}}
   effort: {{}}
@@ -65,9 +65,15 @@ ALL_EFFECTS = f"""effects:
   compliance: {{links: {{coupler: 1.0e+6}}}}
   clearance: {{pins: {{A: 2.0e-5, B: 3.0e-5}}}}
   jitter: {{seconds: 3.0e-4, distribution: half_normal}}
-  bias: {{joints: {{rocker_joint: 0.01}}}}
-  noise: {{joints: {{rocker_joint: {{white: 0.001, walk: 0.001, rate_white: 0.01}}}}}}
-  encoder: {{joints: {{crank_joint: {{counts: 4096}}, coupler_joint: {{counts: 4096}}}}}}
+  bias: {{joints: {{rocker_joint: 0.01}}, scales: {{rocker_joint: 0.001}}}}
+  noise:
+    joints:
+      rocker_joint: {{white: 0.001, walk: 0.001, rate_white: 0.01, effort_white: 0.001}}
+      coupler_joint: {{density: 1.0e-5, drift: 0.001, correlation_time: 0.1}}
+  measuring_range: {{joints: {{rocker_joint: {{high: 2.2, effort: 1}}}}}}
+  encoder:
+    joints: {{crank_joint: {{counts: 4096}}, coupler_joint: {{counts: 4096}}}}
+    cutoff: 90
   rate_limit: {{rate: 700}}
   dropout: {{probability: 0.1, burst: 3}}
   delay: {{seconds: 0.0025}}
@@ -77,6 +83,18 @@ LOADS = """loads:
   gravity: [0, -9.81]
   drive_inertia: 1.0e-4
   springs: {back: {from: ground.O4, to: coupler.B, stiffness: 20, free_length: 0.05, damping: 0.1}}
+  joint_springs: {rocker_joint: {stiffness: 0.01, free: 1.5, damping: 1.0e-4}}
+  efforts: {rocker_joint: {over_time: [[0, 0], [1, 0.02]], over_position: [[1, 0], [2, 0.01]]}}
+  forces: {coupler.P: {direction: [0, -1], frame: link, over_rate: [[-9, 0.1], [9, -0.1]]}}
+"""
+MOTOR = """\
+drive:
+  torque:
+    start: 1.0
+    timeout: 0.02
+    motor: {torque_constant: 0.05, resistance: 2, ratio: 5, efficiency: 0.9, delay: 0.003}
+    play: {width: 0.01, inertia: 1.0e-4, restitution: 0.3}
+    motor_encoder: {counts: 2048}
 """
 ALL_FAULTS = """faults:
   stuck: {stuck: {joint: rocker_joint}, at: [0.1, 1.2], seconds: 0.05}
@@ -90,7 +108,7 @@ ALL_FAULTS = """faults:
 SPOILT = next(f'{line}\n' for line in ALL_FAULTS.splitlines() if 'not_a_number' in line)
 ONE = f'linkage: {LINKAGES}/four_bar.yaml\n'
 MANY = {
-    'measured': 'topic: {}',
+    'measured': 'topic: {acceleration: differenced, cutoff: 30}',
     'turning': 'constant_rate: {rate: 20}',
     'stepping': 'profile: {table: [[0, 0], [0.3, 2], [0.5, 2], [0.9, 0.5]], repeat: true}',
     'swinging': 'sine: {mean: 1, amplitude: 0.5, frequency: 3}',
@@ -99,7 +117,8 @@ MANY = {
     'recorded': 'bag: {file: samples, repeat: true}',
 }
 SCENES = {
-    'measured': f'{ONE}publish_input: true\ndrive: {{topic: {{}}}}\nseed: 7\n'
+    'measured': f'{ONE}publish_input: true\nseed: 7\n'
+    'drive: {topic: {acceleration: differenced, cutoff: 30}}\n'
     f'{ALL_EFFECTS}{LOADS}{ALL_FAULTS}',
     'several': 'publish_input: true\nseed: 7\nlinkages:\n'
     + ''.join(
@@ -112,6 +131,7 @@ SCENES = {
     .replace('link: coupler', 'link: turning_coupler'),
     'pushed': f'{ONE}drive: {{torque: {{start: 1.0, timeout: 0.02}}}}\nseed: 7\n'
     f'{ALL_EFFECTS.replace(BACKLASH, "")}{LOADS}{ALL_FAULTS}',
+    'driven': f'{ONE}{MOTOR}seed: 7\n{ALL_EFFECTS.replace(BACKLASH, "")}{LOADS}{ALL_FAULTS}',
 }
 
 

@@ -47,12 +47,14 @@ EFFECTS = {
     'backlash': '{play: 0.3}',
     'acceleration': '{}',
     'jitter': '{seconds: 0.005}',
-    'bias': '{joints: {coupler_joint: 0.1}}',
-    'noise': '{joints: {coupler_joint: {white: 1.0e-3, walk: 1.0e-2, rate_white: 1.0e-3}}}',
+    'bias': '{joints: {coupler_joint: 0.1}, deviations: {coupler_joint: 0.01}}',
+    'measuring_range': '{joints: {coupler_joint: {low: -1, rate: 5}}}',
+    'noise': '{joints: {coupler_joint: {white: 1.0e-3, walk: 1.0e-2, rate_white: 1.0e-3, '
+    'drift: 1.0e-3, correlation_time: 0.02}}}',
     'encoder': '{joints: {right_rocker_joint: {counts: 4096, incremental: true}}}',
-    'rate_limit': '{rate: 190, hold: silent}',
+    'rate_limit': '{rate: 190, hold: silent, phase: 0.004, ppm: 50}',
     'dropout': '{probability: 0.4, burst: 3}',
-    'delay': '{seconds: 0.012}',
+    'delay': '{seconds: 0.012, spread: 0.005, reorder: true, duplicates: 0.1}',
     'markers': '{rate: 120, trace: 0.03}',
 }
 DRIVES = {
