@@ -209,6 +209,12 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         raise DefinitionError(
             'drive.torque.brake', 'the brake is never applied', 'add on_timeout: brake'
         )
+    if context.friction and context.friction.loaded:
+        raise DefinitionError(
+            f'effects.friction.joints.{context.friction.loaded}.coefficient',
+            'the torque drive does not integrate friction that grows with the force in its joint',
+            'write coulomb instead, or use another drive',
+        )
     mechanics = context.mechanics
     yielding = mechanics.loads.applied.stops
     motion: Any = OneFreedom(

@@ -201,7 +201,7 @@ class Loads:
 
 @dataclass(frozen=True, slots=True)
 class JointFriction:
-    """Friction of one pin or slider; it does not depend on the force in the joint."""
+    """Friction of one pin or slider."""
 
     viscous: float = number(
         'for each unit of rate', 0.0, unit='N·m·s/rad or N·s/m', least=0.0, most=GREATEST_LOAD
@@ -216,6 +216,15 @@ class JointFriction:
         unit='rad/s or m/s',
         least=0.0,
         most=1e6,
+    )
+    coefficient: float = number(
+        'of friction: what the force in the joint adds at any rate, by it and by the radius',
+        0.0,
+        least=0.0,
+        most=10.0,
+    )
+    radius: float = number(
+        'of the pin, on which its force rubs', 0.0, unit='m', least=0.0, most=100.0
     )
 
     @property
@@ -236,6 +245,11 @@ class Friction:
     joints: Mapping[str, JointFriction] = field(default_factory=dict)
     holds: bool = False
     """Whether friction carries the load at rest as far as it can, and the effort is the rest."""
+
+    @property
+    def loaded(self) -> str:
+        """Return the first joint whose friction grows with the force in it; '' without one."""
+        return next((name for name, joint in self.joints.items() if joint.coefficient), '')
 
 
 def check_masses(linkage: Linkage) -> None:
@@ -289,19 +303,38 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
     carried = [name for names in linkage.links.values() for name in names]
     carried += [slider.point for slider in linkage.sliders.values() if not slider.block]
     pins = {name for name in carried if carried.count(name) > 1}
-    for name in friction.joints if friction else ():
+    for name, joint in friction.joints.items() if friction else ():
+        key = f'effects.friction.joints.{name}'
         if name not in pins and name not in linkage.sliders:
             raise DefinitionError(
-                f'effects.friction.joints.{name}',
+                key,
                 f'{quoted(name)} is no pin or slider',
                 _one_of({*pins, *linkage.sliders}),
             )
         if name in pins and name in linkage.sliders:
             raise DefinitionError(
-                f'effects.friction.joints.{name}',
-                f'{quoted(name)} names a pin and a slider',
-                'give the slider another name',
+                key, f'{quoted(name)} names a pin and a slider', 'give the slider another name'
             )
+        if name in linkage.sliders and joint.radius:
+            raise DefinitionError(
+                f'{key}.radius', f'{quoted(name)} is a slider, which has none', 'leave it out'
+            )
+        if name in pins and bool(joint.coefficient) != bool(joint.radius):
+            given, missing = (
+                ('coefficient', 'radius') if joint.coefficient else ('radius', 'coefficient')
+            )
+            raise DefinitionError(
+                f'{key}.{given}',
+                f'the force in a pin rubs by both, and there is no {missing}',
+                f'write {missing} too',
+            )
+    if friction and friction.holds and friction.loaded:
+        raise DefinitionError(
+            'effects.friction.holds',
+            f'at rest the force in {quoted(friction.loaded)} has no certain value, and neither '
+            'has its friction',
+            'leave it out, or write breakaway instead of coefficient',
+        )
 
 
 def _one_of(names: Iterable[str]) -> str:

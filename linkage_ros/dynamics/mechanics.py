@@ -446,6 +446,11 @@ def resistance(rubbing: Rubbing, v: list[float]) -> float:
     return rubbing.friction.viscous * slip + dry
 
 
+def sense(rubbing: Rubbing, v: list[float]) -> float:
+    """Return the direction of a joint's rate: 1, -1, or 0 at rest, within rounding."""
+    return where(_stands(v, rubbing.one, rubbing.other), 0.0, copysign(1.0, rubbing.slip(v)))
+
+
 def _stands(v: list[float], one: int, other: int) -> bool:
     """Return whether the difference of two rates is 0 within rounding."""
     rates = abs(v[one]) + abs(v[other]) + abs(v[1])

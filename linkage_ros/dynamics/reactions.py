@@ -24,6 +24,12 @@ across and the moment in each slider, and the effort of each drive: as many as e
 linear system A·f = b (R. L. Norton, Design of Machinery, ch. 11; E. J. Haug, Computer Aided
 Kinematics and Dynamics of Mechanical Systems, 1989, ch. 6).
 
+Friction that grows with the force in its joint is T = µ·ρ·|F| in a pin of radius ρ, and µ·|F| in a
+slider, against the motion; the moment that keeps a slider from turning does not count. It changes
+the forces. With the solutions P_k for a unit of friction in each such joint, f = f₀ + Σ T_k·P_k,
+the T_k are iterated until they stay. For some µ they grow without end: the linkage jams, and there
+are no forces.
+
 A column of A is the effect of one unknown on each link (`JointMatrix`). By virtual work, a row of
 Aᵀ gives the displacement δ in a joint that small displacements Δ of the links cause: Aᵀ·Δ = δ.
 `Reactions.shift` solves this for Δ with the inputs held: how far play in a pin or the stretch of
@@ -32,12 +38,12 @@ a link moves the linkage, to first order.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from math import isfinite
+from math import hypot, isfinite
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.dynamics.mechanics import Mechanics, resistance, stretched
+from linkage_ros.dynamics.mechanics import Mechanics, resistance, Rubbing, sense, stretched
 from linkage_ros.kinematics.arithmetic import called, facing, is_found, vector
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
@@ -220,6 +226,9 @@ def _filled(constant: Array, where: NDArray[np.intp], *values: float) -> Array:
 
 _SOLVED = (Status.CLOSED, Status.LIMITED)
 
+_ROUNDS, _STAYS = 300, 1e-15
+"""Most iterations of friction by its own forces, and the change at which it stays."""
+
 
 class Reaction(NamedTuple):
     """
@@ -303,6 +312,12 @@ class Reactions:
             for spring in mechanics.loads.springs
         )
         self._loaded = tuple(at)
+        self._pressed = tuple(joint for joint in mechanics.rubbing if joint.friction.coefficient)
+        self._solved: Callable[..., list[float] | None] = _solved
+        if self._pressed:
+            self._solved = partial(
+                _pressed_solved, [self._rubs_by(rubbing) for rubbing in self._pressed]
+            )
         self._published = tuple(
             (rows.get(joint.child, -1), rows.get(joint.parent, -1))
             if isinstance(joint, RevoluteJoint)
@@ -346,6 +361,34 @@ class Reactions:
                 reaction = Reaction(one, other, 0.0 - resisting)
             reactions += (reaction,)
         return reactions
+
+    def efforts(
+        self,
+        position: Position,
+        velocity: Velocity,
+        acceleration: Acceleration,
+        seconds: float = 0.0,
+    ) -> tuple[float, ...]:
+        """
+        Return the effort of each drive; empty where there are no forces.
+
+        It is that of `Mechanics.drive_efforts`, which does not know the friction that grows with
+        the forces in the joints. The parameters are those of `solve`.
+        """
+        balance = self._balance(position, velocity, acceleration, seconds)
+        if balance is None:
+            return ()
+        forces, _ = balance
+        a, linkage = acceleration.state.coordinates, self._mechanics.closure.linkage
+        inertia, first = self._mechanics.loads.drive_inertia, 2 * len(self.joints)
+        efforts: tuple[float, ...] = ()
+        for i, given in enumerate(linkage.inputs):
+            inert, force = inertia * a[1 + i], forces[first + i]
+            if given.slider:
+                efforts += (force + inert * self._scale,)
+            else:
+                efforts += (force * self._scale + inert,)
+        return efforts
 
     def shift(self, position: Position, offsets: Sequence[complex]) -> tuple[float, ...] | None:
         """
@@ -448,8 +491,22 @@ class Reactions:
             number = rubbing.joint
             resistances[number] = resistance(rubbing, v)
             self._rub(sides, number, resistances[number], x, places)
-        forces = called(_solved, self._matrix.at(x, places), *sides)
-        return (forces, resistances) if is_found(forces) else None
+        senses = [sense(rubbing, v) for rubbing in self._pressed]
+        for rubbing, against in zip(self._pressed, senses, strict=True):
+            of_a_unit = [0.0] * self._matrix.size
+            self._rub(of_a_unit, rubbing.joint, against, x, places)
+            sides += of_a_unit
+        forces = called(self._solved, self._matrix.at(x, places), *sides)
+        if not is_found(forces):
+            return None
+        for i, (rubbing, against) in enumerate(zip(self._pressed, senses, strict=True)):
+            resistances[rubbing.joint] += against * forces[self._matrix.size + i]
+        return forces, resistances
+
+    def _rubs_by(self, rubbing: Rubbing) -> tuple[int, bool, float]:
+        """Return the first unknown of a joint, whether it is a pin, and its friction by force."""
+        friction, pin = rubbing.friction, rubbing.joint not in self._matrix.lines
+        return 2 * rubbing.joint, pin, friction.coefficient * (friction.radius if pin else 1.0)
 
     def _apply(
         self,
@@ -506,6 +563,45 @@ def _solved(matrix: Array, *sides: float) -> list[float] | None:
     except np.linalg.LinAlgError:
         return None
     return solution if all(map(isfinite, solution)) else None
+
+
+def _pressed_solved(
+    pressed: Sequence[tuple[int, bool, float]], matrix: Array, *sides: float
+) -> list[float] | None:
+    """
+    Return the solution of a linear system with friction by its own forces, and that friction.
+
+    Parameters
+    ----------
+    pressed
+        As `Reactions._rubs_by` returns them.
+    matrix
+        The matrix.
+    *sides
+        The right sides: first without this friction, then what a unit of each adds.
+
+    """
+    columns = np.reshape(sides, (len(pressed) + 1, len(matrix)))
+    try:
+        free, *units = np.linalg.solve(matrix, columns.T).T
+    except np.linalg.LinAlgError:
+        return None
+    frictions = [0.0] * len(pressed)
+    for _ in range(_ROUNDS):
+        forces = free + sum(t * unit for t, unit in zip(frictions, units, strict=True))
+        largest = float(np.abs(forces).max())
+        if not isfinite(largest):
+            return None
+        before = frictions
+        frictions = [
+            factor * hypot(forces[i], forces[i + 1] if pin else 0.0) for i, pin, factor in pressed
+        ]
+        if all(
+            abs(now - old) <= _STAYS * factor * largest
+            for now, old, (_, _, factor) in zip(frictions, before, pressed, strict=True)
+        ):
+            return [*forces.tolist(), *frictions]
+    return None
 
 
 def _turned_solved(matrix: Array, *sides: float) -> list[float] | None:

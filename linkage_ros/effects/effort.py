@@ -16,6 +16,9 @@
 """
 Effort of the drive for the motion, by virtual work (inverse dynamics).
 
+With friction that grows with the forces in the joints it comes from these forces, by
+`linkage_ros.dynamics.reactions`; a linkage that jams has no effort.
+
 It covers the inertia of links and drive, gravity, springs and friction: see
 `linkage_ros.dynamics.mechanics` for the equation and its source. It uses the crank's acceleration
 from the drive; that of a topic counts as 0 unless it is estimated. Under the torque drive, the
@@ -48,6 +51,8 @@ PARAMETERS = EffortParameters
 def stage(_parameters: EffortParameters, context: Context) -> Stage:
     """Build the stage."""
     efforts_of = context.mechanics.drive_efforts
+    if context.friction and context.friction.loaded:
+        efforts_of = context.reactions.efforts
 
     def effort(motion: MechanismState) -> MechanismState:
         velocity, acceleration = motion.velocity, motion.acceleration

@@ -22,7 +22,10 @@ clearance and compliance, and the torque drive. In a pin::
     T = −viscous·ω − (coulomb + (breakaway − coulomb)·exp(−(ω/stribeck)²))·sign(ω)
 
 with ω the rate of one of its links against the other, and in a slider likewise, with the rate of
-its slide. It does not depend on the force in the joint (for this and better models: H. Olsson, K.
+its slide. With `coefficient` µ the force F in the joint adds µ·radius·|F| against the motion in a
+pin, and µ·|F| in a slider (the friction circle: R. L. Norton, Design of Machinery, ch. 11; J. J.
+Uicker, G. R. Pennock, J. E. Shigley, Theory of Machines and Mechanisms, ch. 11). The torque drive
+refuses it: it would have to know the forces before the motion (for other models: H. Olsson, K.
 J. Åström, C. Canudas de Wit, M. Gäfvert and P. Lischinsky, Friction models and friction
 compensation, European Journal of Control 4, 1998; with Stribeck's curve in the form of eq. 5 with
 the exponent 2).

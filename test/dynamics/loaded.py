@@ -30,7 +30,6 @@ from linkage_ros.dynamics.loads import (
     PointLoad,
     Spring,
 )
-from linkage_ros.dynamics.reactions import Reactions
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
@@ -168,21 +167,6 @@ def slope(function, x: float, step: float = 1e-3) -> float:
     """Return the derivative of a function by six points: the error falls as the sixth power."""
     weights = ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0))
     return sum(w * (function(x + k * step) - function(x - k * step)) for k, w in weights) / step
-
-
-def efforts_by_forces(mechanics, position, velocity, acceleration):
-    """Return the effort of each drive by the equations of every link; the node uses work."""
-    closure, reactions = mechanics.closure, Reactions(mechanics)
-    forces, _ = reactions._balance(position, velocity, acceleration)
-    first = 2 * len(reactions.joints)
-    drives = forces[first:]
-    pulls = acceleration.state.coordinates[1:]
-    efforts = []
-    for given, force, pull in zip(closure.linkage.inputs, drives, pulls, strict=False):
-        # The matrix divides moments by the scale; the closure divides lengths by it.
-        moment, length = (1.0, closure.scale) if given.slider else (closure.scale, 1.0)
-        efforts.append(force * moment + mechanics.loads.drive_inertia * pull * length)
-    return tuple(efforts)
 
 
 BEGIN = 1_700_000_000_000_000_000

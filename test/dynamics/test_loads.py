@@ -66,6 +66,18 @@ REFUSED = {
         'scotch_yoke', Loads(), {'Y': RUBBING},
         "effects.friction.joints.Y: 'Y' is no pin or slider; name one of A, O2, guide, slot",
     ),
+    'a pin with a coefficient alone': (
+        'four_bar', Loads(), {'A': JointFriction(coefficient=0.1)},
+        'effects.friction.joints.A.coefficient: the force in a pin rubs by both, and there is no ',
+    ),
+    'a pin with a radius alone': (
+        'four_bar', Loads(), {'A': JointFriction(radius=0.1)},
+        'effects.friction.joints.A.radius: the force in a pin rubs by both, and there is no coef',
+    ),
+    'a slider with a radius': (
+        'slider_crank', Loads(), {'cylinder': JointFriction(coefficient=0.1, radius=0.01)},
+        "effects.friction.joints.cylinder.radius: 'cylinder' is a slider, which has none; leave",
+    ),
 }  # fmt: skip
 
 

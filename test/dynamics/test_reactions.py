@@ -34,7 +34,6 @@ import pytest
 
 from .loaded import (
     closed,
-    efforts_by_forces,
     everywhere,
     four_bar,
     loads_of,
@@ -59,7 +58,7 @@ def at_rest(mechanics, *inputs):
 def moving(mechanics, position, velocity, acceleration):
     reactions = Reactions(mechanics)
     found = reactions.solve(position, velocity, acceleration)
-    effort = efforts_by_forces(mechanics, position, velocity, acceleration)[0]
+    effort = Reactions(mechanics).efforts(position, velocity, acceleration)[0]
     return dict(zip(reactions.names, found, strict=True)), effort
 
 
@@ -153,7 +152,7 @@ def test_both_ways_to_the_effort(name):
         position = closure.position(*q)
         velocity = closure.velocity(position, *rates)
         acceleration = closure.acceleration(position, velocity, *pulls)
-        assert efforts_by_forces(mechanics, position, velocity, acceleration) == pytest.approx(
+        assert Reactions(mechanics).efforts(position, velocity, acceleration) == pytest.approx(
             mechanics.drive_efforts(position, velocity, acceleration), rel=1e-10
         )
 
@@ -202,7 +201,7 @@ def test_the_ground_bears_what_the_linkage_does(name):
                 force += push
                 moment += (points[joint.link, point].conjugate() * push).imag
                 moment += sign * reaction.moment
-        efforts = efforts_by_forces(mechanics, position, velocity, acceleration)
+        efforts = Reactions(mechanics).efforts(position, velocity, acceleration)
         for given, effort, pull in zip(linkage.inputs, efforts, pulls, strict=True):
             moved = effort - loads.drive_inertia * pull
             if given.slider:

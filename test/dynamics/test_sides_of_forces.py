@@ -32,7 +32,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
 import pytest
 
-from .loaded import efforts_by_forces, slope, STATES, weighed
+from .loaded import slope, STATES, weighed
 
 GRAVITY = complex(1.5, -9.81)
 
@@ -147,7 +147,7 @@ def test_each_link_that_is_cut_free_obeys_newton(linkage, name):
     velocity = moved.closure.velocity(position, *rates)
     acceleration = moved.closure.acceleration(position, velocity, *pulls)
     wrenches = reactions.solve(position, velocity, acceleration)
-    efforts = efforts_by_forces(mechanics, position, velocity, acceleration)
+    efforts = Reactions(mechanics).efforts(position, velocity, acceleration)
     acting = {}  # for each link forces with their places, and moments
 
     def act(link, force, place, moment=0.0):

@@ -1,0 +1,174 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Friction that grows with the force in its joint: against closed forms and its own definition."""
+
+from cmath import rect
+from dataclasses import replace
+from math import copysign, cos, hypot, sin, sqrt
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.dynamics.loads import AppliedLoads, Friction, JointFriction, JointLoad, Loads
+from linkage_ros.dynamics.mechanics import Mechanics
+from linkage_ros.dynamics.reactions import Reactions
+from linkage_ros.errors import FileError
+from linkage_ros.kinematics.arithmetic import cross
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND, Mass
+import pytest
+
+from .loaded import closed, loads_of, STATES
+from ..support.messages import read_joint_state
+from ..support.scenes import closure_of, PENDULUM, pipeline_of
+
+RUBBING = JointFriction(coefficient=0.3, radius=0.01)
+RADIUS = 0.3 * 0.01
+"""Of the friction circle, in [m]."""
+
+
+def moved(closure, value, rate=1.0, pull=0.0):
+    position = closure.position(value)
+    velocity = closure.velocity(position, rate)
+    return position, velocity, closure.acceleration(position, velocity, pull)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
+def test_a_crank_alone_rubs_with_the_force_that_its_mass_needs(angle, rate, pull):
+    friction = Friction({'O': replace(RUBBING, coulomb=0.1)})
+    reactions = Reactions(Mechanics(closure_of(PENDULUM), Loads((0.0, -9.81)), friction))
+    motion = moved(closure_of(PENDULUM), angle, rate, pull)
+    inward, across = 0.3 * rate**2 - 9.81 * sin(angle), 0.3 * pull + 9.81 * cos(angle)
+    against = (rate > 0.0) - (rate < 0.0)
+    rubbed = against * (0.1 + RADIUS * 2.0 * hypot(inward, across))
+    expected = (0.05 + 2.0 * 0.3**2) * pull + 2.0 * 9.81 * 0.3 * cos(angle) + rubbed
+    assert reactions.efforts(*motion) == pytest.approx((expected,), rel=1e-12, abs=1e-12)
+    assert reactions.solve(*motion)[0].moment == pytest.approx(-rubbed, rel=1e-12)
+
+
+@pytest.mark.parametrize('rate', [1.0, -1.0])
+@pytest.mark.parametrize('load', [2.0, -2.0])
+@pytest.mark.parametrize('angle', [0.3, 1.1, 1.9, -2.0])
+def test_a_coupler_pushes_along_a_tangent_of_both_friction_circles(angle, load, rate):
+    # Links without weight: the coupler carries one force F on one line, at the distance µρ from
+    # both of its pins (Norton, ch. 11), and the rocker bears the load.
+    linkage = closed('four_bar').linkage
+    weightless = {link: Mass(1e-15, (0.0, 0.0), 0.0) for link in linkage.links if link != GROUND}
+    closure = Closure(replace(linkage, masses=weightless))
+    loads = Loads(applied=AppliedLoads(efforts={'rocker_joint': JointLoad(load)}))
+    friction = Friction(dict.fromkeys(('O2', 'A', 'B', 'O4'), RUBBING))
+    reactions = Reactions(Mechanics(closure, loads, friction))
+    position, velocity, acceleration = moved(closure, angle, rate)
+
+    before, after = (closure.link_angles(closure.position(angle + h)) for h in (-1e-4, 1e-4))
+    turn = {link: rate * (after[link] - before[link]) for link in after}
+    at_a = copysign(1.0, turn['coupler'] - turn['crank'])
+    at_b = copysign(1.0, turn['coupler'] - turn['rocker'])
+    at_o2, at_o4 = copysign(1.0, turn['crank']), copysign(1.0, turn['rocker'])
+    points = closure.points(position)
+    a, b, o4 = points['coupler', 'A'], points['coupler', 'B'], points['rocker', 'O4']
+    found = []
+    for pushes in (1.0, -1.0):
+        sine = -(at_a + at_b) * RADIUS / abs(b - a) * pushes
+        along = (b - a) / abs(b - a) * complex(sqrt(1.0 - sine * sine), sine)
+        lever = cross(b - o4, along) + pushes * RADIUS * (at_b - at_o4)
+        force = -load / lever
+        if force * pushes > 0.0:
+            rubbed = RADIUS * abs(force) * (at_o2 - at_a)
+            found.append((abs(force), force * cross(a, along) + rubbed))
+    ((force, effort),) = found
+    assert reactions.efforts(position, velocity, acceleration) == pytest.approx((effort,))
+    for reaction in reactions.solve(position, velocity, acceleration):
+        assert hypot(reaction.fx, reaction.fy) == pytest.approx(force)
+
+
+@pytest.mark.parametrize('name', STATES)
+def test_each_joint_rubs_by_the_force_that_it_then_has(name):
+    # With each friction written as a constant, the forces, and the work, are the same.
+    closure = closed(name)
+    joints = {
+        joint.name: JointFriction(
+            0.01, 0.02, coefficient=0.1, radius=0.0 if joint.kind == 'P' else 0.005
+        )
+        for joint in closure.structure.joints
+    }
+    loads = loads_of(closure.linkage)
+    reactions = Reactions(Mechanics(closure, loads, Friction(joints)))
+    for inputs in STATES[name]:
+        position = closure.position(*inputs)
+        velocity = closure.velocity(position, *(1.5 for _ in inputs))
+        motion = (
+            position,
+            velocity,
+            closure.acceleration(position, velocity, *(-4.0,) * len(inputs)),
+        )
+        forces = reactions.solve(*motion)
+        if len(set(joints)) < len(forces):  # a pin of three links has one entry for two joints
+            continue
+        constant = {}
+        for joint, force in zip(closure.structure.joints, forces, strict=True):
+            pressed = complex(force.fx, force.fy)
+            if joint.kind == 'P':
+                slider = closure.linkage.sliders[joint.name]
+                line = complex(*slider.direction)
+                line *= rect(1.0 / abs(line), closure.link_angles(position)[slider.along])
+                pressed = cross(line, pressed)
+            rubbing = joints[joint.name]
+            by_force = 0.1 * (rubbing.radius or 1.0) * abs(pressed)
+            constant[joint.name] = JointFriction(0.01, 0.02 + by_force)
+        mechanics = Mechanics(closure, loads, Friction(constant))
+        for one, other in zip(Reactions(mechanics).solve(*motion), forces, strict=True):
+            assert tuple(one) == pytest.approx(tuple(other), rel=1e-9, abs=1e-9)
+        assert reactions.efforts(*motion) == pytest.approx(
+            mechanics.drive_efforts(*motion), rel=1e-9
+        )
+
+
+def test_a_linkage_that_jams_has_no_forces():
+    # The rod leans so far that the cylinder holds what it pushes, however strong: µ·tan(φ) > 1.
+    closure = closed('slider_crank')
+    joints = {'cylinder': JointFriction(coefficient=9.0)}
+    reactions = Reactions(Mechanics(closure, Loads((0.0, -9.81)), Friction(joints)))
+    motion = moved(closure, 0.9)
+    assert (reactions.solve(*motion), reactions.efforts(*motion)) == (None, ())
+
+
+SCENE = """
+drive: {DRIVE}
+effects:
+  effort: {}
+  friction: {holds: HOLDS, joints: {O: {coefficient: 0.3, radius: 0.01}}}
+loads: {gravity: [0, -9.81]}
+"""
+
+
+def test_a_tick_publishes_the_effort_with_it():
+    scene = SCENE.replace('DRIVE', 'constant_rate: {rate: -2, start: 0.4}')
+    pipeline = pipeline_of(scene.replace('HOLDS', 'false'), PENDULUM)
+    published = read_joint_state(pipeline.tick(1_000_000_000).message)
+    weight, inward = 2.0 * 9.81 * cos(0.4), 2.0 * (0.3 * 4.0 - 9.81 * sin(0.4))
+    expected = weight * 0.3 - RADIUS * hypot(weight, inward)
+    assert published.effort[0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('drive', 'holds', 'told'),
+    [
+        ('constant_rate: {rate: 1}', 'true', "holds: at rest the force in 'O' has no certain"),
+        ('torque: {start: 0.3}', 'false', 'joints.O.coefficient: the torque drive does not'),
+    ],
+)
+def test_it_is_refused_where_the_force_is_not_known(drive, holds, told):
+    with pytest.raises(FileError, match=told):
+        pipeline_of(SCENE.replace('DRIVE', drive).replace('HOLDS', holds), PENDULUM)
