@@ -254,10 +254,18 @@ def test_a_scene_with_one_drive_has_no_other(tmp_path, bare, drive):
     assert 'numpy' not in look.modules
 
 
+_DYNAMICS = 'linkage_ros.dynamics.'
+
+
 def test_a_motor_is_made_where_it_is_asked_for_alone(tmp_path):
-    for motor, there in (('', False), ('motor: {torque_constant: 1.0}', True)):
+    wound = 'motor: {torque_constant: 1, resistance: 1, inductance: 1, command: voltage}'
+    for motor, parts in (
+        ('', set()),
+        ('motor: {torque_constant: 1.0}', {'motor'}),
+        (wound, {'motor', 'winding'}),
+    ):
         look = Look(tmp_path, f'drive: {{torque: {{{motor}}}}}')
-        assert ('linkage_ros.dynamics.motor' in look.modules) == there
+        assert {part for part in ('motor', 'winding') if _DYNAMICS + part in look.modules} == parts
 
 
 @pytest.mark.parametrize('fault', FAULT_SCENES)

@@ -20,11 +20,13 @@ from __future__ import annotations
 from math import cos, sin, tau
 from typing import Any
 
+from linkage_ros.messages.joint_state import JointStateReader
+from linkage_ros.messages.joint_values import JOINT_STATE
 from matplotlib.figure import Figure
 import numpy as np
 
 from .paper import BLUE, empty_sheet, GREEN, legend, sheet, SKY, VERMILLION
-from .runs import changed, Run, run, Sample, Scene
+from .runs import changed, CRANK, extra_messages, Run, run, Sample, Scene
 
 _RESTS = 0.5
 """Time shown after the end of the drive, in [s]."""
@@ -121,6 +123,48 @@ def torque(scene: Scene) -> Figure:
     return figure
 
 
+def motor(scene: Scene) -> Figure:
+    """Draw a crank that a voltage accelerates, with the inductance and without."""
+    figure, (upper, lower) = sheet(2, 1, sharex=True)
+    commands = [(0.05 * number, 12.0) for number in range(1, 6)]
+    at_once = changed(scene, ('drive.torque.motor.inductance', None))
+    for given, style in (
+        (at_once, {'color': VERMILLION, 'linestyle': '--', 'label': 'without inductance'}),
+        (scene, {'color': BLUE, 'label': 'with it'}),
+    ):
+        moving = run(given, 0.3, commands=commands)
+        _, rate, acceleration = moving.crank()
+        upper.plot(moving.times, rate, **style)
+        lower.plot(moving.times, acceleration, **style)
+    upper.set_ylabel('crank [rad/s]')
+    lower.set_ylabel('crank [rad/s²]')
+    lower.set_xlabel('time [s]')
+    legend(upper)
+    return figure
+
+
+def play(scene: Scene) -> Figure:
+    """Draw a motor and its crank as they meet, and the distance between both."""
+    figure, (upper, lower) = sheet(2, 1, sharex=True)
+    seconds = 1.0
+    moving = run(scene, seconds)
+    read = JointStateReader([f'{CRANK}_motor']).read
+    read_motor = [read(data) for data in extra_messages(scene, JOINT_STATE, seconds)]
+    angles = np.array([sample.angles[0] for sample in read_motor])
+    crank, _, _ = moving.crank()
+    upper.plot(moving.times, angles, color=VERMILLION, linestyle='--', label='motor')
+    upper.plot(moving.times, crank, color=BLUE, label='crank')
+    upper.set_ylabel('angle [rad]')
+    lower.plot(moving.times, angles - crank, color=GREEN)
+    half = 0.5 * scene['drive']['torque']['play']['width']
+    for end in (-half, half):
+        lower.axhline(end, color='black', linewidth=0.8)
+    lower.set_ylabel('motor − crank [rad]')
+    lower.set_xlabel('time [s]')
+    legend(upper)
+    return figure
+
+
 def _span_of_potential(scene: Scene) -> float:
     """Return the span of the potential energy of a linkage, in [J]."""
     creeping = {**scene, 'drive': {'constant_rate': {'rate': tau}}, 'effects': {'effort': {}}}
@@ -166,4 +210,6 @@ PICTURES = {
     'chirp': chirp,
     'bag': bag,
     'torque': torque,
+    'motor': motor,
+    'play': play,
 }

@@ -127,12 +127,22 @@ class Run(NamedTuple):
         return np.array([each[place] if each else nan for each in read])
 
 
-def run(scene: Scene, seconds: float, samples: Sequence[Sample] = ()) -> Run:
-    """Run a scene for some seconds; the samples are on the topic, or in the bag, of its drive."""
+def run(
+    scene: Scene,
+    seconds: float,
+    samples: Sequence[Sample] = (),
+    commands: Sequence[tuple[float, float]] = (),
+) -> Run:
+    """
+    Run a scene for some seconds.
+
+    The samples are on the topic, or in the bag, of its drive. Commands of a torque drive have a
+    time, in [s], and a value.
+    """
     with TemporaryDirectory() as folder:
         pipeline, reset = _built(Path(folder), scene, samples)
         listens = bool(pipeline.topic)
-        due = list(messages(samples)) if listens else []
+        due = [*messages(samples), *_commands(commands)] if listens else []
         times = ticks(scene, seconds)
         looks = []
         last = START
@@ -172,6 +182,15 @@ def messages(samples: Sequence[Sample]) -> list[tuple[int, bytes]]:
     return [
         (time, write(time, (angle,), (rate,)))
         for time, (_, angle, rate) in zip(times, samples, strict=True)
+    ]
+
+
+def _commands(commands: Sequence[tuple[float, float]]) -> list[tuple[int, bytes]]:
+    write = JointStateWriter([CRANK]).write
+    times = [START + round(time * 1e9) for time, _ in commands]
+    return [
+        (time, write(time, (0.0,), (0.0,), (value,)))
+        for time, (_, value) in zip(times, commands, strict=True)
     ]
 
 

@@ -28,7 +28,7 @@ effort follows from it and the rate. A command that is delayed waits until its t
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign, inf, isfinite, pi
 from typing import Any, TYPE_CHECKING
 
@@ -46,6 +46,7 @@ from linkage_ros.messages.layout import NANOSECONDS
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.motor import Motor
+    from linkage_ros.dynamics.winding import Winding
 
 TOPIC = 'crank_commands'
 EXTRA_TOPIC, EXTRA_MESSAGE = '~/motor', JOINT_STATE
@@ -74,6 +75,13 @@ class MotorParameters:
         'of torque over current, and of voltage over rate', unit='N·m/A', least=1e-9, most=1e6
     )
     resistance: float = number('of the winding', 0.0, unit='Ω', least=0.0, most=1e6)
+    inductance: float = number(
+        'of the winding; 0: the current follows the voltage at once',
+        0.0,
+        unit='H',
+        least=0.0,
+        most=1e6,
+    )
     ratio: float = number(
         'turns of the motor for one of the input',
         1.0,
@@ -278,7 +286,7 @@ def writer(parameters: TorqueParameters, context: Context, drive: TorqueDrive) -
     return MotorEncoder(name, parameters.motor_encoder.counts, lambda: drive.motor)
 
 
-def _motor(given: MotorParameters, most: float) -> Motor:
+def _motor(given: MotorParameters, most: float) -> Motor | Winding:
     """Return the motor of an input that bears an effort of at most ``most``."""
     from linkage_ros.dynamics.motor import Motor  # local import: only with a motor
 
@@ -289,7 +297,7 @@ def _motor(given: MotorParameters, most: float) -> Motor:
             f'it is {given.resistance:g} Ω, and a voltage would give any current',
             "write the winding's, or command an effort or a current without a limit of voltage",
         )
-    return Motor(
+    motor = Motor(
         given.torque_constant,
         given.resistance,
         given.ratio,
@@ -303,6 +311,18 @@ def _motor(given: MotorParameters, most: float) -> Motor:
         given.voltage,
         given.command,
     )
+    if not given.inductance:
+        return motor
+    if not voltage:
+        raise DefinitionError(
+            'drive.torque.motor.inductance',
+            'the current is commanded, and without a limit of voltage nothing holds it back',
+            'write voltage, or leave it out',
+        )
+    from linkage_ros.dynamics.winding import Winding  # local import: only with an inductance
+
+    by_current = replace(motor, supply=LARGEST, command='current')
+    return Winding(by_current, given.inductance, given.voltage, given.command)
 
 
 def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]:
@@ -395,7 +415,7 @@ class TorqueDrive(Drive):
         use: TorqueParameters,
         made_up: int,
         most: float = LARGEST,
-        motor: Motor | None = None,
+        motor: Motor | Winding | None = None,
     ) -> None:
         self._mechanism = mechanism
         self._motion = self._shown = start

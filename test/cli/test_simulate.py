@@ -58,7 +58,8 @@ drive:
   torque:
     start: 1.0
     rate: 12
-    motor: {torque_constant: 0.02, resistance: 1.5, ratio: 10, efficiency: 0.8, command: voltage}
+    motor: {torque_constant: 0.02, resistance: 1.5, ratio: 10, efficiency: 0.8, command: voltage,
+            inductance: 0.01}
     play: {width: 0.01, inertia: 1.0e-3, restitution: 0.4}
     motor_encoder: {counts: 2048}
 loads:

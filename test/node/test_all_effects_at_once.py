@@ -92,7 +92,8 @@ drive:
   torque:
     start: 1.0
     timeout: 0.02
-    motor: {torque_constant: 0.05, resistance: 2, ratio: 5, efficiency: 0.9, delay: 0.003}
+    motor: {torque_constant: 0.05, resistance: 2, inductance: 0.005, voltage: 24, ratio: 5,
+            efficiency: 0.9, delay: 0.003}
     play: {width: 0.01, inertia: 1.0e-4, restitution: 0.3}
     motor_encoder: {counts: 2048}
 """

@@ -1,0 +1,242 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The inductance of a motor's winding: the current is a state, and follows the voltage with a lag.
+
+With the inductance L, and else as in `linkage_ros.dynamics.motor`::
+
+    L·di/dt = V − R·i − k·ω
+
+A command of voltage is V, within the supply ±U. For a command of current or effort the amplifier
+drives the current to what is commanded, as fast as the supply lets it: at each instant with a V
+within ±U. A limit of the current holds it there. Without a valid command there is no current.
+
+A step of the mechanism lies between two halves of a step of the current (G. Strang, On the
+construction and comparison of difference schemes, SIAM J. Numer. Anal. 5, 1968): the mechanism
+moves under a constant current by its own method, and the current is exact at a constant rate. So
+the whole is of order 2, whatever the method; a step longer than L/R is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import expm1, inf, sqrt
+from typing import Any, NamedTuple
+
+from linkage_ros.dynamics.longest_step import check_step
+from linkage_ros.dynamics.motor import Motor
+from linkage_ros.errors import DefinitionError
+
+
+@dataclass(frozen=True, slots=True)
+class Winding:
+    """
+    A motor whose winding has an inductance.
+
+    Attributes
+    ----------
+    motor
+        The motor under a command of current, without a limit of voltage.
+    inductance
+        L, in [H].
+    supply
+        U, in [V].
+    command
+        What is commanded: 'effort' in [N·m] or [N], 'current' in [A], or 'voltage' in [V].
+
+    """
+
+    motor: Motor
+    inductance: float
+    supply: float
+    command: str
+
+    @property
+    def ratio(self) -> float:
+        """Return the turns of the motor for one of the input, in [rad/rad] or [rad/m]."""
+        return self.motor.ratio
+
+    def mounted(self, mechanism: Any) -> WoundMechanism:
+        """Return a mechanism with this motor at its input, without a command."""
+        return WoundMechanism(self.motor.mounted(mechanism), self)
+
+    def driven(
+        self, mechanism: WoundMechanism, command: float
+    ) -> tuple[WoundMechanism, float, float]:
+        """Return a mechanism under a command, and no further force or friction on its input."""
+        if self.command == 'effort':
+            command /= self.motor.constant * self.motor.ratio * self.motor.forward
+        return replace(mechanism, command=command), 0.0, 0.0
+
+    def check_step(self, inertia: float, method: str, step: float) -> None:
+        """
+        Refuse a motor whose current, alone or with the rate, is too fast for the integration.
+
+        Parameters
+        ----------
+        inertia
+            The least inertia of the equation of motion, in [kg·m²] or [kg].
+        method, step
+            The method of integration, by name, and its step, in [s].
+
+        Raises
+        ------
+        DefinitionError
+            The remedy is the longest step that carries it.
+
+        """
+        motor = self.motor
+        if motor.resistance and self.inductance / motor.resistance < step:
+            raise DefinitionError(
+                'drive.torque.motor.inductance',
+                f'the current changes within {self.inductance / motor.resistance:.3g} s, and a '
+                f'step is {step:g} s',
+                'leave it out, so that the current follows at once, or write a shorter step',
+            )
+        coupling = motor.constant * motor.ratio / sqrt(motor.backward * inertia)
+        swings = coupling / sqrt(self.inductance)
+        slows = coupling**2 / motor.resistance if motor.resistance else inf
+        check_step(
+            'drive.torque.motor',
+            min(swings, slows),
+            method,
+            step,
+            'its current and its rate change too fast',
+            'add the inertia of its rotor to loads.drive_inertia',
+        )
+
+    def current(self, begin: float, rate: float, command: float | None, seconds: float) -> float:
+        """
+        Return the current after some time at a constant rate.
+
+        Parameters
+        ----------
+        begin
+            The current before, in [A].
+        rate
+            The rate of the input, in [rad/s] or [m/s].
+        command
+            In [A] or [V]; None for no current.
+        seconds
+            The time, in [s].
+
+        """
+        if command is None:
+            return 0.0
+        low, high = -self.supply, self.supply
+        if self.command == 'voltage':
+            low = high = min(max(command, low), high)
+        least, most = (self._after(begin, rate, volt, seconds) for volt in (low, high))
+        if self.command == 'voltage':
+            command = least
+        command = min(max(command, least), most)
+        return min(max(command, -self.motor.most), self.motor.most)
+
+    def _after(self, begin: float, rate: float, voltage: float, seconds: float) -> float:
+        """Return the current after some time at a constant voltage."""
+        push = voltage - self.motor.constant * self.motor.ratio * rate
+        resistance, times = self.motor.resistance, seconds / self.inductance
+        if not resistance * times:
+            return begin + push * times
+        return begin + (begin - push / resistance) * expm1(-resistance * times)
+
+
+class WoundMotion(NamedTuple):
+    """
+    A state of a mechanism and of the current that drives it.
+
+    Attributes
+    ----------
+    moved
+        The state of the mechanism.
+    current
+        The current in the winding, in [A].
+
+    """
+
+    moved: Any
+    current: float
+
+    @property
+    def value(self) -> float:
+        """Return the input's value, in [rad] or [m]."""
+        return float(self.moved.value)
+
+    @property
+    def rate(self) -> float:
+        """Return the input's rate, in [rad/s] or [m/s]."""
+        return float(self.moved.rate)
+
+    @property
+    def motor(self) -> Any:
+        """Return the state of the motor: behind play its own, else that of the input."""
+        return getattr(self.moved, 'motor', self.moved)
+
+
+@dataclass(frozen=True, slots=True)
+class WoundMechanism:
+    """
+    A mechanism that is driven by the current in a winding.
+
+    Attributes
+    ----------
+    mechanism
+        What moves, with its motor.
+    winding
+        The winding.
+    command
+        The command, in [A] or [V]; None if there is none.
+
+    """
+
+    mechanism: Any
+    winding: Winding
+    command: float | None = None
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """Lower and upper stop of the input, in [rad] or [m]."""
+        low, high = self.mechanism.stops
+        return low, high
+
+    def at(self, value: float, rate: float) -> WoundMotion | None:
+        """Return a state without a current, or None if there is none."""
+        moved = self.mechanism.at(value, rate)
+        return None if moved is None else WoundMotion(moved, 0.0)
+
+    def acceleration(
+        self, motion: WoundMotion, force: float, brake: float = 0.0, time: float = 0.0
+    ) -> float:
+        """Return q̈; the parameters are those of `OneFreedom.advance`."""
+        under, _, holding = self.winding.motor.driven(self.mechanism, motion.current)
+        return float(under.acceleration(motion.moved, force, brake + holding, time))
+
+    def advance(
+        self,
+        motion: WoundMotion,
+        seconds: float,
+        force: float,
+        brake: float = 0.0,
+        time: float = 0.0,
+    ) -> WoundMotion:
+        """Advance a state by one step; the parameters are those of `OneFreedom.advance`."""
+        current_after, half = self.winding.current, 0.5 * seconds
+        current = current_after(motion.current, motion.motor.rate, self.command, half)
+        under, _, holding = self.winding.motor.driven(self.mechanism, current)
+        moved = WoundMotion(
+            under.advance(motion.moved, seconds, force, brake + holding, time), current
+        )
+        current = current_after(current, moved.motor.rate, self.command, half)
+        return moved._replace(current=current)
