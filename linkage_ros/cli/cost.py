@@ -95,6 +95,21 @@ EVERY_LOAD = {
 }
 """Every load on joints and points, on the shipped four-bar; its rocker gets limits."""
 
+OF_TORQUE = {
+    'motor': 'motor: {torque_constant: 0.05, ratio: 10, resistance: 2, command: voltage}',
+    'motor with inductance': 'motor: {torque_constant: 0.05, ratio: 10, resistance: 2, '
+    'inductance: 0.01, command: voltage}',
+    'play': 'play: {width: 0.05, inertia: 1.0e-4}',
+    'motor_encoder': 'motor_encoder: {counts: 2048}',
+}
+"""Every part of the torque drive."""
+
+FRICTION = {
+    'coulomb friction': '{coulomb: 0.002}',
+    'Stribeck friction': '{coulomb: 0.002, breakaway: 0.003, stribeck: 1}',
+}
+"""Friction in a pin, which changes the motion under the torque drive."""
+
 EVERY_FAULT = {
     'time_jump': '{by: 1.0}',
     'not_a_number': '{}',
@@ -170,15 +185,16 @@ class Costs(NamedTuple):
         What each drive takes beyond the topic drive; empty unless all are measured.
     faults
         What each fault takes while it is not injected; empty unless all are measured.
-    loads
-        What each load takes under the torque drive; empty unless all are measured.
+    under_torque
+        What each part, friction and load takes under the torque drive; empty unless all are
+        measured.
 
     """
 
     scene: SceneCost
     drives: Mapping[str, Times] = MappingProxyType({})
     faults: Mapping[str, Times] = MappingProxyType({})
-    loads: Mapping[str, Times] = MappingProxyType({})
+    under_torque: Mapping[str, Times] = MappingProxyType({})
 
 
 def all_effects(
@@ -186,7 +202,7 @@ def all_effects(
     stopped: Callable[[], bool] = lambda: False,
     advance: ProgressCallback = lambda _done, _of: None,
 ) -> Costs | None:
-    """Measure all effects, drives, loads and faults on the four-bar; return None if stopped."""
+    """Measure all that a scene can name, on the four-bar; return None if stopped."""
 
     def part(number: int) -> ProgressCallback:
         return lambda done, of: advance(number * of + done, 3 * of)
@@ -201,12 +217,13 @@ def all_effects(
         del drives['topic']
         faults = {name: _of_four_bar(_with_fault(name)) for name in EVERY_FAULT}
         found = compare(bare, {**drives, **faults}, ticks, stopped=stopped, progress=part(1))
-    loaded = {name: _of_four_bar(_with_load(name)) for name in EVERY_LOAD}
-    under_torque = _of_four_bar(_with_drive('torque'))
-    loads = compare(under_torque, loaded, ticks, stopped=stopped, progress=part(2))
-    if found is None or loads is None:
+    moved = {name: _of_four_bar(text) for name, text in _under_torque().items()}
+    under_torque = compare(
+        _of_four_bar(_with_drive('torque')), moved, ticks, stopped=stopped, progress=part(2)
+    )
+    if found is None or under_torque is None:
         return None
-    return Costs(cost, {n: found[n] for n in drives}, {n: found[n] for n in faults}, loads)
+    return Costs(cost, {n: found[n] for n in drives}, {n: found[n] for n in faults}, under_torque)
 
 
 def account_of(costs: Costs) -> dict[str, Any]:
@@ -229,7 +246,9 @@ def account_of(costs: Costs) -> dict[str, Any]:
             for effect in cost.effects
         ],
         'drives': {name: _times_account(times) for name, times in costs.drives.items()},
-        'loads': {name: _times_account(times) for name, times in costs.loads.items()},
+        'under_torque': {
+            name: _times_account(times) for name, times in costs.under_torque.items()
+        },
         'faults': {name: _times_account(times) for name, times in costs.faults.items()},
     }
 
@@ -255,9 +274,15 @@ def _with_drive(name: str) -> str:
     return f'linkage: four_bar.yaml\npublish_input: true\ndrive: {{{name}: {EVERY_DRIVE[name]}}}\n'
 
 
-def _with_load(name: str) -> str:
-    """Return a scene of one load, under torque."""
-    return f'{_with_drive("torque")}loads: {{{name}: {EVERY_LOAD[name]}}}\n'
+def _under_torque() -> dict[str, str]:
+    """Return the scenes with one part, friction or load each, under the torque drive."""
+    drive = _with_drive('torque')
+    rubbed = f'{drive}effects: {{friction: {{joints: {{O2: %s}}}}}}\n'
+    return {
+        **{name: drive.replace('}}', f', {part}}}}}') for name, part in OF_TORQUE.items()},
+        **{name: rubbed % friction for name, friction in FRICTION.items()},
+        **{name: f'{drive}loads: {{{name}: {load}}}\n' for name, load in EVERY_LOAD.items()},
+    }
 
 
 def _with_fault(name: str) -> str:
@@ -315,7 +340,7 @@ def table_of_all(costs: Costs, ticks: int) -> Table:
     ]
     for found, beside in (
         (costs.drives, 'in the place of topic'),
-        (costs.loads, 'under torque'),
+        (costs.under_torque, 'under torque'),
         (costs.faults, 'not injected'),
     ):
         rows += [

@@ -218,13 +218,13 @@ class JointFriction:
         most=1e6,
     )
     coefficient: float = number(
-        'of friction: what the force in the joint adds at any rate, by it and by the radius',
+        'of friction by the force in the joint',
         0.0,
         least=0.0,
         most=10.0,
     )
     radius: float = number(
-        'of the pin, on which its force rubs', 0.0, unit='m', least=0.0, most=100.0
+        'of the pin, if there is a coefficient', 0.0, unit='m', least=0.0, most=100.0
     )
 
     @property

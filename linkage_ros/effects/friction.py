@@ -19,16 +19,16 @@ Friction: resistance of pins and sliders to their motion.
 It is no stage of the tick: all that works with forces includes it, namely efforts, pin forces,
 clearance and compliance, and the torque drive. In a pin::
 
-    T = −viscous·ω − (coulomb + (breakaway − coulomb)·exp(−(ω/stribeck)²))·sign(ω)
+    T = −viscous·ω − (coulomb + (breakaway − coulomb)·exp(−(ω/stribeck)²) + D)·sign(ω)
+    D = coefficient·radius·|F|
 
-with ω the rate of one of its links against the other, and in a slider likewise, with the rate of
-its slide. With `coefficient` µ the force F in the joint adds µ·radius·|F| against the motion in a
-pin, and µ·|F| in a slider (the friction circle: R. L. Norton, Design of Machinery, ch. 11; J. J.
-Uicker, G. R. Pennock, J. E. Shigley, Theory of Machines and Mechanisms, ch. 11). The torque drive
-refuses it: it would have to know the forces before the motion (for other models: H. Olsson, K.
-J. Åström, C. Canudas de Wit, M. Gäfvert and P. Lischinsky, Friction models and friction
+with ω the rate of one of its links against the other and F the force in the pin, and in a slider
+likewise, with the rate of its slide and without a radius (for D, the friction circle: R. L. Norton, Design of Machinery, ch. 11; J. J.
+Uicker, G. R. Pennock, J. E. Shigley, Theory of Machines and Mechanisms, ch. 11; for the others: H.
+Olsson, K. J. Åström, C. Canudas de Wit, M. Gäfvert and P. Lischinsky, Friction models and friction
 compensation, European Journal of Control 4, 1998; with Stribeck's curve in the form of eq. 5 with
-the exponent 2).
+the exponent 2). The torque drive refuses a coefficient: it would have to know the forces before
+the motion.
 
 Under the torque drive a linkage at rest sticks up to the sum of breakaway·|ψ'| over its joints. In
 an effort under another drive, friction at rest is 0; with `holds` it carries the load as far as it

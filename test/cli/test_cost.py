@@ -66,6 +66,8 @@ EVERYTHING = [
     'a tick without effects',
     *EFFECTS,
     *(drive for drive in DRIVES if drive != 'topic'),
+    *command.OF_TORQUE,
+    *command.FRICTION,
     *command.EVERY_LOAD,
     *FAULTS,
 ]
@@ -267,7 +269,7 @@ def test_json_of_a_scene_has_the_documented_keys_in_microseconds(capsys):
     assert account['ticks'] == FEW
     assert set(account['whole_tick']) == {'median_us', 'p99_us', 'low_us', 'high_us'}
     assert account['whole_tick']['median_us'] > 0.0
-    assert (account['drives'], account['loads'], account['faults']) == ({}, {}, {})
+    assert (account['drives'], account['under_torque'], account['faults']) == ({}, {}, {})
     scene = load_scene(CONFIG / 'scenes' / 'demo.yaml')
     assert set(scene.members[0].effects) <= {effect['name'] for effect in account['effects']}
 

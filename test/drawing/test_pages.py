@@ -87,6 +87,7 @@ SECTIONS = make_effects.sections(PAGE)
 BY_NAME = {section.name: section for section in SECTIONS}
 MODULES = {**DRIVES, **EFFECTS, **FAULTS}
 DRAWN = [section for section in SECTIONS if section.scene]
+PARTS_OF_TORQUE = ('Motor', 'Play')
 
 
 def scene_of(text):
@@ -139,6 +140,8 @@ def test_a_scene_is_a_scene_and_has_what_its_section_is_about(section):
         assert {fault.kind for fault in scene.faults.values()} == set(FAULTS)
     elif section.name == 'loads':
         assert member.loads.applied
+    elif section.name in PARTS_OF_TORQUE:
+        assert getattr(member.drive[1], section.name.lower()) is not None
     else:
         assert section.name in (member.drive[0], *member.effects)
 
@@ -154,7 +157,8 @@ def test_the_page_says_what_each_is_held_against_and_where():
 
 
 def test_every_drive_and_effect_has_a_scene_and_the_faults_have_one_together():
-    assert [section.name for section in DRAWN] == [*DRIVES, *EFFECTS, 'Faults', 'loads']
+    drives = [*DRIVES, *PARTS_OF_TORQUE]
+    assert [section.name for section in DRAWN] == [*drives, *EFFECTS, 'Faults', 'loads']
 
 
 @pytest.mark.parametrize('section', DRAWN, ids=lambda section: section.name)
