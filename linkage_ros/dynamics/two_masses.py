@@ -29,8 +29,9 @@ step there (M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlas
 Automatica 38, 2002; for impacts D. E. Stewart, Rigid-Body Dynamics with Friction and Impact, SIAM
 Review 42, 2000).
 
-Friction in the joints takes no part in an impact. A stop of the mechanism that is reached while
-motor and crank touch stops both.
+A stop bears the crank, not the motor: where the crank comes to its stop, the motor goes on alone,
+or meets the crank. To a motor that pushes it against the stop a crank at rest is a wall. Friction
+in the joints takes no part in an impact.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ class TwoMasses:
     motor
         The motor alone.
     joined
-        Both as one.
+        Both as one; it comes to rest at the crank's stops.
     half
         Half of the play, in [rad] or [m].
     restitution
@@ -120,7 +121,8 @@ class TwoMasses:
             return None if terms is None else terms._replace(inertia=terms.inertia + inertia)
 
         motor = OneFreedom(lambda _value: alone, crank.step)
-        return cls(crank, motor, replace(crank, terms=together), 0.5 * play, restitution)
+        joined = replace(crank, terms=together, restitution=0.0)
+        return cls(crank, motor, joined, 0.5 * play, restitution)
 
     @property
     def stops(self) -> tuple[float, float]:
@@ -169,16 +171,23 @@ class TwoMasses:
                     return self._pressed(state, force, brake, now + state.ahead)
                 return self.half - abs(state.motor.value - state.crank.value)
 
-            end = reach(left)
-            if margin(end) >= 0.0:
+            length, end = left, reach(left)
+            stopped = side and self._at_stop(end.crank) and not self._at_stop(begin.crank)
+            if stopped:
+                length, end, _ = last_before(reach, self._before_stop, begin, left, end)
+            if margin(end) < 0.0:
+                length, _, _ = last_before(reach, margin, begin, length, end)
+                stopped = False
+            elif not stopped:
                 return end
-            length, _, _ = last_before(reach, margin, begin, left, end)
-            beyond = reach(length)
             left -= length
-            if side:
-                motion = beyond._replace(side=0)
+            if stopped:
+                motion = self._stopped(end, bounces < _BOUNCES)
+                bounces += not motion.side
+            elif side:
+                motion = reach(length)._replace(side=0)
             else:
-                motion = self._met(beyond, bounces < _BOUNCES)
+                motion = self._met(reach(length), bounces < _BOUNCES)
                 bounces += not motion.side
             if left <= seconds * NARROW:
                 return motion
@@ -203,6 +212,24 @@ class TwoMasses:
         """Return the state of both as one."""
         return crank._replace(terms=self.joined.terms(crank.value) or crank.terms)
 
+    def _at_stop(self, crank: Motion) -> bool:
+        """Return whether the crank rests at a stop."""
+        return crank.rate == 0.0 and crank.value in self.stops
+
+    def _before_stop(self, motion: PlayMotion) -> float:
+        return -1.0 if self._at_stop(motion.crank) else 1.0
+
+    def _stopped(self, motion: PlayMotion, bounces: bool) -> PlayMotion:
+        """Return the state after a crank that touches its motor has come to its stop."""
+        low, high = self.stops
+        crank, motor, side, ahead = motion
+        stop = high if crank.rate > 0.0 else low
+        rate = 0.0 - self.crank.restitution * crank.rate
+        crank = self.crank.at(stop, rate) or crank._replace(value=stop, rate=rate)
+        motor = motor._replace(value=stop + side * self.half)
+        parted = PlayMotion(crank, motor, 0, ahead)
+        return self._met(parted, bounces) if side * (motor.rate - rate) > 0.0 else parted
+
     def _pressed(self, motion: PlayMotion, force: float, brake: float, time: float) -> float:
         """Return how fast they would press on each other if they were apart."""
         motor = self.motor.acceleration(motion.motor, force, brake, time)
@@ -213,6 +240,11 @@ class TwoMasses:
         crank, motor = motion.crank, motion.motor
         side = int(copysign(1.0, motor.value - crank.value))
         closing = motor.rate - crank.rate
+        low, high = self.stops
+        if self._at_stop(crank) and crank.value == (high if side > 0 else low):
+            back = self.restitution * motor.rate if bounces else 0.0
+            motor = motor._replace(value=crank.value + side * self.half, rate=0.0 - back)
+            return PlayMotion(crank, motor, 0 if back else side, motion.ahead)
         own, other = motor.terms.inertia, crank.terms.inertia
         common = (own * motor.rate + other * crank.rate) / (own + other)
         slow = side * closing <= _SLOW * (abs(motor.rate) + abs(crank.rate))

@@ -18,6 +18,7 @@ Motor and crank with play between them: two wheels in closed form, a four-bar by
 Without other forces the momentum J·φ̇ + I·q̇ is the impulse of the drive, whatever the meetings.
 """
 
+from dataclasses import replace
 from math import exp, sqrt, tau
 
 from linkage_ros.dynamics.integrators import METHODS
@@ -153,6 +154,62 @@ def test_bounces_without_number_come_to_their_end():
         momentum = MOTOR * states[-1].motor.rate + CRANK * states[-1].crank.rate
         assert momentum == pytest.approx(TORQUE * 3.0, rel=1e-9)
         assert abs(states[-1].motor.value - states[-1].crank.value) <= PLAY / 2.0 + 1e-12
+
+
+# A crank that turns at 1 rad/s with its motor, at one end of the play, comes to its stop at 1 rad
+# after a second. (restitution of the stop, of the play, side of the motor) and in turn: (seconds,
+# rates of crank and motor). Of the motor's momentum 0.1 and the crank's -0.115, if it bounces, a
+# meeting without a bounce leaves -0.015/0.33 = -1/22; a stop that bears the crank is a wall.
+AT_A_STOP = {
+    'the motor pushes, and both rest': (0.0, 0.0, 1, [(0.99, 1.0, 1.0), (1.01, 0.0, 0.0)]),
+    'the motor pushes, and bounces back over the play': (
+        0.0, 0.5, 1, [(1.01, 0.0, -0.5), (1.03, 0.0, -0.5), (1.05, -5 / 22, 1 / 44)],
+    ),
+    'the motor is drawn, and goes on over the play': (
+        0.0, 0.0, -1, [(0.99, 1.0, 1.0), (1.01, 0.0, 1.0), (1.019, 0.0, 1.0), (1.03, 0.0, 0.0)],
+    ),
+    'the motor is drawn, goes on and bounces back': (
+        0.0, 0.5, -1, [(1.01, 0.0, 1.0), (1.03, 0.0, -0.5), (1.07, -5 / 22, 1 / 44)],
+    ),
+    'the crank bounces against the motor that pushes': (
+        0.5, 0.0, 1, [(0.99, 1.0, 1.0), (1.01, -1 / 22, -1 / 22)],
+    ),
+    'the crank bounces, and meets the motor that it drew': (
+        0.5, 0.0, -1, [(1.005, -0.5, 1.0), (1.013, -0.5, 1.0), (1.02, -1 / 22, -1 / 22)],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', AT_A_STOP)
+@pytest.mark.parametrize('end', [1.0, -1.0])
+def test_a_stop_bears_the_crank_and_not_the_motor(name, end):
+    of_stop, of_play, side, timeline = AT_A_STOP[name]
+    mechanism = wheels(of_play)
+    stopped = {'stops': (-1.0, 1.0), 'restitution': of_stop}
+    crank = replace(mechanism.crank, **stopped)
+    mechanism = TwoMasses.of(crank, MOTOR, PLAY, of_play)
+    begin = mechanism.at(0.0, end)
+    begin = begin._replace(
+        motor=begin.motor._replace(value=end * side * PLAY / 2.0), side=round(end * side)
+    )
+    states = run(mechanism, 1.2, 0.0, motion=begin)
+    for seconds, *rates in timeline:
+        state = states[round(1e3 * seconds)]
+        found = end * state.crank.rate, end * state.motor.rate
+        assert found == pytest.approx(tuple(rates), abs=1e-9), seconds
+
+
+def test_a_motor_meets_a_crank_that_is_held_at_its_stop():
+    crank = OneFreedom(
+        lambda _: Terms(CRANK, 0.0, -5.0, 0.0, 0.0), METHODS['rk4'].step, (-1.0, 0.0)
+    )
+    mechanism = TwoMasses.of(crank, MOTOR, PLAY, 0.5)
+    begin = mechanism.at(0.0, 0.0)
+    begin = begin._replace(motor=begin.motor._replace(rate=1.0))
+    states = run(mechanism, 0.03, 0.0, motion=begin)
+    assert [(state.crank.rate, state.motor.rate) for state in states[::15]] == [
+        (0.0, 1.0), (0.0, -0.5), (0.0, -0.5),
+    ]  # fmt: skip
 
 
 # A four-bar under its weight, whose motor goes to and fro: scipy integrates each flight and each
