@@ -27,14 +27,14 @@ from linkage_ros.effects.backlash import BacklashParameters
 from linkage_ros.effects.bias import BiasParameters
 from linkage_ros.effects.clearance import ClearanceParameters
 from linkage_ros.effects.compliance import ComplianceParameters
-from linkage_ros.effects.delay import DelayParameters
-from linkage_ros.effects.dropout import DropoutParameters
+from linkage_ros.effects.delay import DelayParameters, JointDelay
+from linkage_ros.effects.dropout import DropoutParameters, JointDropout
 from linkage_ros.effects.encoder import EncoderParameters, JointEncoder
 from linkage_ros.effects.friction import FrictionParameters
 from linkage_ros.effects.jitter import JitterParameters
 from linkage_ros.effects.measuring_range import JointRange, MeasuringRangeParameters
 from linkage_ros.effects.noise import JointNoise, NoiseParameters
-from linkage_ros.effects.rate_limit import RateLimitParameters
+from linkage_ros.effects.rate_limit import JointRateLimit, RateLimitParameters
 from linkage_ros.effects.stage import EFFECTS, NEEDS
 from linkage_ros.effects.tolerance import ToleranceParameters
 from linkage_ros.errors import FileError
@@ -110,9 +110,27 @@ READ = [
         EncoderParameters({'rocker_joint': JointEncoder(4096, 0.0, False, True)}, 'differenced'),
     ),
     ('jitter', 'four_bar', '{seconds: 0.002}', JitterParameters(0.002, 'uniform')),
-    ('rate_limit', 'four_bar', '{rate: 100}', RateLimitParameters(100.0, 'repeat')),
-    ('dropout', 'four_bar', '{probability: 0.1}', DropoutParameters(0.1, 0.0, 'silent')),
-    ('delay', 'four_bar', '{seconds: 0.002}', DelayParameters(0.002, 'automatic', 'arrival')),
+    ('rate_limit', 'four_bar', '{rate: 100}', RateLimitParameters(100.0)),
+    (
+        'rate_limit',
+        'four_bar',
+        '{rate: 100, joints: {rocker_joint: {rate: 20, phase: 0.01}}}',
+        RateLimitParameters(100.0, joints={'rocker_joint': JointRateLimit(20.0, 0.01)}),
+    ),
+    ('dropout', 'four_bar', '{probability: 0.1}', DropoutParameters(0.1)),
+    (
+        'dropout',
+        'four_bar',
+        '{probability: 0, joints: {rocker_joint: {probability: 0.1, burst: 5}}}',
+        DropoutParameters(0.0, joints={'rocker_joint': JointDropout(0.1, 5.0)}),
+    ),
+    ('delay', 'four_bar', '{seconds: 0.002}', DelayParameters(0.002)),
+    (
+        'delay',
+        'four_bar',
+        '{seconds: 0.004, joints: {rocker_joint: {seconds: 0.02}}}',
+        DelayParameters(0.004, joints={'rocker_joint': JointDelay(0.02)}),
+    ),
 ]
 
 REFUSED_EFFECTS = {
@@ -190,6 +208,11 @@ REFUSED_EFFECTS = {
         ('{rate: 0}', 'at least 0.001'),
         ('{rate: 30000}', 'at most 20000'),
         ('{rate: 10, hold: forget}', 'repeat or silent'),
+        ('{rate: 10, joints: {rocker_joint: {}}}', "the key 'rate' is missing"),
+        ('{rate: 10, joints: {rocker: {rate: 1}}}', "joint 'rocker'; did you mean 'rocker_joint'"),
+        ('{rate: 10, joints: {}}', 'joints: names no joint; write {JOINT'),
+        ('{rate: 10, rocker_joint: {rate: 1}}', 'write it under joints'),
+        ('{rate: 10, joints: {rocker_joint: {rate: 1, hold: silent}}}', 'hold: unknown key'),
     ],
     'dropout': [
         ('{}', 'probability'),
@@ -197,6 +220,15 @@ REFUSED_EFFECTS = {
         ('{probability: -0.1}', 'at least 0'),
         ('{probability: 0.1, burst: -1}', 'at least 0'),
         ('{probability: 0.1, hold: last}', 'silent or repeat'),
+        ('{probability: 0.1, joints: {}}', 'joints: names no joint'),
+        (
+            '{probability: 0, joints: {rocker_joint: {probability: 0.75, burst: 2}}}',
+            'joints.rocker_joint.burst: with a mean of 2 …; write 3 or more',
+        ),
+        (
+            '{probability: 0.75, burst: 2, joints: {rocker_joint: {probability: 0}}}',
+            '.burst: with a mean of 2',
+        ),
     ],
     'delay': [
         ('{}', 'seconds'),
@@ -206,6 +238,16 @@ REFUSED_EFFECTS = {
         ('{seconds: 1, between: extrapolated}', 'interpolated or sampled or automatic'),
         ('{seconds: 1, stamp: late}', 'arrival or measured'),
         ('{seconds: 1, second: 2}', 'unknown key'),
+        ('{seconds: 1, joints: {}}', 'joints: names no joint'),
+        ('{seconds: 1, joints: {rocker_joint: 2}}', 'joints.rocker_joint: 2 is not a mapping'),
+        (
+            '{seconds: 1, joints: {rocker_joint: {seconds: 1, reorder: true}}}',
+            'joints.rocker_joint.reorder: nothing overtakes without a spread',
+        ),
+        (
+            '{seconds: 1, stamp: measured, joints: {rocker_joint: {seconds: 2}}}',
+            'stamp: measured is one time, …; write arrival',
+        ),
     ],
 }
 

@@ -47,28 +47,30 @@ else it arrives with the one before it at the earliest, as over TCP. With the pr
 ``duplicates`` a message arrives a second time, after a latency of its own. Of several that arrive
 between two ticks the last one is published. (On latencies in networked control: J. Nilsson,
 Real-Time Control Systems with Delays, 1998.)
+
+A joint under ``joints`` has a line of its own, with its own latency: see `own_sensors`.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from random import Random
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
-from linkage_ros.effects.stage import restamped, SensorReading
+from linkage_ros.effects.stage import restamped, Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, flag, number
+from linkage_ros.files.parameters import choice, flag, number, own
 
 _AUTOMATIC = 'automatic'
 
 
 @dataclass(frozen=True, slots=True)
-class DelayParameters:
-    """Transport delay: readings arrive later."""
+class JointDelay:
+    """Transport delay of a joint's own sensor."""
 
     seconds: float = number('delay, rounded to nanoseconds', unit='s', least=0.0, most=10.0)
     between: str = choice(
@@ -76,11 +78,6 @@ class DelayParameters:
         'automatic: sampled after an encoder, else interpolated',
         ('interpolated', 'sampled', _AUTOMATIC),
         _AUTOMATIC,
-    )
-    stamp: str = choice(
-        'stamp of the message: time of its arrival, or of the measurement',
-        ('arrival', 'measured'),
-        'arrival',
     )
     spread: float = number(
         'random part of the latency: its most, or its mean', 0.0, unit='s', least=0.0, most=10.0
@@ -99,28 +96,53 @@ class DelayParameters:
         return bool(self.spread or self.duplicates)
 
 
+@dataclass(frozen=True, slots=True)
+class DelayParameters(JointDelay):
+    """Transport delay: readings arrive later."""
+
+    stamp: str = choice(
+        'stamp of the message: time of its arrival, or of the measurement',
+        ('arrival', 'measured'),
+        'arrival',
+    )
+    joints: Mapping[str, JointDelay] | None = own('own line of a joint', JointDelay)
+
+    @property
+    def lines(self) -> tuple[JointDelay, ...]:
+        """The line of the joints without their own one, and these."""
+        return self, *(self.joints or {}).values()
+
+
 PARAMETERS = DelayParameters
 
 
 def interpolates(parameters: DelayParameters, named: Collection[str]) -> bool:
-    """Return whether readings are interpolated, given the effects of the scene."""
-    if parameters.random:
-        return False
-    if parameters.between == _AUTOMATIC:
-        return 'encoder' not in named
-    return parameters.between == 'interpolated'
+    """Return whether a line interpolates readings, given the effects of the scene."""
+    between = {line.between for line in parameters.lines if not line.random}
+    return 'interpolated' in between or (_AUTOMATIC in between and 'encoder' not in named)
 
 
-def sensor(parameters: DelayParameters, context: Context) -> Delay | RandomDelay:
+def sensor(parameters: DelayParameters, context: Context) -> Sensor:
     """
     Build the sensor.
 
     Raises
     ------
     DefinitionError
-        Readings of random latency are to be interpolated, or to overtake without a spread.
+        Readings of random latency are to be interpolated, or to overtake without a spread; or
+        joints that were measured at several times are to have one stamp.
 
     """
+    if parameters.joints is not None:
+        from linkage_ros.effects.own_sensors import own_sensors  # local import: only for joints
+
+        if parameters.stamp == 'measured':
+            raise DefinitionError(
+                'effects.delay.stamp',
+                'measured is one time, and joints with lines of their own have several',
+                'write arrival, or leave joints out',
+            )
+        return own_sensors('delay', sensor, parameters, context)
     if parameters.random and parameters.between == 'interpolated':
         raise DefinitionError(
             'effects.delay.between',

@@ -36,23 +36,26 @@ sample to lose.
 
 ``hold: silent`` publishes nothing for a lost sample; ``repeat`` publishes the last one that
 arrived, with the stamp of the tick, and nothing before the first.
+
+A joint under ``joints`` has a line of its own, with its own losses: see `own_sensors`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Context as Rounding
 from random import Random
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import restamped, SensorReading
+from linkage_ros.effects.stage import restamped, Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, number
+from linkage_ros.files.parameters import choice, number, own
 
 
 @dataclass(frozen=True, slots=True)
-class DropoutParameters:
-    """Samples are lost, one by one or in bursts."""
+class JointDropout:
+    """Losses on the line of a joint's own sensor."""
 
     probability: float = number('fraction of all samples that is lost', least=0.0, most=1.0)
     burst: float = number(
@@ -62,17 +65,24 @@ class DropoutParameters:
         least=0.0,
         most=1e9,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class DropoutParameters(JointDropout):
+    """Samples are lost, one by one or in bursts."""
+
     hold: str = choice(
         'instead of a lost sample: publish nothing, or repeat the last one that arrived',
         ('silent', 'repeat'),
         'silent',
     )
+    joints: Mapping[str, JointDropout] | None = own('own line of a joint', JointDropout)
 
 
 PARAMETERS = DropoutParameters
 
 
-def sensor(parameters: DropoutParameters, context: Context) -> Dropout:
+def sensor(parameters: DropoutParameters, context: Context) -> Sensor:
     """
     Build the sensor.
 
@@ -82,7 +92,11 @@ def sensor(parameters: DropoutParameters, context: Context) -> Dropout:
         Bursts this short cannot lose so many samples.
 
     """
-    return Dropout(parameters, context.random('dropout'))
+    if parameters.joints is None:
+        return Dropout(parameters, context.random('dropout'))
+    from linkage_ros.effects.own_sensors import own_sensors  # local import: only for joints
+
+    return own_sensors('dropout', sensor, parameters, context)
 
 
 def _chances(loss: float, burst: float) -> tuple[float, float]:

@@ -53,7 +53,7 @@ without an encoder are unchanged.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import expm1, floor, tau
 
@@ -236,6 +236,12 @@ class Encoder:
         self._differenced = differenced
         self._last = 0
         self.read_at_ticks = True
+
+    def part(self, places: Sequence[int]) -> Encoder:
+        """Return a driver that reads the counts of these joints alone, at its own times."""
+        counters = dict(self._counters)
+        found = [(at, counters[place]) for at, place in enumerate(places) if place in counters]
+        return Encoder(tuple(found), self._differenced)
 
     def __call__(self, now: int, reading: SensorReading) -> SensorReading:
         """Return the reading of the encoders."""

@@ -33,32 +33,31 @@ between two samples.
 ``hold: repeat`` publishes the held sample at every tick, with rates, accelerations and efforts,
 and with the stamp of the tick, as a driver that polls its sensor. ``silent`` publishes a sample
 once.
+
+A joint under ``joints`` has a sensor of its own, with its own rate, phase and clock error: see
+`own_sensors`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import restamped, Sensor, SensorReading
-from linkage_ros.files.parameters import choice, number
+from linkage_ros.files.parameters import choice, number, own
 
 if TYPE_CHECKING:
     from linkage_ros.effects.encoder import Encoder
 
 
 @dataclass(frozen=True, slots=True)
-class RateLimitParameters:
-    """The sensor's own, slower rate: sample and hold."""
+class JointRateLimit:
+    """The rate of a joint's own sensor."""
 
     rate: float = number('samples a second', unit='Hz', least=0.001, most=20_000.0)
-    hold: str = choice(
-        'between two samples: repeat the last one at every tick, or publish nothing',
-        ('repeat', 'silent'),
-        'repeat',
-    )
     phase: float = number(
         'time of the first sample, from the first tick on', 0.0, unit='s', least=0.0, most=3600.0
     )
@@ -67,12 +66,28 @@ class RateLimitParameters:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class RateLimitParameters(JointRateLimit):
+    """The sensor's own, slower rate: sample and hold."""
+
+    hold: str = choice(
+        'between two samples: repeat the last one at every tick, or publish nothing',
+        ('repeat', 'silent'),
+        'repeat',
+    )
+    joints: Mapping[str, JointRateLimit] | None = own('own sensor of a joint', JointRateLimit)
+
+
 PARAMETERS = RateLimitParameters
 
 
-def sensor(parameters: RateLimitParameters, _context: Context) -> Sensor:
+def sensor(parameters: RateLimitParameters, context: Context) -> Sensor:
     """Build the sensor."""
-    return RateLimit(parameters)
+    if parameters.joints is None:
+        return RateLimit(parameters)
+    from linkage_ros.effects.own_sensors import own_sensors  # local import: only for joints
+
+    return own_sensors('rate_limit', sensor, parameters, context)
 
 
 class RateLimit:

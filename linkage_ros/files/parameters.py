@@ -453,6 +453,11 @@ def each(meaning: str, kind: str, of: Any, *, required: bool = False) -> Any:
     return field(default_factory=dict, metadata={_KEY: declared})
 
 
+def own(meaning: str, of: Any) -> Any:
+    """Declare parameters that joints have of their own, read as a mapping; if absent, None."""
+    return _declared(Each(meaning, 'joint', of), None)
+
+
 def group(meaning: str, of: Any) -> Any:
     """Declare a section of parameters; if absent, all have their defaults."""
     return field(default_factory=of, metadata={_KEY: Group(meaning, of)})

@@ -761,7 +761,7 @@ def _refuse_stamps(scene: Scene) -> None:
     """Refuse measurement stamps that cannot share one message of several linkages."""
     delays = [member.effects.get('delay') for member in scene.members]
     for member, delay in zip(scene.members, delays, strict=True):
-        if delay is not None and delay.stamp == 'measured' and set(delays) != {delay}:
+        if delay is not None and delay.stamp == 'measured' and delays.count(delay) < len(delays):
             raise member.content.error(
                 'effects.delay.stamp',
                 'measured is a stamp of its own, and all linkages share one message',

@@ -180,7 +180,7 @@ def _lost(scene: Scene) -> tuple[str, ...]:
         ):
             named.append('encoder')
         delay = member.effects.get('delay')
-        if delay and delay.random:
+        if delay and any(line.random for line in delay.lines):
             named.append('delay')
         markers = member.effects.get('markers')
         if markers and markers.trace:

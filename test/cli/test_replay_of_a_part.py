@@ -46,6 +46,13 @@ RINGS = {
     'random latencies': (
         'velocity: {}, delay: {seconds: 0.002, spread: 0.004}', 1, 'cannot be told', 'delay',
     ),
+    'delays that fill': (
+        'delay: {seconds: 0.02, joints: {rocker_joint: {seconds: 0.03}}}', 0, 'identical', '',
+    ),
+    "a joint's random latencies": (
+        'delay: {seconds: 0, joints: {rocker_joint: {seconds: 0, spread: 0.004}}}',
+        1, 'cannot be told', 'delay',
+    ),
     'a low-pass': (
         'velocity: {}, encoder: {joints: {rocker_joint: {counts: 4096}}, cutoff: 5}',
         1, 'cannot be told', 'encoder',

@@ -28,7 +28,7 @@ from .sensors import BEGIN, context, MS, published, reading
 
 
 def limited(rate, hold='repeat'):
-    return rate_limit.sensor(RateLimitParameters(rate, hold), context())
+    return rate_limit.sensor(RateLimitParameters(rate, hold=hold), context())
 
 
 def sampled_at(rate, times):

@@ -74,9 +74,9 @@ ALL_EFFECTS = f"""effects:
   encoder:
     joints: {{crank_joint: {{counts: 4096}}, coupler_joint: {{counts: 4096}}}}
     cutoff: 90
-  rate_limit: {{rate: 700}}
-  dropout: {{probability: 0.1, burst: 3}}
-  delay: {{seconds: 0.0025}}
+  rate_limit: {{rate: 700, joints: {{coupler_joint: {{rate: 300, phase: 0.01}}}}}}
+  dropout: {{probability: 0.1, burst: 3, joints: {{rocker_joint: {{probability: 0.2}}}}}}
+  delay: {{seconds: 0.0025, joints: {{rocker_joint: {{seconds: 0.004, spread: 0.002}}}}}}
   markers: {{rate: 50}}
 """
 LOADS = """loads:

@@ -57,6 +57,12 @@ EFFECTS = {
     'delay': '{seconds: 0.012, spread: 0.005, reorder: true, duplicates: 0.1}',
     'markers': '{rate: 120, trace: 0.03}',
 }
+OWN = {
+    'rate_limit': '{rate: 500, joints: {coupler_joint: {rate: 130, phase: 0.003}}}',
+    'dropout': '{probability: 0.1, joints: {coupler_joint: {probability: 0.4, burst: 3}}}',
+    'delay': '{seconds: 0.005, joints: {coupler_joint: {seconds: 0.009, spread: 0.004}}}',
+}
+"""Effects with a joint that has a sensor of its own."""
 DRIVES = {
     'topic': '{max_age: 0.02}',
     'sine': '{mean: 1.2, amplitude: 0.9, frequency: 9}',
@@ -142,8 +148,12 @@ def runs(draw: st.DrawFn) -> tuple[str, Plan]:
     if drive == 'topic' and draw(st.booleans()):
         rest += 'rate: 0\n'
     effects = draw(st.sets(st.sampled_from(sorted(EFFECTS)), max_size=5))
+    own = draw(st.sets(st.sampled_from(sorted(OWN))))
     changes = st.tuples(st.sampled_from(sorted(faults) or ['none']), st.booleans())
-    return scene(drive, effects, faults, rest), Plan(
+    text = scene(drive, effects, faults, rest)
+    for effect in own:
+        text = text.replace(EFFECTS[effect], OWN[effect])
+    return text, Plan(
         resets=draw(st.sets(ticks, max_size=2)),
         jumps=draw(st.dictionaries(ticks, st.sampled_from([-60, -9, 9, 400]), max_size=2)),
         asked=draw(st.dictionaries(ticks, changes, max_size=6)) if faults else {},
@@ -178,9 +188,19 @@ FOUND = {
 }
 # A delay of another kind than those drawn, behind noise that walks and readings that are lost.
 SAMPLED = scene('topic', ['noise', 'dropout', 'delay']).replace(
-    '{seconds: 0.012}', '{seconds: 0.0205, between: sampled, stamp: measured}'
+    EFFECTS['delay'], '{seconds: 0.0205, between: sampled, stamp: measured}'
 )
 FOUND['a delay that holds samples as they were measured'] = (SAMPLED, Plan(every=3))
+# In the first gap, of 9 to 30 ms, the other joints' readings arrive before the coupler's first.
+EARLIER = scene('topic', ['rate_limit', 'delay']).replace(
+    EFFECTS['rate_limit'], '{rate: 500, hold: silent}'
+)
+FOUND['readings that arrive before there is one of each joint'] = (
+    EARLIER.replace(
+        EFFECTS['delay'], '{seconds: 0.005, joints: {coupler_joint: {seconds: 0.012}}}'
+    ),
+    Plan(),
+)
 
 
 @pytest.mark.parametrize('name', FOUND)

@@ -1,0 +1,181 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Own sensors: joints that are read by sensors of their own, beside the one of the other joints.
+
+A joint under ``joints`` of `rate_limit`, `dropout` or `delay` has such a sensor of its own, with
+its own parameters (those that it leaves out have their defaults) and its own random generator. So
+one more such joint changes nothing for the others.
+
+A message has all joints. It is published at each tick at which at least one sensor has a reading;
+a sensor without one repeats its last: values, rates, accelerations and efforts. So ``hold:
+silent`` publishes nothing where no sensor has a reading. Nothing is published before each sensor
+has had its first. Where a reading has no rates, as at a toggle, the message has none while it is
+repeated; likewise for accelerations and efforts.
+
+The stamp is that of the newest reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, replace
+from typing import Any, TYPE_CHECKING
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Sensor, SensorReading
+from linkage_ros.errors import DefinitionError
+
+if TYPE_CHECKING:
+    from linkage_ros.effects.encoder import Encoder
+
+_Values = tuple[float, ...]
+
+
+def own_sensors(
+    effect: str, build: Callable[[Any, Context], Sensor], parameters: Any, context: Context
+) -> OwnSensors:
+    """
+    Build one sensor for each joint under ``joints``, and one for all other joints.
+
+    Parameters
+    ----------
+    effect
+        Name of the effect.
+    build
+        Builds a sensor of the effect.
+    parameters, context
+        Its parameters, and the context of the linkage.
+
+    Raises
+    ------
+    DefinitionError
+        No joint is named, or parameters do not fit together.
+
+    """
+    if not parameters.joints:
+        raise DefinitionError(
+            f'effects.{effect}.joints', 'names no joint', 'write {JOINT: {…}}, or leave it out'
+        )
+    others: list[int] = []
+    groups = [(others, build(replace(parameters, joints=None), context))]
+    for place, joint in enumerate(context.joints):
+        if joint not in parameters.joints:
+            others.append(place)
+            continue
+        own = replace(parameters, **asdict(parameters.joints[joint]), joints=None)
+        try:
+            built = build(own, replace(context, seed=f'{context.seed}/joints/{joint}'))
+        except DefinitionError as error:
+            key = error.where.removeprefix(f'effects.{effect}.')
+            where = f'effects.{effect}.joints.{joint}.{key}'
+            raise DefinitionError(where, error.reason, error.remedy) from None
+        groups.append(([place], built))
+    return OwnSensors(groups if others else groups[1:])
+
+
+class OwnSensors:
+    """
+    Sensors side by side.
+
+    Parameters
+    ----------
+    groups
+        Indices of joints, and the sensor that reads them.
+
+    Attributes
+    ----------
+    gap, silence
+        As of the sensors; None if they have none.
+    gap_begins
+        Whether the last reported gap began there, or one of the sensors had a reading that was
+        not published: a replay needs these ticks.
+
+    """
+
+    __slots__ = ('_groups', '_held', '_order', 'gap', 'gap_begins', 'silence')
+
+    gap: Callable[[int], SensorReading | None] | None
+    silence: Callable[[int, bool], SensorReading | None] | None
+
+    def __init__(self, groups: Sequence[tuple[Sequence[int], Any]]) -> None:
+        self._groups = groups
+        self._held: list[SensorReading | None] = [None] * len(groups)
+        self._order = [
+            (number, at)
+            for _, number, at in sorted(
+                (place, number, at)
+                for number, (places, _) in enumerate(groups)
+                for at, place in enumerate(places)
+            )
+        ]
+        hears = all(hasattr(sensor, 'gap') for _, sensor in groups)
+        self.gap, self.silence = (self._gap, self._silence) if hears else (None, None)
+        self.gap_begins = False
+
+    def read_by(self, encoder: Encoder) -> None:
+        """Make the counts of an encoder before them be read with each sample of their joints."""
+        encoder.read_at_ticks = False
+        for places, sensor in self._groups:
+            sensor.read_by(encoder.part(places))
+
+    def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
+        """Return the newest readings of all; None if none is new."""
+        return self._newest(
+            [sensor(now, _part(reading, places)) for places, sensor in self._groups]
+        )
+
+    def _gap(self, now: int) -> SensorReading | None:
+        found = [sensor.gap(now) for _, sensor in self._groups]
+        newest = self._newest(found)
+        unseen = newest is None and any(part is not None for part in found)
+        self.gap_begins = unseen or any(sensor.gap_begins for _, sensor in self._groups)
+        return newest
+
+    def _silence(self, now: int, gap: bool) -> SensorReading | None:
+        if gap:
+            return self._gap(now)
+        return self._newest([sensor.silence(now, False) for _, sensor in self._groups])
+
+    def _newest(self, found: Sequence[SensorReading | None]) -> SensorReading | None:
+        """Return what is held of all joints; None if no reading is new, or one is missing."""
+        stamp = None
+        for number, part in enumerate(found):
+            if part is not None:
+                self._held[number], stamp = part, part.stamp
+        held = [part for part in self._held if part is not None]
+        if stamp is None or len(held) < len(found):
+            return None
+        return SensorReading(
+            stamp,
+            self._joined(part.joints for part in held),
+            self._joined(part.rates for part in held),
+            self._joined(part.accelerations for part in held),
+            self._joined(part.efforts for part in held),
+        )
+
+    def _joined(self, parts: Iterable[_Values]) -> _Values:
+        """Return the values of all joints in their order; none if a sensor has none."""
+        values = list(parts)
+        return tuple([values[number][at] for number, at in self._order]) if all(values) else ()
+
+
+def _part(reading: SensorReading, places: Sequence[int]) -> SensorReading:
+    """Return a reading of some joints."""
+    stamp, *values = reading
+    return SensorReading(
+        stamp, *[tuple([of[place] for place in places]) if of else () for of in values]
+    )

@@ -1,0 +1,311 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Own sensors: each joint by its own rate, delay and losses, and all in one message."""
+
+from fractions import Fraction
+from math import floor, tau
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.effects import delay, dropout, rate_limit
+from linkage_ros.effects.delay import DelayParameters, JointDelay
+from linkage_ros.effects.dropout import DropoutParameters, JointDropout
+from linkage_ros.effects.rate_limit import JointRateLimit, RateLimitParameters
+import pytest
+
+from .sensors import BEGIN, context, likely, MS, published, reading
+
+
+def limited(rate, own, **parameters):
+    use = RateLimitParameters(rate, joints={'rocker_joint': JointRateLimit(**own)}, **parameters)
+    return rate_limit.sensor(use, context())
+
+
+def delayed(seconds, own, **parameters):
+    use = DelayParameters(seconds, joints={'rocker_joint': JointDelay(**own)}, **parameters)
+    return delay.sensor(use, context())
+
+
+def lossy(probability, joints, seed='seed', **parameters):
+    own = {joint: JointDropout(*each) for joint, each in joints.items()}
+    use = DropoutParameters(probability, joints=own, **parameters)
+    return dropout.sensor(use, context(seed=seed))
+
+
+def values(found):
+    return None if found is None else found.joints
+
+
+# Coupler and rocker both read the time, in [ms]. The coupler is sampled at 0, 2, 4, 6, … ms.
+SAMPLES = [
+    pytest.param(
+        *({'rate': 250.0}, 'repeat'),  # 0, 4, 8
+        [(0, 0), (0, 0), (2, 0), (2, 0), (4, 4), (4, 4), (6, 4), (6, 4), (8, 8)],
+        id='slower',
+    ),
+    pytest.param(
+        *({'rate': 250.0}, 'silent'),
+        [(0, 0), None, (2, 0), None, (4, 4), None, (6, 4), None, (8, 8)],
+        id='slower, else silent',
+    ),
+    pytest.param(
+        *({'rate': 300.0, 'phase': 0.001}, 'repeat'),  # due at 1, 4.33 and 7.67 ms
+        [None, (0, 1), (2, 1), (2, 1), (4, 1), (4, 5), (6, 5), (6, 5), (8, 8)],
+        id='later',
+    ),
+    pytest.param(
+        *({'rate': 300.0, 'phase': 0.001}, 'silent'),
+        [None, (0, 1), (2, 1), None, (4, 1), (4, 5), (6, 5), None, (8, 8)],
+        id='later, else silent',
+    ),
+    pytest.param(
+        *({'rate': 1000.0}, 'silent'),
+        [(0, 0), (0, 1), (2, 2), (2, 3), (4, 4), (4, 5), (6, 6), (6, 7), (8, 8)],
+        id='faster',
+    ),
+]
+
+
+@pytest.mark.parametrize(('own', 'hold', 'expected'), SAMPLES)
+def test_each_joint_is_sampled_as_the_timeline_says(own, hold, expected):
+    sensor = limited(500.0, own, hold=hold)
+    found = [
+        sensor(BEGIN + ms * MS, reading(BEGIN + ms * MS, ms, ms)) for ms in range(len(expected))
+    ]
+    assert [values(read) for read in found] == expected
+    assert all(read.stamp == BEGIN + ms * MS for ms, read in enumerate(found) if read is not None)
+
+
+@given(
+    st.tuples(st.floats(1.0, 20_000.0), st.floats(1.0, 20_000.0)),
+    st.integers(0, 20 * MS),
+    st.floats(-1000.0, 1000.0),
+    st.lists(st.integers(1, 5 * MS), min_size=5, max_size=40),
+)
+def test_each_joint_has_a_clock_of_its_own_to_the_nanosecond(rates, phase, ppm, gaps):
+    ticks = [sum(gaps[:n]) for n in range(len(gaps))]
+
+    def sample(now, begin, rate):
+        """Return the tick of the newest sample, in [ns]; None before the first."""
+        if now < begin:
+            return None
+        k = floor((now - begin) * rate / 10**9) + 1
+        due = [
+            begin + floor(n * 10**9 / rate + Fraction(1, 2)) for n in range(max(k - 2, 0), k + 1)
+        ]
+        last = max(time for time in due if time <= now)
+        return min(tick for tick in ticks if tick >= last)
+
+    general, own = rates
+    sensor = limited(general, {'rate': own, 'phase': phase * 1e-9, 'ppm': ppm})
+    of_rocker = Fraction(own) * (1 + Fraction(ppm) / 10**6)
+    for now in ticks:
+        found = values(sensor(BEGIN + now, reading(BEGIN + now, now, now)))
+        expected = sample(now, 0, Fraction(general)), sample(now, phase, of_rocker)
+        assert found == (None if None in expected else expected)
+
+
+# Coupler and rocker both read 10 a millisecond. The coupler's reading is 2 ms late.
+ARRIVALS = [
+    ({'seconds': 0.004}, [None, None, None, None, (20, 0), (30, 10), (40, 20)]),
+    ({'seconds': 0.0035}, [None, None, None, None, (20, 5), (30, 15), (40, 25)]),
+    (
+        {'seconds': 0.0035, 'between': 'sampled'},
+        [None, None, None, None, (20, 0), (30, 10), (40, 20)],
+    ),
+    ({'seconds': 0.0}, [None, None, (0, 20), (10, 30), (20, 40), (30, 50), (40, 60)]),
+]
+
+
+@pytest.mark.parametrize(('own', 'expected'), ARRIVALS)
+def test_each_joint_is_as_late_as_the_timeline_says(own, expected):
+    sensor = delayed(0.002, own)
+    found = [
+        sensor(BEGIN + ms * MS, reading(BEGIN + ms * MS, 10.0 * ms, 10.0 * ms)) for ms in range(7)
+    ]
+    assert [values(read) for read in found] == expected
+    assert all(read.stamp == BEGIN + ms * MS for ms, read in enumerate(found) if read is not None)
+
+
+def test_a_gap_is_as_late_as_the_readings_of_each_joint():
+    sensor, found, begins = delayed(0.001, {'seconds': 0.004}, between='sampled'), [], []
+    for ms in range(16):
+        now = BEGIN + ms * MS
+        gap = 4 <= ms < 10
+        read = sensor.gap(now) if gap else sensor(now, reading(now, ms, ms))
+        found.append(values(read))
+        begins += [ms] if gap and sensor.gap_begins else []
+    assert found == [
+        *(None, None, None, None),  # the rocker's first reading is on its way
+        *((3, 0), (3, 1), (3, 2), (3, 3)),  # the coupler repeats its last one before the gap
+        *(None, None, None),
+        *((10, 3), (11, 3), (12, 3)),  # now the rocker
+        *((13, 10), (14, 11)),
+    ]
+    assert begins == [4]
+
+
+def test_a_joint_repeats_all_that_it_has_read():
+    sensor = limited(1000.0, {'rate': 100.0})
+    for ms in range(10):
+        now, ones = BEGIN + ms * MS, (ms, ms)
+        found = sensor(now, reading(now, *ones, rates=ones, accelerations=ones, efforts=ones))
+        expected = reading(now, ms, 0, rates=(ms, 0), accelerations=(ms, 0), efforts=(ms, 0))
+        assert found == expected
+
+
+def test_there_are_no_rates_while_a_reading_without_them_is_repeated():
+    sensor = limited(1000.0, {'rate': 500.0})
+    found = []
+    for ms in range(6):
+        now = BEGIN + ms * MS
+        found.append(sensor(now, reading(now, ms, ms, rates=() if ms == 2 else (ms, ms))).rates)
+    assert found == [(0, 0), (1, 0), (), (), (4, 4), (5, 4)]
+
+
+N = 20_000
+OWN = {
+    'independent': (0.3, 0.0),
+    'bursts': (0.2, 5.0),
+}
+
+
+def losses(sensor, n=N):
+    """Return for coupler and rocker whether each sample is lost."""
+    lost, held = [], (None, None)
+    for number in range(n):
+        now = BEGIN + number * MS
+        held = values(sensor(now, reading(now, number, number))) or held
+        lost.append(tuple(of != number for of in held))
+    return list(zip(*lost, strict=True))
+
+
+@pytest.mark.parametrize('chain', OWN)
+def test_of_each_joint_as_much_is_lost_as_it_says(chain):
+    probability, burst = OWN[chain]
+    of_coupler, of_rocker = losses(lossy(0.1, {'rocker_joint': OWN[chain]}))
+    # Variances of means: of independent samples; of a chain of two states whose correlation falls
+    # by ρ each step.
+    stay = burst or 1.0 / (1.0 - probability)
+    rho = 1.0 - 1.0 / stay - probability / (stay * (1.0 - probability))
+    variance = probability * (1.0 - probability) * (1.0 + rho) / (1.0 - rho) / N
+    assert likely((sum(of_coupler) / N - 0.1) ** 2 / (0.1 * 0.9 / N), 1)
+    assert likely((sum(of_rocker) / N - probability) ** 2 / variance, 1)
+
+
+def test_joints_lose_their_samples_independently():
+    lost = losses(lossy(0.0, {'coupler_joint': (0.1,), 'rocker_joint': (0.3,)}))
+    both = sum(map(all, zip(*lost, strict=True))) / N
+    assert likely((both - 0.03) ** 2 / (0.03 * 0.97 / N), 1)
+
+
+def test_nothing_is_published_where_all_joints_are_lost():
+    sensor = lossy(0.5, {'rocker_joint': (0.5,)})
+    found = [sensor(BEGIN + n * MS, reading(BEGIN + n * MS, n, n)) for n in range(400)]
+    _, *rest = found
+    assert 0.15 < rest.count(None) / len(rest) < 0.35
+    assert all(n in read.joints for n, read in enumerate(found) if read is not None)
+
+
+def test_one_more_joint_changes_no_other():
+    alone, _ = losses(lossy(0.1, {'rocker_joint': (0.3,)}), 500)
+    whole = dropout.sensor(DropoutParameters(0.1), context())
+    told = [whole(BEGIN, reading(BEGIN, n, n)) is None for n in range(500)]
+    # Before the rocker's first reading nothing is published.
+    first = alone.index(False)
+    assert list(alone[first:]) == told[first:]
+    _, rocker = losses(lossy(0.1, {'rocker_joint': (0.3,)}), 500)
+    both = losses(lossy(0.1, {'coupler_joint': (0.3,), 'rocker_joint': (0.3,)}), 500)
+    assert both[1][10:] == rocker[10:]
+    assert both[0] != both[1]
+
+
+def test_one_more_random_latency_changes_no_other():
+    def rocker(joints):
+        found = published(f'delay: {{seconds: 0, joints: {{{joints}}}}}', 300)
+        return [None if read is None else read.joints[1] for read in found]
+
+    own = '{seconds: 0.002, spread: 0.01, reorder: true}'
+    one = rocker(f'rocker_joint: {own}')
+    two = rocker(f'rocker_joint: {own}, coupler_joint: {own}')
+    begun = next(n for n, value in enumerate(two) if value is not None)
+    last = None
+    for before, now in zip(one[begun:], two[begun:], strict=True):
+        last = now or last  # where neither arrives nothing is published
+        assert last == before
+    assert len(set(one)) > 100
+
+
+# Effects with the general parameters, and those of the rocker.
+CHAINS = {
+    'rate_limit': ('rate_limit: {{{}}}', 'rate: 250', 'rate: 70, phase: 0.004, ppm: 500'),
+    'delay': ('delay: {{{}}}', 'seconds: 0.004', 'seconds: 0.0207'),
+    'sampled': ('delay: {{{}}}', 'seconds: 0.0051', 'seconds: 0.0107, between: sampled'),
+    'behind an encoder': (
+        (
+            'encoder: {{joints: {{coupler_joint: {{counts: 4096}}, rocker_joint: {{counts: 1000, '
+            'incremental: true}}}}, cutoff: 20}}, rate_limit: {{{}}}'
+        ),
+        *('rate: 190', 'rate: 33.3'),
+    ),
+}
+
+
+@pytest.mark.parametrize('name', CHAINS)
+def test_a_joint_reads_as_where_all_are_read_by_its_sensor(name):
+    effects, general, own = CHAINS[name]
+    found = published(effects.format(f'{general}, joints: {{rocker_joint: {{{own}}}}}'), 400)
+    coupler = published(effects.format(general), 400)
+    rocker = published(effects.format(own), 400)
+    assert sum(read is not None for read in found) > 350
+    for read, one, other in zip(found, coupler, rocker, strict=True):
+        assert (read is None) == (one is None or other is None)
+        if read is not None:
+            assert read.stamp == one.stamp
+            assert read.joints == (one.joints[0], other.joints[1])
+            assert read.rates == (one.rates[0], other.rates[1])
+
+
+def test_counts_stay_whole_and_rates_are_differences_over_the_time_of_each_joint():
+    counts = 4096
+    encoders = f'{{coupler_joint: {{counts: {counts}}}, rocker_joint: {{counts: {counts}}}}}'
+    found = published(
+        f'encoder: {{joints: {encoders}}}, '
+        'rate_limit: {rate: 250, joints: {rocker_joint: {rate: 100}}}'
+    )
+    whole = [[floor(angle * counts / tau) for angle in read.joints] for read in published('')]
+    for n, read in enumerate(found):
+        for joint, period in enumerate((4, 10)):
+            last = n - n % period
+            count = whole[last][joint]
+            assert read.joints[joint] == pytest.approx(count * tau / counts, abs=1e-12)
+            moved = count - whole[max(last - period, 0)][joint]
+            rate = moved * tau / counts / (period * 1e-3)
+            assert read.rates[joint] == pytest.approx(rate, abs=1e-9)
+
+
+def test_all_three_together_as_the_timeline_says():
+    # The rocker's samples of 10, 60, 110, … ms are 20 ms late; the coupler's, of each 10 ms, 4 ms.
+    found = published(
+        'rate_limit: {rate: 100, joints: {rocker_joint: {rate: 20, phase: 0.01}}}, '
+        'delay: {seconds: 0.004, joints: {rocker_joint: {seconds: 0.02}}}',
+        200,
+    )
+    ideal = published('', 200)
+    assert found[:30] == [None] * 30
+    for n, read in enumerate(found[30:], 30):
+        coupler = (n - 4) // 10 * 10
+        rocker = 10 + (n - 30) // 50 * 50
+        assert read.joints == (ideal[coupler].joints[0], ideal[rocker].joints[1])
