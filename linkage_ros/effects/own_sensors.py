@@ -31,7 +31,7 @@ The stamp is that of the newest reading.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any, TYPE_CHECKING
 
@@ -114,14 +114,9 @@ class OwnSensors:
     def __init__(self, groups: Sequence[tuple[Sequence[int], Any]]) -> None:
         self._groups = groups
         self._held: list[SensorReading | None] = [None] * len(groups)
-        self._order = [
-            (number, at)
-            for _, number, at in sorted(
-                (place, number, at)
-                for number, (places, _) in enumerate(groups)
-                for at, place in enumerate(places)
-            )
-        ]
+        together = [place for places, _ in groups for place in places]
+        self._order = [together.index(place) for place in sorted(together)]
+        """Where each joint is among the joints of all sensors, one after the other."""
         hears = all(hasattr(sensor, 'gap') for _, sensor in groups)
         self.gap, self.silence = (self._gap, self._silence) if hears else (None, None)
         self.gap_begins = False
@@ -159,18 +154,13 @@ class OwnSensors:
         held = [part for part in self._held if part is not None]
         if stamp is None or len(held) < len(found):
             return None
-        return SensorReading(
-            stamp,
-            self._joined(part.joints for part in held),
-            self._joined(part.rates for part in held),
-            self._joined(part.accelerations for part in held),
-            self._joined(part.efforts for part in held),
-        )
+        _, *values = zip(*held, strict=True)
+        return SensorReading(stamp, *map(self._joined, values))
 
-    def _joined(self, parts: Iterable[_Values]) -> _Values:
+    def _joined(self, parts: Sequence[_Values]) -> _Values:
         """Return the values of all joints in their order; none if a sensor has none."""
-        values = list(parts)
-        return tuple([values[number][at] for number, at in self._order]) if all(values) else ()
+        values, order = [value for part in parts for value in part], self._order
+        return tuple([values[at] for at in order]) if len(values) == len(order) else ()
 
 
 def _part(reading: SensorReading, places: Sequence[int]) -> SensorReading:
