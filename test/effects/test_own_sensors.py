@@ -296,6 +296,48 @@ def test_counts_stay_whole_and_rates_are_differences_over_the_time_of_each_joint
             assert read.rates[joint] == pytest.approx(rate, abs=1e-9)
 
 
+# Period and phase of sampling, and delay, in [s], of a sensor of MuJoCo; its time step is 1 s.
+MUJOCO = [
+    ((2.0, 0.0, 0.0), (2.5, -1.5, 0.0)),
+    ((1.0, 0.0, 1.0), (1.0, 0.0, 4.0)),
+    ((2.0, 0.0, 3.0), (3.7, -0.2, 6.0)),
+]
+
+
+@pytest.mark.parametrize('sensors', MUJOCO)
+def test_as_sensors_of_mujoco_with_an_interval_and_a_delay(sensors):
+    mujoco = pytest.importorskip('mujoco')
+    elements = [
+        f'<jointpos joint="slide" nsample="9" interval="{period} {phase}" delay="{late}"/>'
+        for period, phase, late in sensors
+    ]
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option timestep="1" gravity="0 0 0"/><worldbody><body>'
+        '<joint name="slide" type="slide"/><geom size="1"/></body></worldbody>'
+        f'<sensor>{"".join(elements)}</sensor></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    data.qvel[0] = 1.0
+    (coupler, rocker) = (
+        {'rate': 1.0 / period, 'phase': period + phase if phase else 0.0}
+        for period, phase, _ in sensors
+    )
+    limit = limited(**coupler, own=rocker)
+    line = delayed(sensors[0][2], {'seconds': sensors[1][2], 'between': 'sampled'},
+                   between='sampled')  # fmt: skip
+    told = 0
+    for second in range(60):
+        mujoco.mj_forward(model, data)
+        now = BEGIN + second * 1000 * MS
+        read = limit(now, reading(now, data.qpos[0], data.qpos[0]))
+        found = line.silence(now, False) if read is None else line(now, read)
+        if found is not None:  # before, MuJoCo reads 0
+            told += 1
+            assert found.joints == tuple(data.sensordata)
+        mujoco.mj_step(model, data)
+    assert told > 45
+
+
 def test_all_three_together_as_the_timeline_says():
     # The rocker's samples of 10, 60, 110, … ms are 20 ms late; the coupler's, of each 10 ms, 4 ms.
     found = published(
