@@ -109,7 +109,7 @@ class DelayParameters(JointDelay):
 
     @property
     def lines(self) -> tuple[JointDelay, ...]:
-        """The line of the joints without their own one, and these."""
+        """Return the line of the joints without their own one, and these."""
         return self, *(self.joints or {}).values()
 
 

@@ -26,6 +26,9 @@ silent`` publishes nothing where no sensor has a reading. Nothing is published b
 has had its first. Where a reading has no rates, as at a toggle, the message has none while it is
 repeated; likewise for accelerations and efforts.
 
+For the own sensors behind these, a joint is silent where its sensor has no reading: `dropout`
+loses its samples, and not their repetitions.
+
 The stamp is that of the newest reading.
 """
 
@@ -87,6 +90,20 @@ def own_sensors(
     return OwnSensors(groups if others else groups[1:])
 
 
+class PartlyNew(SensorReading):
+    """
+    A reading in which some joints repeat their last one.
+
+    Attributes
+    ----------
+    new
+        Indices of the other joints; None for all.
+
+    """
+
+    new: frozenset[int] | None = None
+
+
 class OwnSensors:
     """
     Sensors side by side.
@@ -129,9 +146,14 @@ class OwnSensors:
 
     def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
         """Return the newest readings of all; None if none is new."""
-        return self._newest(
-            [sensor(now, _part(reading, places)) for places, sensor in self._groups]
-        )
+        new = reading.new if isinstance(reading, PartlyNew) else None
+        found = []
+        for places, sensor in self._groups:
+            if new is None or not new.isdisjoint(places):
+                found.append(sensor(now, _part(reading, places)))
+            else:
+                found.append(sensor.silence(now, False) if self.silence is not None else None)
+        return self._newest(found)
 
     def _gap(self, now: int) -> SensorReading | None:
         found = [sensor.gap(now) for _, sensor in self._groups]
@@ -155,7 +177,15 @@ class OwnSensors:
         if stamp is None or len(held) < len(found):
             return None
         _, *values = zip(*held, strict=True)
-        return SensorReading(stamp, *map(self._joined, values))
+        reading = PartlyNew(stamp, *map(self._joined, values))
+        if None in found:
+            reading.new = frozenset(
+                place
+                for (places, _), part in zip(self._groups, found, strict=True)
+                if part is not None
+                for place in places
+            )
+        return reading
 
     def _joined(self, parts: Sequence[_Values]) -> _Values:
         """Return the values of all joints in their order; none if a sensor has none."""

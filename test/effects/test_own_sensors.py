@@ -219,6 +219,40 @@ def test_nothing_is_published_where_all_joints_are_lost():
     assert all(n in read.joints for n, read in enumerate(found) if read is not None)
 
 
+@pytest.mark.parametrize(('hold', 'samples'), [('silent', 1), ('repeat', 50)])
+def test_a_lost_sample_of_a_slow_joint_is_missing_until_its_next(hold, samples):
+    # Of the rocker's samples, each 50 ms, half are lost; repeated, each is lost 50 times or fewer.
+    limit = limited(1000.0, {'rate': 20.0}, hold=hold)
+    line = lossy(0.0, {'rocker_joint': (0.5,)})
+    changes, last, n = [], None, 20_000
+    for ms in range(n):
+        now = BEGIN + ms * MS
+        found = line(now, limit(now, reading(now, ms, ms)))
+        if found is not None and found.joints[1] != last:
+            last = found.joints[1]
+            changes.append(ms - last)
+    if samples == 1:
+        assert set(changes) == {0}
+        assert likely((len(changes) - n / 100) ** 2 / (n / 50 / 4), 1)
+    else:
+        assert len(changes) == n / 50
+        assert likely((sum(change > 0 for change in changes) - n / 100) ** 2 / (n / 50 / 4), 1)
+
+
+def test_a_joint_that_is_silent_is_so_for_its_delay():
+    # The rocker is sampled at 0, 5, 10, … ms, and its samples come in turn, 7 ms and more later.
+    limit = limited(1000.0, {'rate': 200.0}, hold='silent')
+    line = delayed(0.0, {'seconds': 0.0061}, between='interpolated')
+    found = []
+    for ms in range(20):
+        now = BEGIN + ms * MS
+        found.append(values(line(now, limit(now, reading(now, float(ms), float(ms))))))
+    expected = [None] * 7 + [0] * 5 + [5] * 5 + [10] * 3
+    assert found == [
+        None if of_rocker is None else (ms, of_rocker) for ms, of_rocker in enumerate(expected)
+    ]
+
+
 def test_one_more_joint_changes_no_other():
     alone, _ = losses(lossy(0.1, {'rocker_joint': (0.3,)}), 500)
     whole = dropout.sensor(DropoutParameters(0.1), context())
