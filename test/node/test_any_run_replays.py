@@ -58,7 +58,7 @@ EFFECTS = {
     'markers': '{rate: 120, trace: 0.03}',
 }
 OWN = {
-    'rate_limit': '{rate: 500, joints: {coupler_joint: {rate: 130, phase: 0.003}}}',
+    'rate_limit': '{rate: 500, hold: silent, joints: {coupler_joint: {rate: 130, phase: 0.003}}}',
     'dropout': '{probability: 0.1, joints: {coupler_joint: {probability: 0.4, burst: 3}}}',
     'delay': '{seconds: 0.005, joints: {coupler_joint: {seconds: 0.009, spread: 0.004}}}',
 }
