@@ -17,7 +17,7 @@ The encoder on the shaft of a motor, before its gear and the play behind it.
 
 With n counts a turn the reading is ⌊φ·n/2π⌋·2π/n, and its rate the difference of counts since the
 last message over the time between (as in `linkage_ros.effects.encoder`). With 0 counts both are
-exact.
+exact. The effort is the torque of the motor, as its amplifier knows it by the current.
 """
 
 from __future__ import annotations
@@ -39,11 +39,14 @@ class MotorEncoder:
     counts
         Counts in a turn of the motor; 0 for an exact reading.
     motor
-        Returns angle and rate of the motor, in [rad] and [rad/s].
+        Returns angle, rate and torque of the motor, in [rad], [rad/s] and [N·m]; None for no
+        torque.
 
     """
 
-    def __init__(self, name: str, counts: int, motor: Callable[[], tuple[float, float]]) -> None:
+    def __init__(
+        self, name: str, counts: int, motor: Callable[[], tuple[float, float, float | None]]
+    ) -> None:
         self._write = JointStateWriter([name]).write
         self._counts = counts
         self._motor = motor
@@ -52,7 +55,7 @@ class MotorEncoder:
 
     def __call__(self, now: int, _motion: object, _reading: object) -> bytes:
         """Return the message at a time, in [ns]."""
-        angle, rate = self._motor()
+        angle, rate, torque = self._motor()
         if self._counts:
             count = floor(angle * self._counts / tau)
             if self._last is not None and now > self._last[0]:
@@ -60,4 +63,4 @@ class MotorEncoder:
                 self._rate = (count - before) * tau / (self._counts * (now - time) * 1e-9)
             self._last = now, count
             angle, rate = count * tau / self._counts, self._rate
-        return self._write(now, [angle], [rate], [])
+        return self._write(now, [angle], [rate], [] if torque is None else [torque])

@@ -487,11 +487,13 @@ class TorqueDrive(Drive):
         return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
 
     @property
-    def motor(self) -> tuple[float, float]:
-        """Angle and rate of the motor at the last state, before its gear, in [rad]."""
-        motor = getattr(self._shown, 'motor', self._shown)
-        ratio = self._motor.ratio if self._motor else 1.0
-        return ratio * motor.value, ratio * motor.rate
+    def motor(self) -> tuple[float, float, float | None]:
+        """Angle, rate and torque before the gear at the last state; None without `motor`."""
+        moved, mechanism = getattr(self._shown, 'motor', self._shown), self._acting[0]
+        if self._motor is None:
+            return moved.value, moved.rate, None
+        ratio, torque = self._motor.ratio, self._motor.torque(mechanism, self._shown)
+        return ratio * moved.value, ratio * moved.rate, torque
 
     def _advance(self, now: int) -> None:
         """Integrate all steps that end by a time, in [ns]."""

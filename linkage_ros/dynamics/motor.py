@@ -40,7 +40,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from math import copysign, inf
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from linkage_ros.dynamics.laws import LawTerm
 from linkage_ros.dynamics.longest_step import check_step
@@ -73,6 +73,10 @@ class MotorLaw:
         The effort at rest, without this friction.
     holding
         This friction: the most that the gear holds at rest.
+    torques
+        The torque of the motor before the gear in each segment, in [N·m].
+    stalled
+        The torque at rest.
 
     """
 
@@ -80,6 +84,8 @@ class MotorLaw:
     lines: tuple[Line, ...] = ((0.0, 0.0),)
     resting: float = 0.0
     holding: float = 0.0
+    torques: tuple[Line, ...] = ((0.0, 0.0),)
+    stalled: float = 0.0
 
     def segment(self, _value: float, rate: float, _time: float) -> int:
         """Return how many ends a rate has passed; -1 at rest."""
@@ -96,6 +102,11 @@ class MotorLaw:
     def force(self, segment: int, _value: float, rate: float, _time: float) -> float:
         """Return the effort by the line of a segment."""
         return self.resting if segment == _RESTING else _at(self.lines[segment], rate)
+
+    def torque(self, rate: float) -> float:
+        """Return the torque of the motor before the gear, in [N·m], at a rate of the input."""
+        segment = self.segment(0.0, rate, 0.0)
+        return self.stalled if segment == _RESTING else _at(self.torques[segment], rate)
 
 
 _OFF = MotorLaw()
@@ -165,6 +176,13 @@ class Motor:
         under = mechanism.driven_by(lambda moved: replace(moved, laws=(*moved.laws[:-1], law)))
         return under, 0.0, law.holding
 
+    @staticmethod
+    def torque(mechanism: Any, motion: Any) -> float:
+        """Return the torque before the gear, in [N·m], under the command of a mechanism."""
+        *_, law = getattr(mechanism, 'motor', mechanism).laws
+        torque: float = law.torque(getattr(motion, 'motor', motion).rate)
+        return torque
+
     def check_step(self, inertia: float, method: str, step: float) -> None:
         """
         Refuse a motor whose rate follows the voltage faster than the integration can.
@@ -207,6 +225,7 @@ class Motor:
         holding = 0.5 * to_input * abs(still) * (1.0 / self.backward - self.forward)
         ends: list[float] = []
         lines: list[Line] = []
+        torques: list[Line] = []
         begins = [-inf, *rates]
         for begin, at in zip(begins, _between(rates), strict=True):
             start, slope = self._current(wanted, supply, at)
@@ -215,9 +234,11 @@ class Motor:
             line = factor * start + copysign(holding, at), factor * slope
             if not lines or line != lines[-1]:
                 lines.append(line)
+                torques.append((self.constant * start, self.constant * slope))
                 ends.append(begin)
         resting = 0.5 * to_input * still * (1.0 / self.backward + self.forward)
-        return MotorLaw(tuple(ends[1:]), tuple(lines), resting, holding)
+        stalled = self.constant * still
+        return MotorLaw(tuple(ends[1:]), tuple(lines), resting, holding, tuple(torques), stalled)
 
     def _wanted(self, command: float) -> Line:
         """Return the current that a command asks for, in [A]."""

@@ -80,6 +80,10 @@ class Winding:
             command /= self.motor.constant * self.motor.ratio * self.motor.forward
         return replace(mechanism, command=command), 0.0, 0.0
 
+    def torque(self, _mechanism: WoundMechanism, motion: WoundMotion) -> float:
+        """Return the torque before the gear, in [N·m]."""
+        return self.motor.constant * motion.current
+
     def check_step(self, inertia: float, method: str, step: float) -> None:
         """
         Refuse a motor whose current, alone or with the rate, is too fast for the integration.

@@ -129,6 +129,22 @@ def test_a_wheel_runs_up_in_closed_form(name):
         assert state == pytest.approx(known(t), rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ('motor', 'command', 'known'),
+    [
+        ({}, 12.0, lambda rate: CONSTANT * (12.0 - CONSTANT * RATIO * rate) / RESISTANCE),
+        ({'current': 4.0}, 12.0, lambda rate: CONSTANT * 4.0),
+        ({'command': 'current', **LOSSES}, -3.0, lambda rate: CONSTANT * -3.0),
+        ({'command': 'effort', **LOSSES}, 1.6, lambda rate: 1.6 / (RATIO * 0.8)),
+    ],
+)
+def test_the_motor_has_its_torque_before_the_gear(motor, command, known):
+    built = drive(motor)
+    for _, _, rate, _ in under(built, command, 200):
+        *_, torque = built.motor
+        assert torque == pytest.approx(known(rate), rel=1e-12)
+
+
 def test_stall_and_no_load():
     first, *_, last = under(drive({}, step=0.01), 12.0, 20_000, 1000)
     assert first[3] * INERTIA == pytest.approx(RATIO * CONSTANT * 12.0 / RESISTANCE, rel=1e-9)

@@ -311,7 +311,7 @@ def read(drive, commands=(), ticks=200, loads=''):
             if tick == number:
                 assert line.drive.offer(EffortCommand(0, effort), now) is None
         reading = line.see(now).reading
-        found.append((*line.drive.motor, reading.joints[0], reading.rates[0]))
+        found.append((*line.drive.motor[:2], reading.joints[0], reading.rates[0]))
     return found
 
 
