@@ -115,5 +115,10 @@ def named_file(named: str | PathLike[str], *folders: str) -> Path:
     )
 
 
+def linkage_of_scene(name: str, folder: Path) -> Path:
+    """Return the path of a linkage that a scene in a folder names: a shipped one, or a file."""
+    return shipped(f'linkages/{name}.yaml') if name in linkage_names() else folder / name
+
+
 def _names(folder: str) -> list[str]:
     return sorted(file.stem for file in shipped(folder).glob('*.yaml'))

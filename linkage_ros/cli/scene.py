@@ -44,7 +44,7 @@ from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
-from linkage_ros.resources import named_file
+from linkage_ros.resources import linkage_of_scene, named_file
 from linkage_ros.scene.load import kind_of, load_scene
 from linkage_ros.scene.notes import scene_notes
 from linkage_ros.scene.scene import Scene
@@ -369,7 +369,7 @@ def _violations(file: Path) -> list[FileError]:
         return wrong
     for linkage in dict.fromkeys(_linkages(content)):
         # The reader reports a missing file, with the line that names it.
-        path = file.parent / linkage
+        path = linkage_of_scene(linkage, file.parent)
         if isfile(path):  # noqa: PTH113 (Path's raises where a name is too long)
             wrong += violations(read_yaml(path)[0], linkage_schema())
     return wrong

@@ -39,7 +39,7 @@ from linkage_ros.files.units import ANGLES, LENGTHS, Units
 from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.resources import named_file
+from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.scene.scene import (
     AS_THE_RUN_GOES,
     LEASTS,
@@ -101,12 +101,16 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
         return _stand_in(name, content, data, folder, settings)
 
     def open_linkage(where: Section) -> tuple[Section, bytes]:
-        linkage = file.parent / where.text('linkage')
+        linkage = linkage_of_scene(where.text('linkage'), file.parent)
         if not isfile(linkage):  # noqa: PTH113 (Path's raises where a name is too long)
             raise where.error(
                 'linkage',
                 f'{quoted(str(linkage))} is not a file',
-                'name one, relative to the scene',
+                did_you_mean(
+                    linkage.name,
+                    linkage_names(),
+                    'name one relative to the scene, or one that linkage gallery lists',
+                ),
             )
         return read_yaml(linkage)
 

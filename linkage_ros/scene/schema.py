@@ -82,6 +82,12 @@ _SHORTHANDS = ('four_bar', 'inverted_slider_crank')
 _WRITTEN_OUT = ('links', 'input', 'joints')
 
 
+_NAMED = (
+    'path of the linkage file, relative to the folder of this file; or the name of a linkage that '
+    'comes with the package'
+)
+
+
 def as_text(schema: Schema) -> str:
     """Return a schema as the text of its file."""
     return json.dumps(schema, indent=2, ensure_ascii=False, allow_nan=False) + '\n'
@@ -117,7 +123,7 @@ def scene_schema() -> Schema:
     whole = mapping(
         'A linkage or several, what drives them, what is called for, and a recording.',
         {
-            'linkage': _text('path of the linkage file, relative to the folder of this file'),
+            'linkage': _text(_NAMED),
             'linkages': _linkages(own),
             'rate': {
                 **_number(_RATE, 'Hz', least=0.0, most=HIGHEST_RATE),
@@ -190,7 +196,7 @@ def _linkages(own: Mapping[str, Schema]) -> Schema:
                 'its name, which its joints have before their own: letters, digits and _',
                 ROS_NAME,
             ),
-            'linkage': _text('path of its file, relative to the folder of this file'),
+            'linkage': _text(_NAMED),
             **own,
         },
         required=('name', 'linkage'),

@@ -191,6 +191,12 @@ def test_a_linkage_that_is_no_file(build, named, shown):
     assert re.search(rf':2: linkage: .*{shown}.* is not a file; name one', str(caught.value))
 
 
+@pytest.mark.parametrize('named', [b'hoekens', b'hoeken.yaml'])
+def test_a_linkage_that_comes_with_the_package_is_meant(build, named):
+    with pytest.raises(FileError, match=f"{named.decode()}' is not a file; did you mean 'hoeken'"):
+        build(b'linkage: ' + named)
+
+
 def test_the_name_of_a_file_far_down_is_told(tmp_path):
     folder = tmp_path / 'a_folder_with_a_long_name' / 'that_is_in_one_of_its_kind' / 'and_so_on'
     folder.mkdir(parents=True)

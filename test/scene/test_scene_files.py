@@ -478,3 +478,16 @@ def test_a_file_that_is_no_scene_and_no_linkage(tmp_path, kind):
         load_scene(tmp_path / 'file.yaml')
     assert is_one_line(caught.value)
     assert f'file.yaml{said}' in str(caught.value)
+
+
+def test_a_scene_names_a_linkage_that_comes_with_the_package(tmp_path):
+    file = tmp_path / 'scene.yaml'
+    for name in ('hoeken', 'four_bar'):
+        file.write_text(f'linkage: {name}')
+        (member,) = load_scene(file).members
+        assert member.linkage.links == load_scene(name).members[0].linkage.links
+    # A file with a suffix, or in a folder, is the user's.
+    (tmp_path / 'four_bar.yaml').write_text(load_scene('hoeken').files['linkage.yaml'].decode())
+    file.write_text('linkage: four_bar.yaml')
+    hoeken = load_scene('hoeken').members[0].linkage
+    assert load_scene(file).members[0].linkage.links == hoeken.links
