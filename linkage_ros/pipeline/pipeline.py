@@ -638,7 +638,8 @@ class Pipeline:
         if any(line.wrenches for line in self.lines):
             from linkage_ros.pipeline.wrench_topics import wrench_topics
 
-            self.wrenches = wrench_topics(self.lines, self.topic)
+            linkages = [(line.member, line.drive, line.wrenches) for line in self.lines]
+            self.wrenches = wrench_topics(linkages, self.topic)
         # Among the drives, only the topic drive keeps no state from earlier ticks.
         self._goes_on = any(
             line.member.drive[0] != 'topic' or not _GOING_ON.isdisjoint(line.stages)

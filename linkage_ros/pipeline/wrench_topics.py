@@ -16,10 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from re import fullmatch
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from linkage_ros.dynamics.loads import GREATEST_LOAD
 from linkage_ros.errors import FileError, quoted
@@ -28,7 +28,7 @@ from linkage_ros.messages.wrench import read_wrench
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.wrenches import HeldWrench
-    from linkage_ros.pipeline.pipeline import LinkagePipeline
+    from linkage_ros.scene.scene import SceneLinkage
 
 MOST_WRENCHES = 32
 """Most wrenches of a scene: each tick asks for the messages of each."""
@@ -45,8 +45,10 @@ class WrenchTopic:
 
     Parameters
     ----------
-    line, link
+    member, link
         The linkage, and its link.
+    drive
+        The drive of the linkage; it learns of each wrench if it has ``load``.
     held
         The wrench, which the messages change.
 
@@ -61,13 +63,12 @@ class WrenchTopic:
 
     """
 
-    def __init__(self, line: LinkagePipeline, link: str, held: HeldWrench) -> None:
-        member = line.member
+    def __init__(self, member: SceneLinkage, link: str, drive: Any, held: HeldWrench) -> None:
         given = member.loads.applied.wrenches[link] if member.loads else None
         self.key = f'loads.wrenches.{link}'
         self.topic = (given and given.topic) or f'wrenches/{member.prefix}{link}'
         self.held = held
-        self._load = getattr(line.drive, 'load', None)
+        self._load = getattr(drive, 'load', None)
         self._content = member.content
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
@@ -102,14 +103,16 @@ class WrenchTopic:
         return self._content.error(f'{self.key}.topic', reason, remedy)
 
 
-def wrench_topics(lines: Sequence[LinkagePipeline], of_drives: str) -> tuple[WrenchTopic, ...]:
+def wrench_topics(
+    linkages: Sequence[tuple[SceneLinkage, Any, Mapping[str, HeldWrench]]], of_drives: str
+) -> tuple[WrenchTopic, ...]:
     """
     Return the topics of all wrenches on linkages.
 
     Parameters
     ----------
-    lines
-        The linkages.
+    linkages
+        Each linkage with its drive, and its wrenches by the name of the link.
     of_drives
         Topic of the drives; '' for none.
 
@@ -120,7 +123,9 @@ def wrench_topics(lines: Sequence[LinkagePipeline], of_drives: str) -> tuple[Wre
 
     """
     topics = tuple(
-        WrenchTopic(line, link, held) for line in lines for link, held in line.wrenches.items()
+        WrenchTopic(member, link, drive, held)
+        for member, drive, wrenches in linkages
+        for link, held in wrenches.items()
     )
     taken = {of_drives: 'the drive', 'joint_states': 'the joint states'}
     for number, one in enumerate(topics):
