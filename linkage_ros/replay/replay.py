@@ -217,8 +217,8 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
             pipeline.offer(event.data, event.log_time)
         elif isinstance(event, WrenchEvent):
             # The account of a damaged bag may name more topics than its scene.
-            for topic in pipeline.wrenches[event.number : event.number + 1]:
-                topic.offer(event.data, event.log_time)
+            if event.number < len(pipeline.wrenches):
+                pipeline.wrenches[event.number].offer(event.data, event.log_time)
         elif injection is not None:
             turn(bag, injection, event.data)
 
