@@ -29,6 +29,8 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.wrench import PlanarWrench, read_wrench
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -78,13 +80,21 @@ TIMELINES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize('method', ['rk4', 'gauss_legendre'])
+DRIVES = {
+    'rk4': 'method: rk4',
+    'gauss_legendre': 'method: gauss_legendre',
+    'within its play': 'play: {width: 2, inertia: 0.1}',
+    'with a motor': 'motor: {torque_constant: 0.1}',
+}
+
+
+@pytest.mark.parametrize('drive', DRIVES)
 @pytest.mark.parametrize('name', TIMELINES)
-def test_a_wrench_moves_a_crank_from_the_time_at_which_it_is_taken(name, method):
+def test_a_wrench_moves_a_crank_from_the_time_at_which_it_is_taken(name, drive):
     messages, pieces = TIMELINES[name]
     assert sum(duration for duration, _ in pieces) == 100
     pipeline = pipeline_of(
-        f'drive: {{torque: {{method: {method}, start: 0.2, rate: 1}}}}\n'
+        f'drive: {{torque: {{{DRIVES[drive]}, start: 0.2, rate: 1}}}}\n'
         'loads: {wrenches: {crank: {point: end, frame: link, max_age: 0.03}}}\n',
         PENDULUM,
     )
@@ -325,6 +335,39 @@ def test_two_wrenches_do_not_share_a_topic():
         "loads.wrenches.rocker.topic: 'push' is the topic of loads.wrenches.coupler; write another"
     )
     assert line in str(refused.value)
+
+
+@pytest.fixture
+def together(tmp_path):
+    """Return a function that builds a scene of so many four-bars with the same loads."""
+
+    def build(count):
+        members = ', '.join(
+            f'{{name: bar{n}, linkage: {LINKAGES}/four_bar.yaml}}' for n in range(count)
+        )
+        scene = tmp_path / 'scene.yaml'
+        scene.write_text(
+            f'linkages: [{members}]\ndrive: {{torque: {{}}}}\n'
+            'loads: {wrenches: {crank: {}, coupler: {}, rocker: {}}}\n'
+        )
+        return Pipeline(load_scene(scene))
+
+    return build
+
+
+def test_linkages_with_the_same_loads_have_topics_of_their_own(together):
+    assert [wrench.topic for wrench in together(2).wrenches] == [
+        *('wrenches/bar0_crank', 'wrenches/bar0_coupler', 'wrenches/bar0_rocker'),
+        *('wrenches/bar1_crank', 'wrenches/bar1_coupler', 'wrenches/bar1_rocker'),
+    ]
+
+
+def test_there_are_32_wrenches_at_most(together):
+    with pytest.raises(FileError) as refused:
+        together(11)
+    assert 'loads.wrenches.rocker.topic: is one of 33, more than 32; leave some' in str(
+        refused.value
+    )
 
 
 def test_a_name_that_passes_is_one_of_ros():
