@@ -347,9 +347,8 @@ class DiagnosticsSummary:
                 f'Rejected: {name}': sum(counts.rejected.values()),
                 f'Age of the newest: {name} (s)': f'{age / NANOSECONDS:.3f}',
             }
-            # A copy: the tick may add a reason meanwhile.
             values |= {
-                f'Rejected: {name}: {why.value}': n for why, n in counts.rejected.copy().items()
+                f'Rejected: {name}: {why.value}': n for why, n in counts.rejected.items() if n
             }
         rejected = self.now.wrenches_rejected - self.before.wrenches_rejected
         level, message = OK, 'Wrenches arriving'
@@ -641,7 +640,7 @@ class Warnings:
 
         """
         for name, counts in topics:
-            rejected, before = counts.rejected.copy(), self._wrenches_rejected.get(name, {})
+            rejected, before = dict(counts.rejected), self._wrenches_rejected.get(name, {})
             new = {why: n - before.get(why, 0) for why, n in rejected.items()}
             why = '; '.join(f'{r.value} ({n}): {_WRENCH_REMEDIES[r]}' for r, n in new.items() if n)
             line = f'{name}: {sum(new.values())} wrenches rejected: {why}'

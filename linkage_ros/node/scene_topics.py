@@ -128,8 +128,6 @@ class SceneTopics:
                 callback_group=TakenByTick(),
                 qos_overriding_options=overridable,
             )
-        if pipeline.wrenches:
-            self._connect_wrenches(pipeline, overridable)
         if pipeline.injection is not None:
             self._changes = node.create_publisher(
                 message_type('std_msgs/msg/String', 'faults'), '~/faults', CHANGES_QOS
@@ -138,22 +136,25 @@ class SceneTopics:
                 self._kinds[name] = fault.kind
                 serve = partial(self._on_inject, name)
                 self._injectors.append(node.create_service(SetBool, f'~/inject/{name}', serve))
+        if pipeline.wrenches:
+            self._connect_wrenches(pipeline, overridable)
 
     def _connect_wrenches(self, pipeline: Pipeline, overridable: QoSOverridingOptions) -> None:
-        """Subscribe to the topics of wrenches, which only a remapping can make another's."""
+        """Subscribe to the topics of wrenches, unless the node has other messages there."""
         node = self._node
         kind = message_type('geometry_msgs/msg/WrenchStamped', 'loads.wrenches')
-        taken = {self.crank_topic: 'the drive', node.resolve_topic_name('joint_states'): 'joints'}
-        taken |= {extra.topic_name: extra.topic_name for extra in self.extras}
+        others: list[Any] = [*node.publishers, *node.subscriptions]
+        taken = {each.topic_name for each in others}
+        taken |= {node.resolve_topic_name(name) for name in (SCENE_TOPIC, 'robot_description')}
         for wrench in pipeline.wrenches:
             name = node.resolve_topic_name(wrench.topic)
             if name in taken:
                 raise LinkageError(
                     f'{wrench.key}.topic',
-                    f'{name} is the topic of {taken[name]} too',
-                    'remap it elsewhere',
+                    f'{name} is another topic of the node',
+                    'write or remap another',
                 )
-            taken[name] = wrench.key
+            taken.add(name)
             self.wrenches.append(
                 node.create_subscription(
                     kind,

@@ -163,7 +163,7 @@ class WrenchCounts:
     """Counts of the messages on the topic of a wrench."""
 
     received: int = 0
-    rejected: dict[Rejection, int] = field(default_factory=dict)
+    rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
     """Those that changed nothing, by the reason."""
 
 
@@ -394,7 +394,7 @@ class TickLoop:
                 )
             rejection = wrench.offer(message, now)
             if rejection is not None:
-                counts.rejected[rejection] = counts.rejected.get(rejection, 0) + 1
+                counts.rejected[rejection] += 1
             if not end:
                 end = monotonic_ns() + _LONGEST_DRAIN
             elif monotonic_ns() > end:

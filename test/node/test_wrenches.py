@@ -78,7 +78,7 @@ def test_a_run_replays_to_the_last_byte(recorded, name, jumps):
     done = recorded(name, resets={90}, jumps=jumps)
     (counts,) = done.loop.counts.wrenches
     assert counts.received == 53
-    assert counts.rejected == {Rejection.WRENCH_NOT_FINITE: 10}
+    assert counts.rejected[Rejection.WRENCH_NOT_FINITE] == sum(counts.rejected.values()) == 10
     again = list(replay_all(done.bag, recorded_scene(done.bag), done.bag.messages()))
     assert [each.tick.message for each in again if each.recorded] == done.published
     assert [extra for each in again for extra in each.tick.extras if extra] == done.extras
@@ -149,10 +149,10 @@ def test_over_the_graph_a_wrench_moves_the_crank_and_what_is_no_number_is_counte
     assert all(each.recorded == each.tick.message for each in again)
 
 
-@pytest.mark.parametrize('name', ['crank_commands', 'joint_states'])
+@pytest.mark.parametrize('name', ['crank_commands', 'joint_states', 'diagnostics'])
 def test_a_topic_that_is_remapped_to_another_of_the_node_is_refused(start, write_scene, name):
     scene = write_scene('clash', f'{SCENES["moved"]}{LOADS}', PENDULUM)
     node = start(scene, '-r', f'wrenches/crank:={name}', ready='')
-    node.wait_for_log(f'loads.wrenches.crank.topic: /{name} is the topic of')
+    node.wait_for_log(f'loads.wrenches.crank.topic: /{name} is another topic of the node; write')
     assert node.process.wait(20) == 2
     assert 'Traceback' not in node.log
