@@ -268,6 +268,15 @@ def test_a_motor_is_made_where_it_is_asked_for_alone(tmp_path):
         assert {part for part in ('motor', 'winding') if _DYNAMICS + part in look.modules} == parts
 
 
+def test_wrenches_are_made_where_they_are_asked_for_alone(tmp_path):
+    theirs = {f'linkage_ros.{name}' for name in ('dynamics.wrenches', 'pipeline.wrench_topics')}
+    theirs.add('linkage_ros.messages.wrench')
+    other = 'efforts: {rocker_joint: {constant: 1}}'
+    for loads, there in ((other, set()), (f'{other}, wrenches: {{coupler: {{}}}}', theirs)):
+        look = Look(tmp_path, f'drive: {{torque: {{}}}}\nloads: {{{loads}}}')
+        assert theirs & look.modules == there
+
+
 @pytest.mark.parametrize('fault', FAULT_SCENES)
 def test_a_scene_with_one_fault_has_no_other(tmp_path, fault):
     drive = 'drive: {topic: {}}\n' if fault == 'not_a_number' else BARE

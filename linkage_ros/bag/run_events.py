@@ -38,6 +38,9 @@ USER_EFFECTS = 'effects'
 SEED = 'seed'
 """Key for the seed of all random numbers."""
 
+WRENCH_TOPICS = 'wrench_topics'
+"""Key for the topics with wrenches, if the scene has any."""
+
 _LONGEST_ACCOUNT = 4 * 2**20
 """Greatest size [bytes]; usually a kilobyte, more if the bag was made from another one."""
 
@@ -50,6 +53,27 @@ class SampleEvent(NamedTuple):
     log_time: int
     publish_time: int
     data: bytes
+
+
+class WrenchEvent(NamedTuple):
+    """
+    Message with a wrench that a tick took.
+
+    Attributes
+    ----------
+    log_time, publish_time
+        The tick's time and the source's, in [ns].
+    data
+        The message.
+    number
+        Index of its topic among those of the run.
+
+    """
+
+    log_time: int
+    publish_time: int
+    data: bytes
+    number: int
 
 
 class FaultEvent(NamedTuple):
@@ -87,7 +111,7 @@ class TickEvent(NamedTuple):
     messages: tuple[bytes, ...]
 
 
-Event = SampleEvent | FaultEvent | Reset | TickEvent
+Event = SampleEvent | WrenchEvent | FaultEvent | Reset | TickEvent
 
 
 class RunAccount(NamedTuple):
@@ -100,6 +124,8 @@ class RunAccount(NamedTuple):
         Name of the scene, and the folder for its relative paths.
     crank_topic, joint_states_topic, faults_topic, withheld_topic, resets_topic, extras
         Names of the topics.
+    wrenches
+        Names of the topics with wrenches, in the order of the scene.
     begun
         When the bag was begun, as in `MID_RUN`; '' if it does not say.
     versions
@@ -121,6 +147,7 @@ class RunAccount(NamedTuple):
     withheld_topic: str = ''
     resets_topic: str = ''
     extras: tuple[str, ...] = ()
+    wrenches: tuple[str, ...] = ()
     begun: str = ''
     versions: Mapping[str, str] = {}
     solvers: Mapping[str, Any] = {}
@@ -155,7 +182,7 @@ def run_account(bag: StoredRun) -> RunAccount:
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'
         )
     account = raw_account(bag)
-    extras = account.get('extra_topics', [])
+    extras, wrenches = account.get('extra_topics', []), account.get(WRENCH_TOPICS, [])
     texts = {
         key: value
         for key, value in account.items()
@@ -168,7 +195,7 @@ def run_account(bag: StoredRun) -> RunAccount:
     if not isinstance(modules, dict):
         modules = {}
     topics = [value for key, value in texts.items() if key.endswith('_topic')]
-    named = _are_names(topics) and _are_names(extras)
+    named = _are_names(topics) and _are_names(extras) and _are_names(wrenches)
     seed = account.get(SEED, 0)
     if missing or wrong or not named or not isinstance(solvers, dict) or type(seed) is not int:
         raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag')
@@ -178,6 +205,7 @@ def run_account(bag: StoredRun) -> RunAccount:
     return RunAccount(
         **{key: texts[key] for key in _TEXTS if key in texts},
         extras=tuple(extras),
+        wrenches=tuple(wrenches),
         begun=texts.get(BEGUN, ''),
         versions={key: texts[key] for key in VERSIONS if key in texts},
         solvers=solvers,
@@ -241,6 +269,8 @@ def recorded_events(
     topics = (run.joint_states_topic, *run.extras) if run.joint_states_topic else ()
     outputs = {topic: number for number, topic in enumerate(topics)}
     others = {run.faults_topic, run.withheld_topic, run.resets_topic} - {''}
+    wrenches = {topic: number for number, topic in enumerate(run.wrenches)}
+    others |= set(wrenches)
     open_tick: tuple[int, int, list[bytes]] | None = None  # may get further messages
     withheld: tuple[int, int] | None = None
     for topic, log_time, publish_time, data in messages:
@@ -266,6 +296,8 @@ def recorded_events(
         if output is not None:
             open_tick = log_time, publish_time, [b''] * len(outputs)
             open_tick[2][output] = data
+        elif topic in wrenches:
+            yield WrenchEvent(log_time, publish_time, data, wrenches[topic])
         elif topic == run.faults_topic:
             yield FaultEvent(log_time, publish_time, data)
         elif topic == run.resets_topic:

@@ -92,6 +92,7 @@ EVERY_LOAD = {
     'stops': '{rocker_joint: {stiffness: 50}}',
     'efforts': '{rocker_joint: {over_position: [[1, 0], [1.5, 0.01], [2, 0]]}}',
     'forces': '{coupler.P: {direction: [0, -1], constant: 0.1}}',
+    'wrenches': '{coupler: {point: P}}',
 }
 """Every load on joints and points, on the shipped four-bar; its rocker gets limits."""
 

@@ -162,6 +162,8 @@ def _faults(scene: Scene) -> Iterator[tuple[str, ...]]:
 def _topics(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
     if pipeline.topic:
         yield 'listens to', pipeline.topic, JOINT_STATE, ''
+    for wrench in pipeline.wrenches:
+        yield 'listens to', wrench.topic, 'geometry_msgs/msg/WrenchStamped', wrench.key
     yield 'publishes', 'joint_states', JOINT_STATE, f'{len(scene.joints)} joints'
     for extra in pipeline.extras:
         yield 'publishes', extra.topic, extra.message, ''

@@ -17,9 +17,9 @@
 Hardware in the loop: a controller commands the effort of the input, which moves the linkage.
 
 Time is divided into equal steps from the first tick on. A step is divided again where a command
-arrives or expires, since the force changes there. So the motion depends only on the commands and
-their times, not on when the state is read: the state between two steps comes from a shorter step
-of the same method, which is then discarded.
+or a wrench arrives or expires, since the force changes there. So the motion depends only on the
+messages and their times, not on when the state is read: the state between two steps comes from a
+shorter step of the same method, which is then discarded.
 
 With a motor (`linkage_ros.dynamics.motor`) a command is an effort, a current or a voltage, and the
 effort follows from it and the rate. A command that is delayed waits until its time.
@@ -47,6 +47,8 @@ from linkage_ros.messages.layout import NANOSECONDS
 if TYPE_CHECKING:
     from linkage_ros.dynamics.motor import Motor
     from linkage_ros.dynamics.winding import Winding
+    from linkage_ros.dynamics.wrenches import HeldWrench
+    from linkage_ros.messages.wrench import PlanarWrench
 
 TOPIC = 'crank_commands'
 EXTRA_TOPIC, EXTRA_MESSAGE = '~/motor', JOINT_STATE
@@ -273,7 +275,8 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     # A scene with slow ticks must not skip time between them.
     period = round(NANOSECONDS / context.rate) if context.rate else 0
     made_up = max(_MADE_UP, 2 * period)
-    return TorqueDrive(motion, start, parameters, made_up, min(most, LARGEST), motor)
+    wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
+    return TorqueDrive(motion, start, parameters, made_up, min(most, LARGEST), motor, wrenches)
 
 
 def writer(parameters: TorqueParameters, context: Context, drive: TorqueDrive) -> Any:
@@ -372,6 +375,8 @@ class TorqueDrive(Drive):
         commands are clipped to it.
     motor
         The motor that is mounted on the mechanism; None if there is none.
+    wrenches
+        The wrenches on the links, which messages change.
 
     """
 
@@ -382,6 +387,7 @@ class TorqueDrive(Drive):
         '_delay',
         '_due',
         '_idle',
+        '_loaded_until',
         '_made_up',
         '_mechanism',
         '_most',
@@ -393,6 +399,7 @@ class TorqueDrive(Drive):
         '_time',
         '_until',
         '_waiting',
+        '_wrenches',
         'lost',
         'max_age',
         'saturated',
@@ -416,6 +423,7 @@ class TorqueDrive(Drive):
         made_up: int,
         most: float = LARGEST,
         motor: Motor | Winding | None = None,
+        wrenches: tuple[HeldWrench, ...] = (),
     ) -> None:
         self._mechanism = mechanism
         self._motion = self._shown = start
@@ -423,7 +431,8 @@ class TorqueDrive(Drive):
         self._made_up = made_up
         self._idle = self._acting = (mechanism, 0.0, use.brake)
         self._time = self._boundary = self._begun = -1
-        self._until = self._due = _NEVER
+        self._until = self._due = self._loaded_until = _NEVER
+        self._wrenches = wrenches
         self._motor = motor
         self._delay = round(use.motor.delay * NANOSECONDS) if use.motor else 0
         self._quantum = use.motor.quantum if use.motor else 0.0
@@ -470,6 +479,15 @@ class TorqueDrive(Drive):
         self._until = now + self.max_age
         return None
 
+    def load(self, held: HeldWrench, wrench: PlanarWrench, now: int) -> None:
+        """Let a wrench act on its link from a time on, in [ns]."""
+        if self._time >= 0:
+            self._advance(now)
+            if wrench != held.wrench and now > self._time:
+                self._go_to(now)
+        held.take(wrench, now)
+        self._loaded_until = min(each.until for each in self._wrenches)
+
     def state(self, now: int) -> CrankState:
         """Return the crank state at a time, in [ns]; for an earlier time, the last state."""
         if self._time < 0:
@@ -503,8 +521,12 @@ class TorqueDrive(Drive):
             self._time += left_out
             self._boundary += left_out
             self.lost += left_out
-        while (end := min(self._boundary, self._until, self._due)) <= now:
+        while (end := min(self._boundary, self._until, self._due, self._loaded_until)) <= now:
             self._go_to(end)
+            if end == self._loaded_until:
+                for held in self._wrenches:
+                    held.expire(end)
+                self._loaded_until = min(held.until for held in self._wrenches)
             if end == self._until:
                 self._acting, self._until = self._idle, _NEVER
             if end == self._boundary:

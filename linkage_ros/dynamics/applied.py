@@ -13,11 +13,13 @@
 # limitations under the License.
 
 """
-Loads that are applied to joints and points, and their work over the motion of a linkage.
+Loads that are applied to joints, points and links, and their work over the motion of a linkage.
 
 A joint effort acts on the joint's child, and the opposite on its parent; a force on a slide acts
 along its line. By virtual work, a load f adds f·λ to the force on an input, with the lever λ: the
 rate of its joint, or the velocity of its point along its direction, at a rate of the input of 1.
+A wrench is three such loads: two components of a force on a point, and a torque, whose lever is
+the rate of its link.
 """
 
 from __future__ import annotations
@@ -25,16 +27,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from math import hypot, sqrt, tau
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics import longest_step
 from linkage_ros.dynamics.laws import Contact, Law, LawTerm, Table
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, JointSpring, PointLoad, SoftStop
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
 from linkage_ros.kinematics.arithmetic import called, facing, remainder
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
 from linkage_ros.kinematics.results import Position, Velocity
+
+if TYPE_CHECKING:
+    from linkage_ros.dynamics.wrenches import Component, HeldWrench
 
 _SAMPLES = 90
 """Intervals of the range over which the stiffest place is looked for."""
@@ -159,11 +164,13 @@ class AppliedForces:
         The laws of the loads that are not constant, in the order of `LawTerm` in `one_input`.
     points
         The loaded points: link, and place in its frame, in [m].
+    wrenches
+        The wrenches on links, each with its newest message, by the name of the link.
 
     Raises
     ------
     DefinitionError
-        A table, a stop or a direction is wrong; with the key ``loads.KIND.NAME``.
+        A table, a stop, a direction or a point is wrong; with the key ``loads.KIND.NAME``.
 
     """
 
@@ -173,6 +180,9 @@ class AppliedForces:
         _check(closure, applied)
         places = [name.rpartition('.') for name in applied.forces]
         self.points = [(link, complex(*linkage.links[link][name])) for link, _, name in places]
+        for link, wrench in applied.wrenches.items():
+            point = linkage.links[link][wrench.point] if wrench.point else (0.0, 0.0)
+            self.points.append((link, complex(*point)))
         self._tracker = closure.point_tracker(self.points)
         self._springs = tuple(
             (joint_coordinate(closure, name), spring)
@@ -200,7 +210,8 @@ class AppliedForces:
             joint = joint_coordinate(closure, name)
             loaded.append((joint, joint, effort))
         first = joint_coordinate(closure, linkage.inputs[0].joint)
-        pairs = zip(places, applied.forces.values(), self._tracker.indices, strict=True)
+        # Behind them follow the points of the wrenches.
+        pairs = zip(places, applied.forces.values(), self._tracker.indices, strict=False)
         for count, ((link, _, _), force, index) in enumerate(pairs):
             angle = closure.angles[link]
             unit = complex(*force.direction) / hypot(*force.direction)
@@ -217,7 +228,29 @@ class AppliedForces:
                 if table:
                     middle = of.middle(table[0][0], table[-1][0]) if over == 'position' else None
                     add(part, of, Table(over, table, middle))
-        self.laws = tuple(laws)
+        self.wrenches: dict[str, HeldWrench] = {}
+        self._components: list[tuple[JointCoordinate | LoadedPoint, Component]] = []
+        if applied.wrenches:
+            self._hold_wrenches(applied, len(places))
+        self.laws = (*laws, *(component for _, component in self._components))
+
+    def _hold_wrenches(self, applied: AppliedLoads, count: int) -> None:
+        """Let a wrench act on each link that has one; ``count`` points precede theirs."""
+        from linkage_ros.dynamics.wrenches import Component, HeldWrench  # local import: few scenes
+
+        for number, (link, given) in enumerate(applied.wrenches.items(), count):
+            self.wrenches[link] = held = HeldWrench(given.max_age)
+            angle, place = self._closure.angles[link], self._tracker.indices[number]
+            axes, coordinate = (1 + 0j, 1j), 0
+            if given.frame == 'link':
+                axes, coordinate = (angle.unit, 1j * angle.unit), angle.coordinate
+            along: list[JointCoordinate | LoadedPoint]
+            along = [LoadedPoint(link, number, place, axis, coordinate) for axis in axes]
+            # The turning of a link is that of a joint between it and the ground.
+            names = ('', link, GROUND)
+            along.append(JointCoordinate(0, False, True, *names, angle.coordinate, 0, 1.0))
+            for component, at in enumerate(along):
+                self._components.append((at, Component(held, component)))
 
     def check_step(
         self,
@@ -324,6 +357,8 @@ class AppliedForces:
         for at, of, _ in self._lawful:
             lever, factor = (of.lever(velocity, position, moved) for of in (at, of))
             terms += (LawTerm(lever, of.value(position), factor),)
+        for at, _ in self._components:
+            terms += (LawTerm(at.lever(velocity, position, moved), 0.0, 0.0),)
         return slope, viscous, terms
 
     def potential(self, position: Position) -> float:
@@ -355,6 +390,8 @@ class AppliedForces:
         for at, of, force in self._lawful:
             rate = of.lever(velocity, position, ())
             yield at, called(force, of.value(position), rate, time)[0]
+        for at, component in self._components:
+            yield at, component.force(0, 0.0, 0.0, time)
 
     def work(
         self,
@@ -426,6 +463,14 @@ def _check(closure: Closure, applied: AppliedLoads) -> None:
                 key,
                 f'there is a table over the input, and there are {len(linkage.inputs)}',
                 'write over_time',
+            )
+    for link, wrench in applied.wrenches.items():
+        points = linkage.links[link]
+        if wrench.point and wrench.point not in points:
+            raise DefinitionError(
+                f'loads.wrenches.{link}.point',
+                f'{quoted(wrench.point)} is not a point of {quoted(link)}',
+                did_you_mean(wrench.point, points, f'name one of {listed(sorted(points))}'),
             )
     for key, load in loads:
         tables = {

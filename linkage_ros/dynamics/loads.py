@@ -24,7 +24,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from linkage_ros.errors import DefinitionError, listed, quoted
-from linkage_ros.files.parameters import choice, each, number, point, rows
+from linkage_ros.files.parameters import choice, each, number, point, rows, text
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 
 
@@ -152,8 +152,30 @@ class PointLoad:
 
 
 @dataclass(frozen=True, slots=True)
+class WrenchLoad:
+    """A force and a torque on a link, from the messages of a topic."""
+
+    topic: str = text(
+        'topic of geometry_msgs/WrenchStamped; absent, wrenches/LINK, of one of several linkages '
+        'wrenches/NAME_LINK',
+        '',
+    )
+    point: str = text(
+        "point of the link at which the force acts; absent, the origin of the link's frame", ''
+    )
+    frame: str = choice('frame of the force', ('ground', 'link'), 'ground')
+    max_age: float = number(
+        'validity of a message, unless another one comes; then the load is 0',
+        0.1,
+        unit='s',
+        least=1e-6,
+        most=3600.0,
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class AppliedLoads:
-    """Loads on joints and points."""
+    """Loads on joints, points and links."""
 
     joint_springs: Mapping[str, JointSpring] = each('springs at joints', 'any_joint', JointSpring)
     stops: Mapping[str, SoftStop] = each(
@@ -163,10 +185,14 @@ class AppliedLoads:
     )
     efforts: Mapping[str, JointLoad] = each('efforts on joints', 'any_joint', JointLoad)
     forces: Mapping[str, PointLoad] = each('forces on points', 'point', PointLoad)
+    wrenches: Mapping[str, WrenchLoad] = each(
+        'forces and torques on links, as messages give them', 'link', WrenchLoad
+    )
 
     def __bool__(self) -> bool:
         """Return whether there are any."""
-        return bool(self.joint_springs or self.stops or self.efforts or self.forces)
+        constant = self.joint_springs or self.stops or self.efforts or self.forces
+        return bool(constant or self.wrenches)
 
     @property
     def timed(self) -> bool:
@@ -189,7 +215,7 @@ class Loads:
     drive_inertia
         Inertia of each input's motor, seen at the input: in [kg·m²], or in [kg] for a slide.
     applied
-        Springs, stops and efforts of joints, and forces on points.
+        Springs, stops and efforts of joints, forces on points, and wrenches on links.
 
     """
 

@@ -351,6 +351,12 @@ def _refuse(scene: Scene) -> None:
                 f'listens to {topic}, for which an FMU has no inputs',
                 f'name one of {listed(_INPUT_FIELDS)}, or a drive that moves by itself',
             )
+        if member.loads is not None and member.loads.applied.wrenches:
+            raise member.content.error(
+                'loads.wrenches',
+                'come on topics, for which an FMU has no inputs',
+                'leave them out',
+            )
         if member.accuracy is not None:
             raise member.content.error(
                 'accuracy',

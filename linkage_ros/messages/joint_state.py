@@ -51,7 +51,7 @@ JOINT_STATE = declared(
 
 
 class Rejection(Enum):
-    """Reason for the rejection of a crank message."""
+    """Reason for the rejection of a message."""
 
     MALFORMED = 'malformed message'
     EMPTY = 'no joints or no positions'
@@ -68,6 +68,8 @@ class Rejection(Enum):
     STAMP_INVALID = 'stamp negative or with 1e9 ns or more'
     STAMP_FUTURE = 'stamp in the future'
     STAMP_OLD = 'stamp older than the last'
+    WRENCH_NOT_FINITE = 'force or torque not finite'
+    WRENCH_TOO_LARGE = 'force or torque beyond 1e9'
 
 
 class CrankSample(NamedTuple):

@@ -39,7 +39,7 @@ from linkage_ros.messages.joint_state import head_of, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.run_recording import RunSnapshots
 from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageTick
-from linkage_ros.pipeline.tick_loop import Counts, TickLoop
+from linkage_ros.pipeline.tick_loop import Counts, TickLoop, WrenchCounts
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 if TYPE_CHECKING:
@@ -77,6 +77,7 @@ class Snapshot:
     limited: int = 0
     unclosed: int = 0
     indeterminate: int = 0
+    wrenches_rejected: int = 0
 
     @classmethod
     def of(cls, counts: Counts, time: int) -> Snapshot:
@@ -90,6 +91,7 @@ class Snapshot:
             counts.unclosed[Status.LIMITED],
             counts.unclosed[Status.OPEN] + counts.unclosed[Status.INDETERMINATE],
             counts.unclosed[Status.INDETERMINATE],
+            sum(sum(each.rejected.values()) for each in counts.wrenches),
         )
 
 
@@ -155,6 +157,8 @@ class DiagnosticsSummary:
         statuses = [self._tick(), self._crank(), self._closure(), self._recording()]
         if self.loop.injection is not None:
             statuses.append(self._faults(self.loop.injection))
+        if self.loop.counts.wrenches:
+            statuses.append(self._wrenches())
         return statuses
 
     def _tick(self) -> DiagnosticStatus:
@@ -328,6 +332,32 @@ class DiagnosticsSummary:
             values[f'Times injected: {name}'] = injection.injected[name]
         return self._status('faults', WARN if on else OK, message, values)
 
+    def _wrenches(self) -> DiagnosticStatus:
+        values: dict[str, object] = {}
+        silent = []
+        for topic, counts in zip(
+            self.loop.pipeline.wrenches, self.loop.counts.wrenches, strict=True
+        ):
+            held, name = topic.held, topic.topic
+            age = self.clock - held.stamp if held.stamp else inf
+            if age > held.max_age:
+                silent.append(name)
+            values |= {
+                f'Received: {name}': counts.received,
+                f'Rejected: {name}': sum(counts.rejected.values()),
+                f'Age of the newest: {name} (s)': f'{age / NANOSECONDS:.3f}',
+            }
+            values |= {
+                f'Rejected: {name}: {why.value}': n for why, n in counts.rejected.items() if n
+            }
+        rejected = self.now.wrenches_rejected - self.before.wrenches_rejected
+        level, message = OK, 'Wrenches arriving'
+        if rejected:
+            level, message = WARN, f'{rejected} wrenches rejected'
+        elif silent:
+            level, message = STALE, f'No load, for want of messages: {", ".join(silent)}'
+        return self._status('wrenches', level, message, values)
+
     def _recording(self) -> DiagnosticStatus:
         if self.snapshots is not None:
             return self._memory(self.snapshots)
@@ -468,6 +498,12 @@ _REMEDIES = {
     Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
 }
 
+_WRENCH_REMEDIES = {
+    Rejection.MALFORMED: 'the publisher must send geometry_msgs/WrenchStamped as plain CDR',
+    Rejection.WRENCH_NOT_FINITE: 'look at the sensor',
+    Rejection.WRENCH_TOO_LARGE: 'the units are N and N·m',
+}
+
 
 _PATIENCE = 2.0
 """Time without a warning about a missing crank, in [s]."""
@@ -488,6 +524,7 @@ class Warnings:
         self._logger = logger
         self._last: dict[str, float] = {}
         self._rejected = dict.fromkeys(Rejection, 0)
+        self._wrenches_rejected: dict[str, dict[Rejection, int]] = {}
         self._unclosed = dict.fromkeys(Status, 0)
         self._lost = self._stalls = self._ticks = 0
         self._heard = (0, 0, monotonic())
@@ -589,6 +626,26 @@ class Warnings:
                 )
                 if self.warn(status.value, line, period):
                     self._unclosed[status] = counts.unclosed[status]
+
+    def check_wrenches(self, topics: Sequence[tuple[str, WrenchCounts]], period: float) -> None:
+        """
+        Warn of rejected wrenches since the last such warning.
+
+        Parameters
+        ----------
+        topics
+            The name of each topic with a wrench, and its counts.
+        period
+            Least time between two warnings about a topic, in [s].
+
+        """
+        for name, counts in topics:
+            rejected, before = dict(counts.rejected), self._wrenches_rejected.get(name, {})
+            new = {why: n - before.get(why, 0) for why, n in rejected.items()}
+            why = '; '.join(f'{r.value} ({n}): {_WRENCH_REMEDIES[r]}' for r, n in new.items() if n)
+            line = f'{name}: {sum(new.values())} wrenches rejected: {why}'
+            if why and self.warn(f'wrenches {name}', line, period):
+                self._wrenches_rejected[name] = rejected
 
     def _lost_ticks(self, counts: Counts) -> str:
         """Return the line for ticks that were lost: by what, and whether the rate is too high."""

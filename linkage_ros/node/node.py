@@ -224,8 +224,10 @@ class LinkageNode(LifecycleNode):
         assert self.scene is not None
         self.loop = self._build_loop(self.scene)
         self._warnings = Warnings(self.get_logger())  # starts with the counts that it compares
-        while (take := self._scene_topics.take) is not None and take() is not None:
-            pass  # discard messages from before this run
+        take_crank = self._scene_topics.take
+        for take in (*([take_crank] if take_crank else []), *self._scene_topics.take_wrenches):
+            while take() is not None:
+                pass  # discard messages from before this run
         self._activated = time.monotonic_ns()
         self._before = Snapshot.of(self.loop.counts, self._activated)
         if self.scene.record is not None:
@@ -238,6 +240,8 @@ class LinkageNode(LifecycleNode):
         cranks = ', '.join(joint for member in self.scene.members for joint in member.inputs)
         drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
         source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
+        wrenches = [each.topic_name for each in self._scene_topics.wrenches]
+        source += f'; wrenches from {" and ".join(wrenches)}' if wrenches else ''
         to = [each.topic_name for each in (self._joint_states, *self._scene_topics.extras)]
         self.get_logger().info(
             f'{self.scene.name}: ticking {rate}; crank {cranks} {source}; '
@@ -286,6 +290,7 @@ class LinkageNode(LifecycleNode):
             self._scene_topics.publish_change,
             # An unbounded queue: only the time of a tick limits how many messages it takes.
             depth=(crank.qos_profile.depth if crank is not None else 0) or maxsize,
+            take_wrenches=self._scene_topics.take_wrenches,
         )
 
     def _pace(self, rate: float) -> Pace:
@@ -414,6 +419,8 @@ class LinkageNode(LifecycleNode):
             return
         period = self.get_parameter('warning_period').value
         self._warnings.check(loop.counts, loop.pipeline.closures, self.crank_topic, period)
+        wrenches = [each.topic_name for each in self._scene_topics.wrenches]
+        self._warnings.check_wrenches([*zip(wrenches, loop.counts.wrenches, strict=True)], period)
         silence = self._clock_silence()
         if min(silence, (time.monotonic_ns() - self._activated) / NANOSECONDS) > CLOCK_PATIENCE:
             remedy = 'start the simulation, or set use_sim_time: false'

@@ -27,10 +27,7 @@ from typing import Any, cast
 
 from linkage_ros.bag.bag_file import compression_type
 from linkage_ros.bag.recorder import Recorder, RecordingSummary, TopicCounts
-from linkage_ros.bag.run_events import (
-    MID_RUN,
-    WITH_THE_RUN,
-)
+from linkage_ros.bag.run_events import MID_RUN, WITH_THE_RUN, WRENCH_TOPICS
 from linkage_ros.bag.snapshot import KeptCounts, SnapshotMemory, SnapshotWriting
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
@@ -238,8 +235,11 @@ class RunRecording:
 def _attachments(
     scene: Scene, topics: Sequence[tuple[str, Topic]], begun: str, lines: Sequence[LinkagePipeline]
 ) -> dict[str, tuple[str, bytes]]:
-    named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
+    several = {EXTRA, WRENCH_TOPICS}
+    named: dict[str, Any] = {key: topic.name for key, topic in topics if key not in several}
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
+    if wrenches := [topic.name for key, topic in topics if key == WRENCH_TOPICS]:
+        named[WRENCH_TOPICS] = wrenches
     return attachments(scene_files(scene, named, begun, lines))
 
 

@@ -21,7 +21,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, TYPE_CHECKING
 
+from linkage_ros.bag.run_events import WRENCH_TOPICS
 from linkage_ros.bag.topic import Topic
+from linkage_ros.errors import LinkageError
 from linkage_ros.messages.single_values import text_message
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.run_recording import DESCRIPTION
@@ -92,6 +94,8 @@ class SceneTopics:
         self._crank_name = ''
         self.crank: Subscription | None = None
         """Subscription to the drives' topic; None without one."""
+        self.wrenches: list[Subscription] = []
+        """Subscriptions to the topics of wrenches on links."""
 
     def connect(self, pipeline: Pipeline) -> None:
         """
@@ -100,7 +104,7 @@ class SceneTopics:
         Raises
         ------
         LinkageError
-            The package of a message is not installed.
+            The package of a message is not installed, or the topic of a wrench is another's too.
 
         """
         self.disconnect()
@@ -132,6 +136,35 @@ class SceneTopics:
                 self._kinds[name] = fault.kind
                 serve = partial(self._on_inject, name)
                 self._injectors.append(node.create_service(SetBool, f'~/inject/{name}', serve))
+        if pipeline.wrenches:
+            self._connect_wrenches(pipeline, overridable)
+
+    def _connect_wrenches(self, pipeline: Pipeline, overridable: QoSOverridingOptions) -> None:
+        """Subscribe to the topics of wrenches, unless the node has other messages there."""
+        node = self._node
+        kind = message_type('geometry_msgs/msg/WrenchStamped', 'loads.wrenches')
+        others: list[Any] = [*node.publishers, *node.subscriptions]
+        taken = {each.topic_name for each in others}
+        taken |= {node.resolve_topic_name(name) for name in (SCENE_TOPIC, 'robot_description')}
+        for wrench in pipeline.wrenches:
+            name = node.resolve_topic_name(wrench.topic)
+            if name in taken:
+                raise LinkageError(
+                    f'{wrench.key}.topic',
+                    f'{name} is another topic of the node',
+                    'write or remap another',
+                )
+            taken.add(name)
+            self.wrenches.append(
+                node.create_subscription(
+                    kind,
+                    wrench.topic,
+                    never_called,
+                    CRANK_QOS,
+                    callback_group=TakenByTick(),
+                    qos_overriding_options=overridable,
+                )
+            )
 
     def describe(self, scene: Scene, pipeline: Pipeline) -> None:
         """
@@ -185,8 +218,10 @@ class SceneTopics:
                 self._node.destroy_publisher(publisher)
         for service in self._injectors:
             self._node.destroy_service(service)
-        if self.crank is not None:
-            self._node.destroy_subscription(self.crank)
+        for subscription in (*self.wrenches, self.crank):
+            if subscription is not None:
+                self._node.destroy_subscription(subscription)
+        self.wrenches = []
         self.extras, self._injectors, self._kinds = [], [], {}
         self._changes = self._description = self._announced = self.crank = None
         self.description = b''
@@ -211,6 +246,11 @@ class SceneTopics:
             return None
         return partial(self.crank.handle.take_message, JointState, True)
 
+    @property
+    def take_wrenches(self) -> list[Take]:
+        """Return functions that take the next message of each topic with a wrench."""
+        return [partial(one.handle.take_message, one.msg_type, True) for one in self.wrenches]
+
     def publish_change(self, change: Change) -> bytes:
         """Publish the begin or end of a fault; return the serialized message."""
         assert self._changes is not None
@@ -225,6 +265,9 @@ class SceneTopics:
             publishers = self.crank_publishers
             qos = publishers[0].qos_profile if publishers else CRANK_QOS
             topics[handles.crank] = 'crank_topic', bag_topic(self.crank_topic, JointState, qos)
+        for handle, wrench in zip(handles.wrenches, self.wrenches, strict=True):
+            described = bag_topic(wrench.topic_name, wrench.msg_type, CRANK_QOS)
+            topics[handle] = WRENCH_TOPICS, described
         if handles.faults is not None and (changes := self._changes) is not None:
             described = bag_topic(changes.topic_name, changes.msg_type, CHANGES_QOS)
             topics[handles.faults] = 'faults_topic', described

@@ -60,8 +60,10 @@ from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.solvers.registry import SOLVERS
 
 if TYPE_CHECKING:
+    from linkage_ros.dynamics.wrenches import HeldWrench
     from linkage_ros.faults.injection import Injection
     from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
+    from linkage_ros.pipeline.wrench_topics import WrenchTopic
     from linkage_ros.solvers.solver import Choice
 
 _WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
@@ -255,6 +257,12 @@ class LinkagePipeline:
         # Closure and mechanism.
         self._timed = forced and member.loads is not None and member.loads.applied.timed
         self._first = -1
+        self.wrenches: dict[str, HeldWrench] = {}
+        """The wrenches that messages give, by the name of the link."""
+        if forced and member.loads is not None and member.loads.applied.wrenches:
+            applied = context.mechanics.applied
+            assert applied is not None
+            self.wrenches = applied.wrenches
         self._close = self.closure.position
         if member.silent_beyond_limits and self.closure.bounds:
             self._close = _silent_beyond(self._close, self.closure)
@@ -310,6 +318,8 @@ class LinkagePipeline:
         self._straight: Straight | None = None
         moved = {effect.name for effect in effects if effect.stage is not None}
         numbers_only = not self._faults and not self._timed
+        if self.wrenches and not moved.isdisjoint(FORCE_EFFECTS):
+            numbers_only = False  # A compiled tick computes from the crank alone.
         if self.closure.by_steps and moved <= {*_KINEMATIC, *FORCE_EFFECTS} and numbers_only:
             wanted = None
             if 'acceleration' in moved:
@@ -357,6 +367,8 @@ class LinkagePipeline:
         if self._timed and self._first < 0:
             # A bag does not know of ticks before the first pose.
             self._first = now
+        for held in self.wrenches.values():
+            held.expire(now)
         motion = self._moved(crank, position, (now - self._first) * 1e-9 if self._timed else 0.0)
         return LinkageTick(crank, position, motion, self._read(now, self._observed(now, motion)))
 
@@ -621,6 +633,13 @@ class Pipeline:
         _refuse_stamps(scene)
         self.topic = topics[0] if topics else ''
         """The topic of the drives; '' for none."""
+        self.wrenches: tuple[WrenchTopic, ...] = ()
+        """The topics of wrenches on links."""
+        if any(line.wrenches for line in self.lines):
+            from linkage_ros.pipeline.wrench_topics import wrench_topics
+
+            linkages = [(line.member, line.drive, line.wrenches) for line in self.lines]
+            self.wrenches = wrench_topics(linkages, self.topic)
         # Among the drives, only the topic drive keeps no state from earlier ticks.
         self._goes_on = any(
             line.member.drive[0] != 'topic' or not _GOING_ON.isdisjoint(line.stages)

@@ -95,6 +95,8 @@ class RecordedTopics(NamedTuple):
         Published by every run.
     crank
         The topic of the drives.
+    wrenches
+        The topics of the wrenches on links.
     faults
         Begin and end of faults.
     withheld
@@ -111,6 +113,7 @@ class RecordedTopics(NamedTuple):
     joint_states: int
     diagnostics: int
     crank: int | None
+    wrenches: tuple[int, ...]
     faults: int | None
     withheld: int | None
     extras: tuple[int, ...]
@@ -125,6 +128,7 @@ def recorded_topics(pipeline: Pipeline) -> RecordedTopics:
         joint_states=next(handles),
         diagnostics=next(handles),
         crank=next(handles) if pipeline.topic else None,
+        wrenches=tuple(next(handles) for _ in pipeline.wrenches),
         faults=next(handles) if pipeline.injection is not None else None,
         withheld=next(handles) if pipeline.withholds else None,
         extras=tuple(next(handles) for _ in pipeline.extras),
@@ -152,6 +156,15 @@ class Stall(NamedTuple):
 
     duration: int
     in_tick: bool
+
+
+@dataclass(slots=True)
+class WrenchCounts:
+    """Counts of the messages on the topic of a wrench."""
+
+    received: int = 0
+    rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
+    """Those that changed nothing, by the reason."""
 
 
 @dataclass(slots=True)
@@ -186,6 +199,8 @@ class Counts:
     unclosed: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
     last_unclosed: dict[Status, tuple[int, Position]] = field(default_factory=dict)
     """Index and position of the linkage that had each status last."""
+    wrenches: tuple[WrenchCounts, ...] = ()
+    """Of each topic with a wrench."""
 
 
 _Taken = tuple[bytes, dict[str, Any]]
@@ -219,6 +234,8 @@ class TickLoop:
         Publishes the begin or end of a fault, and returns the serialized message.
     depth
         Most messages that one tick takes: the depth of the queue in front of it.
+    take_wrenches
+        Take the next message of each topic with a wrench, as ``take`` does.
 
     """
 
@@ -231,12 +248,14 @@ class TickLoop:
         publish_extras: Sequence[Callable[[bytes], None]] = (),
         publish_change: Callable[[Change], bytes] | None = None,
         depth: int = 100,
+        take_wrenches: Sequence[Take] = (),
     ) -> None:
         self._build = build
         self._take = take or _take_nothing
         self._publish = publish
         self._own = own
         self._depth = depth
+        self._take_wrenches = take_wrenches
         self._sequence = 0
         self._last_time = 0
         self._pipeline = build()
@@ -247,7 +266,7 @@ class TickLoop:
         self._publish_extras = tuple(zip(self.topics.extras, publish_extras, strict=True))
         self._stopping = Event()
         self._thread: Thread | None = None
-        self.counts = Counts()
+        self.counts = Counts(wrenches=tuple(WrenchCounts() for _ in take_wrenches))
         self.recorder: Recorder | None = None
         self.reset_requested = False
         self.several_publishers = False
@@ -313,20 +332,18 @@ class TickLoop:
         """
         Take the waiting messages: record, count and offer each to the pipeline.
 
-        A clock moves `_last_time` on to the time when a message is taken.
+        A clock moves `_last_time` on to the time when a message is taken. Wrenches come first: a
+        tick for a sample has them.
         """
+        for which, take in enumerate(self._take_wrenches):
+            self._take_wrench(which, take, clock)
         counts, pipeline = self.counts, self._pipeline
         good, end = 0, 0
         for _ in range(self._depth):
             if (taken := self._take()) is None:
                 break
             if clock is not None:
-                time = clock()
-                # A message may be newer than the tick that takes it.
-                if self.injection is not None:
-                    time = self.injection.clock(time)
-                if time > self._last_time:
-                    self._last_time = time
+                self._move_on(clock())
             now = self._last_time
             message, info = taken
             if self._own is None or not self._own(message):
@@ -358,6 +375,37 @@ class TickLoop:
             used = good if tick_for_each else pipeline.newly_used()
             counts.used += used
             counts.superseded += good - used
+
+    def _take_wrench(self, number: int, take: Take, clock: Callable[[], int] | None) -> None:
+        """Take the waiting messages of a topic with a wrench: record, offer and count them."""
+        counts, wrench = self.counts.wrenches[number], self._pipeline.wrenches[number]
+        end = 0
+        for _ in range(self._depth):
+            if (taken := take()) is None:
+                break
+            if clock is not None:
+                self._move_on(clock())
+            now = self._last_time
+            message, info = taken
+            counts.received += 1
+            if (recorder := self.recorder) is not None:
+                recorder.offer(
+                    self.topics.wrenches[number], now, info['source_timestamp'], message
+                )
+            rejection = wrench.offer(message, now)
+            if rejection is not None:
+                counts.rejected[rejection] += 1
+            if not end:
+                end = monotonic_ns() + _LONGEST_DRAIN
+            elif monotonic_ns() > end:
+                break
+
+    def _move_on(self, time: int) -> None:
+        """Move `_last_time` on: a message may be newer than the tick that takes it."""
+        if self.injection is not None:
+            time = self.injection.clock(time)
+        if time > self._last_time:
+            self._last_time = time
 
     def tick_at(self, now: int, clock: Callable[[], int] | None = None) -> None:
         """

@@ -32,7 +32,15 @@ from dataclasses import replace
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.bag.reader import Bag, BagMessage
-from linkage_ros.bag.run_events import Event, FaultEvent, Reset, RunAccount, SampleEvent, TickEvent
+from linkage_ros.bag.run_events import (
+    Event,
+    FaultEvent,
+    Reset,
+    RunAccount,
+    SampleEvent,
+    TickEvent,
+    WrenchEvent,
+)
 from linkage_ros.errors import BagError, did_you_mean, LinkageError, listed
 from linkage_ros.messages.joint_state import head_of, JointStateReader, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE
@@ -70,11 +78,12 @@ class Remade(NamedTuple):
     tick: Tick | None
 
 
+HeardEvent = SampleEvent | FaultEvent | Reset | TickEvent
 ReplayEvent = SampleEvent | FaultEvent | Reset | Remade
 
 
 def check_drives(scene: Scene, where: str) -> None:
-    """Raise LinkageError if a scene does not read its crank from a topic."""
+    """Raise LinkageError if a scene does not read its crank, and that alone, from a topic."""
     for member in scene.members:
         drive, _ = member.drive
         if drive != 'topic':
@@ -83,6 +92,12 @@ def check_drives(scene: Scene, where: str) -> None:
                 f'{f"{member.name}: " if member.name else ""}its drive is {drive}, which takes no '
                 "samples of a bag's",
                 'write drive: {topic: {}}',
+            )
+        if member.loads is not None and member.loads.applied.wrenches:
+            raise LinkageError(
+                where,
+                'its loads.wrenches come on topics, of which another scene takes no messages',
+                'leave them out',
             )
 
 
@@ -137,14 +152,15 @@ class Counterfactual:
 
     def run(self, events: Iterable[Event]) -> Iterator[ReplayEvent]:
         """Yield the events of the run, in order: samples, faults, resets and ticks."""
-        return self._on_clock(events) if self._period else self._on_samples(events)
+        heard = (event for event in events if not isinstance(event, WrenchEvent))
+        return self._on_clock(heard) if self._period else self._on_samples(heard)
 
     def withheld(self, tick: Tick) -> bool:
         """Return whether a tick without a message is one that a replay has to know of."""
         published = tick.message or tick.extras
         return self.withholds and not published and self._pipeline.remembers(tick)
 
-    def _on_samples(self, events: Iterable[Event]) -> Iterator[ReplayEvent]:
+    def _on_samples(self, events: Iterable[HeardEvent]) -> Iterator[ReplayEvent]:
         made: Remade | None = None  # its recorded messages may follow
         for event in events:
             if isinstance(event, TickEvent):
@@ -167,7 +183,7 @@ class Counterfactual:
         if made is not None:
             yield made
 
-    def _on_clock(self, events: Iterable[Event]) -> Iterator[ReplayEvent]:
+    def _on_clock(self, events: Iterable[HeardEvent]) -> Iterator[ReplayEvent]:
         taken: int | None = None  # time of a tick that took samples and perhaps published nothing
         for event in events:
             at = event.log_time

@@ -40,6 +40,7 @@ from linkage_ros.bag.run_events import (
     StoredRun,
     TickEvent,
     VERSIONS,
+    WrenchEvent,
 )
 from linkage_ros.errors import BagError, listed
 from linkage_ros.messages.joint_state import OwnJointStates
@@ -214,6 +215,10 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
             yield ReplayedTick(event.time, joint_states, tuple(extras), tick)
         elif isinstance(event, SampleEvent):
             pipeline.offer(event.data, event.log_time)
+        elif isinstance(event, WrenchEvent):
+            # The account of a damaged bag may name more topics than its scene.
+            if event.number < len(pipeline.wrenches):
+                pipeline.wrenches[event.number].offer(event.data, event.log_time)
         elif injection is not None:
             turn(bag, injection, event.data)
 

@@ -64,7 +64,7 @@ def check_simulated(scene: Scene, seconds: float) -> int:
     Raises
     ------
     FileError
-        A drive waits for samples.
+        A drive waits for samples, or a load for messages.
     LinkageError
         There would be too many ticks.
 
@@ -75,6 +75,12 @@ def check_simulated(scene: Scene, seconds: float) -> int:
                 'drive',
                 'topic waits for samples, and there are none',
                 'write another drive, such as constant_rate; bag takes the samples of a run',
+            )
+        if member.loads is not None and member.loads.applied.wrenches:
+            raise member.content.error(
+                'loads.wrenches',
+                'wait for messages, and there are none',
+                'leave them out, or write forces and efforts over_time instead',
             )
     ticks = floor(seconds * scene.rate * (1.0 + 1e-12)) + 1
     if ticks > MOST_TICKS:

@@ -368,6 +368,10 @@ BAD = {
         PLAIN, 'drive: {sine: {amplitude: 1.0, frequency: 1.0}}\n', FOUR_BAR,
         'other.yaml: its drive is sine',
     ),
+    'wrenches': (
+        PLAIN, 'effects: {effort: {}}\nloads: {wrenches: {coupler: {}}}\n', FOUR_BAR,
+        'its loads.wrenches come on topics, of which another scene takes no messages; leave them',
+    ),
     'other joints': (
         PLAIN, '', GENERAL.replace('coupler_joint', 'rod').replace('rocker_joint', 'swing'),
         'publishes rod, swing, and ',

@@ -161,6 +161,9 @@ REFUSED = {
     ('torque_crank', '-o', 'x.csv', '--set', 'loads.efforts.crank_joint.over_time=[[1, 1]]'): (
         'has one row'
     ),
+    ('torque_crank', '--set', 'loads.wrenches.coupler={}', '-o', 'x'): (
+        'loads.wrenches: wait for messages, and there are none; leave them out, or write forces'
+    ),
 }
 
 

@@ -390,6 +390,7 @@ def test_the_same_scene_gives_the_same_bytes_and_names_no_folder(tmp_path, monke
         ('accuracy: 1.0e-9', 'accuracy', 'own solver'),
         ('faults: {clock: {time_jump: {by: 0.5}, at: [1], seconds: 1}}', 'faults.clock', 'clock'),
         ('effects: {own.effect: {}}', 'effects.own.effect', 'module'),
+        ('loads: {wrenches: {coupler: {}}}', 'loads.wrenches', 'come on topics'),
     ],
 )
 def test_a_scene_that_needs_more_than_its_files_is_refused(scene, where, reason):

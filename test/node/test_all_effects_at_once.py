@@ -27,7 +27,7 @@ The replay runs in a process of its own too, with other hashes of texts.
 
 import hashlib
 from itertools import pairwise
-from math import cos, sin
+from math import cos, inf, sin
 import os
 from pathlib import Path
 import subprocess
@@ -45,6 +45,7 @@ import pytest
 
 from .conftest import LINKAGES
 from .ticked import Moment, run
+from ..support.messages import wrench_stamped
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
@@ -86,6 +87,7 @@ LOADS = """loads:
   joint_springs: {rocker_joint: {stiffness: 0.01, free: 1.5, damping: 1.0e-4}}
   efforts: {rocker_joint: {over_time: [[0, 0], [1, 0.02]], over_position: [[1, 0], [2, 0.01]]}}
   forces: {coupler.P: {direction: [0, -1], frame: link, over_rate: [[-9, 0.1], [9, -0.1]]}}
+  wrenches: {rocker: {point: B, frame: link, max_age: 0.02}, coupler: {max_age: 0.1}}
 """
 MOTOR = """\
 drive:
@@ -156,7 +158,13 @@ def moments(joint):
         if number % 3 == 0 and not 1000 < number < 1150:
             angle, rate = 1.0 + sin(0.01 * number), 10.0 * cos(0.01 * number)
             messages = (write(now, [angle], [rate], [0.03 * cos(0.05 * number)]),)
-        yield Moment(now, messages)
+        # Some expire, some are rejected, and they have no time in common with the samples.
+        wrenches = []
+        if number % 7 == 0 and not 400 < number < 450:
+            wrenches.append((0, wrench_stamped(0.2, 0.1 * cos(0.03 * number), 0.001)))
+        if number % 250 < 2:
+            wrenches.append((1, wrench_stamped(0.1, inf if number % 2 else 0.05, -0.002)))
+        yield Moment(now, messages, wrenches=tuple(wrenches))
 
 
 @pytest.fixture(scope='module')
@@ -202,6 +210,9 @@ def test_they_replay_to_the_last_bit(recorded, name):
     assert len(set(done.published)) > 500, 'it has published, and not the same again and again'
     assert set(done.loop.injection.injected.values()) >= {1}, 'every fault has been on'
     assert 0 not in done.loop.injection.injected.values()
+    force, sparse, *_ = done.loop.counts.wrenches
+    assert (force.received, sum(force.rejected.values())) == (208, 0)
+    assert (sparse.received, sum(sparse.rejected.values())) == (12, 6)
     again = list(replay(done.bag, recorded_scene(done.bag)))
     assert [each.recorded for each in again if each.recorded] == done.published
     extras = [extra for each in again for extra in each.recorded_extras if extra]

@@ -33,12 +33,17 @@ from linkage_ros.scene.load import load_scene
 
 
 class Moment(NamedTuple):
-    """A tick at a time in [ns], and what comes before it; `asked` turns faults on or off."""
+    """
+    A tick at a time in [ns], and what comes before it.
+
+    `asked` turns faults on or off; `wrenches` are messages by the number of their topic.
+    """
 
     time: int
     messages: tuple[bytes, ...] = ()
     reset: bool = False
     asked: tuple[tuple[str, bool], ...] = ()
+    wrenches: tuple[tuple[int, bytes], ...] = ()
 
 
 class Run(NamedTuple):
@@ -50,26 +55,34 @@ class Run(NamedTuple):
     loop: TickLoop
 
 
+def _first(waiting: list[tuple[bytes, dict[str, int]]]) -> tuple[bytes, dict[str, int]] | None:
+    return waiting.pop(0) if waiting else None
+
+
 def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
     """Run a scene through these moments, into a bag in the folder."""
     scene = load_scene(scene_file)
     pipeline = Pipeline(scene)
     closures, injection = pipeline.closures, pipeline.injection
     waiting: list[tuple[bytes, dict[str, int]]] = []
+    pushing: list[list[tuple[bytes, dict[str, int]]]] = [[] for _ in pipeline.wrenches]
     published: list[bytes] = []
     extras: list[bytes] = []
     loop = TickLoop(
         partial(Pipeline, scene, closures, injection),
-        (lambda: waiting.pop(0) if waiting else None) if pipeline.topic else None,
+        partial(_first, waiting) if pipeline.topic else None,
         published.append,
         publish_extras=[extras.append] * len(pipeline.extras),
         publish_change=lambda c: text_message(change_text(c, scene.faults[c.name].kind)),
+        take_wrenches=[partial(_first, each) for each in pushing],
     )
     others = [f'/extra_{number}' for number in range(len(pipeline.extras))]
+    loads = [f'/wrench_{number}' for number in range(len(pushing))]
     names = {
         'joint_states_topic': '/joint_states',
         'diagnostics_topic': '/diagnostics',
         **({'crank_topic': '/crank'} if pipeline.topic else {}),
+        **{name: name for name in loads},
         **({'faults_topic': '/faults'} if injection else {}),
         **({'withheld_topic': '/withheld'} if pipeline.withholds else {}),
         **{name: name for name in others},
@@ -77,7 +90,7 @@ def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
     }
     folder_of_scene = str(scene_file.parent)
     said = {'scene': 's', 'scene_folder': folder_of_scene, 'seed': scene.seed}
-    said |= {'extra_topics': others, **names}
+    said |= {'extra_topics': others, 'wrench_topics': loads, **names}
     files = {name: ('application/yaml', data) for name, data in scene.files.items()}
     kinds = {name: each.message for name, each in zip(others, pipeline.extras, strict=True)}
     topics = [
@@ -88,7 +101,9 @@ def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
     recorder = Recorder(BagWriter(folder, topics, attached), capacity=1_000_000)
     loop.recorder = recorder
     tick = loop.tick_at if scene.rate else loop.tick_samples
-    for time, messages, reset, asked in moments:
+    for time, messages, reset, asked, wrenches in moments:
+        for number, message in wrenches:
+            pushing[number].append((message, {'source_timestamp': time}))
         waiting += [(message, {'source_timestamp': time}) for message in messages]
         loop.reset_requested |= reset
         for name, on in asked:

@@ -50,6 +50,7 @@ ROS = (
     'ament_index_python',
     'builtin_interfaces',
     'diagnostic_msgs',
+    'geometry_msgs',
     'lifecycle_msgs',
     'rcl_interfaces',
     'rclpy',

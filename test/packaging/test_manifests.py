@@ -56,9 +56,9 @@ def test_every_ros_import_is_declared(root, package_xml):
 
 ROS_PACKAGES = {
     'ament_copyright', 'ament_flake8', 'ament_pep257', 'builtin_interfaces', 'diagnostic_msgs',
-    'launch', 'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'robot_state_publisher',
-    'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs', 'trajectory_msgs',
-    'visualization_msgs',
+    'geometry_msgs', 'launch', 'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy',
+    'robot_state_publisher', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs',
+    'trajectory_msgs', 'visualization_msgs',
 }  # fmt: skip
 """Released into Jazzy: rosdep takes them from ros-jazzy-…. (rosdistro, jazzy/distribution.yaml)"""
 

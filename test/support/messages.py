@@ -21,6 +21,7 @@ from rosbags.typesys import get_typestore, Stores
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 JOINT_STATE = 'sensor_msgs/msg/JointState'
+WRENCH_STAMPED = 'geometry_msgs/msg/WrenchStamped'
 
 
 def header(stamp=(0, 0), frame=''):
@@ -40,3 +41,12 @@ def joint_state(
 def read_joint_state(data: bytes) -> Any:
     """Return a JointState of its bytes."""
     return STORE.deserialize_cdr(data, JOINT_STATE)
+
+
+def wrench_stamped(fx, fy, moment, others=(7.0, 8.0, 9.0), frame='', little=True) -> bytes:
+    """Return the bytes of a WrenchStamped; the others are force.z, torque.x and torque.y."""
+    vector = STORE.types['geometry_msgs/msg/Vector3']
+    fz, *torques = others
+    wrench = STORE.types['geometry_msgs/msg/Wrench'](vector(fx, fy, fz), vector(*torques, moment))
+    message = STORE.types[WRENCH_STAMPED](header((1, 2), frame), wrench)
+    return bytes(STORE.serialize_cdr(message, WRENCH_STAMPED, little_endian=little))

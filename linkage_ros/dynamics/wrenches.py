@@ -1,0 +1,102 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Wrenches that messages give: a force and a torque on a link, held until they expire.
+
+A wrench counts from the time at which it is taken, constant until the next one or until it is too
+old; then it is 0. So its laws have one segment, and no integrator cuts a step for them: the torque
+drive divides its steps where a wrench changes (`linkage_ros.drives.torque`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages.wrench import PlanarWrench
+
+NEVER = 1 << 63
+"""A time after all others, in [ns]."""
+
+_NONE = PlanarWrench(0.0, 0.0, 0.0)
+
+
+class HeldWrench:
+    """
+    The wrench on a link.
+
+    Parameters
+    ----------
+    max_age
+        Validity of a message, in [s].
+
+    Attributes
+    ----------
+    wrench
+        What acts now.
+    until
+        The time at which it ends, in [ns]; `NEVER` if none acts.
+    stamp
+        Time at which the newest message was taken, in [ns]; 0 before the first.
+    max_age
+        Validity of a message, in [ns].
+
+    """
+
+    __slots__ = ('max_age', 'stamp', 'until', 'wrench')
+
+    def __init__(self, max_age: float) -> None:
+        self.max_age = round(max_age * NANOSECONDS)
+        self.wrench, self.until, self.stamp = _NONE, NEVER, 0
+
+    def take(self, wrench: PlanarWrench, now: int) -> None:
+        """Let a wrench act from a time on, in [ns]."""
+        self.wrench, self.until, self.stamp = wrench, now + self.max_age, now
+
+    def expire(self, now: int) -> None:
+        """End the wrench if it is too old at a time, in [ns]."""
+        if now >= self.until:
+            self.wrench, self.until = _NONE, NEVER
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """
+    One number of a held wrench, as a law (`linkage_ros.dynamics.laws`).
+
+    Attributes
+    ----------
+    of
+        The wrench.
+    number
+        Index of the number in a `PlanarWrench`.
+
+    """
+
+    of: HeldWrench
+    number: int
+
+    def segment(self, _value: float, _rate: float, _time: float) -> int:
+        """Return the only segment."""
+        return 0
+
+    def margin(self, _segment: int, _value: float, _rate: float, _time: float) -> float:
+        """Return infinity: nothing of the motion ends the segment."""
+        return inf
+
+    def force(self, _segment: int, _value: float, _rate: float, _time: float) -> float:
+        """Return the force or the torque that acts now, in [N] or [N·m]."""
+        return self.of.wrench[self.number]

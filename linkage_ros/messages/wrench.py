@@ -1,0 +1,61 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Read the planar part of serialized ``geometry_msgs/msg/WrenchStamped`` messages."""
+
+from __future__ import annotations
+
+from struct import Struct
+from typing import NamedTuple
+
+from linkage_ros.messages.joint_state import Rejection
+from linkage_ros.messages.layout import byte_order, declared, MalformedError, parsed
+
+WRENCH_STAMPED = 'geometry_msgs/msg/WrenchStamped'
+
+_FIELDS = declared('Time stamp, string frame_id, Wrench wrench')
+_NUMBERS = {order: Struct(f'{order}6d') for order in '<>'}
+
+
+class PlanarWrench(NamedTuple):
+    """
+    What of a wrench moves a planar linkage.
+
+    Attributes
+    ----------
+    fx, fy
+        Components of the force, in [N].
+    moment
+        Torque about the normal of the plane, counter-clockwise, in [N·m].
+
+    """
+
+    fx: float
+    fy: float
+    moment: float
+
+
+def read_wrench(data: bytes) -> PlanarWrench | Rejection:
+    """
+    Return force.x, force.y and torque.z of a message, or the reason for its rejection.
+
+    The other numbers are ignored, as are the stamp and the frame: a wrench holds from its arrival,
+    in the frame that the scene names. The numbers may be any.
+    """
+    try:
+        first = parsed(data, _FIELDS)['wrench'].first
+    except MalformedError:
+        return Rejection.MALFORMED
+    fx, fy, _, _, _, moment = _NUMBERS[byte_order(data)].unpack_from(data, first)
+    return PlanarWrench(fx, fy, moment)
