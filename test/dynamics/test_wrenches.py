@@ -25,6 +25,7 @@ from math import acos, inf, nan
 
 from linkage_ros.dynamics.loads import AppliedLoads, Loads, WrenchLoad
 from linkage_ros.dynamics.mechanics import Mechanics
+from linkage_ros.dynamics.reactions import Reactions
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.messages.joint_state import Rejection
@@ -34,7 +35,7 @@ from linkage_ros.scene.load import load_scene
 import pytest
 from scipy.integrate import solve_ivp
 
-from .loaded import closed, efforts_by_forces, slope, STATES
+from .loaded import closed, slope, STATES
 from ..support.messages import wrench_stamped
 from ..support.scenes import LINKAGES, PENDULUM, pipeline_of
 
@@ -231,7 +232,7 @@ def test_forces_in_pins_balance_it_on_every_link(name, frame):
         velocity = closure.velocity(position, *(0.8 for _ in q))
         acceleration = closure.acceleration(position, velocity, *(1.1 for _ in q))
         given = position, velocity, acceleration
-        assert efforts_by_forces(mechanics, *given) == pytest.approx(
+        assert Reactions(mechanics).efforts(*given) == pytest.approx(
             mechanics.drive_efforts(*given), rel=1e-8, abs=1e-9
         )
 
