@@ -63,15 +63,7 @@ _DOMAINS = range(1, 102)
 
 @contextmanager
 def held_domain() -> Iterator[int]:
-    """
-    Hold a ROS domain that no other process of this machine holds.
-
-    Raises
-    ------
-    LinkageError
-        If all are held.
-
-    """
+    """Hold a ROS domain that no other process here holds; a LinkageError if all are held."""
     # From a place of its own, since other programs take the first ones.
     first = os.getpid() % len(_DOMAINS)
     for domain in (*_DOMAINS[first:], *_DOMAINS[:first]):
@@ -112,17 +104,7 @@ class MeasurementError(Exception):
 
 
 class Process:
-    """
-    A Python program on the graph.
-
-    Attributes
-    ----------
-    name
-        Name in messages.
-    pid
-        Process id.
-
-    """
+    """A Python program on the graph, with its name in messages and its process id."""
 
     def __init__(self, name: str, popen: subprocess.Popen[bytes], log: Path) -> None:
         self.name = name

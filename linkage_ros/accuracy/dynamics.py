@@ -221,15 +221,7 @@ _ROUNDS = 3
 
 
 def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | None:
-    """
-    Measure the integration of the first linkage that a torque drives; None without one.
-
-    Parameters
-    ----------
-    scene, quick, progress
-        See `linkage_ros.accuracy`.
-
-    """
+    """Measure the integration of the first linkage that a torque drives; None without one."""
     driven = [member for member in scene.members if member.drive[0] == 'torque']
     if not driven:
         return None
@@ -355,13 +347,7 @@ def slope(errors: Sequence[tuple[float, float]]) -> float | None:
     """
     Return the order of convergence, from the two shortest steps that show it.
 
-    Errors near the rounding error do not count.
-
-    Parameters
-    ----------
-    errors
-        Steps, longest first, and errors.
-
+    The longest step comes first. Errors near the rounding error do not count.
     """
     points = [(log10(step), log10(error)) for step, error in errors if error > _ROUNDED]
     if len(points) < 2:

@@ -140,16 +140,7 @@ def measure_effects(scene: Scene, quick: bool, progress: Progress) -> Part | Non
     """
     Measure the effects of a scene; None if it has none.
 
-    Parameters
-    ----------
-    scene, quick, progress
-        See `linkage_ros.accuracy`.
-
-    Raises
-    ------
-    FileError
-        If parts of the scene cannot be combined.
-
+    A FileError says which parts of the scene cannot be combined.
     """
     named = Names(name for member in scene.members for name in member.effects)
     named |= faults_of(scene)

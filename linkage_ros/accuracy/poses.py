@@ -387,21 +387,7 @@ def batch_errors(
 
 
 def off(linkage: Linkage, found: Sequence[Any], truth: Truth, order: int = 0) -> float:
-    """
-    Return the greatest error of joints, rates or accelerations.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    found
-        Values of the published joints.
-    truth
-        The state.
-    order
-        Order of the derivative.
-
-    """
+    """Return the greatest error of the published joints, or of the derivatives of an order."""
     size, worst, greatest = size_of(linkage), 0.0, 1.0
     for joint, value, true in zip(
         linkage.joints.values(), found, truth.orders[order], strict=True

@@ -130,19 +130,9 @@ def measure_costs(
     progress: Progress = lambda _: None,
 ) -> list[Cost]:
     """
-    Record a scene with each setting in turn.
+    Record a scene with each setting in turn; a setting of None writes no bag.
 
-    Parameters
-    ----------
-    scene, folder, progress
-        See `measure_recording`.
-    compared
-        The settings; None for no bag.
-    seconds
-        Minimum duration of a run, in [s].
-    rounds
-        Number of runs of each setting.
-
+    ``seconds`` is the minimum duration of a run, ``rounds`` the number of runs of each setting.
     """
     closures = Pipeline(scene).closures
     runs: list[list[Recorded]] = [[] for _ in compared]

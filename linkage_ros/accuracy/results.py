@@ -86,19 +86,7 @@ class Point(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """
-    The results of a method, over its settings.
-
-    Attributes
-    ----------
-    name
-        Name of the method.
-    points
-        In the order of the settings.
-    joined
-        Whether a line joins the points.
-
-    """
+    """The results of a method, in the order of its settings, and whether a line joins them."""
 
     name: str
     points: Sequence[Point]
@@ -136,17 +124,7 @@ class Table(NamedTuple):
     """
     A table; each column's name has its unit: 'time [µs]'.
 
-    Attributes
-    ----------
-    key
-        File name without suffix.
-    title
-        Its heading.
-    columns
-        Headings.
-    rows
-        Numbers or texts; None for an empty cell.
-
+    The ``key`` is its file name without suffix. A cell of None is empty.
     """
 
     key: str

@@ -77,15 +77,7 @@ _PASS = 5e-3
 
 
 def measure_solving(scene: Scene, quick: bool, progress: Progress) -> Part:
-    """
-    Measure how a scene's first linkage is solved.
-
-    Parameters
-    ----------
-    scene, quick, progress
-        See `linkage_ros.accuracy`.
-
-    """
+    """Measure how a scene's first linkage is solved."""
     member = scene.members[0]
     sets = pose_sets(member.name or scene.name, member.linkage, 24 if quick else 128)
     results: list[Measured] = []
@@ -102,11 +94,7 @@ def judge(poses: Poses, quick: bool) -> list[Measured]:
     """
     Return the errors of all methods on a set of poses, without times.
 
-    Raises
-    ------
-    ArithmeticError
-        If two references differ.
-
+    An ArithmeticError says that two references differ.
     """
     truths = true_states(poses)
     confirmed(poses, truths)
@@ -259,11 +247,7 @@ def confirmed(poses: Poses, truths: Sequence[Truth]) -> int:
     """
     Return the number of states that balls verify; 0 if python-flint is not installed.
 
-    Raises
-    ------
-    ArithmeticError
-        If the references differ.
-
+    An ArithmeticError says that the references differ.
     """
     if find_spec('flint') is None:
         return 0

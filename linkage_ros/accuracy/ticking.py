@@ -77,17 +77,7 @@ class Motions(NamedTuple):
 
 
 def motions_of(closure: Closure, seconds: float) -> Motions:
-    """
-    Return motions within the range where the loops close.
-
-    Parameters
-    ----------
-    closure
-        A linkage with one input.
-    seconds
-        Duration of each.
-
-    """
+    """Return motions of some seconds each, within the range where the loops of one input close."""
     (start,) = usual_inputs(closure)
     widest = InputSweep(closure).widest_range
     length = round(seconds * NANOSECONDS)
@@ -159,24 +149,9 @@ class Used(NamedTuple):
 
 def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> list[Used]:
     """
-    Run a node and a subscriber that uses its states.
+    Run a node at a rate in [Hz], and a subscriber that uses its states; a motion takes seconds.
 
-    Parameters
-    ----------
-    folder
-        An empty folder for its files.
-    linkage
-        The linkage to solve.
-    rate
-        Tick rate, in [Hz].
-    seconds
-        Duration of each motion.
-
-    Raises
-    ------
-    LinkageError
-        If the node or the subscriber fails.
-
+    The folder is empty, for their files. A LinkageError says that one of the two failed.
     """
     inputs = {given.joint for given in linkage.inputs}
     joints = {name: joint for name, joint in linkage.joints.items() if name not in inputs}
@@ -255,16 +230,7 @@ def measure_ticking(scene: Scene, quick: bool, progress: Progress) -> Part | Non
     """
     Measure the states that a subscriber gets; None without rclpy or with several inputs.
 
-    Parameters
-    ----------
-    scene, quick, progress
-        See `linkage_ros.accuracy`.
-
-    Raises
-    ------
-    LinkageError
-        If the node or the subscriber fails.
-
+    A LinkageError says that the node or the subscriber failed.
     """
     linkage = scene.members[0].linkage
     if find_spec('rclpy') is None or len(linkage.inputs) > 1:

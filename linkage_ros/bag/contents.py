@@ -38,21 +38,7 @@ RECORD_SIZE = 31
 
 
 class TopicContents(NamedTuple):
-    """
-    Messages of one topic in a bag.
-
-    Attributes
-    ----------
-    topic
-        The topic.
-    messages
-        Number of messages.
-    size
-        Their size [bytes].
-    first, last
-        Least and greatest log time, in [ns]; 0 without messages.
-
-    """
+    """Messages of one topic in a bag: number, size in [bytes], first and last log time in [ns]."""
 
     topic: Topic
     messages: int
@@ -204,15 +190,7 @@ class Layout(NamedTuple):
 
 
 def layout_of(file: Path) -> Layout:
-    """
-    Return the layout of a file, up to the first record that is not whole.
-
-    Raises
-    ------
-    BagError
-        The file cannot be opened.
-
-    """
+    """Return the layout of a file, up to the first broken record; a BagError if unreadable."""
     library = ''
     compressions: dict[str, tuple[int, int]] = {}
     content = 0

@@ -484,15 +484,7 @@ class DataSection:
         return messages_in(content, self.definitions)
 
     def covered(self) -> bool:
-        """
-        Return whether a checksum covers the whole data section.
-
-        Raises
-        ------
-        DamagedError
-            The checksum does not match.
-
-        """
+        """Return whether a checksum covers the data section; a DamagedError if it differs."""
         if self._misfit:
             raise self._misfit
         if self._covered is None:

@@ -335,13 +335,7 @@ def counts_in(custom: Mapping[str, str], word: str) -> dict[str, int]:
     """
     Return the counts by topic in a bag's ``custom_data``; empty if missing or damaged.
 
-    Parameters
-    ----------
-    custom
-        The ``custom_data``.
-    word
-        Kind of counts: 'received', 'dropped' or 'let_go'.
-
+    They are of the kind 'received', 'dropped' or 'let_go'.
     """
     try:
         counts = json.loads(custom[f'{_PREFIX}{word}'])

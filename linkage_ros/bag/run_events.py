@@ -283,17 +283,7 @@ _NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
 
 
 def lost_beginning(bag: Bag, run: RunAccount) -> str:
-    """
-    Return text on why the first messages of a run are not in its bag; '' if they are.
-
-    Parameters
-    ----------
-    bag
-        The bag.
-    run
-        The run's account in it.
-
-    """
+    """Return text on why the first messages of a run are not in its bag; '' if they are."""
     discarded = sum(counts_in(bag.custom, 'let_go').values())
     if discarded:
         return f'its first {discarded} messages have made way for newer ones'

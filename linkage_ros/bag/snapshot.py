@@ -303,11 +303,7 @@ class SnapshotMemory:
         """
         Return the content of the memory: all messages offered before that are not too old.
 
-        Raises
-        ------
-        RecordingError
-            The memory has ended.
-
+        A RecordingError says that the memory has ended.
         """
         with self._lock:
             if self.failure:

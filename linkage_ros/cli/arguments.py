@@ -183,15 +183,7 @@ def fixed(value: float, digits: int) -> str:
 
 
 class AngleUnit(NamedTuple):
-    """
-    The unit in which a person types and reads angles; files hold radians whatever it is.
-
-    Attributes
-    ----------
-    name
-        ``°`` or ``rad``.
-
-    """
+    """The unit, ``°`` or ``rad``, of angles that a person types and reads; files hold radians."""
 
     name: str
 

@@ -148,17 +148,7 @@ _GAP = 'what depends on one that is not there may differ'
 
 
 class BagReading:
-    """
-    Read the messages of a bag up to damage or a stop request, with progress.
-
-    Parameters
-    ----------
-    bag
-        The bag.
-    stop
-        Set by a signal.
-
-    """
+    """Read the messages of a bag up to damage or the event of a stop request, with progress."""
 
     def __init__(self, bag: Bag, stop: Event) -> None:
         self.damage = ''

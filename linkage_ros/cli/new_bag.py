@@ -73,17 +73,7 @@ class Source(NamedTuple):
 
 
 class Names(NamedTuple):
-    """
-    Names of the topics written beside the samples, as the bag's run named them.
-
-    Attributes
-    ----------
-    joint_states, faults, withheld, resets
-        One topic each.
-    extras
-        The scene's further topics, in their order.
-
-    """
+    """Names of the topics written beside the samples, as the bag's run named them."""
 
     joint_states: str
     faults: str

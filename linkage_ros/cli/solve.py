@@ -65,17 +65,7 @@ _PER = ('', '/s', '/s²')
 
 
 class Column(NamedTuple):
-    """
-    A column of the result.
-
-    Attributes
-    ----------
-    name
-        Joint or coordinate, and its quantity.
-    unit
-        '' for a text.
-
-    """
+    """A column of the result: its joint or coordinate with the quantity; a text has no unit."""
 
     name: str
     unit: str

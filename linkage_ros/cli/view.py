@@ -91,21 +91,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 class _Linkage(NamedTuple):
-    """
-    A linkage to show.
-
-    Attributes
-    ----------
-    name
-        Its name.
-    path
-        The linkage file.
-    data
-        Its content.
-    scene
-        Name, files and folder of the scene; None for a linkage alone.
-
-    """
+    """A linkage to show: file and content, and its scene's name, files and folder, or None."""
 
     name: str
     path: Path

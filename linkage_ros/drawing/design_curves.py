@@ -95,11 +95,7 @@ def poses(design: Design) -> tuple[list[Pose], list[int]]:
     """
     Return a design at its positions, and the numbers of positions where it does not close.
 
-    Raises
-    ------
-    LinkageError
-        If it closes at none.
-
+    A LinkageError says that it closes at none.
     """
     closures = {side: closure_of(design, side) for side in SIDES}
     closed, open_ = [], []

@@ -185,15 +185,7 @@ _SETTINGS: Any = {'font.size': 8.0, 'svg.hashsalt': 'linkage_ros', 'axes.linewid
 
 
 def settings() -> Any:
-    """
-    Return the matplotlib context of a picture.
-
-    Raises
-    ------
-    LinkageError
-        If matplotlib is not installed.
-
-    """
+    """Return the matplotlib context of a picture; a LinkageError without matplotlib."""
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
     import matplotlib as mpl  # local import: an extra, and slow to load
 

@@ -29,17 +29,7 @@ from linkage_ros.faults.fault import Fault, FAULTS, Switch
 
 
 class Change(NamedTuple):
-    """
-    Begin or end of a fault.
-
-    Attributes
-    ----------
-    name
-        Name of the fault in the scene.
-    on
-        Whether it begins.
-
-    """
+    """Begin or end of a fault, by its name in the scene."""
 
     name: str
     on: bool

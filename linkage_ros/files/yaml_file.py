@@ -42,19 +42,11 @@ _LONGEST_INTEGER = 100
 
 class BoundedLoader(yaml.SafeLoader):
     """
-    PyYAML's safe loader with YAML 1.2 scalars, without aliases, and with limits.
+    PyYAML's safe loader with YAML 1.2 scalars, without aliases, and with at most some values.
 
     Ten lines of aliases can expand to gigabytes, and PyYAML takes 50 µs per value. So aliases are
     refused, and the numbers of values and levels are limited. By YAML 1.2 ``1e-3`` is a number and
     ``off`` a string.
-
-    Parameters
-    ----------
-    text
-        YAML text.
-    most
-        Most values that it may contain.
-
     """
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 (as in the base class)
@@ -181,22 +173,7 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
 
 
 def parse_yaml(data: bytes, file: str) -> Section:
-    """
-    Parse YAML that holds a mapping.
-
-    Parameters
-    ----------
-    data
-        The text, UTF-8.
-    file
-        Its name, for error messages.
-
-    Raises
-    ------
-    FileError
-        As in `read_yaml`.
-
-    """
+    """Parse UTF-8 YAML that holds a mapping; errors are those of `read_yaml`."""
     if len(data) > LARGEST_FILE:
         raise FileError(file, '', f'is larger than {LARGEST_FILE} bytes', 'name a YAML file')
     try:

@@ -68,19 +68,7 @@ _OF_A_TICK = 1e-3
 
 
 class Variable(NamedTuple):
-    """
-    A number that goes in or comes out.
-
-    Attributes
-    ----------
-    name
-        Topic, joint and field, as ``joint_states.rocker_joint.position``.
-    unit
-        Its unit, as ``rad/s``.
-    description
-        What it is.
-
-    """
+    """A number that goes in or comes out, named as ``joint_states.rocker_joint.position``."""
 
     name: str
     unit: str
@@ -128,15 +116,7 @@ class _Sender:
 
 
 class LinkageOutputs:
-    """
-    The newest reading of a linkage, and whether it is of the last tick.
-
-    Parameters
-    ----------
-    line
-        The pipeline of the linkage.
-
-    """
+    """The newest reading of a linkage, and whether it is of the last tick."""
 
     def __init__(self, line: LinkagePipeline) -> None:
         member = line.member

@@ -90,20 +90,7 @@ class Bound(NamedTuple):
 
 
 class Bounds:
-    """
-    All limits of a linkage's joints.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-
-    Attributes
-    ----------
-    inputs, joints
-        Of driven joints, and of published ones.
-
-    """
+    """The limits of a linkage's driven joints, and of its published ones."""
 
     def __init__(self, linkage: Linkage) -> None:
         limits = {name: of for name, of in linkage.limits.items() if of.bounded}
@@ -182,22 +169,7 @@ def _bound(name: str, number: int, limits: Limits, *, turning: bool = False) -> 
 
 
 def zero_length(linkage: Linkage, structure: Structure, index: int) -> float | None:
-    """
-    Return the slide at which the two pins of a cylinder meet.
-
-    Parameters
-    ----------
-    linkage, structure
-        The linkage.
-    index
-        Number of the input.
-
-    Returns
-    -------
-    zero : float or None
-        In [m]; None if the input is not a cylinder.
-
-    """
+    """Return the slide in [m] at which the pins of a cylinder meet; None for other inputs."""
     name = linkage.inputs[index].slider
     if not name:
         return None
@@ -232,16 +204,6 @@ def without_mirrored(
 
     Those of negative length are returned if its pose or its limits lie there, or if there are no
     others.
-
-    Parameters
-    ----------
-    linkage, structure
-        The linkage.
-    index
-        Number of the input.
-    ranges
-        All ranges.
-
     """
     zero = zero_length(linkage, structure, index)
     if zero is None:

@@ -92,17 +92,7 @@ class _Hinge(NamedTuple):
 
 
 class SolutionPlan(KnownLinks):
-    """
-    Makes the steps of a linkage, group after group.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    structure
-        Its groups.
-
-    """
+    """Makes the steps of a linkage, Assur group after Assur group."""
 
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
         super().__init__(linkage, structure)

@@ -120,19 +120,7 @@ def _values(frame: str, marker: Marker) -> dict[str, Any]:
 
 
 class MarkerArrayWriter:
-    """
-    Writes the same markers repeatedly.
-
-    A change holds until the next change.
-
-    Parameters
-    ----------
-    frame
-        Frame of all markers.
-    markers
-        The markers, in order.
-
-    """
+    """Writes the same markers repeatedly, in their order; a change holds until the next change."""
 
     __slots__ = ('_buffer', '_where')
 

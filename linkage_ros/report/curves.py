@@ -260,19 +260,7 @@ class SceneCurves:
     def add_states(
         self, times: Times, numbers: Numbers, inputs: Sequence[tuple[Sequence[str], Numbers]]
     ) -> None:
-        """
-        Add joint states.
-
-        Parameters
-        ----------
-        times
-            Run times, in [ns].
-        numbers
-            See `JointBlock.numbers`.
-        inputs
-            Values of driven joints from the samples, by name.
-
-        """
+        """Add joint states at run times in [ns], with driven joints from the samples."""
         self._states.add(times, numbers.reshape(len(times), numbers.shape[1] * numbers.shape[2]))
         values = np.full((len(times), len(self._places)), np.nan)
         for names, angles in inputs:

@@ -208,17 +208,7 @@ Plot = dict[str, Any]
 
 
 def page_data(run: Run, wrapped: bool) -> dict[str, Any]:
-    """
-    Return the data of a page, as JSON holds them.
-
-    Parameters
-    ----------
-    run
-        The run.
-    wrapped
-        Whether published angles jump from π to −π.
-
-    """
+    """Return the data of a page, as JSON holds them; wrapped angles jump from π to −π."""
     since = max(0, run.window.since)
     until = max(since, min(run.end, run.window.until))
     frames = run.frames

@@ -42,21 +42,7 @@ _MOST_ITEMS = 10_000
 
 
 class Status(NamedTuple):
-    """
-    The status of one task.
-
-    Attributes
-    ----------
-    level
-        0 OK, 1 WARN, 2 ERROR, 3 STALE.
-    name
-        Name of the task.
-    message
-        Text of the status.
-    values
-        Texts by key.
-
-    """
+    """The status of one task, with texts by key; level 0 is OK, 1 WARN, 2 ERROR, 3 STALE."""
 
     level: int
     name: str

@@ -51,21 +51,7 @@ _BESIDE_CELL, _BESIDE_ROW, _BESIDE_TABLE = 25, 10, 250
 
 
 class TableOf(NamedTuple):
-    """
-    A table.
-
-    Attributes
-    ----------
-    title
-        Its heading.
-    columns
-        Headings; a leading ``>`` marks a column of numbers.
-    rows
-        The cells.
-    folded
-        Whether it is collapsed at first.
-
-    """
+    """A table, which may be collapsed at first; a leading ``>`` marks a column of numbers."""
 
     title: str
     columns: Sequence[str]

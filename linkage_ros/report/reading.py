@@ -54,17 +54,7 @@ _LATER_JOINTS = 'messages with joints that turn up later'
 
 
 class ForeignRun:
-    """
-    Reads a bag without a scene, block by block.
-
-    Parameters
-    ----------
-    bag
-        The bag.
-    window
-        The part of the run to show.
-
-    """
+    """Reads the window of a bag without a scene, block by block."""
 
     def __init__(self, bag: Bag, window: Window) -> None:
         found = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]

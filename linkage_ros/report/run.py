@@ -47,19 +47,7 @@ _MORE = ', and others'
 
 @dataclass(slots=True)
 class Span:
-    """
-    Consecutive events.
-
-    Attributes
-    ----------
-    begin, end
-        Run times in [ns]; equal for an instant.
-    count
-        Number of events.
-    text
-        Description of the first event.
-
-    """
+    """Consecutive events between two run times in [ns], and the description of the first one."""
 
     begin: int
     end: int
@@ -231,15 +219,7 @@ class Column(NamedTuple):
     """
     A column of a group of curves.
 
-    Attributes
-    ----------
-    name
-        Name of the joint in messages.
-    quantity
-        position, rate, effort, lateness or age.
-    unit
-        Unit of its values.
-
+    The name is the joint's in messages, the quantity position, rate, effort, lateness or age.
     """
 
     name: str
@@ -248,21 +228,7 @@ class Column(NamedTuple):
 
 
 class Curves(NamedTuple):
-    """
-    Curves with common times.
-
-    Attributes
-    ----------
-    title
-        Their topic.
-    columns
-        The columns of a row.
-    rows
-        Number of rows.
-    intervals
-        The curves.
-
-    """
+    """Curves of a topic with common times, and their number of rows."""
 
     title: str
     columns: Sequence[Column]

@@ -63,17 +63,7 @@ class Crank:
         """
         Add samples; return which were for this linkage.
 
-        Parameters
-        ----------
-        numbers
-            Message numbers in the block, increasing.
-        stamps
-            Their stamps, in [ns].
-        good
-            Which samples were accepted.
-        values
-            See `JointBlock.numbers`.
-
+        Message numbers increase, stamps are in [ns], ``good`` tells the accepted samples.
         """
         angles, rates = values[:, 0, self._columns], values[:, 1, self._columns]
         own: Flags = good & ~np.isnan(angles).any(axis=1)

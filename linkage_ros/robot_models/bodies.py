@@ -86,19 +86,7 @@ class Body(NamedTuple):
 
 
 def bodies(closure: Closure, ranges: Mapping[str, Span], first_layer: int = 0) -> dict[str, Body]:
-    """
-    Return the shapes of each link.
-
-    Parameters
-    ----------
-    closure
-        The linkage.
-    ranges
-        Range of motion of its joints.
-    first_layer
-        Number of layers that other linkages occupy below.
-
-    """
+    """Return the shapes of each link, above the layers that other linkages occupy."""
     linkage = closure.linkage
     width = bar_width(closure)
     height = 0.5 * width

@@ -78,15 +78,7 @@ def named_joints(linkage: Linkage) -> dict[str, RevoluteJoint | SlideJoint]:
 
 
 class Orientations:
-    """
-    The relative angles of links that messages determine.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-
-    """
+    """The relative angles of links that messages determine."""
 
     def __init__(self, linkage: Linkage) -> None:
         self._links = tuple(linkage.links)

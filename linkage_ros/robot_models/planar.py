@@ -64,18 +64,7 @@ def find_closings(
     """
     Return the closing constraints, and the single frames, which are points, with their names.
 
-    Parameters
-    ----------
-    urdf
-        The robot.
-    asked
-        Pairs of links whose origins coincide.
-
-    Raises
-    ------
-    FileError
-        If a named link does not exist.
-
+    The origins of each pair of asked links coincide; a FileError if one of the two does not exist.
     """
     found: dict[str, list[str]] = {}
     for joint in urdf.joints.values():

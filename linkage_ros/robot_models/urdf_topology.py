@@ -201,21 +201,7 @@ class _Rail(NamedTuple):
 
 @dataclass(slots=True)
 class UrdfTopology:
-    """
-    The linkage elements of a URDF.
-
-    Attributes
-    ----------
-    links
-        Points of every link, by name, in [m].
-    bodies
-        For each link its body of the URDF.
-    sliders, joints
-        By name.
-    traced
-        Names of traced points.
-
-    """
+    """The linkage elements of a URDF by name: points in [m], bodies, sliders, joints."""
 
     links: dict[str, dict[str, complex]] = field(default_factory=dict)
     bodies: dict[str, str] = field(default_factory=dict)

@@ -52,17 +52,7 @@ Settings = tuple[tuple[str, float], ...]
 
 
 class Sweep(NamedTuple):
-    """
-    A key of a scene and the values that it takes.
-
-    Attributes
-    ----------
-    key
-        As for ``--set``.
-    values
-        The values.
-
-    """
+    """A key of a scene as for ``--set``, and the values that it takes."""
 
     key: str
     values: tuple[float, ...]
@@ -132,15 +122,7 @@ class Outcome(NamedTuple):
 
 
 def sweep_of(text: str) -> Sweep:
-    """
-    Read KEY=LOW:HIGH:N or KEY=a,b,c.
-
-    Raises
-    ------
-    LinkageError
-        It is neither.
-
-    """
+    """Read KEY=LOW:HIGH:N or KEY=a,b,c; a LinkageError if it is neither."""
     key, equals, values = text.partition('=')
     low, *rest = values.split(':')
     try:

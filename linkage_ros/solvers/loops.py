@@ -89,19 +89,7 @@ class Loops(NamedTuple):
 
 
 class LoopFinder:
-    """
-    Finds the loops of a closure.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    structure
-        Its groups.
-    known
-        All its links, from a closure.
-
-    """
+    """Finds the loops of a closure, from all its known links."""
 
     def __init__(self, linkage: Linkage, structure: Structure, known: KnownLinks) -> None:
         self._known = known

@@ -43,17 +43,7 @@ if TYPE_CHECKING:
 
 
 class Choice(NamedTuple):
-    """
-    The solver chosen for a scene that specifies an accuracy.
-
-    Attributes
-    ----------
-    solver, parameters
-        As the scene could have named them.
-    why
-        The reason, in words.
-
-    """
+    """The solver chosen for a scene with an accuracy, as it could have named it, and why."""
 
     solver: str
     parameters: Mapping[str, float]

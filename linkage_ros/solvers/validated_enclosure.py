@@ -184,19 +184,7 @@ class Enclosure(NamedTuple):
 
 
 def enclose(groups: Sequence[Loops], cells: Cells, order: int) -> Enclosure:
-    """
-    Enclose all coordinates.
-
-    Parameters
-    ----------
-    groups
-        The loops of a linkage of one input.
-    cells
-        The cells.
-    order
-        Largest order of the Taylor coefficients.
-
-    """
+    """Enclose all coordinates over the cells, up to an order of the Taylor coefficients."""
     zero = [ZERO] * (order + 1)
     given: Jet = [Disc(cells.middle, cells.half), Disc(1.0, 0.0), *zero][: order + 1]
     jets: dict[int, Jet] = {0: zero, 1: given}

@@ -276,15 +276,7 @@ class Needs(NamedTuple):
         return self.kind in _TURNING
 
     def check(self) -> None:
-        """
-        Refuse requirements that no design can meet.
-
-        Raises
-        ------
-        SynthesisError
-            With the most similar word.
-
-        """
+        """Raise a SynthesisError, with the most similar word, if no design can meet them."""
         if not 0.0 <= self.transmission <= 0.5 * pi:
             raise SynthesisError(
                 'transmission angle',

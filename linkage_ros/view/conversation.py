@@ -110,17 +110,7 @@ class Conversation:
 
 
 class _Page:
-    """
-    An open page.
-
-    Attributes
-    ----------
-    number
-        Its number.
-    state
-        State of the user's file that it has seen.
-
-    """
+    """An open page, and the state of the user's file that it has seen."""
 
     def __init__(
         self, number: int, socket: web.WebSocketResponse, of: Conversation, server: Server
@@ -163,11 +153,7 @@ class _Queue:
         """
         Put a request at the end; return the numbers of those that it replaces.
 
-        Raises
-        ------
-        RequestError
-            Too many wait.
-
+        A RequestError says that too many wait.
         """
         kind = _REPLACED.get(request.do, '')
         replaced = [old for old in self._waiting if kind and _REPLACED.get(old[0].do) == kind]

@@ -59,19 +59,7 @@ _LONGEST_NAME = 80
 
 
 class Request(NamedTuple):
-    """
-    A request of a page.
-
-    Attributes
-    ----------
-    number
-        The ``id``, which the answer repeats.
-    do
-        What is to be done.
-    content
-        The whole message.
-
-    """
+    """A request of a page: the ``id`` that its answer repeats, what to do, the whole message."""
 
     number: float
     do: str
@@ -323,15 +311,7 @@ _ANSWERS: dict[str, Callable[[_Asked], dict[str, Any]]] = {
 
 @lru_cache(maxsize=4)
 def closure_of(text: str, name: str) -> Closure:
-    """
-    Return the closure of a linkage file's text.
-
-    Raises
-    ------
-    FileError
-        As `linkage_ros.load`.
-
-    """
+    """Return the closure of a linkage file's text; errors are those of `linkage_ros.load`."""
     return read_closure(parse_yaml(encoded(text, name), name), name)
 
 

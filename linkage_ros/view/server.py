@@ -134,15 +134,7 @@ class Server:
         self._runner: web.AppRunner | None = None
 
     async def start(self, port: int = 0) -> None:
-        """
-        Listen on a port; 0 for a free one.
-
-        Raises
-        ------
-        LinkageError
-            The port is taken.
-
-        """
+        """Listen on a port, 0 for a free one; a LinkageError if it is taken."""
         within = web.Application()
         within[SERVER_KEY] = self
         within.router.add_get('/', self._answer_page)

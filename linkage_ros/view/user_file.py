@@ -28,15 +28,7 @@ _REMEDY = 'download this version, or load the page again to go on from the file'
 
 
 class UserFile:
-    """
-    A linkage file that pages may save.
-
-    Parameters
-    ----------
-    path
-        Its path.
-
-    """
+    """A linkage file that pages may save."""
 
     def __init__(self, path: Path) -> None:
         self.path = path.absolute()

@@ -84,22 +84,9 @@ class Worker:
 
     async def ask(self, page: int, do: str, message: str) -> str:
         """
-        Return the answer to a request, as JSON.
+        Return the answer to a page's request, as JSON.
 
-        Parameters
-        ----------
-        page
-            Number of the page that asks.
-        do
-            What it asks for.
-        message
-            Its message.
-
-        Raises
-        ------
-        LinkageError
-            There is no answer in time, or the process ended.
-
+        A LinkageError says that there is no answer in time, or that the process ended.
         """
         async with self._one:
             answered = False

@@ -52,15 +52,7 @@ import numpy as np
 
 
 class VelocityEquations:
-    """
-    The constraint equations in the angles and positions of the links, without dyads.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-
-    """
+    """The constraint equations in the angles and positions of the links, without dyads."""
 
     def __init__(self, linkage: Linkage) -> None:
         self._linkage = linkage

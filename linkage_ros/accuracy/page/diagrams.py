@@ -45,17 +45,7 @@ _EMPTY = (0.1, 10.0)
 
 
 class Range(NamedTuple):
-    """
-    The range of an axis.
-
-    Attributes
-    ----------
-    axis
-        The axis.
-    low, high
-        Its ends, in its unit.
-
-    """
+    """The range of an axis; its ends are in its unit."""
 
     axis: Axis
     low: float
@@ -285,15 +275,7 @@ def _all(values: Sequence[tuple[float, Spread | None]]) -> Iterable[float]:
 
 
 class Mark(NamedTuple):
-    """
-    A marker, by its names in both libraries.
-
-    Attributes
-    ----------
-    plotly, matplotlib
-        Its names.
-
-    """
+    """A marker, by its names in both libraries."""
 
     plotly: str
     matplotlib: str

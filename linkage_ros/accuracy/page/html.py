@@ -90,15 +90,7 @@ def _body(title: str, results: Results, pictures: Mapping[str, bytes]) -> Iterat
 
 
 def field_html(answers: Mapping[str, Sequence[Reply]]) -> str:
-    """
-    Return the field for a wanted accuracy, which field.js fills with its input and answers.
-
-    Parameters
-    ----------
-    answers
-        The answers by scene.
-
-    """
+    """Return the field for a wanted accuracy; field.js fills it with the answers by scene."""
     data = {scene: [each._asdict() for each in some] for scene, some in answers.items()}
     return f'<div class="wanted" data-replies="{escape(json.dumps(data, allow_nan=False))}"></div>'
 

@@ -187,15 +187,7 @@ def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
 
     The status is that of the first step that is not closed. If that step has a pose, as at a
     toggle, a later step may have a worse status. None if the steps continue on another path, and
-    only they give the status.
-
-    Parameters
-    ----------
-    closure
-        The linkage.
-    path
-        The path, traced without limits.
-
+    only they give the status. The path is traced without limits.
     """
     tape = path.tape
     inputs: list[Any] = [

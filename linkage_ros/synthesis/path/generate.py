@@ -356,17 +356,7 @@ class PathResult(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """
-    The result of a path generation, sorted by error.
-
-    Attributes
-    ----------
-    found
-        The best accepted linkages.
-    refused
-        The best refused linkages.
-
-    """
+    """The best accepted and refused linkages of a path generation, sorted by error."""
 
     found: tuple[PathResult, ...]
     refused: tuple[PathResult, ...]
