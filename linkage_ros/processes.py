@@ -173,17 +173,9 @@ class Process:
 
 class Graph:
     """
-    A ROS graph that is isolated from others.
+    A ROS graph that is isolated from others, with a folder for its logs.
 
-    Parameters
-    ----------
-    domain
-        The ``ROS_DOMAIN_ID``.
-    folder
-        Folder of the logs.
-    longest
-        Time limit for each process, in [s], even if this process dies.
-
+    Each process ends after the longest time, in [s], even if this process dies.
     """
 
     def __init__(self, domain: int, folder: Path, longest: int = _LONGEST) -> None:
@@ -203,19 +195,7 @@ class Graph:
     def run(
         self, module: str, arguments: Sequence[str] = (), more: Mapping[str, str] | None = None
     ) -> Iterator[Process]:
-        """
-        Run ``python -m module`` for the length of a with statement.
-
-        Parameters
-        ----------
-        module
-            The module, by its dotted name.
-        arguments
-            Its command line.
-        more
-            Further environment variables; they override those of the graph.
-
-        """
+        """Run ``python -m module`` for a with statement; ``more`` is for its environment."""
         if len(self._alive) >= _MOST:
             raise MeasurementError(f'{module}: {_MOST} processes run already')
         name = module.rsplit('.', 1)[-1]

@@ -49,17 +49,8 @@ def scene_choices(scene: Scene, results: Sequence[Measured], ticks: int) -> list
     """
     Return the cheapest solver for each of several accuracies, the least exact first.
 
-    The last is the default of a scene.
-
-    Parameters
-    ----------
-    scene
-        The scene; only the solver of its first linkage differs.
-    results
-        All methods at easy poses, timed.
-    ticks
-        Number of ticks of each.
-
+    The last is the default of a scene. Only the solver of the first linkage differs. The results
+    are of all methods at easy poses, timed; a choice is timed over so many ticks.
     """
     offered = in_a_scene(results)
     (node,) = (one for one in offered if one.method.name in NODE_DEFAULTS)

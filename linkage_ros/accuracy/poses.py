@@ -96,17 +96,7 @@ class Poses(NamedTuple):
 
 
 def pose_sets(name: str, linkage: Linkage, count: int) -> list[Poses]:
-    """
-    Return all sets of poses for a linkage.
-
-    Parameters
-    ----------
-    name, linkage
-        The scene's.
-    count
-        Number of easy poses; of each added linkage half as many.
-
-    """
+    """Return all sets of poses for a linkage: so many easy ones, half of each added linkage."""
     sets = [Poses('easy', 'easy poses', name, linkage, easy(Closure(linkage), count))]
     for key, title, find, guest in (
         ('toggle', 'near a toggle', near_toggle, WITH_TOGGLE),

@@ -88,19 +88,7 @@ class Truth(NamedTuple):
 
 
 class Reference:
-    """
-    A linkage to be solved in extended precision.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    digits
-        Number of digits of the result.
-    guard
-        Number of extra digits to compute with, to begin with.
-
-    """
+    """A linkage to be solved to a number of digits, with guard digits to compute with at first."""
 
     def __init__(self, linkage: Linkage, digits: int = DIGITS, guard: int = _GUARD) -> None:
         self._linkage = linkage
@@ -289,13 +277,8 @@ class ExactEquations:
         """
         Return the residuals of the equations, differentiated as often as the motion.
 
-        Parameters
-        ----------
-        motion
-            The unknowns, then their rates, then their accelerations.
-        given
-            The same of the inputs.
-
+        The motion is the unknowns, then their rates, then their accelerations; so are the given
+        inputs.
         """
         order = len(motion) - 1
         residuals: list[Any] = []

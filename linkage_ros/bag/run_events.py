@@ -141,15 +141,7 @@ class StoredRun(Protocol):
 
 
 def run_account(bag: StoredRun) -> RunAccount:
-    """
-    Return the run's account in its bag.
-
-    Raises
-    ------
-    BagError
-        There is none, or it is damaged.
-
-    """
+    """Return the run's account in its bag; a BagError if there is none, or if it is damaged."""
     if RUN_FILE not in bag.attachments:
         raise BagError(
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'

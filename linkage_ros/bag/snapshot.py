@@ -71,21 +71,10 @@ class Extent(NamedTuple):
 
 class Kept(NamedTuple):
     """
-    Content of the memory at an instant; immutable.
+    Content of the memory at an instant, as packed messages; immutable.
 
-    Attributes
-    ----------
-    blocks
-        The messages, packed.
-    begin
-        Position of the first message in the first block.
-    counts
-        Number of messages of each topic.
-    seconds
-        Time between the oldest message and the newest [s].
-    whole
-        Whether no message has been removed.
-
+    The first message begins at ``begin`` in the first block. From it to the newest pass
+    ``seconds``. The memory is whole if no message has been removed.
     """
 
     blocks: tuple[bytes, ...]

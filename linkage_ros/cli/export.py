@@ -103,19 +103,9 @@ class Source(NamedTuple):
 
 class Found(NamedTuple):
     """
-    Result of the first pass.
+    Result of the first pass: columns beyond the first four, and number of rows.
 
-    Attributes
-    ----------
-    keys
-        The columns beyond the first four.
-    rows
-        Number of rows.
-    counts
-        Number of messages in the rows, by topic.
-    left_out
-        Number of messages that are left out, by topic and reason.
-
+    Messages in the rows are counted by topic, those that are left out by topic and reason.
     """
 
     keys: tuple[Key, ...]

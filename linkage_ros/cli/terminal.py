@@ -238,15 +238,7 @@ def progress(what: str) -> Iterator[ProgressCallback]:
 
 
 class PrintableStream:
-    """
-    A text stream whose lines are made printable; everything else is passed to the stream.
-
-    Parameters
-    ----------
-    stream
-        The stream, for example standard output.
-
-    """
+    """A text stream whose lines are made printable; everything else is passed to the stream."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

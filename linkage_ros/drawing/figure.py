@@ -88,22 +88,9 @@ def view(
     closure: Closure, inputs: tuple[float, ...], ghosts: Sequence[tuple[float, ...]] = ()
 ) -> View:
     """
-    Prepare a picture.
+    Prepare a picture of a pose, with others in the background.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    inputs
-        The pose to draw, in [rad] or [m].
-    ghosts
-        Poses in the background; by default some over the whole range.
-
-    Raises
-    ------
-    LinkageError
-        If a pose does not close.
-
+    By default those are some over the whole range. A LinkageError says that a pose does not close.
     """
     position = _closed(closure, inputs)
     way = InputSweep(closure, inputs)

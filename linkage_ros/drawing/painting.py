@@ -193,15 +193,7 @@ def settings() -> Any:
 
 
 def save(figure: Any, file: Path) -> None:
-    """
-    Save a picture; equal pictures give equal bytes.
-
-    Raises
-    ------
-    LinkageError
-        If the file cannot be written.
-
-    """
+    """Save a picture; equal pictures give equal bytes. A LinkageError if it cannot be written."""
     kind = file.suffix[1:].lower() or 'png'
     metadata = {'png': {'Software': None}, 'svg': {'Date': None}}.get(kind)
     picture = BytesIO()

@@ -36,15 +36,7 @@ class Change(NamedTuple):
 
 
 class Injection:
-    """
-    The faults of a scene with their switches; it outlives a reset of the pipeline.
-
-    Parameters
-    ----------
-    faults
-        Faults of the scene, by name.
-
-    """
+    """The faults of a scene with their switches; it outlives a reset of the pipeline."""
 
     def __init__(self, faults: Mapping[str, Fault]) -> None:
         self.faults = faults

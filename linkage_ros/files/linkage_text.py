@@ -237,20 +237,9 @@ _SAME = 1e-9
 
 def scene_text_for(closure: Closure, file: str) -> str:
     """
-    Return the text of a linkage's default scene.
+    Return the text of a linkage's default scene, which names its file.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    file
-        Name of the linkage file, for the scene to name.
-
-    Raises
-    ------
-    DefinitionError
-        Its pose starts where no loop closes.
-
+    A DefinitionError says that the pose starts where no loop closes.
     """
     return (
         '# What a linkage file alone stands for where a scene is expected.\n'

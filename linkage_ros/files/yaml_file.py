@@ -173,7 +173,22 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
 
 
 def parse_yaml(data: bytes, file: str) -> Section:
-    """Parse UTF-8 YAML that holds a mapping; errors are those of `read_yaml`."""
+    """
+    Parse YAML that holds a mapping.
+
+    Parameters
+    ----------
+    data
+        The text, UTF-8.
+    file
+        Its name, for error messages.
+
+    Raises
+    ------
+    FileError
+        As in `read_yaml`.
+
+    """
     if len(data) > LARGEST_FILE:
         raise FileError(file, '', f'is larger than {LARGEST_FILE} bytes', 'name a YAML file')
     try:

@@ -268,13 +268,7 @@ class SteppedScene:
         """
         Take the values of the inputs at the end of the last step, then do so many ticks.
 
-        Parameters
-        ----------
-        ticks
-            Number of ticks.
-        inputs
-            Values of `inputs`; a drive takes them once, as one message.
-
+        A drive takes them once, as one message.
         """
         self._offer(inputs)
         for _ in range(ticks):

@@ -183,16 +183,7 @@ class Continuation:
         Yield cell after cell, up to a toggle or to an input that must not be passed.
 
         They also end where no cell is proven to hold a single curve, as where two curves cross.
-
-        Parameters
-        ----------
-        node
-            The first node.
-        sign
-            +1 towards larger inputs, −1 towards smaller ones.
-        last
-            The input at which to end.
-
+        The sign is +1 towards larger inputs.
         """
         if node.tangent[-1] * sign < 0.0:
             node = Node(node.place, -node.tangent)
@@ -482,19 +473,9 @@ class _Side:
 
 class Branch:
     """
-    All solutions that lead from a pose without a toggle, for one input.
+    All solutions that lead from a pose without a toggle, for one input that turns or slides.
 
-    Parameters
-    ----------
-    continuation
-        Follows the branch.
-    unknowns, x
-        The solution at the pose, and the input there.
-    turning
-        Whether the input is an angle.
-    far
-        Least distance over which a slide is followed.
-
+    A slide is followed over the distance ``far`` at least.
     """
 
     __slots__ = ('_continuation', '_far', '_gained', '_known_at', '_sides', '_turning', '_turns',

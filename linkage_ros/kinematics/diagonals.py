@@ -116,15 +116,7 @@ class DiagonalAcceleration(NamedTuple):
 
 
 class AnyDiagonal(Protocol):
-    """
-    The interface of a diagonal to a dyad.
-
-    Attributes
-    ----------
-    least
-        A constant lower bound of s².
-
-    """
+    """The interface of a diagonal to a dyad; ``least`` is a constant lower bound of s²."""
 
     least: Fraction
 

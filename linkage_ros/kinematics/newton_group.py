@@ -537,26 +537,9 @@ def iteration(
     before: tuple[Step, ...],
 ) -> Iteration:
     """
-    Return the step that solves a group of links.
+    Return the step that solves a group of links, after the steps before it.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    links
-        The links of the group.
-    constraints
-        Their joints.
-    planner
-        The links solved before the group.
-    before
-        The steps before it.
-
-    Raises
-    ------
-    DefinitionError
-        If there is no pose, or if it has too few points of a link.
-
+    A DefinitionError says that there is no pose, or that it has too few points of a link.
     """
     pose, scale = linkage.pose, planner.scale
     if pose is None:

@@ -35,13 +35,7 @@ class State(NamedTuple):
     """
     The known coordinates and pins; or their rates; or their accelerations.
 
-    Attributes
-    ----------
-    coordinates
-        Angles, in [rad], and slides.
-    pins
-        Places of pins in the frame of the ground.
-
+    Angles are in [rad]; pins have their places in the frame of the ground.
     """
 
     coordinates: list[float]

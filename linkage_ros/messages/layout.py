@@ -119,24 +119,11 @@ def byte_order(data: bytes) -> str:
 
 def parsed(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str, Any]:
     """
-    Return the fields of a message by name; bytes after its end are ignored.
+    Return the declared fields of a message by name; bytes after its end are ignored.
 
-    A string is returned as bytes, numbers as their places: `Numbers`.
-
-    Parameters
-    ----------
-    data
-        The message.
-    fields
-        Its declaration.
-    most
-        Most elements of a sequence of strings or of nested messages.
-
-    Raises
-    ------
-    MalformedError
-        It is not of this type, incomplete, or has too many elements.
-
+    A string is returned as bytes, numbers as their places: `Numbers`. A MalformedError says that
+    it is not of this type, incomplete, or has more than ``most`` elements in a sequence of strings
+    or nests.
     """
     byte_order(data)
     try:

@@ -218,19 +218,7 @@ _OTHER_RECORDER = 'health'
 
 
 class Rows(NamedTuple):
-    """
-    Messages of one kind in a block.
-
-    Attributes
-    ----------
-    numbers
-        Their numbers in the block.
-    logged, published, passed
-        Their log and publish times and their run time, in [ns].
-    data
-        Their bytes.
-
-    """
+    """Messages of one kind in a block, by their numbers; all times are in [ns]."""
 
     numbers: Times
     logged: Times

@@ -65,15 +65,7 @@ _NONE = 2**62
 
 
 class Lateness:
-    """
-    Computes the lateness of ticks as they come.
-
-    Parameters
-    ----------
-    rate
-        Tick rate, in [Hz], more than 0.
-
-    """
+    """Computes the lateness of ticks as they come, at a rate in [Hz], more than 0."""
 
     def __init__(self, rate: float) -> None:
         self._period = 1e9 / rate
@@ -161,24 +153,9 @@ LATENESS, AGE = Column('tick', 'lateness', 'ms'), Column('input', 'age', 'ms')
 
 class BoundedCurves:
     """
-    Curves with common times, within a window.
+    Curves with common times within a window, in a space of some bytes on the page.
 
-    Parameters
-    ----------
-    title
-        Title of the group.
-    columns
-        The columns of a row.
-    space
-        Size limit on the page, in [bytes].
-    window
-        The part of the run to show.
-
-    Attributes
-    ----------
-    left_out
-        Number of columns beyond the size limit; they are the last ones.
-
+    The columns ``left_out`` are beyond it: the last ones.
     """
 
     def __init__(self, title: str, columns: Sequence[Column], space: int, window: Window) -> None:
@@ -217,21 +194,7 @@ def joint_columns(names: Sequence[str], turning: Mapping[str, bool]) -> list[Col
 
 
 class SceneCurves:
-    """
-    Collects the curves of a run.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-    topics
-        Topics of the joint states and of the crank.
-    bodies
-        Number of links that move in the animation.
-    window
-        The part of the run to show.
-
-    """
+    """Collects the curves of a run: joint states, crank, and moving links."""
 
     def __init__(self, scene: Scene, topics: tuple[str, str], bodies: int, window: Window) -> None:
         turning = turning_joints(scene)

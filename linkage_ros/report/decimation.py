@@ -225,22 +225,7 @@ def _least_and_greatest(values: Numbers) -> tuple[Numbers, Numbers]:
 
 
 class Decimation:
-    """
-    Decimated rows at equal steps.
-
-    Parameters
-    ----------
-    columns
-        Number of columns.
-    most
-        Maximum number of rows, an even number.
-
-    Attributes
-    ----------
-    step
-        One row of so many is kept.
-
-    """
+    """Decimated rows at equal steps: one of ``step`` is kept, an even number at most."""
 
     def __init__(self, columns: int, most: int) -> None:
         self.step = 1

@@ -159,21 +159,9 @@ _SPEEDS = ('0.01', '0.1', '0.25', '0.5', '1', '2', '5', '10', '60')
 
 class ReportHeader(NamedTuple):
     """
-    The facts of a bag that a page shows beside its run.
+    The facts of a bag that a page shows beside its run: at its head, as warnings, and as tables.
 
-    Attributes
-    ----------
-    title
-        Title of the page.
-    facts
-        The facts at its head.
-    warnings
-        Missing or damaged parts, a line each.
-    tables
-        The tables at its end.
-    wrapped
-        Whether published angles jump from π to −π.
-
+    If ``wrapped``, published angles jump from π to −π.
     """
 
     title: str

@@ -238,23 +238,10 @@ class Curves(NamedTuple):
 
 class LinkageRun(NamedTuple):
     """
-    A linkage of a scene, as recorded.
+    A linkage of a scene, as recorded; its name is '' if it is the only one.
 
-    Attributes
-    ----------
-    name
-        Its name; '' if it is the only one.
-    prefix
-        Prefix of its joints' names.
-    closure
-        Its closure.
-    inputs, joints
-        Names of the driven and of the published joints in messages.
-    input_units
-        Units of the driven joints.
-    silent
-        Spans in which none of it was published.
-
+    Inputs and joints have their names in messages. In the silent spans nothing of it was
+    published.
     """
 
     name: str

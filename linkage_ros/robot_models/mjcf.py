@@ -428,20 +428,9 @@ its gravity and its springs between points are."""
 
 def mjcf(name: str, parts: Sequence[Part]) -> bytes:
     """
-    Return a model for MuJoCo.
+    Return a model of linkages for MuJoCo.
 
-    Parameters
-    ----------
-    name
-        Name of the model.
-    parts
-        Its linkages.
-
-    Raises
-    ------
-    PartError
-        If one has another gravity than the first, or names that are taken.
-
+    A PartError says that one has another gravity than the first, or names that are taken.
     """
     model = ET.Element('mujoco', model=name)
     model.append(comment(_HEAD.splitlines()))

@@ -134,15 +134,7 @@ _FARTHEST = 1e9
 
 
 def read_urdf(data: bytes, file: str) -> UrdfFile:
-    """
-    Read a URDF.
-
-    Raises
-    ------
-    FileError
-        With file, link or joint, and remedy.
-
-    """
+    """Read a URDF; a FileError has file, link or joint, and remedy."""
     try:
         root = ET.fromstring(data)
     except ET.ParseError as error:

@@ -217,22 +217,9 @@ def urdf_topology(
     alone: dict[str, str],
 ) -> UrdfTopology:
     """
-    Find the linkage elements of a URDF's loops.
+    Find the linkage elements of a URDF's loops; single frames are points, with their names.
 
-    Parameters
-    ----------
-    urdf, planar
-        The robot.
-    closings
-        The loop joints.
-    alone
-        Single frames, which are points, with their names.
-
-    Raises
-    ------
-    FileError
-        If a linkage cannot have such a joint or closing.
-
+    A FileError says that a linkage cannot have such a joint or closing.
     """
     return _Building(urdf, planar, closings, alone).built()
 

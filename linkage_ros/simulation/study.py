@@ -60,17 +60,9 @@ class Sweep(NamedTuple):
 
 class Study(NamedTuple):
     """
-    What all runs of a study share.
+    What all runs of a study share: the scene of `parse_scene`, and the duration of a run in [s].
 
-    Attributes
-    ----------
-    name, files, folder
-        The scene; see `linkage_ros.scene.load.parse_scene`.
-    seconds
-        Duration of a run, in [s].
-    instants
-        Number of instants at which positions are kept.
-
+    Positions are kept at a number of instants.
     """
 
     name: str
@@ -256,15 +248,7 @@ def _reading(seen: LinkageTick | Seen | Numbers) -> SensorReading | None:
 
 
 class _Reduction:
-    """
-    Least, greatest and mean values of many rows, in little memory.
-
-    Parameters
-    ----------
-    width
-        Number of values of a row.
-
-    """
+    """Least, greatest and mean values of many rows of one width, in little memory."""
 
     def __init__(self, width: int) -> None:
         self._rows: list[Sequence[float]] = []
@@ -310,20 +294,8 @@ def outcomes(
     """
     Yield the number of each run and its outcome, in the order in which they end.
 
-    Parameters
-    ----------
-    study, runs
-        The study and the settings of its runs.
-    workers
-        Number of processes here.
-    dask
-        Address of a Dask scheduler whose workers run them instead; '' for none.
-
-    Raises
-    ------
-    LinkageError
-        The workers failed.
-
+    They run in a number of processes here, or on the workers of a Dask scheduler, if its address
+    is not ''. A LinkageError says that the workers failed.
     """
     work = partial(_numbered, study)
     parts = enumerate(runs)

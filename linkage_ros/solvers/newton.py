@@ -70,19 +70,9 @@ _MOST = 2**16
 
 class Knot(NamedTuple):
     """
-    The closed form at a knot.
+    The closed form at a knot: all coordinates, and for each input the derivatives of all.
 
-    Attributes
-    ----------
-    inputs
-        Values of the inputs, as coordinates.
-    coordinates
-        All coordinates.
-    slopes
-        For each input the derivatives of all coordinates.
-    signs
-        Assembly of each dyad: +1 or −1.
-
+    The sign of a dyad is its assembly: +1 or −1.
     """
 
     inputs: tuple[float, ...]

@@ -54,20 +54,8 @@ class Solver(Closure):
     """
     A closure that subclasses solve differently; itself, it uses the closed form.
 
-    Its methods are those of `Closure`.
-
-    Parameters
-    ----------
-    closed
-        The same linkage in closed form.
-
-    Attributes
-    ----------
-    closed
-        The closed form.
-    choice
-        The reason for this solver, if the scene named none.
-
+    Its methods are those of `Closure`. ``choice`` is the reason for this solver, if the scene
+    named none.
     """
 
     def __init__(self, closed: Closure) -> None:

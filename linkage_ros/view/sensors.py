@@ -66,27 +66,9 @@ class SceneFiles(NamedTuple):
 
 class Sensors:
     """
-    The first linkage of a scene, ticked for one page.
+    The first linkage of a scene, ticked for one page; the page may have changed its text.
 
-    Parameters
-    ----------
-    files
-        The scene.
-    text
-        The linkage as the page has changed it; None for that of the scene.
-
-    Attributes
-    ----------
-    text
-        As given.
-    count
-        Number of inputs.
-
-    Raises
-    ------
-    FileError
-        The changed linkage does not fit the scene.
-
+    A FileError says that the changed linkage does not fit the scene.
     """
 
     def __init__(self, files: SceneFiles, text: str | None = None) -> None:

@@ -65,24 +65,10 @@ def serve(
     port: int = 0,
 ) -> None:
     """
-    Serve a page until the stop event is set.
+    Serve a page as `Server` until the stop event is set; 0 is a free port.
 
-    Parameters
-    ----------
-    page, routes, report
-        As for `Server`.
-    stop
-        Set by a signal.
-    ready
-        Called with the address as soon as the server answers.
-    port
-        The port; 0 for a free one.
-
-    Raises
-    ------
-    LinkageError
-        The port is taken.
-
+    ``ready`` is called with the address as soon as the server answers. A LinkageError says that
+    the port is taken.
     """
     asyncio.run(_serve(Server(page, routes, report), stop, ready, port))
 

@@ -47,25 +47,9 @@ class UserFile:
 
     def save(self, data: bytes, known: str) -> str:
         """
-        Replace its content.
+        Replace the content that the page has seen as the state ``known``; return the new state.
 
-        Parameters
-        ----------
-        data
-            The new content.
-        known
-            The `state` that the page has seen.
-
-        Returns
-        -------
-        state : str
-            The new state.
-
-        Raises
-        ------
-        LinkageError
-            Its content is another than the page has seen, or it cannot be written.
-
+        A LinkageError says that the content is another, or that it cannot be written.
         """
         if self.state() != known:
             raise LinkageError(self.path.name, 'has changed since this page read it', _REMEDY)

@@ -300,15 +300,7 @@ class Style(NamedTuple):
     """
     Style of a curve. Seven colours and eight markers make 56 different pairs.
 
-    Attributes
-    ----------
-    colour
-        As #rrggbb; black stands for the colour of the text.
-    mark
-        Marker of a point.
-    dash
-        Line style; one of `DASHES`.
-
+    The colour is #rrggbb; black stands for the colour of the text. The dash is one of `DASHES`.
     """
 
     colour: str

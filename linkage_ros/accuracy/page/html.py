@@ -42,22 +42,9 @@ _HERE = 'linkage_ros.accuracy.page'
 
 def results_html(results: Results, styles: Styles, pictures: Mapping[str, bytes]) -> str:
     """
-    Return the page.
+    Return the page; a LinkageError if plotly is not installed.
 
-    Parameters
-    ----------
-    results
-        The results.
-    styles
-        Style of each method.
-    pictures
-        The diagrams as SVG, by their keys; for print, and for browsers without scripts.
-
-    Raises
-    ------
-    LinkageError
-        If plotly is not installed.
-
+    The pictures are the diagrams as SVG, by key: for print, and for browsers without scripts.
     """
     title = title_of(results)
     diagrams = [diagram for part in results.parts for diagram in part.diagrams]

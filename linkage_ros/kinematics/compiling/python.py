@@ -81,17 +81,7 @@ def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]
 
 
 def python_body(path: Path, leave: str) -> Body:
-    """
-    Return a path as lines of Python.
-
-    Parameters
-    ----------
-    path
-        The path.
-    leave
-        The statement that leaves the lines if the path is not valid.
-
-    """
+    """Return a path as lines of Python; ``leave`` is the statement if it is not valid."""
     constants: dict[str, Any] = {}
     conditions = [decision.condition for decision in path.decisions]
     outputs = [number for group in path.outputs for number in group]

@@ -268,20 +268,9 @@ def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
     """
     Return the tree of a linkage, ignoring its limits.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    derivatives
-        0: positions; 1: velocities too; 2: accelerations too.
-    wanted
-        Selects the numbers of the leaves.
-
-    Raises
-    ------
-    DefinitionError
-        If links are solved by iteration, or no closed state is found.
-
+    ``wanted`` selects the numbers of the leaves. Derivatives are 0 for positions, 1 with
+    velocities, 2 with accelerations. A DefinitionError says that links are solved by iteration, or
+    that no closed state is found.
     """
     if iterated(closure):
         raise DefinitionError(

@@ -172,7 +172,22 @@ class Language(ABC):
 
 
 def source(subject: Subject, language: Language) -> str:
-    """Return a linkage as the source of a program; a DefinitionError if it cannot be compiled."""
+    """
+    Return a linkage as the source of a program.
+
+    Parameters
+    ----------
+    subject
+        The linkage and the numbers to compile.
+    language
+        The language.
+
+    Raises
+    ------
+    DefinitionError
+        If the linkage cannot be compiled.
+
+    """
     closure = subject.closure
     names = list(closure.linkage.joints)
     asked = [names.index(name) for name in subject.joints]

@@ -196,17 +196,7 @@ class Tape:
 
 
 class Symbol:
-    """
-    A number that is not known yet.
-
-    Parameters
-    ----------
-    tape
-        The tape that records the operations on it.
-    operation
-        The operation that it stands for.
-
-    """
+    """A number that is not known yet: the result of an operation on the tape that records it."""
 
     __slots__ = ('operation', 'tape')
 

@@ -306,19 +306,7 @@ def wanted_rocker(task: FunctionTask, crank: ArrayLike) -> Array:
 
 
 def on_scale(task: FunctionTask, crank: float, error: float) -> FunctionError:
-    """
-    Return an error of the rocker on the scale of the function.
-
-    Parameters
-    ----------
-    task
-        The function.
-    crank
-        Angle of the crank, in [rad].
-    error
-        The rocker's angle minus the wanted one, in [rad].
-
-    """
+    """Return an error of the rocker's angle, at a crank angle, as one of the function."""
     x = float(_x(task, np.array(crank)))
     (start, end), (first, last) = task.y_range, task.rocker_range
     part = error / (last - first)

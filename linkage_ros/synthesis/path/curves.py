@@ -216,17 +216,9 @@ _SPARE = 1e-9
 
 class Slopes(NamedTuple):
     """
-    Places of the traced point, and their derivatives.
+    Places of the traced point, (n, N), and their derivatives.
 
-    Attributes
-    ----------
-    places
-        (n, N).
-    by_dimension
-        (n, N, 9), in the order of `COLUMNS`.
-    by_angle
-        (n, N), by the crank angle θ.
-
+    By dimension, in the order of `COLUMNS`, they are (n, N, 9); by the crank angle θ (n, N).
     """
 
     places: Complex
@@ -383,13 +375,7 @@ def theta_at(way: Array, wanted: Array) -> Array:
     """
     Return the places at relative distances along curves, as a fraction of their steps.
 
-    Parameters
-    ----------
-    way
-        From `along`, (n, M).
-    wanted
-        Relative distances from 0 to 1, (N,), or (n, N).
-
+    The ways are from `along`, (n, M), the distances from 0 to 1, (N,) or (n, N).
     """
     before, part = _segment(way, wanted)
     part += before

@@ -356,7 +356,17 @@ class PathResult(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """The best accepted and refused linkages of a path generation, sorted by error."""
+    """
+    The result of a path generation, sorted by error.
+
+    Attributes
+    ----------
+    found
+        The best accepted linkages.
+    refused
+        The best refused linkages.
+
+    """
 
     found: tuple[PathResult, ...]
     refused: tuple[PathResult, ...]
