@@ -99,21 +99,7 @@ class TickPlan:
 
 @dataclass(frozen=True, slots=True)
 class Contender:
-    """
-    A program that ticks.
-
-    Attributes
-    ----------
-    name
-        Its name in tables.
-    rate
-        Requested ticks per second.
-    module
-        The Python module to run.
-    arguments
-        Its command line.
-
-    """
+    """A Python module that ticks, with its command line, its name in tables, and its rate."""
 
     name: str
     rate: float

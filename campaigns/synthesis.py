@@ -176,19 +176,9 @@ class Case(NamedTuple):
 
 class Family(NamedTuple):
     """
-    Random linkages with a common difficulty.
+    Random linkages with a common difficulty; three crank angles may leave them open.
 
-    Attributes
-    ----------
-    description
-        The difficulty.
-    lengths
-        Draws the links.
-    angles
-        Draws three crank angles; the linkage may be open there.
-    mixed
-        Whether each angle has its own assembly.
-
+    If ``mixed``, each angle has its own assembly.
     """
 
     description: str

@@ -155,21 +155,9 @@ _libc = ctypes.CDLL(None, use_errno=True)
 
 class Call(NamedTuple):
     """
-    A waiting system call.
+    A waiting system call: the name of its `Signature`, the path of its file or '', the registers.
 
-    Attributes
-    ----------
-    identifier
-        The kernel's identifier of the call.
-    thread
-        The calling thread.
-    name
-        Name of its `Signature`.
-    path
-        The path of its file; '' for none.
-    arguments
-        Values of the registers.
-
+    The ``identifier`` is the kernel's, the ``thread`` that of the caller.
     """
 
     identifier: int
@@ -192,16 +180,8 @@ def listen() -> int:
     """
     Make the calls of this thread, and of threads that it starts, wait from now on.
 
-    Returns
-    -------
-    int
-        The descriptor on which another process receives them.
-
-    Raises
-    ------
-    OSError
-        The kernel does not allow it.
-
+    Another process receives them on the returned descriptor. An OSError says that the kernel does
+    not allow it.
     """
     calls, seccomp = _MACHINES[platform.machine()]
     filters = [(_LOAD, 0, 0, 0)]
@@ -218,17 +198,7 @@ def listen() -> int:
 
 
 class Listener:
-    """
-    Receives the calls of another process and answers them.
-
-    Parameters
-    ----------
-    descriptor
-        The descriptor that `listen` returned, in this process.
-    process
-        Process id of the calling process.
-
-    """
+    """Receives the calls of another process on the descriptor of `listen`, and answers them."""
 
     def __init__(self, descriptor: int, process: int) -> None:
         self.descriptor = descriptor
@@ -313,19 +283,7 @@ Do = Callable[[Callable[[str], None]], Recorded]
 
 
 class SeenCall(NamedTuple):
-    """
-    A system call on the bag.
-
-    Attributes
-    ----------
-    name
-        Its name.
-    target
-        The part of the bag: file, metadata, folder, reserve or parent folder.
-    phase
-        The phase of the recording.
-
-    """
+    """A system call on a part of a bag: file, metadata, folder, reserve or parent folder."""
 
     name: str
     target: str

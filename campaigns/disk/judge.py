@@ -193,19 +193,7 @@ AT_RECOVERY = 'ended early, complete after recovery'
 
 @dataclass(slots=True)
 class Outcome:
-    """
-    The outcome of a recording.
-
-    Attributes
-    ----------
-    verdict
-        One of the verdicts above; '' if there are only faults.
-    faults
-        The violations.
-    offered, recorded, let_go
-        Numbers of messages.
-
-    """
+    """The outcome of a recording, with counts of messages; no verdict if it has only faults."""
 
     verdict: str = ''
     faults: list[str] = field(default_factory=list)

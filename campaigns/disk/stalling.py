@@ -56,23 +56,9 @@ _LINKAGE = Path(__file__).parents[2] / 'config' / 'linkages' / 'four_bar.yaml'
 
 class Plan(NamedTuple):
     """
-    One run of a node.
+    One run of a node: durations are in [s], the rate in [Hz]; a stall of 0 is none.
 
-    Attributes
-    ----------
-    name
-        Its name in reports.
-    seconds
-        Its duration [s].
-    stall
-        Duration of the stall in the middle of the run [s]; 0 for none.
-    queue
-        Length of the recorder's queue.
-    recovers
-        Whether the disk responds again before the node is ended.
-    rate
-        Rate of the ticks [Hz].
-
+    It stalls in the middle of the run. If the disk ``recovers``, it does before the node is ended.
     """
 
     name: str

@@ -71,19 +71,7 @@ MOST_GROWTH = 1024
 
 
 class Usage(NamedTuple):
-    """
-    Memory, open files and threads of a process at one time.
-
-    Attributes
-    ----------
-    time
-        Time since the beginning [s].
-    resident
-        Resident memory: ``VmRSS`` [kB].
-    files, threads
-        Number of open files and of threads.
-
-    """
+    """Resident memory (``VmRSS``, [kB]), open files and threads of a process, and the time [s]."""
 
     time: float
     resident: int

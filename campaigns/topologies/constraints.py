@@ -359,15 +359,8 @@ class Equations:
         """
         Correct states by Newton's method; return the solutions, and which have converged.
 
-        Parameters
-        ----------
-        unknowns, inputs
-            (n, N) and (inputs, N).
-        shift
-            Wanted residuals, (n, N); 0 if not given.
-        steps
-            Maximum number of corrections.
-
+        Unknowns (n, N) and inputs (inputs, N) have the residuals ``shift``, (n, N), at the end; 0
+        if not given.
         """
         found = np.array(unknowns, Real)
         good = np.zeros(found.shape[1], bool)

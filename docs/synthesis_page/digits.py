@@ -132,15 +132,7 @@ def errors(lengths: Sequence[mpf], crank: Sequence[mpf], rocker: Sequence[mpf]) 
 
 
 class Task:
-    """
-    Three pairs in degrees, and their design in 50 digits.
-
-    Parameters
-    ----------
-    crank, rocker
-        Three angles each, in degrees.
-
-    """
+    """Three pairs in degrees, and their design in 50 digits."""
 
     def __init__(self, crank: Degrees, rocker: Degrees) -> None:
         self.crank, self.rocker = tuple(map(mpf, crank)), tuple(map(mpf, rocker))

@@ -53,19 +53,9 @@ def opened(
     browser: Any, file: Path, *, width: int = 1000, height: int = 900, **context: Any
 ) -> Iterator[Opened]:
     """
-    Open a file.
+    Open a file in a running browser, in a window of some pixels.
 
-    Parameters
-    ----------
-    browser
-        A running browser; see `chromium.browser`.
-    file
-        The page.
-    width, height
-        Of its window, in pixels.
-    **context
-        What else Playwright is told: ``color_scheme='dark'``, ``has_touch=True``.
-
+    The context is what else Playwright is told: ``color_scheme='dark'``, ``has_touch=True``.
     """
     viewport = {'width': width, 'height': height}
     # It is not offline: a request must be seen, not fail.
