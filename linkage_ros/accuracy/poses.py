@@ -145,15 +145,9 @@ def easy(closure: Closure, count: int) -> tuple[tuple[float, ...], ...]:
 
 def path(poses: Poses, count: int) -> Poses | None:
     """
-    Return a path through the whole range of a single input, or one full turn.
+    Return so many states through the whole range of a single input, or one full turn.
 
-    Parameters
-    ----------
-    poses
-        Easy poses of the linkage; a turn begins at the first.
-    count
-        Number of states after the first.
-
+    The turn begins at the first of the easy poses.
     """
     closure = Closure(poses.linkage)
     if len(poses.linkage.inputs) > 1:

@@ -55,13 +55,8 @@ def opened(path: Path, stop: Event) -> Bag:
     """
     Open a bag for reading as far as it goes; report attachments that are not read.
 
-    Raises
-    ------
-    BagError
-        See `read_bag`.
-    StoppedError
-        If a signal came while the file was searched because its index is missing.
-
+    Errors are those of `read_bag`; a StoppedError says that a signal came while the file was
+    searched because its index is missing.
     """
 
     def look(_read: int) -> None:

@@ -82,20 +82,9 @@ def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
 
 def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = ()) -> None:
     """
-    Write or replace a linkage file atomically.
+    Write or replace a linkage file atomically, as `linkage_text`; a symbolic link is followed.
 
-    Parameters
-    ----------
-    linkage, comment
-        As in `linkage_text`.
-    file
-        Target; a symbolic link is followed.
-
-    Raises
-    ------
-    LinkageError
-        The file cannot be written, or its text would not be a valid linkage.
-
+    A LinkageError says that it cannot be written, or that its text would not be a valid linkage.
     """
     data = linkage_text(linkage, comment).encode()
     read_linkage(parse_yaml(data, str(file)))

@@ -78,20 +78,9 @@ class BoundedLoader(yaml.SafeLoader):
 
 def bounded_yaml(text: str, most: int = MOST_VALUES) -> Any:
     """
-    Parse a YAML text.
+    Parse a YAML text of so many values at most.
 
-    Parameters
-    ----------
-    text
-        The text.
-    most
-        Most values that it may contain.
-
-    Raises
-    ------
-    ValueError
-        It is not YAML, or exceeds a limit; the text of the error, one line, says which.
-
+    The text of a ValueError, one line, says whether it is not YAML, or which limit it exceeds.
     """
     try:
         loader = BoundedLoader(text, most)

@@ -208,20 +208,9 @@ class SteppedScene:
 
     def start(self, seed: int, inputs: Sequence[float]) -> None:
         """
-        Do the first tick.
+        Do the first tick, with a seed of all random numbers, and values of `inputs` at that time.
 
-        Parameters
-        ----------
-        seed
-            Seed of all random numbers.
-        inputs
-            Values of `inputs` at that time.
-
-        Raises
-        ------
-        LinkageError
-            The seed is out of bounds, or no linkage can be made of it.
-
+        A LinkageError says that the seed is out of bounds, or that no linkage can be made of it.
         """
         if not 0 <= seed <= LARGEST_SEED:
             raise LinkageError('seed', f'{seed} is out of bounds', f'write 0 to {LARGEST_SEED}')

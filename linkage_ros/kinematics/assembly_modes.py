@@ -62,13 +62,7 @@ def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
     """
     Return the assemblies of an iterated group at the inputs of the pose, except that of the pose.
 
-    Parameters
-    ----------
-    closure
-        A linkage with a pose.
-    number
-        Index of the group. The groups before it keep their places.
-
+    The groups before it keep their places.
     """
     group = closure.structure.groups[number]
     assert isinstance(group, Iterated)

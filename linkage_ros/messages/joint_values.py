@@ -253,15 +253,7 @@ MULTI_DOF_JOINT_STATE = declared(
 
 
 class PlanarWrenchWriter:
-    """
-    Writes a MultiDOFJointState with wrenches only, for a fixed list of joints.
-
-    Parameters
-    ----------
-    names
-        The joints, in the order of the message.
-
-    """
+    """Writes a MultiDOFJointState with wrenches only, for a fixed list of joints."""
 
     __slots__ = ('_constants', '_pack')
 

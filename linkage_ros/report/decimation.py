@@ -100,17 +100,7 @@ def capacity(columns: int, space: int) -> int:
 
 
 class MinMaxCurve:
-    """
-    Curves that grow row by row.
-
-    Parameters
-    ----------
-    columns
-        Number of curves.
-    most
-        Maximum number of intervals, a power of two; twice as many for single rows.
-
-    """
+    """Curves that grow row by row, over a power of two of intervals, or twice as many rows."""
 
     def __init__(self, columns: int, most: int) -> None:
         self._most = most
@@ -126,17 +116,7 @@ class MinMaxCurve:
         self._pair = np.empty((2, columns))
 
     def add(self, times: Times, values: Numbers) -> None:
-        """
-        Add rows.
-
-        Parameters
-        ----------
-        times
-            Times in [ns], of shape (n,).
-        values
-            Values, of shape (n, columns); NaN for a missing value.
-
-        """
+        """Add rows: times in [ns], (n,), and values, (n, columns); NaN for a missing value."""
         at = 0
         while at < len(times):
             if self._open:

@@ -33,20 +33,9 @@ LATER_PINS = 'pins that turn up later'
 
 class PinForces:
     """
-    Collects the forces.
+    Collects the forces of the window from their topics, one of each linkage.
 
-    Parameters
-    ----------
-    topics
-        Their topics: one of each linkage.
-    window
-        The part of the run to show.
-
-    Attributes
-    ----------
-    left_out
-        Number of messages, or pins of messages, left out, by reason.
-
+    Messages, or pins of messages, that are ``left_out`` are counted by reason.
     """
 
     def __init__(self, topics: str, window: Window) -> None:

@@ -204,22 +204,7 @@ _NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving 
 
 
 class SceneRun:
-    """
-    Reads a run of a scene, block by block.
-
-    Parameters
-    ----------
-    bag, run, scene
-        The bag, its run account and its scene.
-    window
-        The part of the run to show.
-
-    Raises
-    ------
-    LinkageError
-        If the scene cannot be built here.
-
-    """
+    """Reads a window of a scene's run, block by block; a LinkageError if it cannot be built."""
 
     def __init__(self, bag: Bag, run: RunAccount, scene: Scene, window: Window) -> None:
         from_beginning = not lost_beginning(bag, run)

@@ -114,13 +114,7 @@ class SampleJudge:
         """
         Return which samples of a block were accepted; apply faults and resets between them.
 
-        Parameters
-        ----------
-        rows
-            The messages of the block, by kind.
-        lanes
-            Lanes of the events: fault, reset and rejected.
-
+        The events get into the lanes fault, reset and rejected.
         """
         samples = rows['samples']
         good = np.zeros(len(samples.data), bool)

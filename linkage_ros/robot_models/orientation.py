@@ -131,17 +131,7 @@ _MARGIN = 1e-3
 
 
 class Span(NamedTuple):
-    """
-    The range of a joint.
-
-    Attributes
-    ----------
-    lowest, highest
-        In [rad] or [m]; −π and π for an angle without limits.
-    limited
-        Whether the two are limits.
-
-    """
+    """The range of a joint in [rad] or [m]; −π and π for an angle without limits."""
 
     lowest: float
     highest: float

@@ -67,11 +67,7 @@ class Names:
         """
         Return the names of one of its linkages; call it for all linkages before using any.
 
-        Raises
-        ------
-        PartError
-            If two linkages lead to the same name.
-
+        A PartError says that two linkages lead to the same name.
         """
         for kind, taken, found in (
             ('link', self._frames, linkage.links),

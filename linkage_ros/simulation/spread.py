@@ -29,19 +29,7 @@ _MEDIAN = 2
 
 
 class JointSpread(NamedTuple):
-    """
-    A joint in all runs.
-
-    Attributes
-    ----------
-    name
-        The joint.
-    unit
-        'rad' or 'm'.
-    values
-        A row for each run, a column for each instant; not a number where nothing was published.
-
-    """
+    """A joint in all runs: a row for each run, a column for each instant; NaN if not published."""
 
     name: str
     unit: str

@@ -43,19 +43,7 @@ _SLOW = ('export',)
 
 
 class Conversation:
-    """
-    Answers what all pages of a server ask for.
-
-    Parameters
-    ----------
-    name
-        Name of the linkage.
-    scene
-        The scene whose sensors are read; None if there is none.
-    file
-        The user's file, if pages may save it; else None.
-
-    """
+    """Answers all pages of a server: of a linkage, a scene's sensors, a user's file."""
 
     def __init__(self, name: str, scene: SceneFiles | None, file: UserFile | None) -> None:
         self._file = file

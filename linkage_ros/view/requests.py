@@ -177,17 +177,9 @@ class Answers:
 
 class _Asked(NamedTuple):
     """
-    What a request holds.
+    What a request holds: the message, and the name of the linkage that the server opened.
 
-    Attributes
-    ----------
-    content
-        The message.
-    opened
-        Name of the linkage with which the server was opened.
-    sensors
-        Returns the sensors of the page, for the text of a linkage.
-
+    ``sensors`` returns the sensors of the page, for the text of a linkage.
     """
 
     content: Mapping[str, Any]

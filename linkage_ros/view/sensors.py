@@ -45,19 +45,7 @@ _FASTEST = 2000.0
 
 
 class SceneFiles(NamedTuple):
-    """
-    A scene as it goes to another process.
-
-    Attributes
-    ----------
-    name
-        Name of the scene.
-    files
-        Texts of the scene and its linkages, by name, as `Scene.files` has them.
-    folder
-        Folder of the paths in the scene.
-
-    """
+    """A scene as it goes to another process: texts as in `Scene.files`, folder of its paths."""
 
     name: str
     files: Mapping[str, str]

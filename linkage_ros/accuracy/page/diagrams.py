@@ -93,17 +93,9 @@ class Placed(NamedTuple):
 
 class PlacedCurve(NamedTuple):
     """
-    A curve with the positions of its points.
+    A curve with the positions of its points; None where the line is broken.
 
-    Attributes
-    ----------
-    curve
-        The curve.
-    points
-        Its points; None where the line is broken.
-    named
-        The point beside which its name stands; None if no point is drawn.
-
+    The name stands beside the point ``named``; None if no point is drawn.
     """
 
     curve: Curve

@@ -42,15 +42,9 @@ _TRIED_ITERATED = 2
 
 class Answer(NamedTuple):
     """
-    The result of a compiled linkage at a state.
+    The result of a compiled linkage at a state; status and gap are those of `Position`.
 
-    Attributes
-    ----------
-    status, gap
-        As in `Position`.
-    values
-        The requested numbers, in groups; a group without a result is empty.
-
+    The requested numbers are in groups; a group without a result is empty.
     """
 
     status: Status

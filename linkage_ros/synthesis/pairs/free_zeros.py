@@ -403,19 +403,8 @@ def four_pairs(
     Return all four-bars for four pairs, with the zero of the rocker free, then the crank's.
 
     Of each the best conditioned comes first. A four-bar with both zeros at 0 is listed once.
-
-    Parameters
-    ----------
-    crank, rocker
-        Four angles each, in [rad].
-    ground
-        Length of the ground, in [m].
-
-    Raises
-    ------
-    SynthesisError
-        If none is real with finite links, or infinitely many exist.
-
+    Angles are in [rad], the ground in [m]. A SynthesisError says that none is real with finite
+    links, or that infinitely many exist.
     """
     check_pairs(crank, rocker, ground)
     rows = differences(crank, rocker)
@@ -457,20 +446,7 @@ def five_pairs(
     """
     Return all four-bars for five pairs with the zeros of crank and rocker free.
 
-    The best conditioned comes first.
-
-    Parameters
-    ----------
-    crank, rocker
-        Five angles each, in [rad].
-    ground
-        Length of the ground, in [m].
-
-    Raises
-    ------
-    SynthesisError
-        If none is real with finite links, or infinitely many exist.
-
+    The best conditioned comes first. Units and errors are those of `four_pairs`.
     """
     check_pairs(crank, rocker, ground)
     rows = differences(crank, rocker)

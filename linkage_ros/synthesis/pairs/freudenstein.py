@@ -446,15 +446,9 @@ class ThreePairs(NamedTuple):
 
 def links(crank: ArrayLike, rocker: ArrayLike) -> Links:
     """
-    Solve for three pairs, or for many triples at once.
+    Solve for three pairs of angles θ and φ in [rad], or for many triples at once, (…, 3).
 
     No error is raised: a link that does not exist is infinite or NaN.
-
-    Parameters
-    ----------
-    crank, rocker
-        Angles θ and φ, in [rad]; (…, 3).
-
     """
     theta, phi = _columns(crank), _columns(rocker)
     k, lengths = np.empty((2, *theta.shape))
@@ -466,17 +460,7 @@ def links(crank: ArrayLike, rocker: ArrayLike) -> Links:
 
 
 def three_pairs(crank: ArrayLike, rocker: ArrayLike) -> ThreePairs:
-    """
-    Solve for three pairs, or for many triples at once, with the accuracy of the result.
-
-    No error is raised: a link that does not exist is infinite or NaN.
-
-    Parameters
-    ----------
-    crank, rocker
-        Angles θ and φ, in [rad]; (…, 3).
-
-    """
+    """Solve as `links`, with the accuracy of the result."""
     theta, phi = _columns(crank), _columns(rocker)
     count = theta.shape[1]
     k, lengths, kappa = np.empty((3, 3, count))

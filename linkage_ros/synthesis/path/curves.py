@@ -324,13 +324,7 @@ def diagonals(a: Array, d: Array, low: Array, high: Array) -> tuple[Array, Array
     """
     Return the shortest and the longest diagonal from the crank's pin to the rocker's pivot.
 
-    Parameters
-    ----------
-    a, d
-        Lengths of crank and ground.
-    low, high
-        First and last crank angle, from the ground line, in [rad].
-
+    Crank angles are from the ground line, in [rad].
     """
     first, last = np.cos(low), np.cos(high)
     nearest = np.where(_holds(low, high, 0.0), 1.0, np.maximum(first, last))
