@@ -123,9 +123,8 @@ def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
         found = model(shown.data.decode(), shown.name)
         write_page(arguments.output, page(found, mode='still'))
         return 0
-    from linkage_ros.view.conversation import Conversation
+    from linkage_ros.view.conversation import Conversation, UserFile
     from linkage_ros.view.sensors import SceneFiles
-    from linkage_ros.view.user_file import UserFile
 
     shipped = arguments.file in (*linkage_names(), *scene_names())
     file = None if shipped else UserFile(shown.path)

@@ -34,12 +34,18 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_values import JOINT_STATE, WRENCHES
 from linkage_ros.replay.replay import own_joint_states, recorded_scene
 from linkage_ros.report.blocks import Blocks, Entry, Progress, Rows, rows_of, RunClock, times_of
-from linkage_ros.report.curves import BoundedCurves, MOST_LINKAGES, NO_ROOM, SceneCurves, UNITS
+from linkage_ros.report.curves import (
+    BoundedCurves,
+    MOST_LINKAGES,
+    NO_ROOM,
+    PinForces,
+    SceneCurves,
+    UNITS,
+)
 from linkage_ros.report.decimation import Flags, Numbers, STATE_BYTES, Times
 from linkage_ros.report.diagnostics_summary import DiagnosticsSummary
 from linkage_ros.report.joint_states import JointBlock, JointStates
 from linkage_ros.report.labels import LANES, short
-from linkage_ros.report.pin_forces import PinForces
 from linkage_ros.report.run import APART, Column, Lane, LinkageRun, Run, Silences, Window
 from linkage_ros.report.samples import Crank, SampleJudge
 from linkage_ros.scene.scene import Scene

@@ -43,8 +43,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.resources import linkage_names, shipped
 from linkage_ros.view.edit import edited, pin_of
 from linkage_ros.view.exports import export
-from linkage_ros.view.model import model, Shown
-from linkage_ros.view.poses import pose
+from linkage_ros.view.model import model, pose, Shown
 from linkage_ros.view.sensors import SceneFiles, Sensors
 
 LARGEST = 1_000_000

@@ -26,10 +26,9 @@ from linkage_ros.files.linkage_file import load, read_closure
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.resources import linkage_names, shipped
-from linkage_ros.view.conversation import Conversation
+from linkage_ros.view.conversation import Conversation, UserFile
 from linkage_ros.view.model import model
 from linkage_ros.view.page import page as page_of
-from linkage_ros.view.user_file import UserFile
 import pytest
 
 from .served import Served, served
