@@ -157,7 +157,6 @@ KINDS: dict[str, Callable[..., Path]] = {
     ),
 }
 
-
 FAULT = 'FAULT: '
 """Prefix of a verdict that is a violation."""
 

@@ -322,7 +322,6 @@ FAMILIES = {
     'extreme': Family('links of 1e-4 to 1e4 grounds', _extreme, _anywhere),
 }
 
-
 _PART = 500
 _ROUNDOFF = 2.0**-53
 

@@ -49,13 +49,11 @@ _LONGEST = 600
 _MOST = 5 + (os.cpu_count() or 1)
 """Maximum number of processes at once."""
 
-
 _BOUNDED = (
     'import os, signal, sys; signal.alarm(int(sys.argv[1])); '
     'os.execv(sys.executable, [sys.executable, *sys.argv[2:]])'
 )
 """Runs Python with the arguments after the first, for at most that many seconds."""
-
 
 _DOMAINS = range(1, 102)
 """ROS domains whose ports are safe on every operating system."""

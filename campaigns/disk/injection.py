@@ -85,7 +85,6 @@ FAULTS: Mapping[str, Fault] = {
     'EIO, pages lost': Fault(frozenset({'fsync'}), errno.EIO, loses=True),
 }
 
-
 _NEW_LISTENER, _SET_FILTER, _NO_NEW_PRIVILEGES = 8, 1, 38
 _NOTIFY, _ALLOW = 0x7FC00000, 0x7FFF0000
 _LOAD, _JUMP_IF_EQUAL, _RETURN = 0x20, 0x15, 0x06

@@ -40,7 +40,6 @@ from linkage_ros.scene.scene import Scene
 _LONGER = 1.1
 """A run is longer than its flush period by this factor, so that it has at least one flush."""
 
-
 NO_BAG = 'no bag'
 
 

@@ -114,7 +114,6 @@ def _zstd(data: bytes, most: int) -> bytes:
 
 _UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {'lz4': _lz4, 'zstd': _zstd}
 
-
 HEAD = Struct('<BQ')
 """Head of a record: its kind, and the length of its content."""
 

@@ -51,7 +51,6 @@ It is not 0: with a nap of 0 the thread often takes the interpreter back before 
 wakes up.
 """
 
-
 PLACE = 16 * 1024
 """
 How large a message may be that takes one place in a queue [bytes]; a larger one takes more.

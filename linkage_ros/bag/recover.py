@@ -57,7 +57,6 @@ from mcap.writer import CompressionType, Writer
 RECOVERED = 'linkage_ros.recovered'
 """Key in the ``custom_data`` of a recovered bag: its origin and losses."""
 
-
 NOTHING_LOST = 'nothing lost'
 """End of that text if nothing was lost."""
 

@@ -32,7 +32,6 @@ PICTURES = ('.png', '.svg', '.pdf')
 LINKAGES = ('.yaml', '.yml')
 """Suffixes of linkage and scene files."""
 
-
 SCENE_HELP = 'scene file or linkage file, or a name of linkage gallery'
 
 

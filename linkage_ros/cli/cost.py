@@ -105,7 +105,6 @@ EVERY_FAULT = {
 }
 """Every fault with its parameters, on the shipped four-bar."""
 
-
 EXAMPLE = 'linkage cost worn_press --ticks 2000'
 
 

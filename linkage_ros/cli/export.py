@@ -235,7 +235,6 @@ def _ticks(
 
 _MIB = 2**20
 
-
 EXAMPLE = 'linkage export my_bag -o my_bag.csv'
 
 

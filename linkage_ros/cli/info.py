@@ -49,7 +49,6 @@ from linkage_ros.signals import heeded
 
 _MIB = 2**20
 
-
 EXAMPLE = 'linkage info my_bag'
 
 

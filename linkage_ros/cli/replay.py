@@ -374,7 +374,6 @@ def _side_by_side(
 
 EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
 
-
 EXAMPLE = 'linkage replay my_bag --set angles=wrapped'
 
 

@@ -136,7 +136,6 @@ KINDS: dict[
 ] = {'.csv': _csv, '.parquet': _parquet}
 """Writer for each suffix of a file."""
 
-
 _MOST = 1000
 _LARGEST_FILE = 10_000_000
 

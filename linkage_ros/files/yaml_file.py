@@ -128,7 +128,6 @@ for _tag, _pattern, _first in (
         f'tag:yaml.org,2002:{_tag}', re.compile(f'(?:{_pattern})$'), [*_first, '']
     )
 
-
 LARGEST_FILE = 1_000_000
 """Most bytes of a file."""
 

@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.results import InputRange, Position
     from linkage_ros.kinematics.topology import Structure
 
-
 _UNDISTURBED = (Status.CLOSED, Status.CHANGE_POINT)
 """A state of these becomes limited beyond the limits; a toggle stays one, without rates."""
 

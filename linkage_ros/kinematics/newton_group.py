@@ -58,7 +58,6 @@ import numpy as np
 if TYPE_CHECKING:
     from linkage_ros.kinematics.known_links import KnownLinks
 
-
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 """Largest residual of a constraint at a solution, relative to the size of the coordinates."""
 

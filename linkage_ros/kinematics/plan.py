@@ -51,7 +51,6 @@ from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Structure
 _SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
 _SIDES['RPR'] = _SIDES['RRP']
 
-
 _LEVEL = Angle(0, 0.0, 1 + 0j)
 """The zero direction of angles in the frame of the ground."""
 

@@ -122,7 +122,6 @@ _APART = 1e-4
 _MANY = 12
 """An extreme met at more places than this lists none of them; also the lines of a grid."""
 
-
 _NEAR_ZERO, _ZERO = 0.25, 1e-7
 """Upper bounds of a sample next to a zero, and of a zero, in [rad]."""
 

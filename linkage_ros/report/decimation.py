@@ -38,7 +38,6 @@ Times = NDArray[np.int64]
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-
 PAGE_BYTES = 20_000_000
 """Size limit of a page, in [bytes]; a quarter of it is the plotting library."""
 
@@ -58,7 +57,6 @@ SHAPE_BYTES = 500_000
 
 TABLE_BYTES = 600_000
 """Size limit of the tables, in [bytes]."""
-
 
 _FEWEST_INTERVALS = 256
 """Minimum number of intervals of a useful curve."""

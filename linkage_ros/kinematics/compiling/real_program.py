@@ -235,7 +235,6 @@ _BY_SQUARES: dict[str, Callable[..., Any]] = {
     'abs': _length_by_squares,
 }
 
-
 # All paths of a linkage's position, as one tree of conditions in real numbers.
 #
 # A leaf gives the status of the linkage, and its numbers if there are any. The tree follows the

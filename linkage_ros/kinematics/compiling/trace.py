@@ -25,7 +25,6 @@ from linkage_ros.kinematics.status import Status
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import Acceleration, LoopClosure, Position, Velocity
 
-
 Number = Operation | float
 """A result of a program: an operation, or a constant."""
 
