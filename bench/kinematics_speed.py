@@ -139,23 +139,11 @@ _AGREEMENT = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class SpeedPlan:
-    """
-    Amount of the measurement.
+    """Amount of the measurement."""
 
-    Attributes
-    ----------
-    rounds
-        Number of measurements of each, in turn.
-    states
-        Number of states solved one at a time, per round.
-    batch
-        Number of states of a batch.
-
-    """
-
-    rounds: int
-    states: int
-    batch: int
+    rounds: int  # Number of measurements of each, in turn
+    states: int  # Number of states solved one at a time, per round
+    batch: int  # Number of states of a batch
 
 
 def measure_speed(plan: SpeedPlan) -> Table:

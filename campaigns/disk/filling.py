@@ -53,25 +53,12 @@ class NotPermittedError(Exception):
 
 
 class Disk(NamedTuple):
-    """
-    A small disk.
+    """A small disk."""
 
-    Attributes
-    ----------
-    name
-        Its name in reports.
-    kind
-        'tmpfs' or 'ext4'; the latter is an image on a loop device.
-    size
-        Its size in [MiB].
-    reserved
-        The share that only root may fill [percent]; if not 0, another user records.
-
-    """
-
-    name: str
-    kind: str
-    size: int
+    name: str  # Its name in reports
+    kind: str  # 'tmpfs' or 'ext4'; the latter is an image on a loop device
+    size: int  # Its size in [MiB]
+    # The share that only root may fill [percent]; if not 0, another user records.
     reserved: int = 0
 
     @property

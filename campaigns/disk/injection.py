@@ -49,29 +49,13 @@ _ALL = _CHANGE | {'open', 'close', 'rmdir', 'statfs'}
 
 
 class Fault(NamedTuple):
-    """
-    A fault of a system call.
+    """A fault of a system call."""
 
-    Attributes
-    ----------
-    calls
-        The calls that can have this fault.
-    error
-        Its error number; 0 for none.
-    short
-        Whether only a part of the data is written.
-    loses
-        Whether the data written since the last successful fsync is lost.
-    harmless
-        Whether a recording has to continue and to be complete.
-
-    """
-
-    calls: frozenset[str]
-    error: int = 0
-    short: bool = False
-    loses: bool = False
-    harmless: bool = False
+    calls: frozenset[str]  # The calls that can have this fault
+    error: int = 0  # Its error number; 0 for none
+    short: bool = False  # Whether only a part of the data is written
+    loses: bool = False  # Whether the data written since the last successful fsync is lost
+    harmless: bool = False  # Whether a recording has to continue and to be complete
 
 
 FAULTS: Mapping[str, Fault] = {
@@ -97,19 +81,10 @@ _PAGE = 4096
 
 
 class Signature(NamedTuple):
-    """
-    A system call.
+    """A system call."""
 
-    Attributes
-    ----------
-    name
-        Its name, the same for all its variants.
-    path
-        Number of the argument that is a path; None if the first argument is a descriptor.
-
-    """
-
-    name: str
+    name: str  # Its name, the same for all its variants
+    # Number of the argument that is a path; None if the first argument is a descriptor.
     path: int | None = None
 
 
@@ -290,23 +265,11 @@ class SeenCall(NamedTuple):
 
 
 class Injection(NamedTuple):
-    """
-    The calls that fail, and their fault.
+    """The calls that fail, and their fault."""
 
-    Attributes
-    ----------
-    number
-        Number of the first failing call, from 0.
-    fault
-        Name of one of `FAULTS`.
-    lasting
-        Whether all later calls that can have this fault fail too.
-
-    """
-
-    number: int
-    fault: str
-    lasting: bool
+    number: int  # Number of the first failing call, from 0
+    fault: str  # Name of one of `FAULTS`
+    lasting: bool  # Whether all later calls that can have this fault fail too
 
 
 def run(

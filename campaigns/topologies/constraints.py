@@ -62,23 +62,13 @@ class _Moved(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """
-    States of a linkage, in columns.
+    """States of a linkage, in columns."""
 
-    Attributes
-    ----------
-    unknowns
-        (n, N): angle [rad] and position [m] of each moving link in turn.
-    rates, accelerations
-        (n, N), their time derivatives.
-    joints
-        Three arrays (joints, N): values of the published joints and their derivatives.
-
-    """
-
-    unknowns: Array
+    unknowns: Array  # (n, N): angle [rad] and position [m] of each moving link in turn
+    # (n, N), their time derivatives.
     rates: Array
     accelerations: Array
+    # Three arrays (joints, N): values of the published joints and their derivatives.
     joints: tuple[Array, Array, Array]
 
 

@@ -54,34 +54,17 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """
-    A linkage, and the knowledge of its generator about it.
+    """A linkage, and the knowledge of its generator about it."""
 
-    Attributes
-    ----------
-    linkage
-        The linkage, in the package's terms.
-    groups
-        Inputs and dyads in the order of solution; None with an Assur group that is no dyad.
-    sides
-        For the pin or slider that closes a dyad +1 (left, ahead) or −1, or a side that changes.
-    start
-        Inputs at which it closes by construction, in [rad] or [m].
-    pose
-        Angle and position of each moving link there.
-    step
-        A small change of each input: 0.3 rad, or 0.3 of a length.
-    change_points
-        Inputs within a turn at which the linkage passes an exact change point.
-
-    """
-
-    linkage: Linkage
+    linkage: Linkage  # The linkage, in the package's terms
+    # Inputs and dyads in the order of solution; None with an Assur group that is no dyad.
     groups: tuple[Group, ...] | None
+    # For the pin or slider that closes a dyad +1 (left, ahead) or −1, or a side that changes.
     sides: Mapping[str, int | Passing]
-    start: tuple[float, ...]
-    pose: Mapping[str, tuple[float, float, float]]
-    step: tuple[float, ...]
+    start: tuple[float, ...]  # Inputs at which it closes by construction, in [rad] or [m]
+    pose: Mapping[str, tuple[float, float, float]]  # Angle and position of each moving link there
+    step: tuple[float, ...]  # A small change of each input: 0.3 rad, or 0.3 of a length
+    # Inputs within a turn at which the linkage passes an exact change point.
     change_points: tuple[float, ...] = ()
 
 

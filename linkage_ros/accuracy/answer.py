@@ -29,26 +29,12 @@ from linkage_ros.accuracy.results import Choice, Rate, Results
 
 
 class Reply(NamedTuple):
-    """
-    The answer for the wanted accuracies from one value up to that of the next answer.
+    """The answer for the wanted accuracies from one value up to that of the next answer."""
 
-    Attributes
-    ----------
-    accuracy
-        The smallest wanted accuracy that it holds for, in [rad].
-    write
-        Text to write into the scene.
-    tick
-        Time of a tick with it.
-    rate
-        The tick rates at which a subscriber notices this accuracy.
-
-    """
-
-    accuracy: float
-    write: str
-    tick: str
-    rate: str
+    accuracy: float  # The smallest wanted accuracy that it holds for, in [rad]
+    write: str  # Text to write into the scene
+    tick: str  # Time of a tick with it
+    rate: str  # The tick rates at which a subscriber notices this accuracy
 
 
 def replies(results: Results) -> list[Reply]:

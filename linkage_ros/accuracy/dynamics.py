@@ -53,56 +53,25 @@ _LOOKS = 100
 
 
 class FreeMotion(NamedTuple):
-    """
-    A motion without friction, damping and command.
+    """A motion without friction, damping and command."""
 
-    Attributes
-    ----------
-    mechanics
-        The linkage and its loads.
-    start
-        State at the start.
-    end
-        State after `SECONDS`.
-    scale
-        Range of its potential energy, in [J]; a drift is given as a fraction of it.
-    unit
-        Unit of the input: 'rad' or 'm'.
-    words
-        Description of the motion.
-
-    """
-
-    mechanics: Mechanics
-    start: State
-    end: State
-    scale: float
-    unit: str
-    words: str
+    mechanics: Mechanics  # The linkage and its loads
+    start: State  # State at the start
+    end: State  # State after `SECONDS`
+    scale: float  # Range of its potential energy, in [J]; a drift is given as a fraction of it
+    unit: str  # Unit of the input: 'rad' or 'm'
+    words: str  # Description of the motion
 
 
 class Integrated(NamedTuple):
-    """
-    The result of a method with one step.
+    """The result of a method with one step."""
 
-    Attributes
-    ----------
-    method, step
-        The method's name, and its step in [s].
-    error
-        Error of the input after `SECONDS`, in [rad] or [m].
-    drift
-        Greatest error of the energy, as a fraction of the motion's scale.
-    times
-        Processor time per second of motion, in [s], one for each round.
-
-    """
-
+    # The method's name, and its step in [s].
     method: str
     step: float
-    error: float
-    drift: float
-    times: Sequence[float]
+    error: float  # Error of the input after `SECONDS`, in [rad] or [m]
+    drift: float  # Greatest error of the energy, as a fraction of the motion's scale
+    times: Sequence[float]  # Processor time per second of motion, in [s], one for each round
 
 
 def free_motion(member: SceneLinkage) -> FreeMotion:

@@ -47,23 +47,14 @@ from linkage_ros.scene.scene import Scene
 
 
 class Departure(NamedTuple):
-    """
-    The error of the published states.
+    """The error of the published states."""
 
-    Attributes
-    ----------
-    angles, slides, rates
-        Root mean square and maximum, in [rad], in [m], in [rad/s] or [m/s]; None if none is
-        published.
-    silent
-        Fraction of the ticks at which the truth is known but no state is published.
-
-    """
-
+    # Root mean square and maximum, in [rad], in [m], in [rad/s] or [m/s]; None if none is
+    # published.
     angles: tuple[float, float] | None
     slides: tuple[float, float] | None
     rates: tuple[float, float] | None
-    silent: float
+    silent: float  # Fraction of the ticks at which the truth is known but no state is published
 
 
 class _Errors:

@@ -64,35 +64,16 @@ BATCH = 4096
 
 
 class Poses(NamedTuple):
-    """
-    States of a linkage.
+    """States of a linkage."""
 
-    Attributes
-    ----------
-    key
-        'easy', 'toggle', 'change_point', 'five_dyads' or 'class_3'.
-    title
-        Title of the set.
-    name
-        Name of the linkage.
-    linkage
-        The linkage.
-    inputs
-        Inputs of each state.
-    distances
-        Distance of each state from the toggle or change point, in [rad] or [m]; empty if easy.
-    own
-        Whether the linkage is the scene's.
-
-    """
-
-    key: str
-    title: str
-    name: str
-    linkage: Linkage
-    inputs: tuple[tuple[float, ...], ...]
+    key: str  # 'easy', 'toggle', 'change_point', 'five_dyads' or 'class_3'
+    title: str  # Title of the set
+    name: str  # Name of the linkage
+    linkage: Linkage  # The linkage
+    inputs: tuple[tuple[float, ...], ...]  # Inputs of each state
+    # Distance of each state from the toggle or change point, in [rad] or [m]; empty if easy.
     distances: tuple[float, ...] = ()
-    own: bool = True
+    own: bool = True  # Whether the linkage is the scene's
 
 
 def pose_sets(name: str, linkage: Linkage, count: int) -> list[Poses]:
@@ -268,21 +249,12 @@ Next to a change point it is a fraction of the distance: the other assembly is e
 
 
 class Errors(NamedTuple):
-    """
-    The errors of a method.
+    """The errors of a method."""
 
-    Attributes
-    ----------
-    each
-        For each state the maximum over the joints, in [rad], for slides relative to the linkage's
-        size; None if it failed. Rates and accelerations above 1 have relative errors.
-    failed
-        Fraction of the states without an answer, or with that of another pose.
-
-    """
-
+    # For each state the maximum over the joints, in [rad], for slides relative to the linkage's
+    # size; None if it failed. Rates and accelerations above 1 have relative errors.
     each: tuple[float | None, ...]
-    failed: float
+    failed: float  # Fraction of the states without an answer, or with that of another pose
 
     @property
     def worst(self) -> float | None:
@@ -300,26 +272,17 @@ class Errors(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """
-    A method on a set of poses.
+    """A method on a set of poses."""
 
-    Attributes
-    ----------
-    poses, method
-        The set and the method.
-    position, motion, batch
-        Errors of positions; of positions, rates and accelerations; and of arrays.
-    times
-        Time per state, in [s], by 'position', 'motion', 'batch' (positions in an array) and
-        'batch_motion' (motions in an array).
-
-    """
-
+    # The set and the method.
     poses: Poses
     method: Method
+    # Errors of positions; of positions, rates and accelerations; and of arrays.
     position: Errors
     motion: tuple[Errors, Errors, Errors] | None
     batch: tuple[Errors, Errors, Errors] | None
+    # Time per state, in [s], by 'position', 'motion', 'batch' (positions in an array) and
+    # 'batch_motion' (motions in an array).
     times: dict[str, Spread]
 
 

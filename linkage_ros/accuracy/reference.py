@@ -60,25 +60,15 @@ _MOST = 800
 
 
 class Truth(NamedTuple):
-    """
-    An exact state.
+    """An exact state."""
 
-    Attributes
-    ----------
-    joints, rates, accelerations
-        Of the published joints, as mpmath numbers, in [rad] or [m], per [s] and [s²].
-    error
-        Bound of the relative error.
-    links
-        For each link but the ground the angle and the position (x, y) of its frame, then their
-        rates, then their accelerations.
-
-    """
-
+    # Of the published joints, as mpmath numbers, in [rad] or [m], per [s] and [s²].
     joints: tuple[Any, ...]
     rates: tuple[Any, ...]
     accelerations: tuple[Any, ...]
-    error: float
+    error: float  # Bound of the relative error
+    # For each link but the ground the angle and the position (x, y) of its frame, then their
+    # rates, then their accelerations.
     links: Mapping[str, tuple[Sequence[Any], ...]]
 
     @property

@@ -33,25 +33,12 @@ Cell = float | int | str | Spread | None
 
 
 class Axis(NamedTuple):
-    """
-    An axis of a diagram.
+    """An axis of a diagram."""
 
-    Attributes
-    ----------
-    name
-        The quantity, for example 'error'.
-    unit
-        Its unit, for example 'rad'; '' for a number.
-    logarithmic
-        Whether the axis is logarithmic.
-    least
-        For a logarithmic axis, the smallest value drawn at its own position; 0 for any.
-
-    """
-
-    name: str
-    unit: str
-    logarithmic: bool = True
+    name: str  # The quantity, for example 'error'
+    unit: str  # Its unit, for example 'rad'; '' for a number
+    logarithmic: bool = True  # Whether the axis is logarithmic
+    # For a logarithmic axis, the smallest value drawn at its own position; 0 for any.
     least: float = 0.0
 
     @property
@@ -61,27 +48,16 @@ class Axis(NamedTuple):
 
 
 class Point(NamedTuple):
-    """
-    A point of a curve.
+    """A point of a curve."""
 
-    Attributes
-    ----------
-    x, y
-        Coordinates: medians.
-    x_spread, y_spread
-        The quartiles, if it was measured several times.
-    setting
-        The setting of the method: 'tolerance 1e-6', '256 knots'.
-    fails
-        Whether the method has no answer for some states; such a point is on no front.
-
-    """
-
+    # Coordinates: medians.
     x: float
     y: float
+    # The quartiles, if it was measured several times.
     x_spread: Spread | None = None
     y_spread: Spread | None = None
-    setting: str = ''
+    setting: str = ''  # The setting of the method: 'tolerance 1e-6', '256 knots'
+    # Whether the method has no answer for some states; such a point is on no front.
     fails: bool = False
 
 
@@ -94,29 +70,16 @@ class Curve(NamedTuple):
 
 
 class Diagram(NamedTuple):
-    """
-    A diagram with one message.
+    """A diagram with one message."""
 
-    Attributes
-    ----------
-    key
-        File name without suffix.
-    title
-        The message, in a sentence.
-    x, y
-        Its axes.
-    curves
-        The curves; the same name has the same colour and mark in all diagrams.
-    front
-        Whether less is better on both axes: the front of best points is drawn, all others pale.
-
-    """
-
-    key: str
-    title: str
+    key: str  # File name without suffix
+    title: str  # The message, in a sentence
+    # Its axes.
     x: Axis
     y: Axis
+    # The curves; the same name has the same colour and mark in all diagrams.
     curves: Sequence[Curve]
+    # Whether less is better on both axes: the front of best points is drawn, all others pale.
     front: bool = False
 
 
@@ -146,111 +109,49 @@ class Table(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """
-    A solver that a scene can choose, and its cost.
+    """A solver that a scene can choose, and its cost."""
 
-    Attributes
-    ----------
-    accuracy
-        Its greatest error at easy poses, in [rad]; slides relative to the linkage's size.
-    write
-        Text to write into the scene.
-    solving
-        Time of a position, in [µs].
-    tick
-        Time of a tick of the scene with it, in [µs].
-
-    """
-
+    # Its greatest error at easy poses, in [rad]; slides relative to the linkage's size.
     accuracy: float
-    write: str
-    solving: Spread
-    tick: Spread
+    write: str  # Text to write into the scene
+    solving: Spread  # Time of a position, in [µs]
+    tick: Spread  # Time of a tick of the scene with it, in [µs]
 
 
 class Rate(NamedTuple):
-    """
-    A tick rate, and the error of a state when a subscriber uses it.
+    """A tick rate, and the error of a state when a subscriber uses it."""
 
-    Attributes
-    ----------
-    rate
-        Tick rate, in [Hz].
-    error
-        Root mean square, in [rad]; the greatest of all motions of the crank.
-    use
-        How the state is used: 'held', or 'carried forward' by its rates.
-
-    """
-
-    rate: float
-    error: float
-    use: str
+    rate: float  # Tick rate, in [Hz]
+    error: float  # Root mean square, in [rad]; the greatest of all motions of the crank
+    use: str  # How the state is used: 'held', or 'carried forward' by its rates
 
 
 class Part(NamedTuple):
-    """
-    A part of the page.
+    """A part of the page."""
 
-    Attributes
-    ----------
-    key
-        'solving', 'ticking', 'effects', 'dynamics' or 'recording'.
-    title
-        Its subject.
-    headline
-        Its result, in a sentence of at most some 80 characters.
-    sentences
-        Up to three sentences beside its picture; no text of a part has markup.
-    method
-        The method of measurement, in paragraphs.
-    diagrams
-        The picture of the part, and more pictures.
-    tables
-        The numbers.
-    advice
-        The cheapest method for some accuracies, a sentence each, derived from the data.
-    clause
-        Its clause of the headline of the page; '' if it has none.
-    choices
-        Solvers to choose from, the least exact first, the default last; the part on solving has
-        them.
-    rates
-        Tick rates to choose from; the part on the rate of ticks has them.
-
-    """
-
-    key: str
-    title: str
-    headline: str
+    key: str  # 'solving', 'ticking', 'effects', 'dynamics' or 'recording'
+    title: str  # Its subject
+    headline: str  # Its result, in a sentence of at most some 80 characters
+    # Up to three sentences beside its picture; no text of a part has markup.
     sentences: Sequence[str] = ()
-    method: Sequence[str] = ()
-    diagrams: Sequence[Diagram] = ()
-    tables: Sequence[Table] = ()
+    method: Sequence[str] = ()  # The method of measurement, in paragraphs
+    diagrams: Sequence[Diagram] = ()  # The picture of the part, and more pictures
+    tables: Sequence[Table] = ()  # The numbers
+    # The cheapest method for some accuracies, a sentence each, derived from the data.
     advice: Sequence[str] = ()
-    clause: str = ''
+    clause: str = ''  # Its clause of the headline of the page; '' if it has none
+    # Solvers to choose from, the least exact first, the default last; the part on solving has
+    # them.
     choices: Sequence[Choice] = ()
-    rates: Sequence[Rate] = ()
+    rates: Sequence[Rate] = ()  # Tick rates to choose from; the part on the rate of ticks has them
 
 
 class Results(NamedTuple):
-    """
-    All measurements of a scene.
+    """All measurements of a scene."""
 
-    Attributes
-    ----------
-    scene
-        Its name.
-    machine
-        Day, machine and versions: names and values.
-    parts
-        The parts in order; a scene without torque has no part on dynamics.
-
-    """
-
-    scene: str
-    machine: Sequence[tuple[str, str]]
-    parts: Sequence[Part]
+    scene: str  # Its name
+    machine: Sequence[tuple[str, str]]  # Day, machine and versions: names and values
+    parts: Sequence[Part]  # The parts in order; a scene without torque has no part on dynamics
 
     @property
     def headline(self) -> str:

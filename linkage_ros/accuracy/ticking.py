@@ -60,19 +60,10 @@ CrankAt = Callable[[int], tuple[float, float]]
 
 
 class Motions(NamedTuple):
-    """
-    The motions of a linkage's input.
+    """The motions of a linkage's input."""
 
-    Attributes
-    ----------
-    by_name
-        `CHIRP` and `ACCELERATION`.
-    greatest
-        For each the maximum rate and acceleration of the input, in [rad/s] and [rad/s²], or [m].
-
-    """
-
-    by_name: Mapping[str, CrankAt]
+    by_name: Mapping[str, CrankAt]  # `CHIRP` and `ACCELERATION`
+    # For each the maximum rate and acceleration of the input, in [rad/s] and [rad/s²], or [m].
     greatest: Mapping[str, tuple[float, float]]
 
 
@@ -119,32 +110,15 @@ _PATIENCE = 30.0  # [s]
 
 
 class Used(NamedTuple):
-    """
-    The states that a subscriber used, at one tick rate and in one motion of the crank.
+    """The states that a subscriber used, at one tick rate and in one motion of the crank."""
 
-    Attributes
-    ----------
-    rate
-        Tick rate, in [Hz].
-    motion
-        Motion of the crank.
-    age
-        Age of the states when used, in [s].
-    errors
-        By `HELD` and `CARRIED`: for each use the maximum error of a joint.
-    unused
-        Number of uses before the first state arrived.
-    cpu
-        Processor time of the node, as a fraction of a core.
-
-    """
-
-    rate: float
-    motion: str
-    age: Sequence[float]
+    rate: float  # Tick rate, in [Hz]
+    motion: str  # Motion of the crank
+    age: Sequence[float]  # Age of the states when used, in [s]
+    # By `HELD` and `CARRIED`: for each use the maximum error of a joint.
     errors: dict[str, Sequence[float]]
-    unused: int
-    cpu: float
+    unused: int  # Number of uses before the first state arrived
+    cpu: float  # Processor time of the node, as a fraction of a core
 
 
 def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> list[Used]:

@@ -555,31 +555,16 @@ MOST_RECORDS = 1_000_000
 
 
 class FileIndex(NamedTuple):
-    """
-    Index of a file.
+    """Index of a file."""
 
-    Attributes
-    ----------
-    start
-        Position of its start, which is the end of the data.
-    checked
-        Whether it has a checksum, which then matches.
-    definitions
-        All schemas and channels, if it repeats them.
-    chunks, attachments, metadata
-        Positions of chunks, attachments and metadata.
-    statistics
-        Counts stated by the file; None if it states none.
-
-    """
-
-    start: int
-    checked: bool
-    definitions: Definitions
+    start: int  # Position of its start, which is the end of the data
+    checked: bool  # Whether it has a checksum, which then matches
+    definitions: Definitions  # All schemas and channels, if it repeats them
+    # Positions of chunks, attachments and metadata.
     chunks: tuple[ChunkIndex, ...]
     attachments: tuple[AttachmentIndex, ...]
     metadata: tuple[MetadataIndex, ...]
-    statistics: Statistics | None
+    statistics: Statistics | None  # Counts stated by the file; None if it states none
 
 
 def index_of(source: Source) -> FileIndex:

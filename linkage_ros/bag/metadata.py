@@ -269,26 +269,13 @@ UNFINISHED_DATA: Mapping[str, str] = {
 
 
 class RecordingStats(NamedTuple):
-    """
-    Messages by topic: ``received == recorded + dropped + discarded``.
+    """Messages by topic: ``received == recorded + dropped + discarded``."""
 
-    Attributes
-    ----------
-    received
-        Messages offered to the recorder.
-    recorded
-        Messages in the bag.
-    dropped
-        Messages for which the disk was too slow or too full, or whose times do not fit into a bag.
-    discarded
-        Messages in files that were removed to keep newer ones.
-
-    """
-
-    received: Sequence[int]
-    recorded: Sequence[int]
+    received: Sequence[int]  # Messages offered to the recorder
+    recorded: Sequence[int]  # Messages in the bag
+    # Messages for which the disk was too slow or too full, or whose times do not fit into a bag.
     dropped: Sequence[int]
-    discarded: Sequence[int]
+    discarded: Sequence[int]  # Messages in files that were removed to keep newer ones
 
 
 def custom_data(

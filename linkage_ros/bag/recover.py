@@ -70,32 +70,14 @@ class TopicRecovery(NamedTuple):
 
 
 class Recovery(NamedTuple):
-    """
-    Outcome of a recovery.
+    """Outcome of a recovery."""
 
-    Attributes
-    ----------
-    folder
-        The new bag.
-    topics
-        Saved and original messages of each topic.
-    attachments
-        Names of the saved attachments.
-    losses
-        Losses, each with the name of its file.
-    repaired
-        Damage or missing parts without loss, one line each.
-    remarks
-        Further remarks, one line each.
-
-    """
-
-    folder: Path
-    topics: tuple[TopicRecovery, ...]
-    attachments: tuple[str, ...]
-    losses: tuple[tuple[str, Loss], ...]
-    repaired: tuple[str, ...]
-    remarks: tuple[str, ...]
+    folder: Path  # The new bag
+    topics: tuple[TopicRecovery, ...]  # Saved and original messages of each topic
+    attachments: tuple[str, ...]  # Names of the saved attachments
+    losses: tuple[tuple[str, Loss], ...]  # Losses, each with the name of its file
+    repaired: tuple[str, ...]  # Damage or missing parts without loss, one line each
+    remarks: tuple[str, ...]  # Further remarks, one line each
 
     @property
     def missing(self) -> int:

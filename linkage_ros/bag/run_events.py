@@ -69,21 +69,13 @@ class Reset(NamedTuple):
 
 
 class TickEvent(NamedTuple):
-    """
-    Result of a tick.
+    """Result of a tick."""
 
-    Attributes
-    ----------
-    log_time, time
-        Time of the tick, and time it solved for, in [ns].
-    messages
-        The joint state and the auxiliary messages, each empty if there is none; all are empty for
-        a tick that the bag records as one without messages.
-
-    """
-
+    # Time of the tick, and time it solved for, in [ns].
     log_time: int
     time: int
+    # The joint state and the auxiliary messages, each empty if there is none; all are empty for a
+    # tick that the bag records as one without messages.
     messages: tuple[bytes, ...]
 
 
@@ -91,40 +83,24 @@ Event = SampleEvent | FaultEvent | Reset | TickEvent
 
 
 class RunAccount(NamedTuple):
-    """
-    The run's account in its bag; '' for missing topics.
+    """The run's account in its bag; '' for missing topics."""
 
-    Attributes
-    ----------
-    scene, scene_folder
-        Name of the scene, and the folder for its relative paths.
-    crank_topic, joint_states_topic, faults_topic, withheld_topic, resets_topic, extras
-        Names of the topics.
-    begun
-        When the bag was begun, as in `MID_RUN`; '' if it does not say.
-    versions
-        Versions of the software of the run, by name.
-    solvers
-        Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
-    user_effects
-        Modules of the user-defined effects, by name.
-    seed
-        Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
-
-    """
-
+    # Name of the scene, and the folder for its relative paths.
     scene: str = ''
     scene_folder: str = ''
+    # Names of the topics.
     crank_topic: str = ''
     joint_states_topic: str = ''
     faults_topic: str = ''
     withheld_topic: str = ''
     resets_topic: str = ''
     extras: tuple[str, ...] = ()
-    begun: str = ''
-    versions: Mapping[str, str] = {}
+    begun: str = ''  # When the bag was begun, as in `MID_RUN`; '' if it does not say
+    versions: Mapping[str, str] = {}  # Versions of the software of the run, by name
+    # Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
     solvers: Mapping[str, Any] = {}
-    user_effects: Mapping[str, str] = {}
+    user_effects: Mapping[str, str] = {}  # Modules of the user-defined effects, by name
+    # Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
     seed: int = 0
 
 

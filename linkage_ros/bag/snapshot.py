@@ -50,22 +50,11 @@ _JUMP = 1_000_000_000
 
 
 class Extent(NamedTuple):
-    """
-    Amount of messages in memory.
+    """Amount of messages in memory."""
 
-    Attributes
-    ----------
-    seconds
-        Time between the oldest message and the newest [s].
-    size
-        Size of the messages [bytes].
-    crowded
-        Whether messages that were not too old had to be removed for lack of memory.
-
-    """
-
-    seconds: float = 0.0
-    size: int = 0
+    seconds: float = 0.0  # Time between the oldest message and the newest [s]
+    size: int = 0  # Size of the messages [bytes]
+    # Whether messages that were not too old had to be removed for lack of memory.
     crowded: bool = False
 
 

@@ -76,28 +76,14 @@ ProgressCallback = Callable[[int], None]
 
 
 class Source(NamedTuple):
-    """
-    The origin of the rows.
+    """The origin of the rows."""
 
-    Attributes
-    ----------
-    bag
-        The bag.
-    types
-        The topics, each with its type.
-    closing
-        Topics whose messages end the row of a tick.
-    wanted
-        For each topic that also carries other messages, the test that selects those of the rows.
-    dependent
-        Names of dependent joints, which nobody can command; see `MessageValues`.
-
-    """
-
-    bag: Bag
-    types: Mapping[str, str]
-    closing: Collection[str]
+    bag: Bag  # The bag
+    types: Mapping[str, str]  # The topics, each with its type
+    closing: Collection[str]  # Topics whose messages end the row of a tick
+    # For each topic that also carries other messages, the test that selects those of the rows.
     wanted: Mapping[str, Callable[[bytes], bool]]
+    # Names of dependent joints, which nobody can command; see `MessageValues`.
     dependent: Collection[str] = ()
 
 

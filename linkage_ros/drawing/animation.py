@@ -87,42 +87,22 @@ Advance = Callable[[int, int], Any]
 
 
 class Motion(NamedTuple):
-    """
-    A motion to be shown, at instants 1/`RATE` s apart.
+    """A motion to be shown, at instants 1/`RATE` s apart."""
 
-    Attributes
-    ----------
-    title
-        What moves.
-    view
-        The linkage, in the pose in which its shapes are made.
-    repeats
-        Whether it ends where it begins.
-    links
-        The links and the blocks of sliders that move.
-    frames
-        Position, in [m], and angle, in [rad], of their frames, of shape (instants, links, 3); NaN
-        if unknown: the linkage is hidden then.
-    x
-        Abscissa of the mark at the instants: the first input, in [rad] or [m], or time, in [s].
-    x_name, x_unit
-        Its name, and the unit in which it is shown: °, m or s.
-    joints
-        The curves of the joints.
-    values
-        The joints at the instants, of shape (instants, joints), in [rad] or [m]; NaN if unknown.
-
-    """
-
-    title: str
-    view: View
-    repeats: bool
-    links: Sequence[str]
+    title: str  # What moves
+    view: View  # The linkage, in the pose in which its shapes are made
+    repeats: bool  # Whether it ends where it begins
+    links: Sequence[str]  # The links and the blocks of sliders that move
+    # Position, in [m], and angle, in [rad], of their frames, of shape (instants, links, 3); NaN if
+    # unknown: the linkage is hidden then.
     frames: Any
+    # Abscissa of the mark at the instants: the first input, in [rad] or [m], or time, in [s].
     x: Any
+    # Its name, and the unit in which it is shown: °, m or s.
     x_name: str
     x_unit: str
-    joints: Sequence[Curve]
+    joints: Sequence[Curve]  # The curves of the joints
+    # The joints at the instants, of shape (instants, joints), in [rad] or [m]; NaN if unknown.
     values: Any
 
 

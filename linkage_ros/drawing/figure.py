@@ -55,33 +55,16 @@ _SAME = 1e-9
 
 
 class View(NamedTuple):
-    """
-    The content of a picture.
+    """The content of a picture."""
 
-    Attributes
-    ----------
-    closure
-        The linkage.
-    inputs, position
-        The pose to draw.
-    ghosts
-        Poses in the background.
-    interval
-        Range of the first input around the pose, with the others held.
-    mark
-        The first input, less the whole turns by which it lies outside of that range.
-    sweep
-        The motion through that range.
-
-    """
-
-    closure: Closure
+    closure: Closure  # The linkage
+    # The pose to draw.
     inputs: tuple[float, ...]
     position: Position
-    ghosts: tuple[Position, ...]
-    interval: InputRange
-    mark: float
-    sweep: Sweep
+    ghosts: tuple[Position, ...]  # Poses in the background
+    interval: InputRange  # Range of the first input around the pose, with the others held
+    mark: float  # The first input, less the whole turns by which it lies outside of that range
+    sweep: Sweep  # The motion through that range
 
 
 def view(

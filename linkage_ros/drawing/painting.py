@@ -37,24 +37,13 @@ _GAP = 4.0
 
 
 class Label(NamedTuple):
-    """
-    A name to be placed; all sizes in one unit, such as pixels.
+    """A name to be placed; all sizes in one unit, such as pixels."""
 
-    Attributes
-    ----------
-    anchors
-        Places that it may be next to; the first is the best.
-    width, height
-        Size of the text.
-    clear
-        Distance of its box from the anchor.
-
-    """
-
-    anchors: tuple[complex, ...]
+    anchors: tuple[complex, ...]  # Places that it may be next to; the first is the best
+    # Size of the text.
     width: float
     height: float
-    clear: float
+    clear: float  # Distance of its box from the anchor
 
 
 class Placed(NamedTuple):

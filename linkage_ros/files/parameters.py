@@ -155,17 +155,9 @@ class Point(Numbers):
 
 @dataclass(frozen=True, slots=True)
 class Rows(Kind):
-    """
-    A list of rows of finite numbers, one per column, each within ±most.
+    """A list of rows of finite numbers, one per column, each within ±most."""
 
-    Attributes
-    ----------
-    columns
-        The meaning of each column, with its unit.
-
-    """
-
-    columns: tuple[str, ...]
+    columns: tuple[str, ...]  # The meaning of each column, with its unit
     most: float = inf
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:

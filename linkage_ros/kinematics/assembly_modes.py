@@ -41,20 +41,12 @@ _SAME = 1e-6
 
 
 class Assembly(NamedTuple):
-    """
-    An assembly at the inputs of the pose.
+    """An assembly at the inputs of the pose."""
 
-    Attributes
-    ----------
-    points
-        Places of the points that the pose names, in the frame of the ground, in [m].
-    turns
-        Number of whole turns of the input after which the branch of the pose reaches it; 0 if it
-        does not.
-
-    """
-
+    # Places of the points that the pose names, in the frame of the ground, in [m].
     points: dict[str, complex]
+    # Number of whole turns of the input after which the branch of the pose reaches it; 0 if it
+    # does not.
     turns: int
 
 

@@ -45,26 +45,14 @@ _ROUNDINGS = 4.0
 
 
 class Bound(NamedTuple):
-    """
-    The limits of one joint, ready for comparisons.
+    """The limits of one joint, ready for comparisons."""
 
-    Attributes
-    ----------
-    name
-        Of the joint.
-    number
-        Its number among the inputs, or among the published joints.
-    low, high
-        In [rad] or [m], widened by rounding.
-    middle
-        Middle of the limits of a published angle, in [rad]; None if whole turns count.
-
-    """
-
-    name: str
-    number: int
+    name: str  # Of the joint
+    number: int  # Its number among the inputs, or among the published joints
+    # In [rad] or [m], widened by rounding.
     low: float
     high: float
+    # Middle of the limits of a published angle, in [rad]; None if whole turns count.
     middle: float | None
 
     def beyond(self, value: float) -> bool:

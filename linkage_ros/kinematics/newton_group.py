@@ -76,24 +76,13 @@ _EARLY_SINGULAR = 1e-6
 
 
 class IteratedPose(NamedTuple):
-    """
-    The links at one state.
+    """The links at one state."""
 
-    Attributes
-    ----------
-    status, gap
-        Whether they close; if not, the smallest residual that was reached.
-    unknowns
-        For each body its angle and the place of its point.
-    jacobian
-        Derivatives of the constraints by the unknowns.
-
-    """
-
+    # Whether they close; if not, the smallest residual that was reached.
     status: Status
     gap: float
-    unknowns: list[float]
-    jacobian: Array
+    unknowns: list[float]  # For each body its angle and the place of its point
+    jacobian: Array  # Derivatives of the constraints by the unknowns
 
 
 class Iteration:

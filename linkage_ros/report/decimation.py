@@ -63,24 +63,14 @@ _FEWEST_INTERVALS = 256
 
 
 class Intervals(NamedTuple):
-    """
-    Curves as intervals.
+    """Curves as intervals."""
 
-    Attributes
-    ----------
-    rows
-        Rows of an interval; the last may have fewer. If it is 1, all rows are kept.
-    begins, ends
-        Time of the first and the last row of each, in [ns].
-    first, second
-        Minimum and maximum of each interval and column, in the order in which they came; NaN if
-        there is none. Equal if an interval is one row.
-
-    """
-
-    rows: int
+    rows: int  # Rows of an interval; the last may have fewer. If it is 1, all rows are kept.
+    # Time of the first and the last row of each, in [ns].
     begins: Times
     ends: Times
+    # Minimum and maximum of each interval and column, in the order in which they came; NaN if
+    # there is none. Equal if an interval is one row.
     first: Numbers
     second: Numbers
 

@@ -48,22 +48,12 @@ TOO_MANY_JOINTS = f'joints beyond the first {MOST_JOINTS}'
 
 
 class JointBlock(NamedTuple):
-    """
-    Messages as arrays.
+    """Messages as arrays."""
 
-    Attributes
-    ----------
-    good
-        Which messages were decoded, of shape (messages,); all other arrays have a row for each.
-    stamps
-        In [ns]; 0 for a message that was not decoded.
-    numbers
-        Positions, rates and efforts, of shape (messages, 3, joints); NaN if missing.
-
-    """
-
+    # Which messages were decoded, of shape (messages,); all other arrays have a row for each.
     good: Flags
-    stamps: Times
+    stamps: Times  # In [ns]; 0 for a message that was not decoded
+    # Positions, rates and efforts, of shape (messages, 3, joints); NaN if missing.
     numbers: Numbers
 
 

@@ -254,69 +254,32 @@ class LinkageRun(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """
-    Instants of a run at which all joints are known, for the animation.
+    """Instants of a run at which all joints are known, for the animation."""
 
-    Attributes
-    ----------
-    step
-        One joint state of so many is kept.
-    times
-        Run times, in [ns].
-    values
-        Joint values by name in messages, in [rad] or [m]; NaN if missing.
-
-    """
-
-    step: int
-    times: Times
+    step: int  # One joint state of so many is kept
+    times: Times  # Run times, in [ns]
+    # Joint values by name in messages, in [rad] or [m]; NaN if missing.
     values: Mapping[str, Numbers]
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """
-    The contents of a bag, as a run.
+    """The contents of a bag, as a run."""
 
-    Attributes
-    ----------
-    begin
-        Log time at run time 0, in [ns]; None without messages.
-    end
-        Run time at the end, in [ns].
-    window
-        The part of the run to show.
-    contents
-        Counts of all messages, and the damage.
-    curves
-        Joints, cranks, lateness and age over time.
-    frames
-        Frames of the animation; None without a scene.
-    linkages
-        Linkages of the scene; empty without a scene.
-    lanes
-        The events, by kind.
-    lateness, age
-        Histograms; None if unknown.
-    rejected
-        Number of rejected samples, by reason.
-    left_out
-        Number of messages, or joints of messages, that were not decoded, by topic and reason.
-    last_values
-        The values of the last diagnostics, by task and key.
-
-    """
-
-    begin: int | None
-    end: int
-    window: Window
-    contents: Contents
-    curves: Sequence[Curves]
-    frames: Frames | None = None
-    linkages: Sequence[LinkageRun] = ()
-    lanes: Mapping[str, Lane] = field(default_factory=dict)
+    begin: int | None  # Log time at run time 0, in [ns]; None without messages
+    end: int  # Run time at the end, in [ns]
+    window: Window  # The part of the run to show
+    contents: Contents  # Counts of all messages, and the damage
+    curves: Sequence[Curves]  # Joints, cranks, lateness and age over time
+    frames: Frames | None = None  # Frames of the animation; None without a scene
+    linkages: Sequence[LinkageRun] = ()  # Linkages of the scene; empty without a scene
+    lanes: Mapping[str, Lane] = field(default_factory=dict)  # The events, by kind
+    # Histograms; None if unknown.
     lateness: Histogram | None = None
     age: Histogram | None = None
+    # Number of rejected samples, by reason.
     rejected: Mapping[str, int] = field(default_factory=dict)
+    # Number of messages, or joints of messages, that were not decoded, by topic and reason.
     left_out: Mapping[tuple[str, str], int] = field(default_factory=dict)
+    # The values of the last diagnostics, by task and key.
     last_values: Mapping[tuple[str, str], str] = field(default_factory=dict)

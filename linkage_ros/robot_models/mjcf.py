@@ -52,46 +52,23 @@ from linkage_ros.robot_models.xml import comment, document, number, numbers, rou
 
 
 class Branch(NamedTuple):
-    """
-    A joint of the tree.
+    """A joint of the tree."""
 
-    Attributes
-    ----------
-    kind
-        ``R`` for a pin, ``P`` for a slider.
-    name
-        Name of the pin or slider.
-    parent, child
-        The links; a block has its name in the closure's structure.
-    joint
-        Name of the joint in messages; '' if it has none.
-    sign
-        −1 if the joint counts in the opposite direction.
-
-    """
-
-    kind: str
-    name: str
+    kind: str  # ``R`` for a pin, ``P`` for a slider
+    name: str  # Name of the pin or slider
+    # The links; a block has its name in the closure's structure.
     parent: str
     child: str
-    joint: str
-    sign: int
+    joint: str  # Name of the joint in messages; '' if it has none
+    sign: int  # −1 if the joint counts in the opposite direction
 
 
 class PhysicalTree(NamedTuple):
-    """
-    A linkage as a tree.
+    """A linkage as a tree."""
 
-    Attributes
-    ----------
-    branches
-        The joints of the tree, each after the one that moves its parent.
-    cuts
-        Pins that are cut: the point, and the two links that it joins.
-
-    """
-
+    # The joints of the tree, each after the one that moves its parent.
     branches: tuple[Branch, ...]
+    # Pins that are cut: the point, and the two links that it joins.
     cuts: tuple[tuple[str, str, str], ...]
 
 

@@ -47,23 +47,11 @@ if TYPE_CHECKING:
 
 
 class Turn(NamedTuple):
-    """
-    A term of an orientation.
+    """A term of an orientation."""
 
-    Attributes
-    ----------
-    joint
-        Name of the published joint; '' for a constant.
-    sign
-        Sign of the joint in the sum, +1 or −1.
-    constant
-        In [rad]; 0 for a joint.
-
-    """
-
-    joint: str
-    sign: int
-    constant: float = 0.0
+    joint: str  # Name of the published joint; '' for a constant
+    sign: int  # Sign of the joint in the sum, +1 or −1
+    constant: float = 0.0  # In [rad]; 0 for a joint
 
 
 def named_joints(linkage: Linkage) -> dict[str, RevoluteJoint | SlideJoint]:

@@ -73,16 +73,9 @@ class Study(NamedTuple):
 
 
 class Statistics(NamedTuple):
-    """
-    One quantity of a joint over a run.
+    """One quantity of a joint over a run."""
 
-    Attributes
-    ----------
-    least, most, mean, rms
-        In [rad] or [m], or per second, or [N·m] or [N]; not a number without a message.
-
-    """
-
+    # In [rad] or [m], or per second, or [N·m] or [N]; not a number without a message.
     least: float
     most: float
     mean: float
@@ -90,26 +83,15 @@ class Statistics(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """
-    A run of a study.
+    """A run of a study."""
 
-    Attributes
-    ----------
-    failure
-        Why it did not run; '' if it did.
-    ticks, messages
-        Number of ticks, and of those that published a joint state.
-    statistics
-        Under the heading of a quantity, in the order of the joints.
-    positions
-        Of each joint at the instants, in [rad] or [m]; not a number where nothing was published.
-
-    """
-
-    failure: str
+    failure: str  # Why it did not run; '' if it did
+    # Number of ticks, and of those that published a joint state.
     ticks: int
     messages: int
+    # Under the heading of a quantity, in the order of the joints.
     statistics: Mapping[str, Statistics]
+    # Of each joint at the instants, in [rad] or [m]; not a number where nothing was published.
     positions: NDArray[np.float64]
 
 

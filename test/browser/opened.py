@@ -24,23 +24,11 @@ from typing import Any, NamedTuple
 
 
 class Opened(NamedTuple):
-    """
-    A page in a browser.
+    """A page in a browser."""
 
-    Attributes
-    ----------
-    page
-        The page, as Playwright has it.
-    said
-        What came on its console, and its uncaught errors: none is good.
-    asked
-        Addresses that it has asked for, its own the first.
-
-    """
-
-    page: Any
-    said: list[str]
-    asked: list[str]
+    page: Any  # The page, as Playwright has it
+    said: list[str]  # What came on its console, and its uncaught errors: none is good
+    asked: list[str]  # Addresses that it has asked for, its own the first
 
     def is_wider_than_its_window(self) -> bool:
         """Say whether one has to scroll sideways."""

@@ -64,31 +64,17 @@ class Range(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """
-    A point with its position in the diagram.
+    """A point with its position in the diagram."""
 
-    Attributes
-    ----------
-    x, y
-        Its position.
-    x_arms, y_arms
-        Distances to the lower and the upper quartile, both positive; 0 without quartiles.
-    on_edge
-        Whether it stands for a value that the axis cannot show.
-    pale
-        Whether it is drawn pale: another point is better on both axes.
-    text
-        Its description, in lines.
-
-    """
-
+    # Its position.
     x: float
     y: float
+    # Distances to the lower and the upper quartile, both positive; 0 without quartiles.
     x_arms: tuple[float, float]
     y_arms: tuple[float, float]
-    on_edge: bool
-    pale: bool
-    text: tuple[str, ...]
+    on_edge: bool  # Whether it stands for a value that the axis cannot show
+    pale: bool  # Whether it is drawn pale: another point is better on both axes
+    text: tuple[str, ...]  # Its description, in lines
 
 
 class PlacedCurve(NamedTuple):
@@ -114,27 +100,14 @@ class PlacedCurve(NamedTuple):
 
 
 class Places(NamedTuple):
-    """
-    A diagram with the positions of its curves.
+    """A diagram with the positions of its curves."""
 
-    Attributes
-    ----------
-    x, y
-        Ranges of its axes.
-    curves
-        Its curves.
-    front
-        Its best points, in the order of x; empty if more is not worse.
-    on_edge
-        Meaning of the marks on its edges: '0', '∞', '0 or ∞'; '' if there are none.
-
-    """
-
+    # Ranges of its axes.
     x: Range
     y: Range
-    curves: tuple[PlacedCurve, ...]
-    front: tuple[Placed, ...]
-    on_edge: str
+    curves: tuple[PlacedCurve, ...]  # Its curves
+    front: tuple[Placed, ...]  # Its best points, in the order of x; empty if more is not worse
+    on_edge: str  # Meaning of the marks on its edges: '0', '∞', '0 or ∞'; '' if there are none
 
     @property
     def empty(self) -> bool:

@@ -247,20 +247,11 @@ _MOST_SOLVED = 32
 
 
 class Program(NamedTuple):
-    """
-    A linkage as a tree in real numbers.
+    """A linkage as a tree in real numbers."""
 
-    Attributes
-    ----------
-    inputs
-        The values of the driven joints, then their rates and accelerations, if requested.
-    tree
-        The decisions and results for finite inputs.
-
-    """
-
+    # The values of the driven joints, then their rates and accelerations, if requested.
     inputs: tuple[Operation, ...]
-    tree: Tree
+    tree: Tree  # The decisions and results for finite inputs
 
 
 def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:

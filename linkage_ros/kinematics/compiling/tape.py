@@ -34,29 +34,14 @@ Kind: TypeAlias = Literal['real', 'complex', 'truth', 'other']
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Operation:
-    """
-    A number of the tape.
+    """A number of the tape."""
 
-    Attributes
-    ----------
-    name
-        The operation: the name of an input, ``+``, ``sin``, ``where``, ``call``, and so on.
-    arguments
-        Other operations, and constants.
-    kind
-        Type of the result.
-    number
-        Index on the tape.
-    value
-        Value at the state of the linkage at which the tape is recorded.
-
-    """
-
+    # The operation: the name of an input, ``+``, ``sin``, ``where``, ``call``, and so on.
     name: str
-    arguments: tuple[Any, ...]
-    kind: Kind
-    number: int
-    value: Any
+    arguments: tuple[Any, ...]  # Other operations, and constants
+    kind: Kind  # Type of the result
+    number: int  # Index on the tape
+    value: Any  # Value at the state of the linkage at which the tape is recorded
 
     @property
     def is_input(self) -> bool:

@@ -42,26 +42,14 @@ Wanted = Callable[[Motion], Sequence[Sequence[float]]]
 
 
 class Path(NamedTuple):
-    """
-    The operations of the steps while their decisions are the same.
+    """The operations of the steps while their decisions are the same."""
 
-    Attributes
-    ----------
-    inputs
-        The values of the driven joints, then their rates and accelerations, if requested.
-    decisions
-        The decisions in order. If one of them differs, the path is not valid.
-    outputs
-        The returned numbers, in groups.
-    tape
-        The tape of the operations.
-
-    """
-
+    # The values of the driven joints, then their rates and accelerations, if requested.
     inputs: tuple[Operation, ...]
+    # The decisions in order. If one of them differs, the path is not valid.
     decisions: tuple[Decision, ...]
-    outputs: tuple[tuple[Number, ...], ...]
-    tape: Tape
+    outputs: tuple[tuple[Number, ...], ...]  # The returned numbers, in groups
+    tape: Tape  # The tape of the operations
 
 
 def joints(motion: Motion) -> Sequence[Sequence[float]]:

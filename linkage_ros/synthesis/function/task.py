@@ -227,24 +227,14 @@ class FunctionTask:
 
 
 class FunctionError(NamedTuple):
-    """
-    An error of the rocker, read on the scale of the function.
+    """An error of the rocker, read on the scale of the function."""
 
-    Attributes
-    ----------
-    x, y
-        Where the error occurs, and the value of the function there.
-    error
-        The shown value minus y.
-    percent
-        The same, in percent of the change of y over the range; above 0 in the direction of that
-        change.
-
-    """
-
+    # Where the error occurs, and the value of the function there.
     x: float
     y: float
-    error: float
+    error: float  # The shown value minus y
+    # The same, in percent of the change of y over the range; above 0 in the direction of that
+    # change.
     percent: float
 
 
@@ -422,33 +412,16 @@ _SAME = 1e-9
 
 
 class StructuralError(NamedTuple):
-    """
-    The error over a range of the crank.
+    """The error over a range of the crank."""
 
-    Attributes
-    ----------
-    crank
-        Angles of the crank from one end of the range to the other, in [rad]; (n,).
-    error
-        The rocker's angle minus the wanted one there, in (−π, π] rad, NaN if the loop is open;
-        (n,).
-    greatest
-        The error that is farthest from 0, in [rad]; NaN if the loop closes nowhere.
-    at
-        Angle of the crank at that error, in [rad].
-    rms
-        Root of the mean square where the loop closes, in [rad].
-    opens_at
-        Angle of the crank, on its way through the range, at which the loop opens, in [rad]; None
-        if it closes all the way.
-
-    """
-
-    crank: Array
+    crank: Array  # Angles of the crank from one end of the range to the other, in [rad]; (n,)
+    # The rocker's angle minus the wanted one there, in (−π, π] rad, NaN if the loop is open; (n,).
     error: Array
-    greatest: float
-    at: float
-    rms: float
+    greatest: float  # The error that is farthest from 0, in [rad]; NaN if the loop closes nowhere
+    at: float  # Angle of the crank at that error, in [rad]
+    rms: float  # Root of the mean square where the loop closes, in [rad]
+    # Angle of the crank, on its way through the range, at which the loop opens, in [rad]; None if
+    # it closes all the way.
     opens_at: float | None
 
 

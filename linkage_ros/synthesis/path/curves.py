@@ -151,23 +151,11 @@ def _size(points: tuple[complex, ...]) -> float:
 
 
 class Fitted(NamedTuple):
-    """
-    Four-bars, and their crank angles at the points.
+    """Four-bars, and their crank angles at the points."""
 
-    Attributes
-    ----------
-    rows
-        Dimensions by `COLUMNS`, (n, 9).
-    angles
-        Crank angles from the ground line at the points, (n, N).
-    side
-        1 for left and −1 for right, (n,).
-
-    """
-
-    rows: Array
-    angles: Array
-    side: Array
+    rows: Array  # Dimensions by `COLUMNS`, (n, 9)
+    angles: Array  # Crank angles from the ground line at the points, (n, N)
+    side: Array  # 1 for left and −1 for right, (n,)
 
     def some(self, chosen: NDArray[np.intp]) -> Fitted:
         """Return the four-bars with these indices."""
@@ -176,29 +164,14 @@ class Fitted(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """
-    The target of a fit.
+    """The target of a fit."""
 
-    Attributes
-    ----------
-    points
-        (N,), of a path around the origin whose size is 1.
-    timing
-        Crank angles at the points, (N,); None if they are free.
-    zero_free
-        Whether the zero of the timing is free, so that only differences count.
-    full_turn
-        Whether the loop must close at every crank angle.
-    shortest, longest
-        Bounds of the links; the traced point may be at most ``longest`` from the crank's pin,
-        along x and along y.
-
-    """
-
-    points: Complex
-    timing: Array | None
-    zero_free: bool
-    full_turn: bool
+    points: Complex  # (N,), of a path around the origin whose size is 1
+    timing: Array | None  # Crank angles at the points, (N,); None if they are free
+    zero_free: bool  # Whether the zero of the timing is free, so that only differences count
+    full_turn: bool  # Whether the loop must close at every crank angle
+    # Bounds of the links; the traced point may be at most ``longest`` from the crank's pin, along
+    # x and along y.
     shortest: float
     longest: float
 
