@@ -178,17 +178,13 @@ class Marks:
     file
         The file; made by `make`.
 
-    Attributes
-    ----------
-    times
-        Begin of each tick, in [ns] of the steady clock; 0 before.
-
     """
 
     def __init__(self, file: Path) -> None:
         with file.open('r+b') as stream:
             self._map = mmap.mmap(stream.fileno(), 0)
         self._numbers = memoryview(self._map).cast('q')
+        # Begin of each tick, in [ns] of the steady clock; 0 before.
         self.times = self._numbers[_FIRST_TICK:]
 
     @classmethod

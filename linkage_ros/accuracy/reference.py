@@ -214,13 +214,6 @@ class ExactEquations:
     digits
         The precision, in decimal digits.
 
-    Attributes
-    ----------
-    mp
-        The context of the numbers.
-    unit
-        Size of the linkage, in [m].
-
     """
 
     def __init__(
@@ -230,7 +223,7 @@ class ExactEquations:
         sliders: Mapping[str, int],
         digits: int,
     ) -> None:
-        self.mp = MPContext()
+        self.mp = MPContext()  # The context of the numbers
         self.mp.dps = digits
         self._linkage, self._links, self._sliders = linkage, links, sliders
         self._points = {
@@ -238,7 +231,7 @@ class ExactEquations:
             for link, points in linkage.links.items()
             for name, place in points.items()
         }
-        self.unit = max(abs(one) for one in self._points.values())
+        self.unit = max(abs(one) for one in self._points.values())  # Size of the linkage, in [m]
         self._pins = []
         self._carriers: dict[str, str] = {}
         for link, name in self._points:

@@ -96,19 +96,13 @@ class MessageQueue:
     capacity
         Messages that may wait, each of up to `PLACE` bytes; a larger one counts as several.
 
-    Attributes
-    ----------
-    open
-        Whether messages are accepted; else they are dropped.
-    received, dropped
-        A counter for each topic.
-
     """
 
     def __init__(self, topics: int, capacity: int) -> None:
-        self.open = True
+        self.open = True  # Whether messages are accepted; else they are dropped
         self._capacity = capacity
         self._waiting: deque[Offered | None] = deque()
+        # A counter for each topic.
         self.received = [ThreadCounter() for _ in range(topics)]
         self.dropped = [ThreadCounter() for _ in range(topics)]
         self._add_received = [counter.add for counter in self.received]

@@ -127,15 +127,6 @@ class NewBag:
     compression
         Compression of chunks: '', 'lz4' or 'zstd'.
 
-    Attributes
-    ----------
-    counts
-        Messages by topic.
-    attachments
-        Content by name.
-    information
-        Metadata that rosbag2 wrote into the damaged file.
-
     Raises
     ------
     OSError
@@ -146,8 +137,9 @@ class NewBag:
     """
 
     def __init__(self, folder: Path, profile: str, compression: str) -> None:
-        self.counts: Counter[str] = Counter()
-        self.attachments: dict[str, bytes] = {}
+        self.counts: Counter[str] = Counter()  # Messages by topic
+        self.attachments: dict[str, bytes] = {}  # Content by name
+        # Metadata that rosbag2 wrote into the damaged file.
         self.information: Mapping[str, Any] = {}
         self._folder = folder
         self._topics: dict[str, Topic] = {}

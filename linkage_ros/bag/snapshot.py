@@ -103,15 +103,10 @@ class LastSeconds:
     most
         Most memory for the messages [bytes]; if it is too little, the oldest are removed.
 
-    Attributes
-    ----------
-    discarded
-        Number of removed messages of each topic.
-
     """
 
     def __init__(self, topics: int, span: int, most: int) -> None:
-        self.discarded = [0] * topics
+        self.discarded = [0] * topics  # Number of removed messages of each topic
         self._span = span
         self._most = most
         self._counts = [0] * topics
@@ -240,13 +235,6 @@ class SnapshotMemory:
     capacity
         Messages that may wait for the memory's thread; as for `Recorder`.
 
-    Attributes
-    ----------
-    extent
-        Amount of messages in memory.
-    failure
-        Reason why the memory has ended early; None if it has not.
-
     """
 
     def __init__(
@@ -254,7 +242,8 @@ class SnapshotMemory:
     ) -> None:
         self.topics = tuple(topics)
         self.seconds = seconds
-        self.extent = Extent()
+        self.extent = Extent()  # Amount of messages in memory
+        # Reason why the memory has ended early; None if it has not.
         self.failure: RecordingError | None = None
         self._queue = MessageQueue(len(topics), capacity)
         self.offer = self._queue.offer
@@ -360,19 +349,13 @@ class SnapshotWriting:
     done
         Called on the writing thread when the outcome is ready.
 
-    Attributes
-    ----------
-    kept
-        As given.
-    outcome
-        Summary of the recording, or the error that prevented it; None until then.
-
     """
 
     def __init__(
         self, kept: Kept, make: Callable[[], BagWriter], done: Callable[[], None]
     ) -> None:
         self.kept = kept
+        # Summary of the recording, or the error that prevented it; None until then.
         self.outcome: RecordingSummary | RecordingError | None = None
         self._make = make
         self._done = done

@@ -106,13 +106,6 @@ class Iteration:
     far
         No slide needs to be longer than this to stretch a link.
 
-    Attributes
-    ----------
-    inputs
-        As given.
-    tolerance
-        Bound of the last correction, in [rad] and in the unit of the lengths; 0 for full accuracy.
-
     """
 
     __slots__ = ('_before', '_branch', '_constraints', '_far', '_slides', '_sliding', '_solution',
@@ -138,6 +131,8 @@ class Iteration:
         self._branch: Branch | None = None
         self._solution: Array | None = None
         self._straight: _StraightSystem | None = None
+        # Bound of the last correction, in [rad] and in the unit of the lengths; 0 for full
+        # accuracy.
         self.tolerance = 0.0
 
     @property

@@ -334,12 +334,6 @@ class ArrayWriter:
     within
         The sequence, with one element, that contains the arrays; '' if none does.
 
-    Attributes
-    ----------
-    write
-        Returns a message from its stamp in [ns] and, for each array, a number per joint. All
-        arrays but the first may be empty, which is their default.
-
     """
 
     __slots__ = ('_arrays', '_fields', '_names', '_within', 'write')
@@ -367,6 +361,8 @@ class ArrayWriter:
                 condition = f'if {" and ".join(filled)}: ' if filled else ''
                 lines.append(f'    {condition}return {call.lines[0]}')
                 bound |= call.bound
+        # Returns a message from its stamp in [ns] and, for each array, a number per joint. All
+        # arrays but the first may be empty, which is their default.
         self.write = written('\n'.join(lines), 'write', bound)
 
     def call(self, numbers: Mapping[str, str], name: str = 'pack') -> Lines:

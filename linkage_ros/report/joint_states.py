@@ -68,19 +68,13 @@ class JointStates:
     others
         Whether other joints may follow; if not, they are ignored.
 
-    Attributes
-    ----------
-    joints
-        All joints so far.
-    left_out
-        Number of messages, or joints of messages, left out, by reason.
-
     """
 
     def __init__(self, joints: Sequence[str] = (), *, others: bool = True) -> None:
-        self.joints = list(joints)
+        self.joints = list(joints)  # All joints so far
         self._most = max(len(self.joints), MOST_JOINTS) if others else len(self.joints)
         self._others = others
+        # Number of messages, or joints of messages, left out, by reason.
         self.left_out: Counter[str] = Counter()
 
     def read(self, messages: Sequence[bytes]) -> JointBlock:

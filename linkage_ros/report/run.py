@@ -72,15 +72,6 @@ class Lane:
     window
         Begin and end, in [ns]; events outside are ignored.
 
-    Attributes
-    ----------
-    count
-        Number of events.
-    spans
-        The spans, in the order in which they were added.
-    near
-        The current value; it grows as spans are merged.
-
     """
 
     def __init__(
@@ -92,11 +83,11 @@ class Lane:
         most: int = MOST_SPANS,
         window: tuple[int, int] = (0, 2**63 - 1),
     ) -> None:
-        self.near = near
+        self.near = near  # The current value; it grows as spans are merged
         self._alike, self._longest, self._most = alike, longest, most
         self._since, self._until = window
-        self.count = 0
-        self.spans: list[Span] = []
+        self.count = 0  # Number of events
+        self.spans: list[Span] = []  # The spans, in the order in which they were added
         self._text = 0
 
     @property

@@ -179,17 +179,6 @@ class Bodies:
     first_layer
         Number of layers that other linkages occupy below.
 
-    Attributes
-    ----------
-    cuts
-        Pins that are cut: the point, and the two links that it joins.
-    inputs
-        Inputs at the start, in [rad] or [m].
-    start
-        Value of every joint at the start, in [rad] or [m], in the order of the model.
-    joints
-        Elements of the joints that have a name in messages, by that name.
-
     """
 
     def __init__(
@@ -198,14 +187,16 @@ class Bodies:
         self._closure = closure = part.closure
         self._names = names
         tree = physical_tree(closure)
-        self.cuts = tree.cuts
+        self.cuts = tree.cuts  # Pins that are cut: the point, and the two links that it joins
         self._drawn = bodies(closure, spans(closure), first_layer)
-        self.inputs = usual_inputs(closure)
+        self.inputs = usual_inputs(closure)  # Inputs at the start, in [rad] or [m]
         self._position = closure.position(*self.inputs)
         self._driven = dict(
             zip((given.joint for given in closure.linkage.inputs), self.inputs, strict=True)
         )
+        # Elements of the joints that have a name in messages, by that name.
         self.joints: dict[str, ET.Element] = {}
+        # Value of every joint at the start, in [rad] or [m], in the order of the model.
         self.start: list[float] = []
         self._masses: dict[str, float] = {}
         self._links = {GROUND: ET.SubElement(world, 'body', name=names.own(GROUND))}

@@ -416,11 +416,6 @@ class NewtonClosure(Solver):
         True: start from the last state. False: start from the pose of the file each time. None:
         start from the nearest knot, so that a state depends on its inputs alone.
 
-    Attributes
-    ----------
-    exact_states
-        Number of states that the closed form has solved so far.
-
     """
 
     by_steps = False
@@ -428,7 +423,7 @@ class NewtonClosure(Solver):
     def __init__(self, linkage: Linkage, tolerance: float, warm: bool | None = None) -> None:
         super().__init__(Closure(linkage))
         self.tolerance = tolerance
-        self.exact_states = 0
+        self.exact_states = 0  # Number of states that the closed form has solved so far
         self._warm = warm is True
         self._last: list[float] | None = None
         self._plan, self._iterates = self._planned(tolerance)

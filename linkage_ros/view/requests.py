@@ -66,19 +66,11 @@ class Request(NamedTuple):
 
 
 class RequestError(LinkageError):
-    """
-    A message that is no request.
-
-    Attributes
-    ----------
-    number
-        The ``id``, as far as it can be read.
-
-    """
+    """A message that is no request."""
 
     def __init__(self, reason: str, remedy: str, number: float | None = None) -> None:
         super().__init__('message', reason, remedy)
-        self.number = number
+        self.number = number  # The ``id``, as far as it can be read
 
 
 def read_request(message: str) -> Request:

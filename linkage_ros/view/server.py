@@ -97,13 +97,6 @@ class Server:
     report
         Called with one line where something is refused for the first time, and with each defect.
 
-    Attributes
-    ----------
-    address
-        Its address, with the token; '' before `start`.
-    refused
-        Number of refused requests and messages, by reason.
-
     """
 
     def __init__(
@@ -113,7 +106,8 @@ class Server:
         self._routes = routes
         self._report = report
         self._token = token_urlsafe(24)
-        self.address = ''
+        self.address = ''  # Its address, with the token; '' before `start`
+        # Number of refused requests and messages, by reason.
         self.refused: Counter[str] = Counter()
         self._hosts: tuple[str, ...] = ()
         self._sockets: dict[web.WebSocketResponse, str] = {}

@@ -71,19 +71,6 @@ class Compiled:
     within_limits
         Whether a state with a joint beyond its limits has the status limited.
 
-    Attributes
-    ----------
-    driven
-        Number of inputs.
-    derivatives, wanted
-        As given.
-    paths
-        The paths of the steps where the linkage is closed; several if the steps take different
-        forms in different regions.
-    fast
-        Takes the inputs, their rates and their accelerations, in this order; returns the values,
-        or None if the plain steps must answer.
-
     """
 
     def __init__(
@@ -95,9 +82,11 @@ class Compiled:
     ) -> None:
         self._closure = closure
         self._within_limits = within_limits
-        self.driven = len(closure.linkage.inputs)
+        self.driven = len(closure.linkage.inputs)  # Number of inputs
         self.derivatives = derivatives
         self.wanted = wanted
+        # The paths of the steps where the linkage is closed; several if the steps take different
+        # forms in different regions.
         self.paths: list[Path] = []
         self._functions: list[Callable[..., Values | None]] = []
         self._bodies: dict[str, Body] = {}
@@ -106,6 +95,8 @@ class Compiled:
         if not self.paths and (self.driven > 1 or closure.input_ranges):
             # This starts an additional search, which takes longer.
             self._follow(usual_inputs(closure))
+        # Takes the inputs, their rates and their accelerations, in this order; returns the values,
+        # or None if the plain steps must answer.
         self.fast: Callable[..., Values | None] = _first_of(self._functions)
 
     def _follow(self, inputs: tuple[float, ...]) -> None:

@@ -116,18 +116,11 @@ _REALS = frozenset(_VALUES) - _TRUTHS - _COMPLEX - _OF_EITHER
 
 
 class Tape:
-    """
-    All operations on symbols, and the decisions by them.
-
-    Attributes
-    ----------
-    decisions
-        The decisions in the order in which the steps made them, each condition once.
-
-    """
+    """All operations on symbols, and the decisions by them."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[Any, ...], Operation] = {}
+        # The decisions in the order in which the steps made them, each condition once.
         self.decisions: list[Decision] = []
         self._decided: dict[int, bool] = {}
         self._ahead: Sequence[bool | None] = ()
