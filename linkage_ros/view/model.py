@@ -29,8 +29,7 @@ from linkage_ros.drawing.drawing_data import drawn_in_frames, pose_in_frames
 from linkage_ros.drawing.figure import view
 from linkage_ros.drawing.shapes import driven_links
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.files.assemblies import closures
-from linkage_ros.files.linkage_file import closable, written_linkage
+from linkage_ros.files.linkage_file import closable, closures, written_linkage
 from linkage_ros.files.section import Section
 from linkage_ros.files.units import Units
 from linkage_ros.files.yaml_file import parse_yaml

@@ -17,8 +17,7 @@
 
 from itertools import pairwise
 
-from linkage_ros.accuracy.answer import replies, reply
-from linkage_ros.accuracy.results import Choice, Part, Results
+from linkage_ros.accuracy.results import Choice, Part, replies, reply, Results
 from linkage_ros.accuracy.solving import scene_choices
 from linkage_ros.measuring import Spread
 from linkage_ros.resources import shipped

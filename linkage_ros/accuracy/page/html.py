@@ -24,7 +24,6 @@ from math import log10
 from textwrap import wrap
 from typing import Any
 
-from linkage_ros.accuracy.answer import replies, Reply
 from linkage_ros.accuracy.page.diagrams import (
     Placed,
     PlacedCurve,
@@ -34,7 +33,7 @@ from linkage_ros.accuracy.page.diagrams import (
     Styles,
 )
 from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
-from linkage_ros.accuracy.results import Diagram, Part, Results, Table
+from linkage_ros.accuracy.results import Diagram, Part, replies, Reply, Results, Table
 from linkage_ros.pages.document import document, facts_html, picture, table_html
 
 _HERE = 'linkage_ros.accuracy.page'
