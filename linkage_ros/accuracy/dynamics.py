@@ -78,11 +78,7 @@ def free_motion(member: SceneLinkage) -> FreeMotion:
     """
     Return a free motion of a linkage, with its known end.
 
-    Raises
-    ------
-    NoReferenceError
-        If no free motion stays off its stops, or has a reference.
-
+    A NoReferenceError is raised if no free motion stays off its stops, or has a reference.
     """
     given = member.loads or Loads()
     springs = tuple(replace(spring, damping=0.0) for spring in given.springs)

@@ -145,11 +145,7 @@ def inputs(
     """
     Return the typed values of the inputs, in [rad] and [m].
 
-    Raises
-    ------
-    LinkageError
-        If there are more or fewer values than inputs.
-
+    A LinkageError is raised if there are more or fewer values than inputs.
     """
     given = linkage.inputs
     if len(typed) != len(given):

@@ -74,11 +74,7 @@ def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
     """
     Return all solutions, the best first.
 
-    Raises
-    ------
-    LinkageError
-        If there is no solution, or the arguments are not a task.
-
+    A LinkageError is raised if there is no solution, or the arguments are not a task.
     """
     tasks = {
         '--pair': typed.pair or typed.pairs,

@@ -110,11 +110,7 @@ def count_of(seconds: float) -> int:
     """
     Return the number of pictures.
 
-    Raises
-    ------
-    LinkageError
-        If it is less than two pictures, or too long.
-
+    A LinkageError is raised if it is less than two pictures, or too long.
     """
     if not 2.0 / RATE <= seconds <= _LONGEST:
         reason = f'{seconds:g} is not between {2.0 / RATE:g} and {_LONGEST:g} s'
@@ -126,11 +122,8 @@ def check_kind(file: Path) -> None:
     """
     Check that files of a name can be written here.
 
-    Raises
-    ------
-    LinkageError
-        If it is no GIF, MP4 or SVG; matplotlib is missing, or ffmpeg for an MP4.
-
+    A LinkageError is raised if it is no GIF, MP4 or SVG; matplotlib is missing, or ffmpeg for an
+    MP4.
     """
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
     check_suffix(file, KINDS)
@@ -145,11 +138,7 @@ def range_motion(shown: View, title: str, seconds: float) -> Motion:
     """
     Return the motion through the range of the first input: a turn, or there and back.
 
-    Raises
-    ------
-    LinkageError
-        If the time is too short or too long.
-
+    A LinkageError is raised if the time is too short or too long.
     """
     count = count_of(seconds)
     low, high = shown.interval.lowest, shown.interval.highest

@@ -183,11 +183,7 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
     """
     Paint a picture to a file.
 
-    Raises
-    ------
-    LinkageError
-        If matplotlib is not installed, or the file cannot be written.
-
+    A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
     """
     context = settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
@@ -233,11 +229,7 @@ def assemblies_picture(views: Mapping[str, View], file: Path) -> None:
     """
     Paint the same linkage in several assemblies, each under the text that a file needs for it.
 
-    Raises
-    ------
-    LinkageError
-        If matplotlib is not installed, or the file cannot be written.
-
+    A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
     """
     context = settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load

@@ -535,12 +535,8 @@ def check_limits(closure: LoopClosure) -> None:
     """
     Refuse limits between which a linkage cannot be.
 
-    Raises
-    ------
-    DefinitionError
-        If the pose is beyond limits, or no state of the input's range is within the limits of the
-        input, of a published joint, or of all joints together.
-
+    A DefinitionError is raised if the pose is beyond limits, or no state of the input's range is
+    within the limits of the input, of a published joint, or of all joints together.
     """
     bounds, linkage = closure.bounds, closure.linkage
     if not bounds:

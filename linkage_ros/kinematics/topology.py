@@ -139,11 +139,7 @@ def assur_groups(linkage: Linkage) -> Structure:
     """
     Find the order in which a linkage is solved.
 
-    Raises
-    ------
-    DefinitionError
-        If a link is free, over-constrained, or not joined to the ground.
-
+    A DefinitionError is raised if a link is free, over-constrained, or not joined to the ground.
     """
     links: dict[str, Mapping[str, Point]] = dict(linkage.links)
     blocks: dict[str, str] = {}

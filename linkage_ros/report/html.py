@@ -175,11 +175,8 @@ def run_html(run: Run, header: ReportHeader) -> str:
     """
     Return the page of a run.
 
-    Raises
-    ------
-    LinkageError
-        If plotly is not installed, or the page would be larger than `PAGE_BYTES`.
-
+    A LinkageError is raised if plotly is not installed, or the page would be larger than
+    `PAGE_BYTES`.
     """
     data = page_data(run, header.wrapped)
     title = short(header.title)

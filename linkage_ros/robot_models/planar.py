@@ -168,11 +168,7 @@ def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
     """
     Reduce the loops of a URDF to their plane.
 
-    Raises
-    ------
-    FileError
-        If its joints are not in one plane; it names the first that is not.
-
+    A FileError is raised if its joints are not in one plane; it names the first that is not.
     """
     turns: dict[str, Array] = {loops.ground: np.eye(3)}
     for joint in urdf.joints.values():

@@ -43,11 +43,7 @@ def check_folder(folder: Path) -> None:
     """
     Check that a page can be written, before anything is measured for it.
 
-    Raises
-    ------
-    LinkageError
-        If the folder exists, or a plotting library is not installed.
-
+    A LinkageError is raised if the folder exists, or a plotting library is not installed.
     """
     check_installed('matplotlib')
     check_installed('plotly')

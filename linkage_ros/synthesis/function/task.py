@@ -246,11 +246,7 @@ def chebyshev(low: float, high: float, count: int) -> Array:
     degree n that deviates least from 0 over the range; computed by half angles, which do not
     cancel near ``low``.
 
-    Raises
-    ------
-    SynthesisError
-        If there are too many points.
-
+    A SynthesisError is raised if there are too many points.
     """
     if count > _MOST:
         raise SynthesisError('points', f'{count} of them', f'{_MOST} do')
@@ -265,11 +261,7 @@ def pairs(task: FunctionTask, xs: ArrayLike) -> tuple[list[float], list[float]]:
     """
     Return the angles of crank and rocker at precision points, in [rad].
 
-    Raises
-    ------
-    SynthesisError
-        If a point lies outside of the range, or is repeated.
-
+    A SynthesisError is raised if a point lies outside of the range, or is repeated.
     """
     points = [float(x) for x in np.asarray(xs, np.float64).ravel()]
     low, high = sorted(task.x_range)
