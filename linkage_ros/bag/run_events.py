@@ -69,13 +69,21 @@ class Reset(NamedTuple):
 
 
 class TickEvent(NamedTuple):
-    """Result of a tick."""
+    """
+    Result of a tick.
 
-    # Time of the tick, and time it solved for, in [ns].
+    Attributes
+    ----------
+    log_time, time
+        Time of the tick, and time it solved for, in [ns].
+    messages
+        The joint state and the auxiliary messages, each empty if there is none; all are empty for
+        a tick that the bag records as one without messages.
+
+    """
+
     log_time: int
     time: int
-    # The joint state and the auxiliary messages, each empty if there is none; all are empty for a
-    # tick that the bag records as one without messages.
     messages: tuple[bytes, ...]
 
 
@@ -83,24 +91,40 @@ Event = SampleEvent | FaultEvent | Reset | TickEvent
 
 
 class RunAccount(NamedTuple):
-    """The run's account in its bag; '' for missing topics."""
+    """
+    The run's account in its bag; '' for missing topics.
 
-    # Name of the scene, and the folder for its relative paths.
+    Attributes
+    ----------
+    scene, scene_folder
+        Name of the scene, and the folder for its relative paths.
+    crank_topic, joint_states_topic, faults_topic, withheld_topic, resets_topic, extras
+        Names of the topics.
+    begun
+        When the bag was begun, as in `MID_RUN`; '' if it does not say.
+    versions
+        Versions of the software of the run, by name.
+    solvers
+        Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
+    user_effects
+        Modules of the user-defined effects, by name.
+    seed
+        Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
+
+    """
+
     scene: str = ''
     scene_folder: str = ''
-    # Names of the topics.
     crank_topic: str = ''
     joint_states_topic: str = ''
     faults_topic: str = ''
     withheld_topic: str = ''
     resets_topic: str = ''
     extras: tuple[str, ...] = ()
-    begun: str = ''  # When the bag was begun, as in `MID_RUN`; '' if it does not say
-    versions: Mapping[str, str] = {}  # Versions of the software of the run, by name
-    # Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
+    begun: str = ''
+    versions: Mapping[str, str] = {}
     solvers: Mapping[str, Any] = {}
-    user_effects: Mapping[str, str] = {}  # Modules of the user-defined effects, by name
-    # Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
+    user_effects: Mapping[str, str] = {}
     seed: int = 0
 
 
@@ -117,7 +141,15 @@ class StoredRun(Protocol):
 
 
 def run_account(bag: StoredRun) -> RunAccount:
-    """Return the run's account in its bag; a BagError if there is none, or if it is damaged."""
+    """
+    Return the run's account in its bag.
+
+    Raises
+    ------
+    BagError
+        There is none, or it is damaged.
+
+    """
     if RUN_FILE not in bag.attachments:
         raise BagError(
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'
@@ -251,7 +283,17 @@ _NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
 
 
 def lost_beginning(bag: Bag, run: RunAccount) -> str:
-    """Return text on why the first messages of a run are not in its bag; '' if they are."""
+    """
+    Return text on why the first messages of a run are not in its bag; '' if they are.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    run
+        The run's account in it.
+
+    """
     discarded = sum(counts_in(bag.custom, 'let_go').values())
     if discarded:
         return f'its first {discarded} messages have made way for newer ones'

@@ -105,6 +105,7 @@ EVERY_FAULT = {
 }
 """Every fault with its parameters, on the shipped four-bar."""
 
+
 EXAMPLE = 'linkage cost worn_press --ticks 2000'
 
 
@@ -158,14 +159,25 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 class Costs(NamedTuple):
-    """Measured costs."""
+    """
+    Measured costs.
 
-    scene: SceneCost  # Cost of a scene, or of the scene of all effects
-    # What each drive takes beyond the topic drive; empty unless all are measured.
+    Attributes
+    ----------
+    scene
+        Cost of a scene, or of the scene of all effects.
+    drives
+        What each drive takes beyond the topic drive; empty unless all are measured.
+    faults
+        What each fault takes while it is not injected; empty unless all are measured.
+    loads
+        What each load takes under the torque drive; empty unless all are measured.
+
+    """
+
+    scene: SceneCost
     drives: Mapping[str, Times] = MappingProxyType({})
-    # What each fault takes while it is not injected; empty unless all are measured.
     faults: Mapping[str, Times] = MappingProxyType({})
-    # What each load takes under the torque drive; empty unless all are measured.
     loads: Mapping[str, Times] = MappingProxyType({})
 
 

@@ -61,7 +61,13 @@ def check_simulated(scene: Scene, seconds: float) -> int:
     """
     Return the number of ticks of a simulation, the last at its end.
 
-    A FileError says that a drive waits for samples, a LinkageError that the ticks are too many.
+    Raises
+    ------
+    FileError
+        A drive waits for samples.
+    LinkageError
+        There would be too many ticks.
+
     """
     for member in scene.members:
         if member.drive[0] == 'topic':
@@ -148,7 +154,17 @@ def simulate(
 
 
 class _Recording:
-    """Writes each message to the bag at once; a tick sees a recorder."""
+    """
+    Writes each message at once; a tick sees a recorder.
+
+    Parameters
+    ----------
+    writer
+        The bag.
+    topics
+        Number of topics.
+
+    """
 
     def __init__(self, writer: BagWriter, topics: int) -> None:
         self._writer = writer
