@@ -163,27 +163,14 @@ class TopicCounts:
 
 @dataclass(frozen=True, slots=True)
 class RecordingSummary:
-    """
-    Outcome of a recording.
+    """Outcome of a recording."""
 
-    Parameters
-    ----------
-    folder
-        Folder of the bag.
-    topics
-        Counts for each topic, in the order of their numbers; no message waits any more, so
-        ``received == recorded + dropped + discarded``.
-    size
-        Size of the MCAP files [bytes].
-    failure
-        Reason for missing messages, on one line; None if no disk has failed.
-
-    """
-
-    folder: Path
+    folder: Path  # Folder of the bag
+    # Counts for each topic, in the order of their numbers; no message waits any more, so
+    # ``received == recorded + dropped + discarded``.
     topics: tuple[TopicCounts, ...]
-    size: int
-    failure: str | None
+    size: int  # Size of the MCAP files [bytes]
+    failure: str | None  # Reason for missing messages, on one line; None if no disk has failed
 
 
 class Recorder:
