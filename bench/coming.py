@@ -54,23 +54,11 @@ _SHARED = f"""\
 
 @dataclass(frozen=True, slots=True)
 class ComersPlan:
-    """
-    Amount of the measurement.
+    """Amount of the measurement."""
 
-    Attributes
-    ----------
-    comers
-        Number of subscribers that come and go, one after the other.
-    listens
-        Time for which each listens, in [s].
-    busy
-        Number of processes that each occupy a processor under load.
-
-    """
-
-    comers: int
-    listens: float
-    busy: int
+    comers: int  # Number of subscribers that come and go, one after the other
+    listens: float  # Time for which each listens, in [s]
+    busy: int  # Number of processes that each occupy a processor under load
 
 
 def measure_comers(

@@ -59,17 +59,8 @@ def stepping(
     """
     Return two functions that turn a four-bar once: state by state, and in one call.
 
-    Both compute positions, velocities and accelerations of its pins.
-
-    Parameters
-    ----------
-    a, b, c, d
-        Lengths of crank, coupler, rocker and ground.
-    steps
-        Number of states per turn.
-    rate, acceleration
-        Of the crank, in [rad/s] and [rad/s²].
-
+    Both compute positions, velocities and accelerations of its pins in so many steps a turn, from
+    crank, coupler, rocker and ground, and the rate and acceleration of the crank.
     """
     pivot, other = Ground(0.0, 0.0), Ground(d, 0.0)
     crank = Crank(anchor=pivot, radius=a, angular_velocity=tau / steps)
@@ -148,23 +139,11 @@ _AGREEMENT = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class SpeedPlan:
-    """
-    Amount of the measurement.
+    """Amount of the measurement."""
 
-    Attributes
-    ----------
-    rounds
-        Number of measurements of each, in turn.
-    states
-        Number of states solved one at a time, per round.
-    batch
-        Number of states of a batch.
-
-    """
-
-    rounds: int
-    states: int
-    batch: int
+    rounds: int  # Number of measurements of each, in turn
+    states: int  # Number of states solved one at a time, per round
+    batch: int  # Number of states of a batch
 
 
 def measure_speed(plan: SpeedPlan) -> Table:

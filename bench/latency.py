@@ -34,23 +34,11 @@ _OURS, _RELAY = 'linkage_node', 'raw_relay'
 
 @dataclass(frozen=True, slots=True)
 class LatencyPlan:
-    """
-    Amount of the measurement.
+    """Amount of the measurement."""
 
-    Attributes
-    ----------
-    rate
-        Samples per second, for both nodes together.
-    size
-        Samples for each node in a part.
-    parts
-        Number of parts, each with a median; an additional first part is not counted.
-
-    """
-
-    rate: float
-    size: int
-    parts: int
+    rate: float  # Samples per second, for both nodes together
+    size: int  # Samples for each node in a part
+    parts: int  # Number of parts, each with a median; an additional first part is not counted
 
 
 def measure_latency(graph: Graph, folder: Path, plan: LatencyPlan) -> Table:

@@ -32,19 +32,7 @@ from linkage_ros.pages.markdown import table_lines
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """
-    A table of text.
-
-    Attributes
-    ----------
-    title
-        The title.
-    head
-        The names of the columns.
-    rows
-        The cells of each row.
-
-    """
+    """A table of text: the names of its columns, and the cells of each row."""
 
     title: str
     head: Sequence[str]

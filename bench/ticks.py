@@ -80,40 +80,17 @@ _APPEARING = 15.0
 
 @dataclass(frozen=True, slots=True)
 class TickPlan:
-    """
-    Amount of the measurement.
+    """Amount of the measurement."""
 
-    Attributes
-    ----------
-    rounds
-        Number of measurements of each, in turn.
-    warm_up, window
-        Time before a measurement and its duration, in [s].
-
-    """
-
-    rounds: int
+    rounds: int  # Number of measurements of each, in turn
+    # Time before a measurement and its duration, in [s].
     warm_up: float
     window: float
 
 
 @dataclass(frozen=True, slots=True)
 class Contender:
-    """
-    A program that ticks.
-
-    Attributes
-    ----------
-    name
-        Its name in tables.
-    rate
-        Requested ticks per second.
-    module
-        The Python module to run.
-    arguments
-        Its command line.
-
-    """
+    """A Python module that ticks, with its command line, its name in tables, and its rate."""
 
     name: str
     rate: float
@@ -123,25 +100,12 @@ class Contender:
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """
-    One window of a contender.
+    """One window of a contender."""
 
-    Attributes
-    ----------
-    cpu
-        Processor time of all its threads, in [µs] per tick.
-    rate
-        Ticks per second, from the listener.
-    waited
-        Fraction of the time that its threads waited for a processor, in total.
-    health
-        The node's last diagnostics, with counts since its start; empty if none arrived.
-
-    """
-
-    cpu: float
-    rate: float
-    waited: float
+    cpu: float  # Processor time of all its threads, in [µs] per tick
+    rate: float  # Ticks per second, from the listener
+    waited: float  # Fraction of the time that its threads waited for a processor, in total
+    # The node's last diagnostics, with counts since its start; empty if none arrived.
     health: dict[str, str]
 
 

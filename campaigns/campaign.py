@@ -154,24 +154,9 @@ def tallies_of(
     """
     Run all parts and merge their findings.
 
-    Parameters
-    ----------
-    do
-        Runs one part.
-    work
-        The parts.
-    jobs
-        Number of processes.
-    new
-        Makes an empty tally.
-    progress
-        Called with the number of linkages of each part that is done.
-
-    Returns
-    -------
-    dict
-        The tally of each test and family, in the order of the work.
-
+    That is a tally of each test and family, in the order of the work. ``do`` runs one part,
+    ``new`` makes an empty tally, and ``progress`` is called with the number of linkages of each
+    part that is done.
     """
     tallies = {(part.test, part.family): new() for part in work}
     for part, tally in results_of(do, work, jobs):

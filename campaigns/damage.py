@@ -157,7 +157,6 @@ KINDS: dict[str, Callable[..., Path]] = {
     ),
 }
 
-
 FAULT = 'FAULT: '
 """Prefix of a verdict that is a violation."""
 
@@ -258,25 +257,14 @@ JUDGES: dict[str, Callable[[Subject], str]] = {
 
 
 class Part(NamedTuple):
-    """
-    Some of the damages to one bag.
+    """Some of the damages to one bag."""
 
-    Attributes
-    ----------
-    kind, seed, size
-        The bag, as arguments of `make`.
-    damage
-        'cut': the file is truncated to so many bytes; 'flip': one bit is inverted.
-    places
-        The sizes, or the numbers of the bits.
-
-    """
-
+    # The bag, as arguments of `make`.
     kind: str
     seed: int
     size: int
-    damage: str
-    places: range | list[int]
+    damage: str  # 'cut': the file is truncated to so many bytes; 'flip': one bit is inverted
+    places: range | list[int]  # The sizes, or the numbers of the bits
 
 
 @dataclass

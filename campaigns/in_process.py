@@ -40,23 +40,12 @@ class _TooLongError(BaseException):
 
 
 class Ended(NamedTuple):
-    """
-    The end of a command.
+    """The end of a command."""
 
-    Attributes
-    ----------
-    code
-        Its exit code, 'no end' or 'traceback'.
-    stderr
-        Its standard error; without an exit code, the time limit or the exception, and its place.
-    stdout
-        Its standard output.
-
-    """
-
-    code: Any
+    code: Any  # Its exit code, 'no end' or 'traceback'
+    # Its standard error; without an exit code, the time limit or the exception, and its place.
     stderr: str
-    stdout: str
+    stdout: str  # Its standard output
 
 
 def in_process(arguments: list[str], seconds: float) -> Ended:

@@ -59,19 +59,10 @@ PRECISION = 384
 
 
 class Truth(NamedTuple):
-    """
-    Three pairs of one linkage.
+    """Three pairs of one linkage."""
 
-    Attributes
-    ----------
-    rocker
-        Its three angles, rounded to doubles, in [rad].
-    sensitivity
-        Σ|x ∂L/∂x| + ``abs(L)`` of crank, coupler and rocker over the six angles.
-
-    """
-
-    rocker: tuple[float, ...]
+    rocker: tuple[float, ...]  # Its three angles, rounded to doubles, in [rad]
+    # Σ|x ∂L/∂x| + ``abs(L)`` of crank, coupler and rocker over the six angles.
     sensitivity: tuple[float, ...]
 
 
@@ -176,19 +167,9 @@ class Case(NamedTuple):
 
 class Family(NamedTuple):
     """
-    Random linkages with a common difficulty.
+    Random linkages with a common difficulty; three crank angles may leave them open.
 
-    Attributes
-    ----------
-    description
-        The difficulty.
-    lengths
-        Draws the links.
-    angles
-        Draws three crank angles; the linkage may be open there.
-    mixed
-        Whether each angle has its own assembly.
-
+    If ``mixed``, each angle has its own assembly.
     """
 
     description: str
@@ -332,7 +313,6 @@ FAMILIES = {
     'extreme': Family('links of 1e-4 to 1e4 grounds', _extreme, _anywhere),
 }
 
-
 _PART = 500
 _ROUNDOFF = 2.0**-53
 
@@ -349,36 +329,21 @@ NONE = Worst(0.0, -1)
 
 @dataclass
 class Tally:
-    """
-    The findings for a family.
+    """The findings for a family."""
 
-    Attributes
-    ----------
-    cases
-        Number of linkages.
-    flagged
-        Number of linkages for which the result trusts no digit of some length.
-    digits
-        Sum over the other linkages of the number of trusted digits of the least trusted length.
-    worst
-        Greatest error of the linkages that are not flagged, relative to the sensitivity that the
-        result gives; lengths dominated by second derivatives are left out.
-    worst_true
-        The same, relative to the sensitivity of the true linkage, computed in balls.
-    worst_lost
-        Greatest error of the linkages that are not flagged, relative to the loss that the result
-        gives.
-    kappa
-        Smallest and largest ratio of the two sensitivities.
-
-    """
-
-    cases: int = 0
-    flagged: int = 0
+    cases: int = 0  # Number of linkages
+    flagged: int = 0  # Number of linkages for which the result trusts no digit of some length
+    # Sum over the other linkages of the number of trusted digits of the least trusted length.
     digits: float = 0.0
+    # Greatest error of the linkages that are not flagged, relative to the sensitivity that the
+    # result gives; lengths dominated by second derivatives are left out.
     worst: Worst = NONE
+    # The same, relative to the sensitivity of the true linkage, computed in balls.
     worst_true: Worst = NONE
+    # Greatest error of the linkages that are not flagged, relative to the loss that the result
+    # gives.
     worst_lost: Worst = NONE
+    # Smallest and largest ratio of the two sensitivities.
     kappa: tuple[float, float] = (np.inf, 0.0)
 
     def merge(self, other: Tally) -> None:

@@ -71,17 +71,7 @@ _WORKS_ON = {
 
 
 class Section(NamedTuple):
-    """
-    A part of the page under a heading.
-
-    Attributes
-    ----------
-    name
-        The heading.
-    text
-        The heading and the text up to the next heading.
-
-    """
+    """A part of the page: its heading, and the text from there to the next one."""
 
     name: str
     text: str

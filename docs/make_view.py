@@ -28,11 +28,10 @@ from threading import Event, Thread
 from typing import Any
 
 from linkage_ros.resources import shipped
-from linkage_ros.view.conversation import Conversation
+from linkage_ros.view.conversation import Conversation, UserFile
 from linkage_ros.view.model import model
 from linkage_ros.view.page import page as page_of
 from linkage_ros.view.server import serve
-from linkage_ros.view.user_file import UserFile
 from PIL import Image
 
 from test.browser import chromium

@@ -198,84 +198,44 @@ _THOUSAND = 1000
 
 
 class Times(NamedTuple):
-    """
-    Durations of ticks.
+    """Durations of ticks."""
 
-    Attributes
-    ----------
-    median
-        Median of all ticks, in [µs].
-    p99
-        The 99th percentile of 1000 consecutive ticks, in [µs]; of all thousands the median, so
-        that a short disturbance of the machine does not count.
-    low, high
-        Quartiles of the medians of 100 consecutive ticks, in [µs].
-
-    """
-
-    median: float
+    median: float  # Median of all ticks, in [µs]
+    # The 99th percentile of 1000 consecutive ticks, in [µs]; of all thousands the median, so that
+    # a short disturbance of the machine does not count.
     p99: float
+    # Quartiles of the medians of 100 consecutive ticks, in [µs].
     low: float
     high: float
 
 
 @dataclass(frozen=True, slots=True)
 class EffectCost:
-    """
-    The cost of an effect.
+    """The cost of an effect."""
 
-    Attributes
-    ----------
-    name
-        Name of the effect; for a fault, which is not injected, one of `faults_of`.
-    adds
-        What the effect, with the effects it requires, adds to the scene without effects; None if
-        it cannot be measured alone.
-    beside
-        The effect beside which ``adds`` was measured, since alone it acts on nothing; '' if none.
-    saves
-        By how much the median tick of the whole scene is shorter without it, in [µs]; None if
-        it cannot be left out.
-    left_out_with
-        The effect that would then act on nothing and is left out too; '' if none.
-    needed_by
-        The effects that require it.
-
-    """
-
-    name: str
+    name: str  # Name of the effect; for a fault, which is not injected, one of `faults_of`
+    # What the effect, with the effects it requires, adds to the scene without effects; None if it
+    # cannot be measured alone.
     adds: Times | None
+    # The effect beside which ``adds`` was measured, since alone it acts on nothing; '' if none.
     beside: str
+    # By how much the median tick of the whole scene is shorter without it, in [µs]; None if it
+    # cannot be left out.
     saves: float | None
-    left_out_with: str
-    needed_by: tuple[str, ...]
+    left_out_with: str  # The effect that would then act on nothing and is left out too; '' if none
+    needed_by: tuple[str, ...]  # The effects that require it
 
 
 @dataclass(frozen=True, slots=True)
 class SceneCost:
-    """
-    The cost of a scene.
+    """The cost of a scene."""
 
-    Attributes
-    ----------
-    offer
-        Reading and accepting a crank message; None if the drives listen to no topic.
-    bare
-        A tick of the scene without effects, including its crank message.
-    whole
-        A tick of the scene, including its crank message.
-    effects
-        Costs of the effects, in physical order.
-    published
-        The fraction of all ticks that published something.
-
-    """
-
+    # Reading and accepting a crank message; None if the drives listen to no topic.
     offer: Times | None
-    bare: Times
-    whole: Times
-    effects: tuple[EffectCost, ...]
-    published: float
+    bare: Times  # A tick of the scene without effects, including its crank message
+    whole: Times  # A tick of the scene, including its crank message
+    effects: tuple[EffectCost, ...]  # Costs of the effects, in physical order
+    published: float  # The fraction of all ticks that published something
 
 
 def measure(

@@ -116,11 +116,7 @@ def missing_packages_reported() -> Iterator[None]:
     Packages that only one kind of work needs are imported where that work begins, with their own
     remedies. So a missing package here is ROS, or a Python package that all installations need.
 
-    Raises
-    ------
-    LinkageError
-        If an import within the context finds no such package.
-
+    A LinkageError is raised if an import within the context finds no such package.
     """
     try:
         yield

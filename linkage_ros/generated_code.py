@@ -25,17 +25,7 @@ _MOST = 128
 
 
 class Lines(NamedTuple):
-    """
-    A part of a function.
-
-    Attributes
-    ----------
-    lines
-        Lines of Python.
-    bound
-        Objects that the lines refer to by name.
-
-    """
+    """A part of a function: lines of Python, and the objects that they refer to by name."""
 
     lines: list[str]
     bound: dict[str, Any]

@@ -49,13 +49,11 @@ _LONGEST = 600
 _MOST = 5 + (os.cpu_count() or 1)
 """Maximum number of processes at once."""
 
-
 _BOUNDED = (
     'import os, signal, sys; signal.alarm(int(sys.argv[1])); '
     'os.execv(sys.executable, [sys.executable, *sys.argv[2:]])'
 )
 """Runs Python with the arguments after the first, for at most that many seconds."""
-
 
 _DOMAINS = range(1, 102)
 """ROS domains whose ports are safe on every operating system."""
@@ -63,15 +61,7 @@ _DOMAINS = range(1, 102)
 
 @contextmanager
 def held_domain() -> Iterator[int]:
-    """
-    Hold a ROS domain that no other process of this machine holds.
-
-    Raises
-    ------
-    LinkageError
-        If all are held.
-
-    """
+    """Hold a ROS domain that no other process here holds; a LinkageError if all are held."""
     # From a place of its own, since other programs take the first ones.
     first = os.getpid() % len(_DOMAINS)
     for domain in (*_DOMAINS[first:], *_DOMAINS[:first]):
@@ -112,17 +102,7 @@ class MeasurementError(Exception):
 
 
 class Process:
-    """
-    A Python program on the graph.
-
-    Attributes
-    ----------
-    name
-        Name in messages.
-    pid
-        Process id.
-
-    """
+    """A Python program on the graph, with its name in messages and its process id."""
 
     def __init__(self, name: str, popen: subprocess.Popen[bytes], log: Path) -> None:
         self.name = name
@@ -191,17 +171,9 @@ class Process:
 
 class Graph:
     """
-    A ROS graph that is isolated from others.
+    A ROS graph that is isolated from others, with a folder for its logs.
 
-    Parameters
-    ----------
-    domain
-        The ``ROS_DOMAIN_ID``.
-    folder
-        Folder of the logs.
-    longest
-        Time limit for each process, in [s], even if this process dies.
-
+    Each process ends after the longest time, in [s], even if this process dies.
     """
 
     def __init__(self, domain: int, folder: Path, longest: int = _LONGEST) -> None:
@@ -221,19 +193,7 @@ class Graph:
     def run(
         self, module: str, arguments: Sequence[str] = (), more: Mapping[str, str] | None = None
     ) -> Iterator[Process]:
-        """
-        Run ``python -m module`` for the length of a with statement.
-
-        Parameters
-        ----------
-        module
-            The module, by its dotted name.
-        arguments
-            Its command line.
-        more
-            Further environment variables; they override those of the graph.
-
-        """
+        """Run ``python -m module`` for a with statement; ``more`` is for its environment."""
         if len(self._alive) >= _MOST:
             raise MeasurementError(f'{module}: {_MOST} processes run already')
         name = module.rsplit('.', 1)[-1]

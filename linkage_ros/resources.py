@@ -26,30 +26,16 @@ from linkage_ros.errors import did_you_mean, FileError, listed, quoted
 
 
 def share_folders(package: str) -> list[Path]:
-    """
-    Return folders that may hold a ROS package's files: the robot's prefixes, then Python's.
-
-    Parameters
-    ----------
-    package
-        Name of the package.
-
-    """
+    """Return folders that may hold a ROS package's files: the robot's prefixes, then Python's."""
     prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
     return [Path(prefix, 'share', package) for prefix in prefixes if prefix]
 
 
 def shipped(name: str) -> Path:
     """
-    Return the path of a file or folder under ``config/``.
+    Return the path of a file or folder under ``config/``; a FileError if it is not installed.
 
     A checkout comes first, since copies made by an editable install become outdated.
-
-    Raises
-    ------
-    FileError
-        If it is not installed.
-
     """
     checkout = Path(__file__).parent.parent
     folders = share_folders('linkage_ros')

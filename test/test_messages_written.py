@@ -21,11 +21,20 @@ from typing import Any, NamedTuple
 
 from hypothesis import given
 from hypothesis import strategies as st
+from linkage_ros.messages.joint_state import JOINT_STATE as JOINT_STATE_FIELDS
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.joint_values import JointTrajectoryWriter, PlanarWrenchWriter
-from linkage_ros.messages.marker_array import ADD, DELETE, Marker, MarkerArrayWriter
+from linkage_ros.messages.joint_values import (
+    JOINT_TRAJECTORY,
+    JointTrajectoryWriter,
+    MULTI_DOF_JOINT_STATE,
+    PlanarWrenchWriter,
+)
+from linkage_ros.messages.layout import MalformedError, packed, parsed
+from linkage_ros.messages.marker_array import ADD, DELETE, Marker, MARKER_ARRAY, MarkerArrayWriter
+from linkage_ros.report.diagnostics_summary import DIAGNOSTIC_ARRAY
 import numpy as np
 import pytest
+from rosbags.interfaces import Nodetype
 
 from .support.messages import header, JOINT_STATE, STORE
 
@@ -273,3 +282,59 @@ def test_what_moves_is_written_into_its_places_and_nothing_else(at, angle, drawn
     expected = marker_array('ground', [other, FULL, other], 3 * NS)
     expected.markers[1] = marker_message('ground', moved, 3 * NS, angle)
     assert writer.message(3 * NS) == serialized(expected, 'visualization_msgs/msg/MarkerArray')
+
+
+# Declarations, against the definitions that rosbags has of Jazzy's.
+
+DECLARATIONS = {
+    'diagnostic_msgs/msg/DiagnosticArray': DIAGNOSTIC_ARRAY,
+    'sensor_msgs/msg/JointState': JOINT_STATE_FIELDS,
+    'sensor_msgs/msg/MultiDOFJointState': MULTI_DOF_JOINT_STATE,
+    'trajectory_msgs/msg/JointTrajectory': JOINT_TRAJECTORY,
+    'visualization_msgs/msg/MarkerArray': MARKER_ARRAY,
+}
+
+
+def defined(kind):
+    """Yield name, type and whether it is a sequence, of each field; a header is its fields."""
+    for name, (node, content) in STORE.fielddefs[kind][1]:
+        many = node is Nodetype.SEQUENCE
+        inner = content[0] if many else (node, content)
+        if inner[1] == 'std_msgs/msg/Header':
+            yield from defined('std_msgs/msg/Header')
+        else:
+            yield name, inner[1], many
+
+
+def numbers_in(kind):
+    """Return how many numbers a type holds, all of one kind; 0 where it holds anything else."""
+    fields = list(defined(kind)) if kind in STORE.fielddefs else []
+    counts = [numbers_in(inner) if inner in STORE.fielddefs else 1 for _, inner, _ in fields]
+    return sum(counts) if all(counts) else 0
+
+
+def check(declaration, kind):
+    fields = list(defined(kind))
+    assert [(field.name, field.many) for field in declaration] == [
+        (name, many) for name, _, many in fields
+    ]
+    for field, (_, inner, _) in zip(declaration, fields, strict=True):
+        if not isinstance(field.kind, str):
+            check(field.kind, inner)
+        elif field.kind[0].isdigit():
+            assert int(field.kind[:-1]) == numbers_in(inner)
+
+
+@pytest.mark.parametrize('kind', DECLARATIONS)
+def test_fields_stand_as_ros_defines_them(kind):
+    check(DECLARATIONS[kind], kind)
+
+
+@pytest.mark.parametrize('kind', DECLARATIONS)
+def test_an_empty_message_is_that_of_ros_and_malformed_if_cut(kind):
+    message = packed(DECLARATIONS[kind], {})
+    assert STORE.serialize_cdr(STORE.deserialize_cdr(message, kind), kind) == message
+    assert parsed(message + b'more', DECLARATIONS[kind]) == parsed(message, DECLARATIONS[kind])
+    for end in range(len(message)):
+        with pytest.raises(MalformedError):
+            parsed(message[:end], DECLARATIONS[kind])

@@ -38,32 +38,15 @@ BARE = 'drive: {constant_rate: {rate: 2.0}}\n'
 
 
 class Expected(NamedTuple):
-    """
-    A scene with one effect, and what it has that the empty scene has not.
+    """A scene with one effect, and what it has that the empty scene has not."""
 
-    Attributes
-    ----------
-    text
-        What the scene says to the effect.
-    brings
-        Effects that it starts from.
-    arrays
-        Arrays of the joint state that are not empty.
-    packages
-        Packages of ours of which more is imported; that of the effects always is.
-    topics
-        Further topics.
-    numpy
-        Whether numpy is imported.
-
-    """
-
-    text: str
-    brings: tuple[str, ...] = ()
-    arrays: tuple[str, ...] = ()
+    text: str  # What the scene says to the effect
+    brings: tuple[str, ...] = ()  # Effects that it starts from
+    arrays: tuple[str, ...] = ()  # Arrays of the joint state that are not empty
+    # Packages of ours of which more is imported; that of the effects always is.
     packages: tuple[str, ...] = ()
-    topics: tuple[str, ...] = ()
-    numpy: bool = False
+    topics: tuple[str, ...] = ()  # Further topics
+    numpy: bool = False  # Whether numpy is imported
 
 
 RATES = ('velocity', 'acceleration')

@@ -73,29 +73,15 @@ class _Dyad:
 
 @dataclass(frozen=True, slots=True)
 class RPR(_Dyad):
-    """
-    Link ``rail`` from pin A, with a line that a block pinned at D slides on.
+    """Link ``rail`` from pin A, with a line that a block pinned at D slides on."""
 
-    Attributes
-    ----------
-    rail
-        The link with the line.
-    a, d
-        The outer pins on the links that carry them.
-    slider
-        Name of the slider.
-    side
-        +1: D lies ahead of A along the line, -1: behind.
-    fold
-        Whether the pins coincide when the crank lies along the ground; the side changes there.
-
-    """
-
-    rail: str
+    rail: str  # The link with the line
+    # The outer pins on the links that carry them.
     a: Spot
     d: Spot
-    slider: str
-    side: int
+    slider: str  # Name of the slider
+    side: int  # +1: D lies ahead of A along the line, -1: behind
+    # Whether the pins coincide when the crank lies along the ground; the side changes there.
     fold: bool = False
 
     @property
@@ -162,29 +148,13 @@ class RPR(_Dyad):
 
 @dataclass(frozen=True, slots=True)
 class RRP(_Dyad):
-    """
-    Link ``one`` from pin A to pin B, which a slider keeps on a line of a placed link.
+    """Link ``one`` from pin A to pin B, which a slider keeps on a line of a placed link."""
 
-    Attributes
-    ----------
-    one
-        The link.
-    a
-        Its outer pin on the link that carries it.
-    pin
-        B; also a point of the slider's block if it has one.
-    slider
-        Name of the slider.
-    side
-        +1: B lies ahead of A along the line, -1: behind.
-
-    """
-
-    one: str
-    a: Spot
-    pin: str
-    slider: str
-    side: int
+    one: str  # The link
+    a: Spot  # Its outer pin on the link that carries it
+    pin: str  # B; also a point of the slider's block if it has one
+    slider: str  # Name of the slider
+    side: int  # +1: B lies ahead of A along the line, -1: behind
 
     @property
     def assembly(self) -> tuple[str, Side]:
@@ -244,31 +214,18 @@ class RRP(_Dyad):
 
 @dataclass(frozen=True, slots=True)
 class RRR(_Dyad):
-    """
-    Links ``one`` (from pin A) and ``two`` (from pin D), pinned together at B.
+    """Links ``one`` (from pin A) and ``two`` (from pin D), pinned together at B."""
 
-    Attributes
-    ----------
-    one, two
-        The links that the dyad places.
-    a, d
-        The outer pins on the links that carry them.
-    pin
-        B, on both links.
-    side
-        +1: B lies left of A→D, -1: right.
-    fold, stretch
-        Whether the linkage folds or stretches when the crank lies along the ground, and passes
-        this change point: ``side`` is then the side for 0 < φ < π, and changes there.
-
-    """
-
+    # The links that the dyad places.
     one: str
     two: str
+    # The outer pins on the links that carry them.
     a: Spot
     d: Spot
-    pin: str
-    side: int
+    pin: str  # B, on both links
+    side: int  # +1: B lies left of A→D, -1: right
+    # Whether the linkage folds or stretches when the crank lies along the ground, and passes this
+    # change point: ``side`` is then the side for 0 < φ < π, and changes there.
     fold: bool = False
     stretch: bool = False
 
@@ -339,21 +296,12 @@ class RRR(_Dyad):
 
 @dataclass(frozen=True, slots=True)
 class PRP(_Dyad):
-    """
-    Two blocks pinned together, each on a line of a placed link; the second may be virtual.
+    """Two blocks pinned together, each on a line of a placed link; the second may be virtual."""
 
-    Attributes
-    ----------
-    one, two
-        Names of the sliders.
-    pin
-        The pin of both blocks; the point of slider ``two`` if its block is virtual.
-
-    """
-
+    # Names of the sliders.
     one: str
     two: str
-    pin: str
+    pin: str  # The pin of both blocks; the point of slider ``two`` if its block is virtual
 
     @property
     def slid(self) -> tuple[str, ...]:

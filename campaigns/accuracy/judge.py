@@ -74,24 +74,15 @@ Answer = tuple[tuple[float, ...], ...]
 
 @dataclass
 class Findings:
-    """
-    The results of a linkage's cases.
+    """The results of a linkage's cases."""
 
-    Attributes
-    ----------
-    counts
-        Number of cases: ``cases``, ``closed``, ``open``, ``at limit``, ``wrong`` (assembly),
-        ``missed``, ``false`` (closures), ``refused`` (regular, but reported as a toggle or
-        indeterminate), ``crashed``.
-    errors
-        For each quantity (case, joint, error in u·κ).
-    notes
-        For each case with a finding its description.
-
-    """
-
+    # Number of cases: ``cases``, ``closed``, ``open``, ``at limit``, ``wrong`` (assembly),
+    # ``missed``, ``false`` (closures), ``refused`` (regular, but reported as a toggle or
+    # indeterminate), ``crashed``.
     counts: Counter[str] = field(default_factory=Counter)
+    # For each quantity (case, joint, error in u·κ).
     errors: dict[str, list[tuple[int, int, float]]] = field(default_factory=dict)
+    # For each case with a finding its description.
     notes: list[tuple[int, str]] = field(default_factory=list)
 
     def count(self, case: int, outcome: str, note: str = '') -> None:

@@ -98,27 +98,15 @@ Tie = Mapping[Key, float]
 
 @dataclass(frozen=True, slots=True)
 class Mechanism:
-    """
-    A linkage whose crank turns about a pivot of the ground; its angle is the input.
+    """A linkage whose crank turns about a pivot of the ground; its angle is the input."""
 
-    Attributes
-    ----------
-    links, sliders
-        As in a linkage file.
-    dyads
-        In the order in which they are solved.
-    joints
-        The published joint: an angle, or the name of a slider.
-    ties
-        For dependent lengths, as in a parallelogram, their independent changes; None: each number
-        changes independently.
-
-    """
-
+    # As in a linkage file.
     links: Mapping[str, Mapping[str, tuple[float, float]]]
     sliders: Mapping[str, Slide]
-    dyads: tuple[Dyad, ...]
-    joints: Mapping[str, Turn | str]
+    dyads: tuple[Dyad, ...]  # In the order in which they are solved
+    joints: Mapping[str, Turn | str]  # The published joint: an angle, or the name of a slider
+    # For dependent lengths, as in a parallelogram, their independent changes; None: each number
+    # changes independently.
     ties: tuple[Tie, ...] | None = None
 
     def linkage(self) -> Linkage:

@@ -56,24 +56,13 @@ class UndecidedError(Exception):
 
 
 class PassedResult(NamedTuple):
-    """
-    A number that a dyad passes to later dyads: a coefficient of a power series in time.
+    """A number that a dyad passes to later dyads: a coefficient of a power series in time."""
 
-    Attributes
-    ----------
-    owner
-        A link, a slider, or a point of a link.
-    quantity
-        ``turn``, the link's angle; ``x`` or ``y`` of the pin that holds the link, or of the point
-        itself; ``slide``.
-    power
-        Power of time: 0, 1 or 2, for the position, the rate and half the acceleration.
-
-    """
-
-    owner: str | Spot
+    owner: str | Spot  # A link, a slider, or a point of a link
+    # ``turn``, the link's angle; ``x`` or ``y`` of the pin that holds the link, or of the point
+    # itself; ``slide``.
     quantity: str
-    power: int
+    power: int  # Power of time: 0, 1 or 2, for the position, the rate and half the acceleration
 
 
 class Constants:

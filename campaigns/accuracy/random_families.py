@@ -35,19 +35,7 @@ from flint import arb
 
 
 class Builder:
-    """
-    Builds a linkage.
-
-    Parameters
-    ----------
-    rng
-        Random generator of all numbers.
-    phi
-        Crank angle of the pose.
-    plain
-        Whether the frames are plain.
-
-    """
+    """Builds a random linkage in a pose of a crank angle; its frames may be plain."""
 
     def __init__(self, rng: random.Random, phi: float, plain: bool) -> None:
         self.rng = rng

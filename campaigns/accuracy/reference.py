@@ -95,19 +95,7 @@ class Truth(NamedTuple):
 
 
 class Reference:
-    """
-    A mechanism, ready to be solved.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism to solve.
-    numbers
-        Replace the mechanism's own numbers; they may be balls.
-    changed
-        As for `Motion`.
-
-    """
+    """A mechanism, ready to be solved; its numbers may be replaced by balls."""
 
     def __init__(
         self,
@@ -122,17 +110,9 @@ class Reference:
 
     def solve(self, phi: Any, alpha: Any, lowest: int = PRECISIONS[0]) -> Truth:
         """
-        Solve at the lowest precision that decides whether the linkage closes.
+        Solve at the lowest precision, in bits, that decides whether the linkage closes.
 
-        Parameters
-        ----------
-        phi
-            Input angle, in [rad].
-        alpha
-            Its acceleration, in [rad/s²]; its rate is 1 rad/s.
-        lowest
-            First precision, in bits.
-
+        The input angle is in [rad], its acceleration in [rad/s²]; its rate is 1 rad/s.
         """
         for precision in [p for p in PRECISIONS if p >= lowest] or [lowest]:
             ctx.prec = precision
@@ -188,19 +168,7 @@ _STEP = 300
 def condition_numbers(
     reference: Reference, truths: list[Truth], phi: list[float], alpha: list[float]
 ) -> Array:
-    """
-    Return κ of all cases in doubles, [case, joint, derivative].
-
-    Parameters
-    ----------
-    reference
-        The linkage.
-    truths
-        Its solution in each case; all are closed.
-    phi, alpha
-        Input angles and accelerations.
-
-    """
+    """Return κ of all closed cases in doubles, [case, joint, derivative]."""
     mechanism = reference.mechanism
     motions = [truth.motion for truth in truths]
     values: dict[str | int, Array] = {}
@@ -240,15 +208,8 @@ def exact_condition_numbers(
     """
     Return κ of one case by differences of balls, [joint, derivative]; None if it is singular.
 
-    Parameters
-    ----------
-    reference
-        The linkage.
-    phi, alpha
-        Input angle and acceleration.
-    independent
-        Whether to vary each number independently, even if the linkage has dependent lengths.
-
+    If ``independent``, each number varies independently, even if the linkage has dependent
+    lengths.
     """
     base = reference.solve(phi, alpha, _PRECISION)
     if base.outcome is not Outcome.CLOSED:

@@ -68,19 +68,7 @@ _NUMBERS = (nan, inf, -inf, -1.0, 0.0, 0.1, 1.0, 3600.0, 1e308)
 
 
 class Calls:
-    """
-    Calls the services of a node.
-
-    Parameters
-    ----------
-    node
-        The calling node.
-    name
-        Full name of the called node.
-    random
-        Random generator of the requests.
-
-    """
+    """Calls the services of a node with random requests."""
 
     def __init__(self, node: Node, name: str, random: Random) -> None:
         self._random = random
@@ -170,24 +158,7 @@ _CLOSING = re.compile(
 
 
 def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
-    """
-    Attack a node.
-
-    Parameters
-    ----------
-    seconds
-        Total duration, in [s].
-    seed
-        Seed of the random generator.
-
-    Returns
-    -------
-    tried : dict
-        Number of tries, by kind.
-    findings : list
-        The violations, one line each.
-
-    """
+    """Attack a node for some seconds; return the tries by kind, and a line per violation."""
     with TemporaryDirectory(prefix='linkage_ros_attack_') as name:
         folder = Path(name)
         linkage = shipped('linkages/four_bar.yaml')
@@ -273,17 +244,7 @@ def malformed(random: Random) -> bytes:
 
 
 class Attacker:
-    """
-    The attacking node.
-
-    Parameters
-    ----------
-    seconds
-        Duration, in [s].
-    seed
-        Seed of the random generator.
-
-    """
+    """The attacking node."""
 
     def __init__(self, seconds: float, seed: int) -> None:
         rclpy.init()

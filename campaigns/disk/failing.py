@@ -46,21 +46,7 @@ class Part(NamedTuple):
 
 
 class Tried(NamedTuple):
-    """
-    One recording, and its outcome.
-
-    Attributes
-    ----------
-    setting
-        Name of one of `SETTINGS`.
-    injection
-        The injected fault; None for none.
-    calls
-        All system calls of the recording.
-    outcome
-        The outcome.
-
-    """
+    """One recording in one of `SETTINGS`: the injected fault, all system calls, the outcome."""
 
     setting: str
     injection: Injection | None

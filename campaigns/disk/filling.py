@@ -53,25 +53,12 @@ class NotPermittedError(Exception):
 
 
 class Disk(NamedTuple):
-    """
-    A small disk.
+    """A small disk."""
 
-    Attributes
-    ----------
-    name
-        Its name in reports.
-    kind
-        'tmpfs' or 'ext4'; the latter is an image on a loop device.
-    size
-        Its size in [MiB].
-    reserved
-        The share that only root may fill [percent]; if not 0, another user records.
-
-    """
-
-    name: str
-    kind: str
-    size: int
+    name: str  # Its name in reports
+    kind: str  # 'tmpfs' or 'ext4'; the latter is an image on a loop device
+    size: int  # Its size in [MiB]
+    # The share that only root may fill [percent]; if not 0, another user records.
     reserved: int = 0
 
     @property
@@ -90,20 +77,9 @@ DISKS = (
 @contextmanager
 def mounted(disk: Disk, work: Path) -> Iterator[Path]:
     """
-    Mount a disk, empty, for the length of a with statement.
+    Mount a disk, empty, for the length of a with statement; its image and mount point are in work.
 
-    Parameters
-    ----------
-    disk
-        The disk.
-    work
-        Folder of its image and its mount point.
-
-    Raises
-    ------
-    NotPermittedError
-        The disk cannot be made or mounted here.
-
+    A NotPermittedError says that it cannot be made or mounted here.
     """
     if os.geteuid():
         raise NotPermittedError('only root may mount a disk')
@@ -160,15 +136,9 @@ STORAGES: Mapping[str, Storage] = {
 
 class Filler(NamedTuple):
     """
-    Another process that writes to the disk.
+    Another process that writes to the disk at a rate in [bytes/s].
 
-    Attributes
-    ----------
-    speed
-        Its rate [bytes/s].
-    hungry
-        Whether it continues to take all space that becomes free.
-
+    If it is hungry, it continues to take all space that becomes free.
     """
 
     speed: float
@@ -184,19 +154,10 @@ FILLERS: Mapping[str, Filler | None] = {
 
 class Filled(NamedTuple):
     """
-    A recording and its outcome.
+    A recording and its outcome, with the names of its disk, storage and filler.
 
-    Attributes
-    ----------
-    disk, storage, filler
-        Their names.
-    outcome
-        The outcome.
-    least_free, free
-        The least free space during the recording, and the free space at its end [bytes].
-    failure
-        Its error message; '' if none.
-
+    Free space, the least and that at its end, is in [bytes]. Its failure is an error message, or
+    ''.
     """
 
     disk: str
@@ -210,22 +171,10 @@ class Filled(NamedTuple):
 
 def fill(disk: Disk, storage: str, filler: str, count: int) -> Filled:
     """
-    Record to a small disk, and judge.
+    Record a number of messages to a small disk, and judge.
 
-    Parameters
-    ----------
-    disk
-        The disk.
-    storage, filler
-        Names of one of `STORAGES` and one of `FILLERS`.
-    count
-        Maximum number of messages.
-
-    Raises
-    ------
-    NotPermittedError
-        The disk cannot be mounted here.
-
+    Storage and filler are named in `STORAGES` and `FILLERS`. A NotPermittedError says that the
+    disk cannot be mounted here.
     """
     how = STORAGES[storage]
     with (

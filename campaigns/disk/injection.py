@@ -49,29 +49,13 @@ _ALL = _CHANGE | {'open', 'close', 'rmdir', 'statfs'}
 
 
 class Fault(NamedTuple):
-    """
-    A fault of a system call.
+    """A fault of a system call."""
 
-    Attributes
-    ----------
-    calls
-        The calls that can have this fault.
-    error
-        Its error number; 0 for none.
-    short
-        Whether only a part of the data is written.
-    loses
-        Whether the data written since the last successful fsync is lost.
-    harmless
-        Whether a recording has to continue and to be complete.
-
-    """
-
-    calls: frozenset[str]
-    error: int = 0
-    short: bool = False
-    loses: bool = False
-    harmless: bool = False
+    calls: frozenset[str]  # The calls that can have this fault
+    error: int = 0  # Its error number; 0 for none
+    short: bool = False  # Whether only a part of the data is written
+    loses: bool = False  # Whether the data written since the last successful fsync is lost
+    harmless: bool = False  # Whether a recording has to continue and to be complete
 
 
 FAULTS: Mapping[str, Fault] = {
@@ -85,7 +69,6 @@ FAULTS: Mapping[str, Fault] = {
     'EIO, pages lost': Fault(frozenset({'fsync'}), errno.EIO, loses=True),
 }
 
-
 _NEW_LISTENER, _SET_FILTER, _NO_NEW_PRIVILEGES = 8, 1, 38
 _NOTIFY, _ALLOW = 0x7FC00000, 0x7FFF0000
 _LOAD, _JUMP_IF_EQUAL, _RETURN = 0x20, 0x15, 0x06
@@ -98,19 +81,10 @@ _PAGE = 4096
 
 
 class Signature(NamedTuple):
-    """
-    A system call.
+    """A system call."""
 
-    Attributes
-    ----------
-    name
-        Its name, the same for all its variants.
-    path
-        Number of the argument that is a path; None if the first argument is a descriptor.
-
-    """
-
-    name: str
+    name: str  # Its name, the same for all its variants
+    # Number of the argument that is a path; None if the first argument is a descriptor.
     path: int | None = None
 
 
@@ -155,21 +129,9 @@ _libc = ctypes.CDLL(None, use_errno=True)
 
 class Call(NamedTuple):
     """
-    A waiting system call.
+    A waiting system call: the name of its `Signature`, the path of its file or '', the registers.
 
-    Attributes
-    ----------
-    identifier
-        The kernel's identifier of the call.
-    thread
-        The calling thread.
-    name
-        Name of its `Signature`.
-    path
-        The path of its file; '' for none.
-    arguments
-        Values of the registers.
-
+    The ``identifier`` is the kernel's, the ``thread`` that of the caller.
     """
 
     identifier: int
@@ -192,16 +154,8 @@ def listen() -> int:
     """
     Make the calls of this thread, and of threads that it starts, wait from now on.
 
-    Returns
-    -------
-    int
-        The descriptor on which another process receives them.
-
-    Raises
-    ------
-    OSError
-        The kernel does not allow it.
-
+    Another process receives them on the returned descriptor. An OSError says that the kernel does
+    not allow it.
     """
     calls, seccomp = _MACHINES[platform.machine()]
     filters = [(_LOAD, 0, 0, 0)]
@@ -218,17 +172,7 @@ def listen() -> int:
 
 
 class Listener:
-    """
-    Receives the calls of another process and answers them.
-
-    Parameters
-    ----------
-    descriptor
-        The descriptor that `listen` returned, in this process.
-    process
-        Process id of the calling process.
-
-    """
+    """Receives the calls of another process on the descriptor of `listen`, and answers them."""
 
     def __init__(self, descriptor: int, process: int) -> None:
         self.descriptor = descriptor
@@ -313,19 +257,7 @@ Do = Callable[[Callable[[str], None]], Recorded]
 
 
 class SeenCall(NamedTuple):
-    """
-    A system call on the bag.
-
-    Attributes
-    ----------
-    name
-        Its name.
-    target
-        The part of the bag: file, metadata, folder, reserve or parent folder.
-    phase
-        The phase of the recording.
-
-    """
+    """A system call on a part of a bag: file, metadata, folder, reserve or parent folder."""
 
     name: str
     target: str
@@ -333,23 +265,11 @@ class SeenCall(NamedTuple):
 
 
 class Injection(NamedTuple):
-    """
-    The calls that fail, and their fault.
+    """The calls that fail, and their fault."""
 
-    Attributes
-    ----------
-    number
-        Number of the first failing call, from 0.
-    fault
-        Name of one of `FAULTS`.
-    lasting
-        Whether all later calls that can have this fault fail too.
-
-    """
-
-    number: int
-    fault: str
-    lasting: bool
+    number: int  # Number of the first failing call, from 0
+    fault: str  # Name of one of `FAULTS`
+    lasting: bool  # Whether all later calls that can have this fault fail too
 
 
 def run(

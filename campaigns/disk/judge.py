@@ -54,32 +54,15 @@ SETTINGS: Mapping[str, Storage] = {
 
 @dataclass(slots=True)
 class Recorded:
-    """
-    The outcome of a recording, as its caller sees it.
+    """The outcome of a recording, as its caller sees it."""
 
-    Attributes
-    ----------
-    refused
-        The error that kept it from beginning; '' for none.
-    escaped
-        An exception other than RecordingError; '' for none.
-    offered
-        Number of messages offered.
-    counts
-        Received, recorded, dropped, let go and waiting, of each topic.
-    failure
-        The error that ended it early; None for none.
-    longest_offer
-        The longest duration of `Recorder.offer` [ns].
-
-    """
-
-    refused: str = ''
-    escaped: str = ''
-    offered: int = 0
+    refused: str = ''  # The error that kept it from beginning; '' for none
+    escaped: str = ''  # An exception other than RecordingError; '' for none
+    offered: int = 0  # Number of messages offered
+    # Received, recorded, dropped, let go and waiting, of each topic.
     counts: list[tuple[int, int, int, int, int]] = field(default_factory=list)
-    failure: str | None = None
-    longest_offer: int = 0
+    failure: str | None = None  # The error that ended it early; None for none
+    longest_offer: int = 0  # The longest duration of `Recorder.offer` [ns]
 
     @property
     def recorded(self) -> int:
@@ -193,19 +176,7 @@ AT_RECOVERY = 'ended early, complete after recovery'
 
 @dataclass(slots=True)
 class Outcome:
-    """
-    The outcome of a recording.
-
-    Attributes
-    ----------
-    verdict
-        One of the verdicts above; '' if there are only faults.
-    faults
-        The violations.
-    offered, recorded, let_go
-        Numbers of messages.
-
-    """
+    """The outcome of a recording, with counts of messages; no verdict if it has only faults."""
 
     verdict: str = ''
     faults: list[str] = field(default_factory=list)

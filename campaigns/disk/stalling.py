@@ -56,23 +56,9 @@ _LINKAGE = Path(__file__).parents[2] / 'config' / 'linkages' / 'four_bar.yaml'
 
 class Plan(NamedTuple):
     """
-    One run of a node.
+    One run of a node: durations are in [s], the rate in [Hz]; a stall of 0 is none.
 
-    Attributes
-    ----------
-    name
-        Its name in reports.
-    seconds
-        Its duration [s].
-    stall
-        Duration of the stall in the middle of the run [s]; 0 for none.
-    queue
-        Length of the recorder's queue.
-    recovers
-        Whether the disk responds again before the node is ended.
-    rate
-        Rate of the ticks [Hz].
-
+    It stalls in the middle of the run. If the disk ``recovers``, it does before the node is ended.
     """
 
     name: str
@@ -93,43 +79,21 @@ PLANS = (
 
 @dataclass(slots=True)
 class Stalled:
-    """
-    The outcome of a run.
+    """The outcome of a run."""
 
-    Attributes
-    ----------
-    plan
-        The plan of the run.
-    counts
-        The bag's counts of messages.
-    ticks, during
-        Number of ticks in the bag, and of those during the stall.
-    lateness, lateness_during
-        Lateness of each tick in the bag outside and during the stall [ns].
-    after
-        Number of ticks in the bag after the stall.
-    gaps
-        Number of missing ticks between the first and the last tick in the bag.
-    ended
-        Time from the signal to the end of the node [s].
-    last_line
-        The node's last log line about the recording.
-    faults
-        The violations.
-
-    """
-
-    plan: Plan
-    counts: Counts = field(default_factory=dict)
+    plan: Plan  # The plan of the run
+    counts: Counts = field(default_factory=dict)  # The bag's counts of messages
+    # Number of ticks in the bag, and of those during the stall.
     ticks: int = 0
     during: int = 0
-    after: int = 0
-    gaps: int = 0
+    after: int = 0  # Number of ticks in the bag after the stall
+    gaps: int = 0  # Number of missing ticks between the first and the last tick in the bag
+    # Lateness of each tick in the bag outside and during the stall [ns].
     lateness: list[int] = field(default_factory=list)
     lateness_during: list[int] = field(default_factory=list)
-    ended: float = 0.0
-    last_line: str = ''
-    faults: list[str] = field(default_factory=list)
+    ended: float = 0.0  # Time from the signal to the end of the node [s]
+    last_line: str = ''  # The node's last log line about the recording
+    faults: list[str] = field(default_factory=list)  # The violations
 
     def total(self, kind: str) -> int:
         """Return the number of messages of a kind, such as 'dropped'."""

@@ -58,21 +58,7 @@ _FLUSH_PERIOD = 0.004
 
 
 class Plan(NamedTuple):
-    """
-    A run.
-
-    Attributes
-    ----------
-    scene
-        Name of a scene that comes with the package.
-    hours
-        Duration, in simulated time.
-    rate
-        Ticks per second, instead of the rate of the scene.
-    split_seconds, keep_files
-        Storage options of the bag.
-
-    """
+    """A run of a shipped scene for hours of simulated time, at a rate, with options of the bag."""
 
     scene: str
     hours: float
@@ -88,25 +74,7 @@ class Plan(NamedTuple):
 
 @dataclass(slots=True)
 class Run:
-    """
-    The outcome of a run.
-
-    Attributes
-    ----------
-    plan
-        The plan of the run.
-    samples
-        The usage of the process from the beginning to the end.
-    summary
-        The recorder's summary.
-    published
-        Number of joint states by the tick loop's count.
-    seconds
-        Its duration [s].
-    faults
-        The violations.
-
-    """
+    """The outcome of a run: the usage of the process, and the counts of recorder and tick loop."""
 
     plan: Plan
     samples: list[Usage]

@@ -71,19 +71,7 @@ MOST_GROWTH = 1024
 
 
 class Usage(NamedTuple):
-    """
-    Memory, open files and threads of a process at one time.
-
-    Attributes
-    ----------
-    time
-        Time since the beginning [s].
-    resident
-        Resident memory: ``VmRSS`` [kB].
-    files, threads
-        Number of open files and of threads.
-
-    """
+    """Resident memory (``VmRSS``, [kB]), open files and threads of a process, and the time [s]."""
 
     time: float
     resident: int
@@ -100,27 +88,15 @@ def usage(time: float, pid: int | str = 'self') -> Usage:
 
 
 class Flatness(NamedTuple):
-    """
-    The growth of the usage after the warm-up.
+    """The growth of the usage after the warm-up."""
 
-    Attributes
-    ----------
-    slope
-        Slope of the memory [kB/s]: the median of the slopes between any two samples (Theil 1950,
-        Sen 1968), which is robust against single peaks.
-    growth
-        The slope times the duration [kB].
-    peak
-        The greatest memory minus the median of the quarter after the warm-up [kB].
-    files, threads
-        The increase from that quarter to the last one, of the lower quartiles. One file more is
-        open while metadata is written, and one fewer when a bag continues in another file.
-
-    """
-
+    # Slope of the memory [kB/s]: the median of the slopes between any two samples (Theil 1950, Sen
+    # 1968), which is robust against single peaks.
     slope: float
-    growth: float
-    peak: float
+    growth: float  # The slope times the duration [kB]
+    peak: float  # The greatest memory minus the median of the quarter after the warm-up [kB]
+    # The increase from that quarter to the last one, of the lower quartiles. One file more is open
+    # while metadata is written, and one fewer when a bag continues in another file.
     files: int
     threads: int
 

@@ -43,25 +43,7 @@ _SAMPLES = 600
 
 @dataclass(slots=True)
 class DdsRun:
-    """
-    The outcome of a run.
-
-    Attributes
-    ----------
-    minutes
-        Its duration [min].
-    samples
-        The usage of the node's process.
-    ticks
-        Counts of ticks in the last diagnostics.
-    counts
-        The bag's counts of messages.
-    replayed
-        The result of ``linkage replay --json``.
-    faults
-        The violations.
-
-    """
+    """The outcome of a run of minutes: usage, counts of ticks and bag, and ``replay --json``."""
 
     minutes: float
     samples: list[Usage] = field(default_factory=list)

@@ -82,23 +82,10 @@ class Phase(IntEnum):
 
 class Plan(NamedTuple):
     """
-    One kill.
+    One kill of a recording with some storage options, which would end after a number of ticks.
 
-    Attributes
-    ----------
-    number
-        Its number.
-    storage
-        The storage options of the bag.
-    ticks
-        Number of ticks before the bag is closed.
-    aim
-        The phase from whose beginning the delay counts; MAKING, the first, for any instant.
-    time
-        The occurrence of the phase, counted from 1.
-    delay
-        Time from there to the kill [s].
-
+    It comes after a delay in [s] from the beginning of a phase, at its occurrence ``time``, from
+    1; MAKING, the first phase, aims at any instant.
     """
 
     number: int
@@ -191,17 +178,13 @@ class Marks:
     file
         The file; made by `make`.
 
-    Attributes
-    ----------
-    times
-        Begin of each tick, in [ns] of the steady clock; 0 before.
-
     """
 
     def __init__(self, file: Path) -> None:
         with file.open('r+b') as stream:
             self._map = mmap.mmap(stream.fileno(), 0)
         self._numbers = memoryview(self._map).cast('q')
+        # Begin of each tick, in [ns] of the steady clock; 0 before.
         self.times = self._numbers[_FIRST_TICK:]
 
     @classmethod

@@ -51,45 +51,24 @@ OLD_FILE = 'old file no longer in the metadata'
 
 @dataclass(slots=True)
 class Outcome:
-    """
-    The outcome of one recording.
+    """The outcome of one recording."""
 
-    Attributes
-    ----------
-    plan
-        The plan of the kill.
-    phase
-        The phase in which it was killed.
-    offered, found, let_go
-        Numbers of messages: offered to the recorder, in the bag, and in files that the ring
-        removed.
-    loss
-        Age at the kill of the oldest lost message [ns]; 0 for none.
-    power_loss
-        Age of the oldest message that no flush had brought to the disk: the greatest loss by a
-        power cut at this instant [ns].
-    paused
-        Time within `loss` in which the recorder waited for the disk: flushes, splits, close [ns].
-    tick
-        The longest tick within `loss` [ns].
-    verdicts
-        The verdicts on the bag, on its metadata, and on the recovered bag.
-    leftovers
-        Other files in the folder.
-
-    """
-
-    plan: Plan
-    phase: Phase
+    plan: Plan  # The plan of the kill
+    phase: Phase  # The phase in which it was killed
+    # Numbers of messages: offered to the recorder, in the bag, and in files that the ring removed.
     offered: int = 0
     found: int = 0
     let_go: int = 0
-    loss: int = 0
+    loss: int = 0  # Age at the kill of the oldest lost message [ns]; 0 for none
+    # Age of the oldest message that no flush had brought to the disk: the greatest loss by a power
+    # cut at this instant [ns].
     power_loss: int = 0
+    # Time within `loss` in which the recorder waited for the disk: flushes, splits, close [ns].
     paused: int = 0
-    tick: int = PERIOD_NS
+    tick: int = PERIOD_NS  # The longest tick within `loss` [ns]
+    # The verdicts on the bag, on its metadata, and on the recovered bag.
     verdicts: dict[str, str] = field(default_factory=dict)
-    leftovers: list[str] = field(default_factory=list)
+    leftovers: list[str] = field(default_factory=list)  # Other files in the folder
 
     @property
     def strict_excess(self) -> int:

@@ -62,23 +62,13 @@ class _Moved(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """
-    States of a linkage, in columns.
+    """States of a linkage, in columns."""
 
-    Attributes
-    ----------
-    unknowns
-        (n, N): angle [rad] and position [m] of each moving link in turn.
-    rates, accelerations
-        (n, N), their time derivatives.
-    joints
-        Three arrays (joints, N): values of the published joints and their derivatives.
-
-    """
-
-    unknowns: Array
+    unknowns: Array  # (n, N): angle [rad] and position [m] of each moving link in turn
+    # (n, N), their time derivatives.
     rates: Array
     accelerations: Array
+    # Three arrays (joints, N): values of the published joints and their derivatives.
     joints: tuple[Array, Array, Array]
 
 
@@ -359,15 +349,8 @@ class Equations:
         """
         Correct states by Newton's method; return the solutions, and which have converged.
 
-        Parameters
-        ----------
-        unknowns, inputs
-            (n, N) and (inputs, N).
-        shift
-            Wanted residuals, (n, N); 0 if not given.
-        steps
-            Maximum number of corrections.
-
+        Unknowns (n, N) and inputs (inputs, N) have the residuals ``shift``, (n, N), at the end; 0
+        if not given.
         """
         found = np.array(unknowns, Real)
         good = np.zeros(found.shape[1], bool)

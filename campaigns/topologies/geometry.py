@@ -48,23 +48,11 @@ class DrivenLink:
 
 @dataclass(frozen=True, slots=True)
 class DrivenRRR:
-    """
-    Two arms pinned together; an arm may consist of two links with an input between them.
+    """Two arms pinned together; an arm may consist of two links with an input between them."""
 
-    Attributes
-    ----------
-    arms
-        The links of each arm, from the outer pin on.
-    ends
-        The outer pins, on the links that carry them.
-    pin
-        The pin that the last links share.
-
-    """
-
-    arms: tuple[tuple[str, ...], tuple[str, ...]]
-    ends: tuple[Spot, Spot]
-    pin: str
+    arms: tuple[tuple[str, ...], tuple[str, ...]]  # The links of each arm, from the outer pin on
+    ends: tuple[Spot, Spot]  # The outer pins, on the links that carry them
+    pin: str  # The pin that the last links share
 
 
 Group = DrivenLink | DrivenRRR | RRR | RRP | RPR | PRP | RPP
@@ -79,27 +67,15 @@ class Margin(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Passing:
-    """
-    A side of assembly that changes where the linkage passes a change point.
+    """A side of assembly that changes where the linkage passes a change point."""
 
-    Attributes
-    ----------
-    side
-        +1 or −1, for a crank direction between 0 and π from the line.
-    crank, line
-        Link whose x axis lies along the crank; link and direction of the line.
-    at
-        Whether it changes at a crank direction of 0, and at π.
-    turns
-        Sign s and constant c of the crank's direction s·input + c, which counts turns; None if
-        the crank is not the input and only its direction is known.
-
-    """
-
-    side: int
+    side: int  # +1 or −1, for a crank direction between 0 and π from the line
+    # Link whose x axis lies along the crank; link and direction of the line.
     crank: str
     line: tuple[str, complex]
-    at: tuple[bool, bool]
+    at: tuple[bool, bool]  # Whether it changes at a crank direction of 0, and at π
+    # Sign s and constant c of the crank's direction s·input + c, which counts turns; None if the
+    # crank is not the input and only its direction is known.
     turns: tuple[int, float] | None
 
     def sign(self, places: Places, inputs: Array) -> Array:
@@ -118,23 +94,13 @@ class Passing:
 
 @dataclass
 class Places:
-    """
-    Poses of links.
+    """Poses of links."""
 
-    Attributes
-    ----------
-    units, origins
-        For each link the direction of its x axis and the position of its origin.
-    margins
-        Margin of each dyad that has limits.
-    crossings
-        For each dyad of two lines the sine of the angle between them; they are parallel at 0.
-
-    """
-
+    # For each link the direction of its x axis and the position of its origin.
     units: dict[str, Array] = field(default_factory=dict)
     origins: dict[str, Array] = field(default_factory=dict)
-    margins: list[Margin] = field(default_factory=list)
+    margins: list[Margin] = field(default_factory=list)  # Margin of each dyad that has limits
+    # For each dyad of two lines the sine of the angle between them; they are parallel at 0.
     crossings: list[Array] = field(default_factory=list)
 
 

@@ -68,22 +68,13 @@ CLOSED, OPEN, AT_LIMIT, UNKNOWN = 'closed', 'open', 'at limit', 'unknown'
 
 @dataclass
 class Findings:
-    """
-    The findings for a linkage.
+    """The findings for a linkage."""
 
-    Attributes
-    ----------
-    counts
-        Number of states by state, and of findings by name.
-    notes
-        (finding, description), the first of each name.
-    errors
-        For each quantity the errors in u·κ.
-
-    """
-
+    # Number of states by state, and of findings by name.
     counts: Counter[str] = field(default_factory=Counter)
+    # (finding, description), the first of each name.
     notes: list[tuple[str, str]] = field(default_factory=list)
+    # For each quantity the errors in u·κ.
     errors: dict[str, list[float]] = field(default_factory=dict)
 
     def find(self, name: str, note: str) -> None:

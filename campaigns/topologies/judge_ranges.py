@@ -43,26 +43,12 @@ _SAME = 1e-6
 
 
 class Travel(NamedTuple):
-    """
-    The values of an input at which the loops close.
+    """The values of an input at which the loops close."""
 
-    Attributes
-    ----------
-    parts
-        Intervals of the input, in [rad] or [m].
-    ends
-        Ends of these intervals that are limits of the linkage.
-    changes
-        Values within them at which the links of a dyad are in line.
-    parallels
-        Values at which the two lines of a dyad are parallel.
-
-    """
-
-    parts: list[tuple[float, float]]
-    ends: list[float]
-    changes: list[float]
-    parallels: list[float]
+    parts: list[tuple[float, float]]  # Intervals of the input, in [rad] or [m]
+    ends: list[float]  # Ends of these intervals that are limits of the linkage
+    changes: list[float]  # Values within them at which the links of a dyad are in line
+    parallels: list[float]  # Values at which the two lines of a dyad are parallel
 
 
 def judge_ranges(

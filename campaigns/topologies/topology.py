@@ -54,49 +54,22 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """
-    A linkage, and the knowledge of its generator about it.
+    """A linkage, and the knowledge of its generator about it."""
 
-    Attributes
-    ----------
-    linkage
-        The linkage, in the package's terms.
-    groups
-        Inputs and dyads in the order of solution; None with an Assur group that is no dyad.
-    sides
-        For the pin or slider that closes a dyad +1 (left, ahead) or −1, or a side that changes.
-    start
-        Inputs at which it closes by construction, in [rad] or [m].
-    pose
-        Angle and position of each moving link there.
-    step
-        A small change of each input: 0.3 rad, or 0.3 of a length.
-    change_points
-        Inputs within a turn at which the linkage passes an exact change point.
-
-    """
-
-    linkage: Linkage
+    linkage: Linkage  # The linkage, in the package's terms
+    # Inputs and dyads in the order of solution; None with an Assur group that is no dyad.
     groups: tuple[Group, ...] | None
+    # For the pin or slider that closes a dyad +1 (left, ahead) or −1, or a side that changes.
     sides: Mapping[str, int | Passing]
-    start: tuple[float, ...]
-    pose: Mapping[str, tuple[float, float, float]]
-    step: tuple[float, ...]
+    start: tuple[float, ...]  # Inputs at which it closes by construction, in [rad] or [m]
+    pose: Mapping[str, tuple[float, float, float]]  # Angle and position of each moving link there
+    step: tuple[float, ...]  # A small change of each input: 0.3 rad, or 0.3 of a length
+    # Inputs within a turn at which the linkage passes an exact change point.
     change_points: tuple[float, ...] = ()
 
 
 class TopologyBuilder(Builder):
-    """
-    Builds a linkage of any topology.
-
-    Parameters
-    ----------
-    rng
-        Random generator of all numbers.
-    plain
-        Whether the frames are plain; None draws it.
-
-    """
+    """Builds a random linkage of any topology; whether its frames are plain is drawn, or given."""
 
     def __init__(self, rng: random.Random, plain: bool | None = None) -> None:
         super().__init__(rng, 0.0, rng.random() < 0.5 if plain is None else plain)
@@ -362,19 +335,9 @@ _CLOSE = 0.05
 
 class Walk(NamedTuple):
     """
-    A linkage followed along a path of its inputs.
+    A linkage followed along its inputs: distances and unknowns, (n, knots), of the knots.
 
-    Attributes
-    ----------
-    values
-        Distance along the path of each knot.
-    unknowns
-        (n, knots).
-    end
-        Distance along the path that was reached.
-    complete
-        Whether this is the end of the path.
-
+    If it is not complete, the path goes on behind ``end``.
     """
 
     values: list[float]
@@ -392,19 +355,9 @@ def walk(
     spacing: float,
 ) -> Walk:
     """
-    Follow a linkage from a solution at ``begin`` along ``direction`` for a length.
+    Follow a linkage from a solution (n, 1) along a line of its inputs for a length.
 
-    Parameters
-    ----------
-    equations
-        The linkage.
-    start
-        (n, 1), a solution.
-    begin, direction
-        (inputs, 1); the inputs at a distance s are begin + s·direction.
-    length, spacing
-        Distance to follow, and the longest step.
-
+    The inputs at a distance s are begin + s·direction, (inputs, 1); spacing is the longest step.
     """
     values, knots = [0.0], [start[:, 0]]
     at, done, step = start, 0.0, spacing

@@ -52,19 +52,7 @@ _LINKAGES = Path(__file__).resolve().parents[2] / 'config' / 'linkages'
 
 
 class Run(NamedTuple):
-    """
-    A run of a scene.
-
-    Attributes
-    ----------
-    pipeline
-        The pipeline, after its last tick.
-    times
-        Times of the ticks, in [s] since the first.
-    looks
-        The linkage at each tick.
-
-    """
+    """A run of a scene: the pipeline after its last tick, and times in [s] since the first one."""
 
     pipeline: Pipeline
     times: Values

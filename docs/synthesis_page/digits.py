@@ -45,27 +45,15 @@ LARGEST_RATIO = 20.0
 
 
 class Rounded(NamedTuple):
-    """
-    A design from rounded numbers.
+    """A design from rounded numbers."""
 
-    Attributes
-    ----------
-    lengths
-        Lengths of crank, coupler and rocker for a ground of 1; None if the coupler is imaginary.
-    off
-        Their relative errors; infinite without a linkage.
-    missed
-        The greatest error of the rocker's angle at the pairs, each in the better assembly, in
-        degrees; infinite if the linkage is open at a pair.
-    reached
-        Whether it closes at each of the pairs.
-
-    """
-
+    # Lengths of crank, coupler and rocker for a ground of 1; None if the coupler is imaginary.
     lengths: tuple[mpf, mpf, mpf] | None
-    off: tuple[mpf, mpf, mpf]
+    off: tuple[mpf, mpf, mpf]  # Their relative errors; infinite without a linkage
+    # The greatest error of the rocker's angle at the pairs, each in the better assembly, in
+    # degrees; infinite if the linkage is open at a pair.
     missed: mpf
-    reached: tuple[bool, ...]
+    reached: tuple[bool, ...]  # Whether it closes at each of the pairs
 
 
 def round_to(value: mpf, decimals: int) -> mpf:
@@ -132,15 +120,7 @@ def errors(lengths: Sequence[mpf], crank: Sequence[mpf], rocker: Sequence[mpf]) 
 
 
 class Task:
-    """
-    Three pairs in degrees, and their design in 50 digits.
-
-    Parameters
-    ----------
-    crank, rocker
-        Three angles each, in degrees.
-
-    """
+    """Three pairs in degrees, and their design in 50 digits."""
 
     def __init__(self, crank: Degrees, rocker: Degrees) -> None:
         self.crank, self.rocker = tuple(map(mpf, crank)), tuple(map(mpf, rocker))

@@ -34,19 +34,7 @@ _ROUNDING = 1e-9
 
 
 class Kind(NamedTuple):
-    """
-    A kind of task.
-
-    Attributes
-    ----------
-    name, picture
-        Its heading, and the name of its picture.
-    description
-        The task.
-    command
-        The arguments of `linkage synthesize`.
-
-    """
+    """A kind of task: its heading, picture, description, and arguments of `linkage synthesize`."""
 
     name: str
     picture: str

@@ -66,27 +66,14 @@ _NONE = 'does not close'
 
 
 class Study(NamedTuple):
-    """
-    The effect of rounding on random designs.
+    """The effect of rounding on random designs."""
 
-    Attributes
-    ----------
-    cosines, angles
-        The designs by decimals of the cosines, and of the angles in degrees.
-    condition
-        The condition number of each.
-    span
-        The smaller of the two spans of each design, in degrees.
-    package
-        The largest relative error of the package's lengths.
-
-    """
-
+    # The designs by decimals of the cosines, and of the angles in degrees.
     cosines: Mapping[int, list[Rounded]]
     angles: Mapping[int, list[Rounded]]
-    condition: np.ndarray
-    span: np.ndarray
-    package: float
+    condition: np.ndarray  # The condition number of each
+    span: np.ndarray  # The smaller of the two spans of each design, in degrees
+    package: float  # The largest relative error of the package's lengths
 
 
 @cache

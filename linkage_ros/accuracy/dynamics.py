@@ -53,67 +53,32 @@ _LOOKS = 100
 
 
 class FreeMotion(NamedTuple):
-    """
-    A motion without friction, damping and command.
+    """A motion without friction, damping and command."""
 
-    Attributes
-    ----------
-    mechanics
-        The linkage and its loads.
-    start
-        State at the start.
-    end
-        State after `SECONDS`.
-    scale
-        Range of its potential energy, in [J]; a drift is given as a fraction of it.
-    unit
-        Unit of the input: 'rad' or 'm'.
-    words
-        Description of the motion.
-
-    """
-
-    mechanics: Mechanics
-    start: State
-    end: State
-    scale: float
-    unit: str
-    words: str
+    mechanics: Mechanics  # The linkage and its loads
+    start: State  # State at the start
+    end: State  # State after `SECONDS`
+    scale: float  # Range of its potential energy, in [J]; a drift is given as a fraction of it
+    unit: str  # Unit of the input: 'rad' or 'm'
+    words: str  # Description of the motion
 
 
 class Integrated(NamedTuple):
-    """
-    The result of a method with one step.
+    """The result of a method with one step."""
 
-    Attributes
-    ----------
-    method, step
-        The method's name, and its step in [s].
-    error
-        Error of the input after `SECONDS`, in [rad] or [m].
-    drift
-        Greatest error of the energy, as a fraction of the motion's scale.
-    times
-        Processor time per second of motion, in [s], one for each round.
-
-    """
-
+    # The method's name, and its step in [s].
     method: str
     step: float
-    error: float
-    drift: float
-    times: Sequence[float]
+    error: float  # Error of the input after `SECONDS`, in [rad] or [m]
+    drift: float  # Greatest error of the energy, as a fraction of the motion's scale
+    times: Sequence[float]  # Processor time per second of motion, in [s], one for each round
 
 
 def free_motion(member: SceneLinkage) -> FreeMotion:
     """
     Return a free motion of a linkage, with its known end.
 
-    Raises
-    ------
-    NoReferenceError
-        If no free motion stays off its stops, or has a reference.
-
+    A NoReferenceError is raised if no free motion stays off its stops, or has a reference.
     """
     given = member.loads or Loads()
     springs = tuple(replace(spring, damping=0.0) for spring in given.springs)
@@ -221,15 +186,7 @@ _ROUNDS = 3
 
 
 def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | None:
-    """
-    Measure the integration of the first linkage that a torque drives; None without one.
-
-    Parameters
-    ----------
-    scene, quick, progress
-        See `linkage_ros.accuracy`.
-
-    """
+    """Measure the integration of the first linkage that a torque drives; None without one."""
     driven = [member for member in scene.members if member.drive[0] == 'torque']
     if not driven:
         return None
@@ -355,13 +312,7 @@ def slope(errors: Sequence[tuple[float, float]]) -> float | None:
     """
     Return the order of convergence, from the two shortest steps that show it.
 
-    Errors near the rounding error do not count.
-
-    Parameters
-    ----------
-    errors
-        Steps, longest first, and errors.
-
+    The longest step comes first. Errors near the rounding error do not count.
     """
     points = [(log10(step), log10(error)) for step, error in errors if error > _ROUNDED]
     if len(points) < 2:

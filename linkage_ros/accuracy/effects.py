@@ -47,23 +47,14 @@ from linkage_ros.scene.scene import Scene
 
 
 class Departure(NamedTuple):
-    """
-    The error of the published states.
+    """The error of the published states."""
 
-    Attributes
-    ----------
-    angles, slides, rates
-        Root mean square and maximum, in [rad], in [m], in [rad/s] or [m/s]; None if none is
-        published.
-    silent
-        Fraction of the ticks at which the truth is known but no state is published.
-
-    """
-
+    # Root mean square and maximum, in [rad], in [m], in [rad/s] or [m/s]; None if none is
+    # published.
     angles: tuple[float, float] | None
     slides: tuple[float, float] | None
     rates: tuple[float, float] | None
-    silent: float
+    silent: float  # Fraction of the ticks at which the truth is known but no state is published
 
 
 class _Errors:
@@ -140,16 +131,7 @@ def measure_effects(scene: Scene, quick: bool, progress: Progress) -> Part | Non
     """
     Measure the effects of a scene; None if it has none.
 
-    Parameters
-    ----------
-    scene, quick, progress
-        See `linkage_ros.accuracy`.
-
-    Raises
-    ------
-    FileError
-        If parts of the scene cannot be combined.
-
+    A FileError says which parts of the scene cannot be combined.
     """
     named = Names(name for member in scene.members for name in member.effects)
     named |= faults_of(scene)

@@ -72,22 +72,10 @@ def prove(
     accelerations: Sequence[float] | None = None,
 ) -> Proof:
     """
-    Return a verified state near the closure's own.
+    Return a verified state near the closure's own; for the rates see `Reference.solve`.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    inputs, rates, accelerations
-        Of the driven joints; see `Reference.solve`.
-
-    Raises
-    ------
-    SingularError
-        If nothing can be proved: at a toggle or a change point.
-    ValueError
-        If the linkage does not close.
-
+    A SingularError says that nothing can be proved, at a toggle or a change point, a ValueError
+    that the linkage does not close.
     """
     rates = [1.0] * len(inputs) if rates is None else rates
     accelerations = [0.0] * len(inputs) if accelerations is None else accelerations

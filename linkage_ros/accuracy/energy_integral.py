@@ -57,15 +57,9 @@ class State(NamedTuple):
 
 class ExactEnergy:
     """
-    The energy of a linkage with masses, in extended precision.
+    The energy of a linkage with one input and masses, in extended precision.
 
-    Parameters
-    ----------
-    linkage
-        The linkage, with one input and with masses.
-    loads
-        Its loads; dampers are ignored.
-
+    Its loads include no dampers.
     """
 
     def __init__(self, linkage: Linkage, loads: Loads) -> None:

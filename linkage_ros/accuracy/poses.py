@@ -64,49 +64,20 @@ BATCH = 4096
 
 
 class Poses(NamedTuple):
-    """
-    States of a linkage.
+    """States of a linkage."""
 
-    Attributes
-    ----------
-    key
-        'easy', 'toggle', 'change_point', 'five_dyads' or 'class_3'.
-    title
-        Title of the set.
-    name
-        Name of the linkage.
-    linkage
-        The linkage.
-    inputs
-        Inputs of each state.
-    distances
-        Distance of each state from the toggle or change point, in [rad] or [m]; empty if easy.
-    own
-        Whether the linkage is the scene's.
-
-    """
-
-    key: str
-    title: str
-    name: str
-    linkage: Linkage
-    inputs: tuple[tuple[float, ...], ...]
+    key: str  # 'easy', 'toggle', 'change_point', 'five_dyads' or 'class_3'
+    title: str  # Title of the set
+    name: str  # Name of the linkage
+    linkage: Linkage  # The linkage
+    inputs: tuple[tuple[float, ...], ...]  # Inputs of each state
+    # Distance of each state from the toggle or change point, in [rad] or [m]; empty if easy.
     distances: tuple[float, ...] = ()
-    own: bool = True
+    own: bool = True  # Whether the linkage is the scene's
 
 
 def pose_sets(name: str, linkage: Linkage, count: int) -> list[Poses]:
-    """
-    Return all sets of poses for a linkage.
-
-    Parameters
-    ----------
-    name, linkage
-        The scene's.
-    count
-        Number of easy poses; of each added linkage half as many.
-
-    """
+    """Return all sets of poses for a linkage: so many easy ones, half of each added linkage."""
     sets = [Poses('easy', 'easy poses', name, linkage, easy(Closure(linkage), count))]
     for key, title, find, guest in (
         ('toggle', 'near a toggle', near_toggle, WITH_TOGGLE),
@@ -155,15 +126,9 @@ def easy(closure: Closure, count: int) -> tuple[tuple[float, ...], ...]:
 
 def path(poses: Poses, count: int) -> Poses | None:
     """
-    Return a path through the whole range of a single input, or one full turn.
+    Return so many states through the whole range of a single input, or one full turn.
 
-    Parameters
-    ----------
-    poses
-        Easy poses of the linkage; a turn begins at the first.
-    count
-        Number of states after the first.
-
+    The turn begins at the first of the easy poses.
     """
     closure = Closure(poses.linkage)
     if len(poses.linkage.inputs) > 1:
@@ -284,21 +249,12 @@ Next to a change point it is a fraction of the distance: the other assembly is e
 
 
 class Errors(NamedTuple):
-    """
-    The errors of a method.
+    """The errors of a method."""
 
-    Attributes
-    ----------
-    each
-        For each state the maximum over the joints, in [rad], for slides relative to the linkage's
-        size; None if it failed. Rates and accelerations above 1 have relative errors.
-    failed
-        Fraction of the states without an answer, or with that of another pose.
-
-    """
-
+    # For each state the maximum over the joints, in [rad], for slides relative to the linkage's
+    # size; None if it failed. Rates and accelerations above 1 have relative errors.
     each: tuple[float | None, ...]
-    failed: float
+    failed: float  # Fraction of the states without an answer, or with that of another pose
 
     @property
     def worst(self) -> float | None:
@@ -316,26 +272,17 @@ class Errors(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """
-    A method on a set of poses.
+    """A method on a set of poses."""
 
-    Attributes
-    ----------
-    poses, method
-        The set and the method.
-    position, motion, batch
-        Errors of positions; of positions, rates and accelerations; and of arrays.
-    times
-        Time per state, in [s], by 'position', 'motion', 'batch' (positions in an array) and
-        'batch_motion' (motions in an array).
-
-    """
-
+    # The set and the method.
     poses: Poses
     method: Method
+    # Errors of positions; of positions, rates and accelerations; and of arrays.
     position: Errors
     motion: tuple[Errors, Errors, Errors] | None
     batch: tuple[Errors, Errors, Errors] | None
+    # Time per state, in [s], by 'position', 'motion', 'batch' (positions in an array) and
+    # 'batch_motion' (motions in an array).
     times: dict[str, Spread]
 
 
@@ -387,21 +334,7 @@ def batch_errors(
 
 
 def off(linkage: Linkage, found: Sequence[Any], truth: Truth, order: int = 0) -> float:
-    """
-    Return the greatest error of joints, rates or accelerations.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    found
-        Values of the published joints.
-    truth
-        The state.
-    order
-        Order of the derivative.
-
-    """
+    """Return the greatest error of the published joints, or of the derivatives of an order."""
     size, worst, greatest = size_of(linkage), 0.0, 1.0
     for joint, value, true in zip(
         linkage.joints.values(), found, truth.orders[order], strict=True

@@ -46,61 +46,34 @@ _PATIENCE = 4.0  # a run may be longer than requested by this factor, until it h
 
 
 class Flush(NamedTuple):
-    """
-    A wait for the disk, all in [ns].
+    """A wait for the disk, all in [ns]."""
 
-    Attributes
-    ----------
-    begin, end
-        On the monotonic clock.
-    cpu
-        Processor time of the recorder thread during the wait.
-    stake
-        From the begin of the previous flush to the end of this one: a power cut just before the
-        end would lose the messages recorded in this time.
-
-    """
-
+    # On the monotonic clock.
     begin: int
     end: int
-    cpu: int
+    cpu: int  # Processor time of the recorder thread during the wait
+    # From the begin of the previous flush to the end of this one: a power cut just before the end
+    # would lose the messages recorded in this time.
     stake: int
 
 
 class Recorded(NamedTuple):
-    """
-    The cost of a run.
+    """The cost of a run."""
 
-    Attributes
-    ----------
-    seconds
-        Duration of the messages, in [s].
-    ticks
-        Lateness of each tick, in [ns].
-    received, recorded, dropped
-        Number of messages on all topics; without a bag, only ``received`` counts.
-    cpu
-        Processor time of the recorder thread, from its start until all messages were written and
-        before the bag was closed, in [ns].
-    flushes
-        The flushes in that time.
-    written
-        Bytes given to disks in that time, as the system counts them, and the time: [bytes] and
-        [s]; None if the system does not count them.
-    size
-        Growth of the bag in that time, in [bytes].
-
-    """
-
-    seconds: float
-    ticks: tuple[int, ...]
+    seconds: float  # Duration of the messages, in [s]
+    ticks: tuple[int, ...]  # Lateness of each tick, in [ns]
+    # Number of messages on all topics; without a bag, only ``received`` counts.
     received: int
     recorded: int
     dropped: int
+    # Processor time of the recorder thread, from its start until all messages were written and
+    # before the bag was closed, in [ns].
     cpu: int
-    flushes: tuple[Flush, ...]
+    flushes: tuple[Flush, ...]  # The flushes in that time
+    # Bytes given to disks in that time, as the system counts them, and the time: [bytes] and [s];
+    # None if the system does not count them.
     written: tuple[int, float] | None
-    size: int
+    size: int  # Growth of the bag in that time, in [bytes]
 
 
 def record_run(

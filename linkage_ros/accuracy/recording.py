@@ -40,50 +40,26 @@ from linkage_ros.scene.scene import Scene
 _LONGER = 1.1
 """A run is longer than its flush period by this factor, so that it has at least one flush."""
 
-
 NO_BAG = 'no bag'
 
 
 class Cost(NamedTuple):
-    """
-    The cost of a setting: the quartiles of several runs.
+    """The cost of a setting: the quartiles of several runs."""
 
-    Attributes
-    ----------
-    setting
-        The setting; None for no bag.
-    cpu
-        Processor time of the recorder thread per message, in [µs].
-    waited
-        Time it waits for the disk, in [ms] per second.
-    waits
-        Time it waits per flush, median and maximum of all flushes, in [ms].
-    stake
-        The longest time that a power cut can destroy, in [ms].
-    stake_messages
-        The same as a number of messages, at their rate.
-    written
-        Data given to the disks, in [kB/s]; None if the system does not count them.
-    size
-        Size of a message in the bag including its share of the index, in [bytes].
-    late, late_p99
-        Lateness of ticks, median and 99th percentile, in [µs].
-    dropped
-        Messages dropped because the recorder's queue was full, in all runs.
-
-    """
-
-    setting: Storage | None
-    cpu: Spread
-    waited: Spread
+    setting: Storage | None  # The setting; None for no bag
+    cpu: Spread  # Processor time of the recorder thread per message, in [µs]
+    waited: Spread  # Time it waits for the disk, in [ms] per second
+    # Time it waits per flush, median and maximum of all flushes, in [ms].
     waits: tuple[float, float]
-    stake: Spread
-    stake_messages: float
+    stake: Spread  # The longest time that a power cut can destroy, in [ms]
+    stake_messages: float  # The same as a number of messages, at their rate
+    # Data given to the disks, in [kB/s]; None if the system does not count them.
     written: Spread | None
-    size: Spread
+    size: Spread  # Size of a message in the bag including its share of the index, in [bytes]
+    # Lateness of ticks, median and 99th percentile, in [µs].
     late: Spread
     late_p99: Spread
-    dropped: int
+    dropped: int  # Messages dropped because the recorder's queue was full, in all runs
 
     @property
     def flush_period(self) -> float:
@@ -130,19 +106,9 @@ def measure_costs(
     progress: Progress = lambda _: None,
 ) -> list[Cost]:
     """
-    Record a scene with each setting in turn.
+    Record a scene with each setting in turn; a setting of None writes no bag.
 
-    Parameters
-    ----------
-    scene, folder, progress
-        See `measure_recording`.
-    compared
-        The settings; None for no bag.
-    seconds
-        Minimum duration of a run, in [s].
-    rounds
-        Number of runs of each setting.
-
+    ``seconds`` is the minimum duration of a run, ``rounds`` the number of runs of each setting.
     """
     closures = Pipeline(scene).closures
     runs: list[list[Recorded]] = [[] for _ in compared]

@@ -60,25 +60,15 @@ _MOST = 800
 
 
 class Truth(NamedTuple):
-    """
-    An exact state.
+    """An exact state."""
 
-    Attributes
-    ----------
-    joints, rates, accelerations
-        Of the published joints, as mpmath numbers, in [rad] or [m], per [s] and [s²].
-    error
-        Bound of the relative error.
-    links
-        For each link but the ground the angle and the position (x, y) of its frame, then their
-        rates, then their accelerations.
-
-    """
-
+    # Of the published joints, as mpmath numbers, in [rad] or [m], per [s] and [s²].
     joints: tuple[Any, ...]
     rates: tuple[Any, ...]
     accelerations: tuple[Any, ...]
-    error: float
+    error: float  # Bound of the relative error
+    # For each link but the ground the angle and the position (x, y) of its frame, then their
+    # rates, then their accelerations.
     links: Mapping[str, tuple[Sequence[Any], ...]]
 
     @property
@@ -88,19 +78,7 @@ class Truth(NamedTuple):
 
 
 class Reference:
-    """
-    A linkage to be solved in extended precision.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    digits
-        Number of digits of the result.
-    guard
-        Number of extra digits to compute with, to begin with.
-
-    """
+    """A linkage to be solved to a number of digits, with guard digits to compute with at first."""
 
     def __init__(self, linkage: Linkage, digits: int = DIGITS, guard: int = _GUARD) -> None:
         self._linkage = linkage
@@ -236,13 +214,6 @@ class ExactEquations:
     digits
         The precision, in decimal digits.
 
-    Attributes
-    ----------
-    mp
-        The context of the numbers.
-    unit
-        Size of the linkage, in [m].
-
     """
 
     def __init__(
@@ -252,7 +223,7 @@ class ExactEquations:
         sliders: Mapping[str, int],
         digits: int,
     ) -> None:
-        self.mp = MPContext()
+        self.mp = MPContext()  # The context of the numbers
         self.mp.dps = digits
         self._linkage, self._links, self._sliders = linkage, links, sliders
         self._points = {
@@ -260,7 +231,7 @@ class ExactEquations:
             for link, points in linkage.links.items()
             for name, place in points.items()
         }
-        self.unit = max(abs(one) for one in self._points.values())
+        self.unit = max(abs(one) for one in self._points.values())  # Size of the linkage, in [m]
         self._pins = []
         self._carriers: dict[str, str] = {}
         for link, name in self._points:
@@ -289,13 +260,8 @@ class ExactEquations:
         """
         Return the residuals of the equations, differentiated as often as the motion.
 
-        Parameters
-        ----------
-        motion
-            The unknowns, then their rates, then their accelerations.
-        given
-            The same of the inputs.
-
+        The motion is the unknowns, then their rates, then their accelerations; so are the given
+        inputs.
         """
         order = len(motion) - 1
         residuals: list[Any] = []

@@ -23,12 +23,15 @@ separately, for all methods on all poses in turn.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from importlib import import_module
 from importlib.util import find_spec
+from itertools import islice
 from math import inf
+from statistics import median
 from time import perf_counter
 from typing import Any
 
-from linkage_ros.accuracy.choices import scene_choices
 from linkage_ros.accuracy.methods import ACCELERATION, Method, RATE
 from linkage_ros.accuracy.methods.equations import extended, integrations
 from linkage_ros.accuracy.methods.formulas import single_precision, textbook
@@ -38,11 +41,13 @@ from linkage_ros.accuracy.methods.node import (
     FROM_KNOTS,
     ITERATED,
     newton,
+    NODE_DEFAULTS,
     STARTS,
     table,
     WARM,
 )
 from linkage_ros.accuracy.methods.peers import casadi, mujoco, pinocchio, pylinkage
+from linkage_ros.accuracy.page.numbers import number_text
 from linkage_ros.accuracy.poses import (
     BATCH,
     batch_errors,
@@ -58,11 +63,15 @@ from linkage_ros.accuracy.poses import (
     there_and_back,
 )
 from linkage_ros.accuracy.reference import Reference, Truth
-from linkage_ros.accuracy.results import Part
-from linkage_ros.accuracy.solving_results import part_of
+from linkage_ros.accuracy.results import Choice, Part
+from linkage_ros.accuracy.solving_results import cheapest, in_a_scene, part_of, WANTED
+from linkage_ros.cost import feed, Variant
+from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint
-from linkage_ros.measuring import Contender, in_turn, Progress
+from linkage_ros.measuring import Contender, in_turn, Progress, Spread, spread_of
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
+from linkage_ros.solvers.registry import SOLVERS
 from linkage_ros.solvers.table import ORDERS
 import numpy as np
 
@@ -75,17 +84,12 @@ _ARRAY = 2e-2
 _PASS = 5e-3
 """If a pass over the states takes longer, only the first states are timed, in [s]."""
 
+_BLOCK, _WARM_UP = 100, 2
+"""Ticks of a block, and number of blocks before the first that counts."""
+
 
 def measure_solving(scene: Scene, quick: bool, progress: Progress) -> Part:
-    """
-    Measure how a scene's first linkage is solved.
-
-    Parameters
-    ----------
-    scene, quick, progress
-        See `linkage_ros.accuracy`.
-
-    """
+    """Measure how a scene's first linkage is solved."""
     member = scene.members[0]
     sets = pose_sets(member.name or scene.name, member.linkage, 24 if quick else 128)
     results: list[Measured] = []
@@ -102,11 +106,7 @@ def judge(poses: Poses, quick: bool) -> list[Measured]:
     """
     Return the errors of all methods on a set of poses, without times.
 
-    Raises
-    ------
-    ArithmeticError
-        If two references differ.
-
+    An ArithmeticError says that two references differ.
     """
     truths = true_states(poses)
     confirmed(poses, truths)
@@ -259,11 +259,7 @@ def confirmed(poses: Poses, truths: Sequence[Truth]) -> int:
     """
     Return the number of states that balls verify; 0 if python-flint is not installed.
 
-    Raises
-    ------
-    ArithmeticError
-        If the references differ.
-
+    An ArithmeticError says that the references differ.
     """
     if find_spec('flint') is None:
         return 0
@@ -298,3 +294,61 @@ def same(linkage: Linkage, proof: Any, truth: Truth) -> bool:
     finally:
         ctx.prec = before
     return True
+
+
+def scene_choices(scene: Scene, results: Sequence[Measured], ticks: int) -> list[Choice]:
+    """
+    Return the cheapest solver for each of several accuracies, the least exact first.
+
+    The last is the default of a scene. Only the solver of the first linkage differs. The results
+    are of all methods at easy poses, timed; the choices tick in turn, so many ticks each. A method
+    that the scene refuses is no choice: a table without a proof, or a solver without poses where
+    forces need them.
+    """
+    offered = in_a_scene(results)
+    (node,) = (one for one in offered if one.method.name in NODE_DEFAULTS)
+    built: dict[str, tuple[float, Measured, Pipeline]] = {}
+    for wanted in WANTED:
+        one = cheapest(offered, wanted)
+        if one is None or one is node:
+            continue
+        solver = 'newton' if one.method.name == FROM_KNOTS else 'table'
+        try:
+            pipeline = _pipeline(scene, solver, wanted)
+        except LinkageError:
+            continue
+        built[f'solver: {{{solver}: {{tolerance: {number_text(wanted)}}}}}'] = (
+            wanted,
+            one,
+            pipeline,
+        )
+    worst = node.position.worst or 0.0
+    built['solver: closed_form # the default'] = worst, node, _pipeline(scene, 'closed_form')
+    times = _tick_times(scene, [pipeline for *_, pipeline in built.values()], ticks)
+    return [
+        Choice(accuracy, write, one.times['position'].scaled(1e6), time)
+        for (write, (accuracy, one, _)), time in zip(built.items(), times, strict=True)
+    ]
+
+
+def _pipeline(scene: Scene, solver: str, tolerance: float | None = None) -> Pipeline:
+    parameters = import_module(SOLVERS[solver]).PARAMETERS
+    given = parameters() if tolerance is None else parameters(tolerance)
+    first, *others = scene.members
+    first = replace(first, solver=(solver, given), accuracy=None)
+    return Pipeline(replace(scene, members=(first, *others), faults={}, record=None))
+
+
+def _tick_times(scene: Scene, pipelines: Sequence[Pipeline], ticks: int) -> list[Spread]:
+    """Return the time of a tick of each with its crank message, in [µs]."""
+    variants = [Variant(pipeline) for pipeline in pipelines]
+    blocks: dict[Variant, list[float]] = {one: [] for one in variants}
+    fed = feed(scene, pipelines[0])
+    for number in range(_WARM_UP + ticks // _BLOCK):
+        nows, messages = zip(*islice(fed, _BLOCK), strict=True)
+        for one in variants if number % 2 else reversed(variants):
+            one.forget()
+            one.run(nows, messages)
+            if number >= _WARM_UP:
+                blocks[one].append(median(one.ticks) * 1e-3)
+    return [spread_of(times) for times in blocks.values()]

@@ -60,34 +60,15 @@ CrankAt = Callable[[int], tuple[float, float]]
 
 
 class Motions(NamedTuple):
-    """
-    The motions of a linkage's input.
+    """The motions of a linkage's input."""
 
-    Attributes
-    ----------
-    by_name
-        `CHIRP` and `ACCELERATION`.
-    greatest
-        For each the maximum rate and acceleration of the input, in [rad/s] and [rad/s²], or [m].
-
-    """
-
-    by_name: Mapping[str, CrankAt]
+    by_name: Mapping[str, CrankAt]  # `CHIRP` and `ACCELERATION`
+    # For each the maximum rate and acceleration of the input, in [rad/s] and [rad/s²], or [m].
     greatest: Mapping[str, tuple[float, float]]
 
 
 def motions_of(closure: Closure, seconds: float) -> Motions:
-    """
-    Return motions within the range where the loops close.
-
-    Parameters
-    ----------
-    closure
-        A linkage with one input.
-    seconds
-        Duration of each.
-
-    """
+    """Return motions of some seconds each, within the range where the loops of one input close."""
     (start,) = usual_inputs(closure)
     widest = InputSweep(closure).widest_range
     length = round(seconds * NANOSECONDS)
@@ -129,54 +110,22 @@ _PATIENCE = 30.0  # [s]
 
 
 class Used(NamedTuple):
-    """
-    The states that a subscriber used, at one tick rate and in one motion of the crank.
+    """The states that a subscriber used, at one tick rate and in one motion of the crank."""
 
-    Attributes
-    ----------
-    rate
-        Tick rate, in [Hz].
-    motion
-        Motion of the crank.
-    age
-        Age of the states when used, in [s].
-    errors
-        By `HELD` and `CARRIED`: for each use the maximum error of a joint.
-    unused
-        Number of uses before the first state arrived.
-    cpu
-        Processor time of the node, as a fraction of a core.
-
-    """
-
-    rate: float
-    motion: str
-    age: Sequence[float]
+    rate: float  # Tick rate, in [Hz]
+    motion: str  # Motion of the crank
+    age: Sequence[float]  # Age of the states when used, in [s]
+    # By `HELD` and `CARRIED`: for each use the maximum error of a joint.
     errors: dict[str, Sequence[float]]
-    unused: int
-    cpu: float
+    unused: int  # Number of uses before the first state arrived
+    cpu: float  # Processor time of the node, as a fraction of a core
 
 
 def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> list[Used]:
     """
-    Run a node and a subscriber that uses its states.
+    Run a node at a rate in [Hz], and a subscriber that uses its states; a motion takes seconds.
 
-    Parameters
-    ----------
-    folder
-        An empty folder for its files.
-    linkage
-        The linkage to solve.
-    rate
-        Tick rate, in [Hz].
-    seconds
-        Duration of each motion.
-
-    Raises
-    ------
-    LinkageError
-        If the node or the subscriber fails.
-
+    The folder is empty, for their files. A LinkageError says that one of the two failed.
     """
     inputs = {given.joint for given in linkage.inputs}
     joints = {name: joint for name, joint in linkage.joints.items() if name not in inputs}
@@ -255,16 +204,7 @@ def measure_ticking(scene: Scene, quick: bool, progress: Progress) -> Part | Non
     """
     Measure the states that a subscriber gets; None without rclpy or with several inputs.
 
-    Parameters
-    ----------
-    scene, quick, progress
-        See `linkage_ros.accuracy`.
-
-    Raises
-    ------
-    LinkageError
-        If the node or the subscriber fails.
-
+    A LinkageError says that the node or the subscriber failed.
     """
     linkage = scene.members[0].linkage
     if find_spec('rclpy') is None or len(linkage.inputs) > 1:

@@ -38,21 +38,7 @@ RECORD_SIZE = 31
 
 
 class TopicContents(NamedTuple):
-    """
-    Messages of one topic in a bag.
-
-    Attributes
-    ----------
-    topic
-        The topic.
-    messages
-        Number of messages.
-    size
-        Their size [bytes].
-    first, last
-        Least and greatest log time, in [ns]; 0 without messages.
-
-    """
+    """Messages of one topic in a bag: number, size in [bytes], first and last log time in [ns]."""
 
     topic: Topic
     messages: int
@@ -68,27 +54,14 @@ class TopicContents(NamedTuple):
 
 
 class Contents(NamedTuple):
-    """
-    Contents of a bag.
+    """Contents of a bag."""
 
-    Attributes
-    ----------
-    topics
-        In the order of the bag.
-    begin, end
-        Least and greatest log time, in [ns]; None without messages.
-    damage
-        Damage at which reading ended, on one line; '' if all was read.
-    stopped
-        Whether reading was stopped early.
-
-    """
-
-    topics: tuple[TopicContents, ...]
+    topics: tuple[TopicContents, ...]  # In the order of the bag
+    # Least and greatest log time, in [ns]; None without messages.
     begin: int | None
     end: int | None
-    damage: str
-    stopped: bool
+    damage: str  # Damage at which reading ended, on one line; '' if all was read
+    stopped: bool  # Whether reading was stopped early
 
 
 class Tally:
@@ -180,39 +153,18 @@ def contents_of(
 
 
 class Layout(NamedTuple):
-    """
-    Layout of an MCAP file.
+    """Layout of an MCAP file."""
 
-    Attributes
-    ----------
-    library
-        Library that wrote it; '' if the file does not name one.
-    compressions
-        For each compression of its chunks ('none' is one): bytes stored, and bytes after
-        decompression as stated in the file.
-    content
-        Size of all its records after decompression [bytes].
-    rosbag2
-        Last metadata record of rosbag2; None if there is none.
-
-    """
-
-    library: str
+    library: str  # Library that wrote it; '' if the file does not name one
+    # For each compression of its chunks ('none' is one): bytes stored, and bytes after
+    # decompression as stated in the file.
     compressions: Mapping[str, tuple[int, int]]
-    content: int
-    rosbag2: Metadata | None
+    content: int  # Size of all its records after decompression [bytes]
+    rosbag2: Metadata | None  # Last metadata record of rosbag2; None if there is none
 
 
 def layout_of(file: Path) -> Layout:
-    """
-    Return the layout of a file, up to the first record that is not whole.
-
-    Raises
-    ------
-    BagError
-        The file cannot be opened.
-
-    """
+    """Return the layout of a file, up to the first broken record; a BagError if unreadable."""
     library = ''
     compressions: dict[str, tuple[int, int]] = {}
     content = 0

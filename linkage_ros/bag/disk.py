@@ -225,11 +225,7 @@ class Reserve:
     """
     Disk space held by an unnamed file; `release`, or the end of the process, frees it.
 
-    Raises
-    ------
-    OSError
-        There is not enough space.
-
+    An OSError says that there is not enough.
     """
 
     def __init__(self, folder: Path) -> None:

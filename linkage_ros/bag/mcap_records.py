@@ -114,7 +114,6 @@ def _zstd(data: bytes, most: int) -> bytes:
 
 _UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {'lz4': _lz4, 'zstd': _zstd}
 
-
 HEAD = Struct('<BQ')
 """Head of a record: its kind, and the length of its content."""
 
@@ -484,15 +483,7 @@ class DataSection:
         return messages_in(content, self.definitions)
 
     def covered(self) -> bool:
-        """
-        Return whether a checksum covers the whole data section.
-
-        Raises
-        ------
-        DamagedError
-            The checksum does not match.
-
-        """
+        """Return whether a checksum covers the data section; a DamagedError if it differs."""
         if self._misfit:
             raise self._misfit
         if self._covered is None:
@@ -564,31 +555,16 @@ MOST_RECORDS = 1_000_000
 
 
 class FileIndex(NamedTuple):
-    """
-    Index of a file.
+    """Index of a file."""
 
-    Attributes
-    ----------
-    start
-        Position of its start, which is the end of the data.
-    checked
-        Whether it has a checksum, which then matches.
-    definitions
-        All schemas and channels, if it repeats them.
-    chunks, attachments, metadata
-        Positions of chunks, attachments and metadata.
-    statistics
-        Counts stated by the file; None if it states none.
-
-    """
-
-    start: int
-    checked: bool
-    definitions: Definitions
+    start: int  # Position of its start, which is the end of the data
+    checked: bool  # Whether it has a checksum, which then matches
+    definitions: Definitions  # All schemas and channels, if it repeats them
+    # Positions of chunks, attachments and metadata.
     chunks: tuple[ChunkIndex, ...]
     attachments: tuple[AttachmentIndex, ...]
     metadata: tuple[MetadataIndex, ...]
-    statistics: Statistics | None
+    statistics: Statistics | None  # Counts stated by the file; None if it states none
 
 
 def index_of(source: Source) -> FileIndex:

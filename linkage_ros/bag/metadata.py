@@ -47,43 +47,19 @@ _PLAIN = re.compile(r'/[A-Za-z0-9_/]*')
 
 @dataclass(frozen=True, slots=True)
 class BagSummary:
-    """
-    Summary of a bag, or of one of its files.
+    """Summary of a bag, or of one of its files."""
 
-    Parameters
-    ----------
-    folder
-        The bag's folder.
-    file
-        Name of its MCAP file; of several the last.
-    topics
-        The topics, in the order of their numbers.
-    counts
-        Messages in the file, for each topic.
-    refused
-        Messages that were not written because one of their times is out of range, for each topic.
-    start
-        Least log time [ns]; `NO_START` without messages.
-    duration
-        Greatest minus least log time [ns].
-    size
-        Size of the MCAP file, or files [bytes].
-    parts
-        Summaries of the files, if there are several.
-    discarded
-        Messages in files that were removed to keep newer ones, for each topic; () for none.
-
-    """
-
-    folder: Path
-    file: str
-    topics: tuple[Topic, ...]
-    counts: tuple[int, ...]
+    folder: Path  # The bag's folder
+    file: str  # Name of its MCAP file; of several the last
+    topics: tuple[Topic, ...]  # The topics, in the order of their numbers
+    counts: tuple[int, ...]  # Messages in the file, for each topic
+    # Messages that were not written because one of their times is out of range, for each topic.
     refused: tuple[int, ...]
-    start: int
-    duration: int
-    size: int
-    parts: tuple[BagSummary, ...] = ()
+    start: int  # Least log time [ns]; `NO_START` without messages
+    duration: int  # Greatest minus least log time [ns]
+    size: int  # Size of the MCAP file, or files [bytes]
+    parts: tuple[BagSummary, ...] = ()  # Summaries of the files, if there are several
+    # Messages in files that were removed to keep newer ones, for each topic; () for none.
     discarded: tuple[int, ...] = ()
 
 
@@ -269,26 +245,13 @@ UNFINISHED_DATA: Mapping[str, str] = {
 
 
 class RecordingStats(NamedTuple):
-    """
-    Messages by topic: ``received == recorded + dropped + discarded``.
+    """Messages by topic: ``received == recorded + dropped + discarded``."""
 
-    Attributes
-    ----------
-    received
-        Messages offered to the recorder.
-    recorded
-        Messages in the bag.
-    dropped
-        Messages for which the disk was too slow or too full, or whose times do not fit into a bag.
-    discarded
-        Messages in files that were removed to keep newer ones.
-
-    """
-
-    received: Sequence[int]
-    recorded: Sequence[int]
+    received: Sequence[int]  # Messages offered to the recorder
+    recorded: Sequence[int]  # Messages in the bag
+    # Messages for which the disk was too slow or too full, or whose times do not fit into a bag.
     dropped: Sequence[int]
-    discarded: Sequence[int]
+    discarded: Sequence[int]  # Messages in files that were removed to keep newer ones
 
 
 def custom_data(
@@ -335,13 +298,7 @@ def counts_in(custom: Mapping[str, str], word: str) -> dict[str, int]:
     """
     Return the counts by topic in a bag's ``custom_data``; empty if missing or damaged.
 
-    Parameters
-    ----------
-    custom
-        The ``custom_data``.
-    word
-        Kind of counts: 'received', 'dropped' or 'let_go'.
-
+    They are of the kind 'received', 'dropped' or 'let_go'.
     """
     try:
         counts = json.loads(custom[f'{_PREFIX}{word}'])

@@ -65,13 +65,6 @@ class LogTimeOrder:
     bag
         The bag.
 
-    Attributes
-    ----------
-    begin
-        Least log time, in [ns]; None without messages.
-    end
-        Greatest log time, in [ns]; None if this requires reading the whole bag.
-
     Raises
     ------
     BagError
@@ -96,8 +89,10 @@ class LogTimeOrder:
                     place = chunk.message_start_time, number, chunk.chunk_start_offset, 0, None
                     self._chunks.append((chunk.message_end_time, place))
         self._rest = replace(bag, files=tuple(unindexed))
+        # Greatest log time, in [ns]; None if this requires reading the whole bag.
         self.end = None if unindexed else max((last for last, _ in self._chunks), default=None)
         first = next(self.messages(), None)
+        # Least log time, in [ns]; None without messages.
         self.begin = first.log_time if first else None
 
     def messages(self, since: int = 0) -> Iterator[BagMessage]:

@@ -201,20 +201,10 @@ def is_in_use(file: Path) -> bool:
 
 
 class FooterMetadata(NamedTuple):
-    """
-    Metadata that our writer puts at the end of a file.
+    """Metadata that our writer puts at the end of a file."""
 
-    Attributes
-    ----------
-    custom
-        ``custom_data`` of the bag at the end of the file.
-    accounted
-        Whether it has the statistics, the last record of a recording.
-
-    """
-
-    custom: Mapping[str, str]
-    accounted: bool
+    custom: Mapping[str, str]  # ``custom_data`` of the bag at the end of the file
+    accounted: bool  # Whether it has the statistics, the last record of a recording
 
 
 def footer_metadata(file: Path) -> FooterMetadata:

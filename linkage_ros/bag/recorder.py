@@ -51,7 +51,6 @@ It is not 0: with a nap of 0 the thread often takes the interpreter back before 
 wakes up.
 """
 
-
 PLACE = 16 * 1024
 """
 How large a message may be that takes one place in a queue [bytes]; a larger one takes more.
@@ -97,19 +96,13 @@ class MessageQueue:
     capacity
         Messages that may wait, each of up to `PLACE` bytes; a larger one counts as several.
 
-    Attributes
-    ----------
-    open
-        Whether messages are accepted; else they are dropped.
-    received, dropped
-        A counter for each topic.
-
     """
 
     def __init__(self, topics: int, capacity: int) -> None:
-        self.open = True
+        self.open = True  # Whether messages are accepted; else they are dropped
         self._capacity = capacity
         self._waiting: deque[Offered | None] = deque()
+        # A counter for each topic.
         self.received = [ThreadCounter() for _ in range(topics)]
         self.dropped = [ThreadCounter() for _ in range(topics)]
         self._add_received = [counter.add for counter in self.received]
@@ -170,27 +163,14 @@ class TopicCounts:
 
 @dataclass(frozen=True, slots=True)
 class RecordingSummary:
-    """
-    Outcome of a recording.
+    """Outcome of a recording."""
 
-    Parameters
-    ----------
-    folder
-        Folder of the bag.
-    topics
-        Counts for each topic, in the order of their numbers; no message waits any more, so
-        ``received == recorded + dropped + discarded``.
-    size
-        Size of the MCAP files [bytes].
-    failure
-        Reason for missing messages, on one line; None if no disk has failed.
-
-    """
-
-    folder: Path
+    folder: Path  # Folder of the bag
+    # Counts for each topic, in the order of their numbers; no message waits any more, so
+    # ``received == recorded + dropped + discarded``.
     topics: tuple[TopicCounts, ...]
-    size: int
-    failure: str | None
+    size: int  # Size of the MCAP files [bytes]
+    failure: str | None  # Reason for missing messages, on one line; None if no disk has failed
 
 
 class Recorder:

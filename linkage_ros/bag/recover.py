@@ -57,7 +57,6 @@ from mcap.writer import CompressionType, Writer
 RECOVERED = 'linkage_ros.recovered'
 """Key in the ``custom_data`` of a recovered bag: its origin and losses."""
 
-
 NOTHING_LOST = 'nothing lost'
 """End of that text if nothing was lost."""
 
@@ -71,32 +70,14 @@ class TopicRecovery(NamedTuple):
 
 
 class Recovery(NamedTuple):
-    """
-    Outcome of a recovery.
+    """Outcome of a recovery."""
 
-    Attributes
-    ----------
-    folder
-        The new bag.
-    topics
-        Saved and original messages of each topic.
-    attachments
-        Names of the saved attachments.
-    losses
-        Losses, each with the name of its file.
-    repaired
-        Damage or missing parts without loss, one line each.
-    remarks
-        Further remarks, one line each.
-
-    """
-
-    folder: Path
-    topics: tuple[TopicRecovery, ...]
-    attachments: tuple[str, ...]
-    losses: tuple[tuple[str, Loss], ...]
-    repaired: tuple[str, ...]
-    remarks: tuple[str, ...]
+    folder: Path  # The new bag
+    topics: tuple[TopicRecovery, ...]  # Saved and original messages of each topic
+    attachments: tuple[str, ...]  # Names of the saved attachments
+    losses: tuple[tuple[str, Loss], ...]  # Losses, each with the name of its file
+    repaired: tuple[str, ...]  # Damage or missing parts without loss, one line each
+    remarks: tuple[str, ...]  # Further remarks, one line each
 
     @property
     def missing(self) -> int:
@@ -146,15 +127,6 @@ class NewBag:
     compression
         Compression of chunks: '', 'lz4' or 'zstd'.
 
-    Attributes
-    ----------
-    counts
-        Messages by topic.
-    attachments
-        Content by name.
-    information
-        Metadata that rosbag2 wrote into the damaged file.
-
     Raises
     ------
     OSError
@@ -165,8 +137,9 @@ class NewBag:
     """
 
     def __init__(self, folder: Path, profile: str, compression: str) -> None:
-        self.counts: Counter[str] = Counter()
-        self.attachments: dict[str, bytes] = {}
+        self.counts: Counter[str] = Counter()  # Messages by topic
+        self.attachments: dict[str, bytes] = {}  # Content by name
+        # Metadata that rosbag2 wrote into the damaged file.
         self.information: Mapping[str, Any] = {}
         self._folder = folder
         self._topics: dict[str, Topic] = {}

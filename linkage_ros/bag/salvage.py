@@ -158,27 +158,15 @@ class Salvage:
     source
         The file, with its size at the time of opening.
 
-    Attributes
-    ----------
-    seen
-        Position up to which it has been examined.
-    losses
-        Lost ranges; grows during the search, as do the next two.
-    repaired
-        Damage without a loss.
-    data
-        Reader of the data section.
-    index
-        The file's index, if its checksum matches.
-
     """
 
     def __init__(self, source: Source) -> None:
-        self.seen = 0
-        self.losses: list[Loss] = []
-        self.repaired: list[str] = []
-        self.index = _trusted_index(source)
+        self.seen = 0  # Position up to which it has been examined
+        self.losses: list[Loss] = []  # Lost ranges; grows during the search, as do the next two
+        self.repaired: list[str] = []  # Damage without a loss
+        self.index = _trusted_index(source)  # The file's index, if its checksum matches
         index = self.index
+        # Reader of the data section.
         self.data = DataSection(
             source,
             index.definitions if index else Definitions(),

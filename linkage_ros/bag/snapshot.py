@@ -50,42 +50,20 @@ _JUMP = 1_000_000_000
 
 
 class Extent(NamedTuple):
-    """
-    Amount of messages in memory.
+    """Amount of messages in memory."""
 
-    Attributes
-    ----------
-    seconds
-        Time between the oldest message and the newest [s].
-    size
-        Size of the messages [bytes].
-    crowded
-        Whether messages that were not too old had to be removed for lack of memory.
-
-    """
-
-    seconds: float = 0.0
-    size: int = 0
+    seconds: float = 0.0  # Time between the oldest message and the newest [s]
+    size: int = 0  # Size of the messages [bytes]
+    # Whether messages that were not too old had to be removed for lack of memory.
     crowded: bool = False
 
 
 class Kept(NamedTuple):
     """
-    Content of the memory at an instant; immutable.
+    Content of the memory at an instant, as packed messages; immutable.
 
-    Attributes
-    ----------
-    blocks
-        The messages, packed.
-    begin
-        Position of the first message in the first block.
-    counts
-        Number of messages of each topic.
-    seconds
-        Time between the oldest message and the newest [s].
-    whole
-        Whether no message has been removed.
-
+    The first message begins at ``begin`` in the first block. From it to the newest pass
+    ``seconds``. The memory is whole if no message has been removed.
     """
 
     blocks: tuple[bytes, ...]
@@ -125,15 +103,10 @@ class LastSeconds:
     most
         Most memory for the messages [bytes]; if it is too little, the oldest are removed.
 
-    Attributes
-    ----------
-    discarded
-        Number of removed messages of each topic.
-
     """
 
     def __init__(self, topics: int, span: int, most: int) -> None:
-        self.discarded = [0] * topics
+        self.discarded = [0] * topics  # Number of removed messages of each topic
         self._span = span
         self._most = most
         self._counts = [0] * topics
@@ -262,13 +235,6 @@ class SnapshotMemory:
     capacity
         Messages that may wait for the memory's thread; as for `Recorder`.
 
-    Attributes
-    ----------
-    extent
-        Amount of messages in memory.
-    failure
-        Reason why the memory has ended early; None if it has not.
-
     """
 
     def __init__(
@@ -276,7 +242,8 @@ class SnapshotMemory:
     ) -> None:
         self.topics = tuple(topics)
         self.seconds = seconds
-        self.extent = Extent()
+        self.extent = Extent()  # Amount of messages in memory
+        # Reason why the memory has ended early; None if it has not.
         self.failure: RecordingError | None = None
         self._queue = MessageQueue(len(topics), capacity)
         self.offer = self._queue.offer
@@ -303,11 +270,7 @@ class SnapshotMemory:
         """
         Return the content of the memory: all messages offered before that are not too old.
 
-        Raises
-        ------
-        RecordingError
-            The memory has ended.
-
+        A RecordingError says that the memory has ended.
         """
         with self._lock:
             if self.failure:
@@ -386,19 +349,13 @@ class SnapshotWriting:
     done
         Called on the writing thread when the outcome is ready.
 
-    Attributes
-    ----------
-    kept
-        As given.
-    outcome
-        Summary of the recording, or the error that prevented it; None until then.
-
     """
 
     def __init__(
         self, kept: Kept, make: Callable[[], BagWriter], done: Callable[[], None]
     ) -> None:
         self.kept = kept
+        # Summary of the recording, or the error that prevented it; None until then.
         self.outcome: RecordingSummary | RecordingError | None = None
         self._make = make
         self._done = done

@@ -42,37 +42,20 @@ class Storage:
 
     Until a file ends, mcap keeps in memory the positions of its chunks and messages, so the size
     of a file must be limited.
-
-    Attributes
-    ----------
-    flush_period
-        Time whose messages a power cut may lose [s]: the flush period, and a tenth more.
-    split_bytes
-        Size after which the next file begins [bytes]; 0 for never.
-    split_seconds
-        Duration after which the next file begins [s], by log times; 0 for never.
-    keep_files
-        Number of files to keep; 0 for all.
-    min_free_bytes
-        Space to leave free on the disk [bytes].
-    compression
-        'none', 'lz4' or 'zstd'.
-    snapshot_seconds
-        Duration of the run to keep in memory until a snapshot is requested [s], by log times; 0 to
-        write the bag continuously.
-    snapshot_bytes
-        Most memory for it [bytes].
-
     """
 
+    # Time whose messages a power cut may lose [s]: the flush period, and a tenth more.
     flush_period: float = 1.0
-    split_bytes: int = 2**30
+    split_bytes: int = 2**30  # Size after which the next file begins [bytes]; 0 for never
+    # Duration after which the next file begins [s], by log times; 0 for never.
     split_seconds: float = 0.0
-    keep_files: int = 0
-    min_free_bytes: int = 0
-    compression: str = NONE
+    keep_files: int = 0  # Number of files to keep; 0 for all
+    min_free_bytes: int = 0  # Space to leave free on the disk [bytes]
+    compression: str = NONE  # 'none', 'lz4' or 'zstd'
+    # Duration of the run to keep in memory until a snapshot is requested [s], by log times; 0 to
+    # write the bag continuously.
     snapshot_seconds: float = 0.0
-    snapshot_bytes: int = 256_000_000
+    snapshot_bytes: int = 256_000_000  # Most memory for it [bytes]
 
 
 def scarcity(folder: Path, least: int) -> str:

@@ -77,18 +77,6 @@ class BagWriter:
         Topic number and CDR bytes of latched messages, written before the first message of each
         file, with its log time.
 
-    Attributes
-    ----------
-    discarded
-        Messages of each topic in files that were removed to keep newer ones.
-    out_of_room
-        Whether it failed for lack of space, so that `resume` may continue.
-    opened
-        Number of messages of each topic written because of `opening`, not by `write`.
-    account
-        Returns the statistics of all messages, given the summary of the bag; None for a bag
-        without statistics.
-
     Raises
     ------
     RecordingError
@@ -108,7 +96,10 @@ class BagWriter:
         self.topics = tuple(topics)
         self.storage = storage or Storage()
         self._compression = compression_type(self.storage.compression, self.folder)
+        # Messages of each topic in files that were removed to keep newer ones.
         self.discarded = (0,) * len(self.topics)
+        # Returns the statistics of all messages, given the summary of the bag; None for a bag
+        # without statistics.
         self.account: Callable[[BagSummary], RecordingStats | None] = lambda summary: None
         channels = 'application/mcap', channels_file(self.topics)
         self._attachments = {**(attachments or {}), CHANNELS_FILE: channels}
@@ -116,6 +107,7 @@ class BagWriter:
         self._splits = self.storage.split_bytes > 0 or self._split_time > 0
         self._paths = (self.folder / f'{self.folder.name}_{number}.mcap' for number in count())
         self._opening = tuple(opening)
+        # Number of messages of each topic written because of `opening`, not by `write`.
         self.opened = (0,) * len(self.topics)
         self._sequences = [0] * len(self.topics)
         self._refused = [0] * len(self.topics)
@@ -124,6 +116,7 @@ class BagWriter:
         self._due = 0.0
         self._checked = 0  # size of the file at the last check of free space [bytes]
         self._summary: BagSummary | None = None
+        # Whether it failed for lack of space, so that `resume` may continue.
         self.out_of_room = False
         self._failure: RecordingError | None = None
         self._outcome: dict[str, str] = {}  # messages about failures, for the metadata

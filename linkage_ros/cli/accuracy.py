@@ -31,10 +31,9 @@ from textwrap import wrap
 from threading import Event
 
 from linkage_ros.accuracy import measure_accuracy, PARTS
-from linkage_ros.accuracy.answer import replies, reply
 from linkage_ros.accuracy.page.files import check_folder, PAGE, write_page
 from linkage_ros.accuracy.page.numbers import number_text
-from linkage_ros.accuracy.results import Results
+from linkage_ros.accuracy.results import replies, reply, Results
 from linkage_ros.cli.arguments import add_set, SCENE_HELP
 from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import check_installed, did_you_mean, LinkageError, listed

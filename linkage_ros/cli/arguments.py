@@ -32,7 +32,6 @@ PICTURES = ('.png', '.svg', '.pdf')
 LINKAGES = ('.yaml', '.yml')
 """Suffixes of linkage and scene files."""
 
-
 SCENE_HELP = 'scene file or linkage file, or a name of linkage gallery'
 
 
@@ -146,11 +145,7 @@ def inputs(
     """
     Return the typed values of the inputs, in [rad] and [m].
 
-    Raises
-    ------
-    LinkageError
-        If there are more or fewer values than inputs.
-
+    A LinkageError is raised if there are more or fewer values than inputs.
     """
     given = linkage.inputs
     if len(typed) != len(given):
@@ -183,15 +178,7 @@ def fixed(value: float, digits: int) -> str:
 
 
 class AngleUnit(NamedTuple):
-    """
-    The unit in which a person types and reads angles; files hold radians whatever it is.
-
-    Attributes
-    ----------
-    name
-        ``°`` or ``rad``.
-
-    """
+    """The unit, ``°`` or ``rad``, of angles that a person types and reads; files hold radians."""
 
     name: str
 

@@ -55,13 +55,8 @@ def opened(path: Path, stop: Event) -> Bag:
     """
     Open a bag for reading as far as it goes; report attachments that are not read.
 
-    Raises
-    ------
-    BagError
-        See `read_bag`.
-    StoppedError
-        If a signal came while the file was searched because its index is missing.
-
+    Errors are those of `read_bag`; a StoppedError says that a signal came while the file was
+    searched because its index is missing.
     """
 
     def look(_read: int) -> None:
@@ -148,17 +143,7 @@ _GAP = 'what depends on one that is not there may differ'
 
 
 class BagReading:
-    """
-    Read the messages of a bag up to damage or a stop request, with progress.
-
-    Parameters
-    ----------
-    bag
-        The bag.
-    stop
-        Set by a signal.
-
-    """
+    """Read the messages of a bag up to damage or the event of a stop request, with progress."""
 
     def __init__(self, bag: Bag, stop: Event) -> None:
         self.damage = ''

@@ -52,7 +52,6 @@ _SINGULAR = {
 _PLACES = 4
 """Maximum number of places shown for one extreme value."""
 
-
 EXAMPLE = 'linkage check jansen_leg'
 
 

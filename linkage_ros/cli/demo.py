@@ -50,7 +50,6 @@ _BESIDE = {
 }
 """Companion processes of the drives that listen to a topic, with parameters."""
 
-
 _SECONDS = 10.0
 """Duration of a demo without ``--seconds``, in [s]; longer if its faults end later."""
 

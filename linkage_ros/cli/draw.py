@@ -36,9 +36,8 @@ from linkage_ros.cli.arguments import (
 from linkage_ros.drawing.dxf import links_dxf
 from linkage_ros.drawing.figure import assemblies_picture, picture, view
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.assemblies import assemblies
 from linkage_ros.files.file_access import atomic_write
-from linkage_ros.files.linkage_file import load
+from linkage_ros.files.linkage_file import assemblies, load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 

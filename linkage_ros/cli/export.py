@@ -76,46 +76,22 @@ ProgressCallback = Callable[[int], None]
 
 
 class Source(NamedTuple):
-    """
-    The origin of the rows.
+    """The origin of the rows."""
 
-    Attributes
-    ----------
-    bag
-        The bag.
-    types
-        The topics, each with its type.
-    closing
-        Topics whose messages end the row of a tick.
-    wanted
-        For each topic that also carries other messages, the test that selects those of the rows.
-    dependent
-        Names of dependent joints, which nobody can command; see `MessageValues`.
-
-    """
-
-    bag: Bag
-    types: Mapping[str, str]
-    closing: Collection[str]
+    bag: Bag  # The bag
+    types: Mapping[str, str]  # The topics, each with its type
+    closing: Collection[str]  # Topics whose messages end the row of a tick
+    # For each topic that also carries other messages, the test that selects those of the rows.
     wanted: Mapping[str, Callable[[bytes], bool]]
+    # Names of dependent joints, which nobody can command; see `MessageValues`.
     dependent: Collection[str] = ()
 
 
 class Found(NamedTuple):
     """
-    Result of the first pass.
+    Result of the first pass: columns beyond the first four, and number of rows.
 
-    Attributes
-    ----------
-    keys
-        The columns beyond the first four.
-    rows
-        Number of rows.
-    counts
-        Number of messages in the rows, by topic.
-    left_out
-        Number of messages that are left out, by topic and reason.
-
+    Messages in the rows are counted by topic, those that are left out by topic and reason.
     """
 
     keys: tuple[Key, ...]
@@ -244,7 +220,6 @@ def _ticks(
 
 
 _MIB = 2**20
-
 
 EXAMPLE = 'linkage export my_bag -o my_bag.csv'
 

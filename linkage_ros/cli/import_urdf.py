@@ -39,7 +39,6 @@ from linkage_ros.robot_models.urdf_file import read_urdf
 
 _LARGEST_FILE = 10_000_000
 
-
 EXAMPLE = 'linkage import four_bar.urdf --input crank_joint -o my_four_bar.yaml'
 
 

@@ -49,7 +49,6 @@ from linkage_ros.signals import heeded
 
 _MIB = 2**20
 
-
 EXAMPLE = 'linkage info my_bag'
 
 
@@ -79,11 +78,7 @@ def info(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any
     """
     Return the description of a bag, as JSON holds it.
 
-    Raises
-    ------
-    BagError
-        If a file of the bag cannot be read.
-
+    A BagError is raised if a file of the bag cannot be read.
     """
     layouts = [layout_of(file) for file in bag.files]
     size = max(1, sum(layout.content for layout in layouts) // _MIB)

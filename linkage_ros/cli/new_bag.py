@@ -50,40 +50,16 @@ _CHANGES_QOS = QosProfile(depth=100, durability='transient_local')
 
 
 class Source(NamedTuple):
-    """
-    The origin of a new bag.
+    """The origin of a new bag."""
 
-    Attributes
-    ----------
-    bag
-        The bag.
-    run
-        The bag's run account; blank if it has none.
-    recorded
-        The scene in the bag; None if there is none that can be read.
-    crank_topic
-        Topic of the crank samples.
-
-    """
-
-    bag: Bag
-    run: RunAccount
-    recorded: Scene | None
-    crank_topic: str
+    bag: Bag  # The bag
+    run: RunAccount  # The bag's run account; blank if it has none
+    recorded: Scene | None  # The scene in the bag; None if there is none that can be read
+    crank_topic: str  # Topic of the crank samples
 
 
 class Names(NamedTuple):
-    """
-    Names of the topics written beside the samples, as the bag's run named them.
-
-    Attributes
-    ----------
-    joint_states, faults, withheld, resets
-        One topic each.
-    extras
-        The scene's further topics, in their order.
-
-    """
+    """Names of the topics written beside the samples, as the bag's run named them."""
 
     joint_states: str
     faults: str

@@ -44,7 +44,6 @@ from linkage_ros.signals import heeded
 
 _CLOCK_RATE = 40.0  # as ``ros2 bag play``
 
-
 EXAMPLE = 'linkage play my_bag --rate 0.5'
 
 

@@ -41,7 +41,6 @@ import numpy as np
 Values = tuple[float, ...]
 """Values of joints, in [rad] or [m], and per second."""
 
-
 EXAMPLE = 'linkage plot my_bag -o my_bag.png'
 
 

@@ -32,7 +32,6 @@ WHOLE, STOPPED, LOSS = 0, 1, 3
 _MOST_SHOWN = 20
 """Maximum number of losses shown; a worn-out disk may cause thousands."""
 
-
 EXAMPLE = 'linkage recover my_bag -o whole_bag'
 
 

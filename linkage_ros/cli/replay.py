@@ -374,7 +374,6 @@ def _side_by_side(
 
 EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
 
-
 EXAMPLE = 'linkage replay my_bag --set angles=wrapped'
 
 
@@ -436,11 +435,8 @@ def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> d
     """
     Run a bag's own scene once more; return the comparison with the recorded run.
 
-    Raises
-    ------
-    LinkageError
-        If the bag carries no scene that can be run, or holds no joint states to compare.
-
+    A LinkageError is raised if the bag carries no scene that can be run, or holds no joint states
+    to compare.
     """
     try:
         scene = scene_of(bag, trust_effects=trust_effects)

@@ -79,26 +79,10 @@ def write_page(file: Path, page: str) -> None:
 
 def report(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool = False) -> str:
     """
-    Return the page of a bag; memory does not grow with the bag.
+    Return the page of a bag, or of a window of it; memory does not grow with the bag.
 
-    Parameters
-    ----------
-    bag_path
-        The bag.
-    window
-        The part of the run to show.
-    stop
-        Set by a signal.
-    trust_effects
-        Whether to import the modules that the scene names as effects.
-
-    Raises
-    ------
-    LinkageError
-        If the bag cannot be read, or plotly is not installed.
-    StoppedError
-        If the event was set.
-
+    ``trust_effects`` lets the scene's effects be imported. A LinkageError says that the bag cannot
+    be read, or that plotly is not installed; a StoppedError that the event was set.
     """
     bag = opened(bag_path, stop)
     layouts = [layout_of(path) for path in bag.files]

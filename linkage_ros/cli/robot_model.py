@@ -41,7 +41,6 @@ from linkage_ros.scene.robot_model import scene_model, Write
 WRITERS: dict[str, Write] = {'urdf': urdf, 'mjcf': mjcf}
 """Writers of models, by the command's name."""
 
-
 SUFFIXES = {'urdf': ('.urdf', '.xml'), 'mjcf': ('.xml', '.mjcf')}
 """Suffixes of the models, by the command's name."""
 

@@ -72,17 +72,9 @@ class Shown(NamedTuple):
 
 class Display:
     """
-    Live display of a running node: a table drawn by rich, or one line a second.
+    Live display of a running node: a table drawn by rich, or one line a second if ``plain``.
 
-    Parameters
-    ----------
-    plain
-        Whether to print lines even where a live display is possible.
-    angles
-        Unit in which angles are shown.
-    page
-        Whether to serve a page of the run.
-
+    It may serve a page of the run.
     """
 
     def __init__(self, *, plain: bool, angles: AngleUnit, page: bool = False) -> None:

@@ -286,7 +286,6 @@ def table_of(what: str, name: str) -> Table:
 SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
 """Functions that make the JSON Schema of each kind of file."""
 
-
 EXAMPLE = 'linkage scene worn_press --set rate=500'
 
 

@@ -65,17 +65,7 @@ _PER = ('', '/s', '/s²')
 
 
 class Column(NamedTuple):
-    """
-    A column of the result.
-
-    Attributes
-    ----------
-    name
-        Joint or coordinate, and its quantity.
-    unit
-        '' for a text.
-
-    """
+    """A column of the result: its joint or coordinate with the quantity; a text has no unit."""
 
     name: str
     unit: str
@@ -162,24 +152,13 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 class Question(NamedTuple):
-    """
-    The requested computation.
+    """The requested computation."""
 
-    Attributes
-    ----------
-    inputs
-        The values of the inputs to solve for, in [rad] and [m].
-    rates, accelerations
-        Of the inputs; empty if not requested.
-    points
-        For each traced point, a link that carries it.
-
-    """
-
-    inputs: list[tuple[float, ...]]
+    inputs: list[tuple[float, ...]]  # The values of the inputs to solve for, in [rad] and [m]
+    # Of the inputs; empty if not requested.
     rates: tuple[float, ...] | None
     accelerations: tuple[float, ...] | None
-    points: dict[str, str]
+    points: dict[str, str]  # For each traced point, a link that carries it
 
 
 def _question(closure: Closure, arguments: argparse.Namespace) -> Question:

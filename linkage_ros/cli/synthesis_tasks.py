@@ -44,27 +44,14 @@ Angles = Sequence[float]
 
 
 class Answer(NamedTuple):
-    """
-    A solution.
+    """A solution."""
 
-    Attributes
-    ----------
-    title
-        How the design was made.
-    design, assessment
-        The design, and its quality.
-    facts
-        Names and values that describe how it was solved.
-    curve
-        Crank angles and the rocker's error there, in [rad]; None if the task gives only
-        positions.
-
-    """
-
-    title: str
+    title: str  # How the design was made
+    # The design, and its quality.
     design: Design
     assessment: Assessment
-    facts: Sequence[tuple[str, str]] = ()
+    facts: Sequence[tuple[str, str]] = ()  # Names and values that describe how it was solved
+    # Crank angles and the rocker's error there, in [rad]; None if the task gives only positions.
     curve: tuple[Sequence[float], Sequence[float]] | None = None
 
 
@@ -87,11 +74,7 @@ def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
     """
     Return all solutions, the best first.
 
-    Raises
-    ------
-    LinkageError
-        If there is no solution, or the arguments are not a task.
-
+    A LinkageError is raised if there is no solution, or the arguments are not a task.
     """
     tasks = {
         '--pair': typed.pair or typed.pairs,

@@ -38,22 +38,12 @@ _BORDER = 3
 
 
 class Table(NamedTuple):
-    """
-    A table.
+    """A table."""
 
-    Attributes
-    ----------
-    title
-        '' for no title.
-    columns
-        Headings; a leading ``>`` aligns to the right. If all are empty, none is written.
-    rows
-        The cells, as text. A line break in a cell begins a new line within its row.
-
-    """
-
-    title: str
+    title: str  # '' for no title
+    # Headings; a leading ``>`` aligns to the right. If all are empty, none is written.
     columns: Sequence[str]
+    # The cells, as text. A line break in a cell begins a new line within its row.
     rows: Sequence[Sequence[str]]
 
 
@@ -238,15 +228,7 @@ def progress(what: str) -> Iterator[ProgressCallback]:
 
 
 class PrintableStream:
-    """
-    A text stream whose lines are made printable; everything else is passed to the stream.
-
-    Parameters
-    ----------
-    stream
-        The stream, for example standard output.
-
-    """
+    """A text stream whose lines are made printable; everything else is passed to the stream."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

@@ -91,21 +91,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 class _Linkage(NamedTuple):
-    """
-    A linkage to show.
-
-    Attributes
-    ----------
-    name
-        Its name.
-    path
-        The linkage file.
-    data
-        Its content.
-    scene
-        Name, files and folder of the scene; None for a linkage alone.
-
-    """
+    """A linkage to show: file and content, and its scene's name, files and folder, or None."""
 
     name: str
     path: Path
@@ -137,9 +123,8 @@ def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
         found = model(shown.data.decode(), shown.name)
         write_page(arguments.output, page(found, mode='still'))
         return 0
-    from linkage_ros.view.conversation import Conversation
+    from linkage_ros.view.conversation import Conversation, UserFile
     from linkage_ros.view.sensors import SceneFiles
-    from linkage_ros.view.user_file import UserFile
 
     shipped = arguments.file in (*linkage_names(), *scene_names())
     file = None if shipped else UserFile(shown.path)

@@ -87,42 +87,22 @@ Advance = Callable[[int, int], Any]
 
 
 class Motion(NamedTuple):
-    """
-    A motion to be shown, at instants 1/`RATE` s apart.
+    """A motion to be shown, at instants 1/`RATE` s apart."""
 
-    Attributes
-    ----------
-    title
-        What moves.
-    view
-        The linkage, in the pose in which its shapes are made.
-    repeats
-        Whether it ends where it begins.
-    links
-        The links and the blocks of sliders that move.
-    frames
-        Position, in [m], and angle, in [rad], of their frames, of shape (instants, links, 3); NaN
-        if unknown: the linkage is hidden then.
-    x
-        Abscissa of the mark at the instants: the first input, in [rad] or [m], or time, in [s].
-    x_name, x_unit
-        Its name, and the unit in which it is shown: °, m or s.
-    joints
-        The curves of the joints.
-    values
-        The joints at the instants, of shape (instants, joints), in [rad] or [m]; NaN if unknown.
-
-    """
-
-    title: str
-    view: View
-    repeats: bool
-    links: Sequence[str]
+    title: str  # What moves
+    view: View  # The linkage, in the pose in which its shapes are made
+    repeats: bool  # Whether it ends where it begins
+    links: Sequence[str]  # The links and the blocks of sliders that move
+    # Position, in [m], and angle, in [rad], of their frames, of shape (instants, links, 3); NaN if
+    # unknown: the linkage is hidden then.
     frames: Any
+    # Abscissa of the mark at the instants: the first input, in [rad] or [m], or time, in [s].
     x: Any
+    # Its name, and the unit in which it is shown: °, m or s.
     x_name: str
     x_unit: str
-    joints: Sequence[Curve]
+    joints: Sequence[Curve]  # The curves of the joints
+    # The joints at the instants, of shape (instants, joints), in [rad] or [m]; NaN if unknown.
     values: Any
 
 
@@ -130,11 +110,7 @@ def count_of(seconds: float) -> int:
     """
     Return the number of pictures.
 
-    Raises
-    ------
-    LinkageError
-        If it is less than two pictures, or too long.
-
+    A LinkageError is raised if it is less than two pictures, or too long.
     """
     if not 2.0 / RATE <= seconds <= _LONGEST:
         reason = f'{seconds:g} is not between {2.0 / RATE:g} and {_LONGEST:g} s'
@@ -146,11 +122,8 @@ def check_kind(file: Path) -> None:
     """
     Check that files of a name can be written here.
 
-    Raises
-    ------
-    LinkageError
-        If it is no GIF, MP4 or SVG; matplotlib is missing, or ffmpeg for an MP4.
-
+    A LinkageError is raised if it is no GIF, MP4 or SVG; matplotlib is missing, or ffmpeg for an
+    MP4.
     """
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
     check_suffix(file, KINDS)
@@ -165,11 +138,7 @@ def range_motion(shown: View, title: str, seconds: float) -> Motion:
     """
     Return the motion through the range of the first input: a turn, or there and back.
 
-    Raises
-    ------
-    LinkageError
-        If the time is too short or too long.
-
+    A LinkageError is raised if the time is too short or too long.
     """
     count = count_of(seconds)
     low, high = shown.interval.lowest, shown.interval.highest

@@ -45,15 +45,8 @@ class Sweep(NamedTuple):
     """
     The motion of a linkage while its input goes through a range.
 
-    Attributes
-    ----------
-    joints
-        The published joints.
-    paths
-        For each traced point its path, in [m].
-    travels
-        Lowest and highest slide of each slider, in [m].
-
+    Paths are of the traced points, travels the lowest and highest slides of the sliders, all in
+    [m].
     """
 
     joints: tuple[Curve, ...]

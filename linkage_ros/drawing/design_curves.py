@@ -67,39 +67,22 @@ class Pose(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """
-    One assembly, while the crank goes through a range.
+    """One assembly, while the crank goes through a range."""
 
-    Attributes
-    ----------
-    own
-        Whether it is the design's own assembly.
-    limited
-        Whether the range ends at toggles.
-    crank, rocker, coupler
-        Angles of the links, in [rad], without jumps; (n,).
-    trace
-        Places of the traced point, in [m]; (n,). Empty if there is none.
-
-    """
-
-    own: bool
-    limited: bool
+    own: bool  # Whether it is the design's own assembly
+    limited: bool  # Whether the range ends at toggles
+    # Angles of the links, in [rad], without jumps; (n,).
     crank: Array
     rocker: Array
     coupler: Array
-    trace: tuple[complex, ...]
+    trace: tuple[complex, ...]  # Places of the traced point, in [m]; (n,). Empty if there is none.
 
 
 def poses(design: Design) -> tuple[list[Pose], list[int]]:
     """
     Return a design at its positions, and the numbers of positions where it does not close.
 
-    Raises
-    ------
-    LinkageError
-        If it closes at none.
-
+    A LinkageError says that it closes at none.
     """
     closures = {side: closure_of(design, side) for side in SIDES}
     closed, open_ = [], []

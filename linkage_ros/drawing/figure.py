@@ -55,55 +55,25 @@ _SAME = 1e-9
 
 
 class View(NamedTuple):
-    """
-    The content of a picture.
+    """The content of a picture."""
 
-    Attributes
-    ----------
-    closure
-        The linkage.
-    inputs, position
-        The pose to draw.
-    ghosts
-        Poses in the background.
-    interval
-        Range of the first input around the pose, with the others held.
-    mark
-        The first input, less the whole turns by which it lies outside of that range.
-    sweep
-        The motion through that range.
-
-    """
-
-    closure: Closure
+    closure: Closure  # The linkage
+    # The pose to draw.
     inputs: tuple[float, ...]
     position: Position
-    ghosts: tuple[Position, ...]
-    interval: InputRange
-    mark: float
-    sweep: Sweep
+    ghosts: tuple[Position, ...]  # Poses in the background
+    interval: InputRange  # Range of the first input around the pose, with the others held
+    mark: float  # The first input, less the whole turns by which it lies outside of that range
+    sweep: Sweep  # The motion through that range
 
 
 def view(
     closure: Closure, inputs: tuple[float, ...], ghosts: Sequence[tuple[float, ...]] = ()
 ) -> View:
     """
-    Prepare a picture.
+    Prepare a picture of a pose, with others in the background.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    inputs
-        The pose to draw, in [rad] or [m].
-    ghosts
-        Poses in the background; by default some over the whole range.
-
-    Raises
-    ------
-    LinkageError
-        If a pose does not close.
-
+    By default those are some over the whole range. A LinkageError says that a pose does not close.
     """
     position = _closed(closure, inputs)
     way = InputSweep(closure, inputs)
@@ -213,11 +183,7 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
     """
     Paint a picture to a file.
 
-    Raises
-    ------
-    LinkageError
-        If matplotlib is not installed, or the file cannot be written.
-
+    A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
     """
     context = settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
@@ -263,11 +229,7 @@ def assemblies_picture(views: Mapping[str, View], file: Path) -> None:
     """
     Paint the same linkage in several assemblies, each under the text that a file needs for it.
 
-    Raises
-    ------
-    LinkageError
-        If matplotlib is not installed, or the file cannot be written.
-
+    A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
     """
     context = settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load

@@ -37,24 +37,13 @@ _GAP = 4.0
 
 
 class Label(NamedTuple):
-    """
-    A name to be placed; all sizes in one unit, such as pixels.
+    """A name to be placed; all sizes in one unit, such as pixels."""
 
-    Attributes
-    ----------
-    anchors
-        Places that it may be next to; the first is the best.
-    width, height
-        Size of the text.
-    clear
-        Distance of its box from the anchor.
-
-    """
-
-    anchors: tuple[complex, ...]
+    anchors: tuple[complex, ...]  # Places that it may be next to; the first is the best
+    # Size of the text.
     width: float
     height: float
-    clear: float
+    clear: float  # Distance of its box from the anchor
 
 
 class Placed(NamedTuple):
@@ -185,15 +174,7 @@ _SETTINGS: Any = {'font.size': 8.0, 'svg.hashsalt': 'linkage_ros', 'axes.linewid
 
 
 def settings() -> Any:
-    """
-    Return the matplotlib context of a picture.
-
-    Raises
-    ------
-    LinkageError
-        If matplotlib is not installed.
-
-    """
+    """Return the matplotlib context of a picture; a LinkageError without matplotlib."""
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
     import matplotlib as mpl  # local import: an extra, and slow to load
 
@@ -201,15 +182,7 @@ def settings() -> Any:
 
 
 def save(figure: Any, file: Path) -> None:
-    """
-    Save a picture; equal pictures give equal bytes.
-
-    Raises
-    ------
-    LinkageError
-        If the file cannot be written.
-
-    """
+    """Save a picture; equal pictures give equal bytes. A LinkageError if it cannot be written."""
     kind = file.suffix[1:].lower() or 'png'
     metadata = {'png': {'Software': None}, 'svg': {'Date': None}}.get(kind)
     picture = BytesIO()

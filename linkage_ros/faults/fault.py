@@ -55,24 +55,13 @@ FAULTS = {
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """
-    A fault that a scene can inject.
+    """A fault that a scene can inject."""
 
-    Attributes
-    ----------
-    kind, parameters
-        Key of `FAULTS`, and the parameters.
-    at
-        Times at which it begins by itself, in [s] from the first tick.
-    seconds
-        Its duration then, in [s].
-
-    """
-
+    # Key of `FAULTS`, and the parameters.
     kind: str
     parameters: Any
-    at: tuple[float, ...]
-    seconds: float
+    at: tuple[float, ...]  # Times at which it begins by itself, in [s] from the first tick
+    seconds: float  # Its duration then, in [s]
 
 
 class Switch:

@@ -43,20 +43,7 @@ def sensor(_parameters: FreezeParameters, switch: Switch, _joints: Sequence[str]
 
 
 class Freeze:
-    """
-    Sensor stage that holds the last reading.
-
-    Parameters
-    ----------
-    switch
-        Switch of the fault.
-
-    Attributes
-    ----------
-    gap_begins
-        False: a gap does not change its state.
-
-    """
+    """Sensor stage that holds the last reading; a gap does not change its state."""
 
     __slots__ = ('_last', '_switch')
 

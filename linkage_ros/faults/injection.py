@@ -29,32 +29,14 @@ from linkage_ros.faults.fault import Fault, FAULTS, Switch
 
 
 class Change(NamedTuple):
-    """
-    Begin or end of a fault.
-
-    Attributes
-    ----------
-    name
-        Name of the fault in the scene.
-    on
-        Whether it begins.
-
-    """
+    """Begin or end of a fault, by its name in the scene."""
 
     name: str
     on: bool
 
 
 class Injection:
-    """
-    The faults of a scene with their switches; it outlives a reset of the pipeline.
-
-    Parameters
-    ----------
-    faults
-        Faults of the scene, by name.
-
-    """
+    """The faults of a scene with their switches; it outlives a reset of the pipeline."""
 
     def __init__(self, faults: Mapping[str, Fault]) -> None:
         self.faults = faults

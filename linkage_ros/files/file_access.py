@@ -65,15 +65,7 @@ def open_regular(file: str | Path) -> BinaryIO:
 
 
 def read_regular(file: str | Path, largest: int) -> bytes:
-    """
-    Read a file; if it exceeds a number of bytes, read one byte more than that.
-
-    Raises
-    ------
-    OSError, ValueError
-        As in `open_regular`.
-
-    """
+    """Read a file as `open_regular`, but at most one byte more than a number of bytes."""
     with open_regular(file) as stream:
         return stream.read(largest + 1)
 
@@ -88,15 +80,7 @@ def _check(status: os.stat_result, file: str | Path) -> None:
 
 
 def check_suffix(file: Path, suffixes: Collection[str]) -> None:
-    """
-    Check that the name of a file to write has one of some suffixes, whatever its case.
-
-    Raises
-    ------
-    LinkageError
-        It has another, or none.
-
-    """
+    """Check that the name of a file to write has one of some suffixes, whatever its case."""
     ending = file.suffix.lower()
     if ending not in suffixes:
         raise LinkageError(
@@ -110,18 +94,7 @@ def atomic_write(file: str | Path, data: bytes) -> None:
     """
     Write or replace a file: write it beside the target, then rename it.
 
-    Parameters
-    ----------
-    file
-        Target; a symbolic link is followed.
-    data
-        Its content.
-
-    Raises
-    ------
-    LinkageError
-        The file cannot be written.
-
+    A symbolic link is followed. A LinkageError says that the file cannot be written.
     """
     try:
         target = Path(file).resolve()

@@ -13,18 +13,18 @@
 # limitations under the License.
 
 
-"""Read a linkage file into a `Linkage`; shorthands expand to the same form."""
+"""Read a linkage file into a `Linkage`, or all its assemblies; shorthands expand to one form."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, repeat
+from itertools import chain, product, repeat
 from math import inf
 from os import PathLike
 from typing import Any
 
-from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.errors import DefinitionError, FileError, listed, quoted
 from linkage_ros.files.section import Section
 from linkage_ros.files.units import ANGLES, LENGTHS, Units
 from linkage_ros.files.yaml_file import read_yaml
@@ -40,7 +40,9 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
+from linkage_ros.kinematics.plan import assembly_sides
 from linkage_ros.kinematics.sweep_analysis import check_limits
+from linkage_ros.kinematics.topology import assur_groups
 from linkage_ros.resources import named_file
 
 _KEYS = (
@@ -57,6 +59,9 @@ _KEYS = (
 )
 _MOST_LINKS, _MOST_POINTS = 400, 10_000
 """Bounds on the links, and on the points of all links; at these a check takes seconds."""
+
+_MOST_SIDES = 5
+"""Most sides to choose for all assemblies: 32 linkages."""
 
 FARTHEST = 1e9
 """Bound on coordinates, in [m]; below it no square overflows."""
@@ -393,3 +398,61 @@ def _inverted_slider_crank(content: Section) -> dict[str, Any]:
 
 
 _SHORTHANDS = {'four_bar': _four_bar, 'inverted_slider_crank': _inverted_slider_crank}
+
+
+def assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
+    """
+    Return a linkage in each choice of assembly sides in which it closes.
+
+    If the file leaves sides out, those that it writes are kept; else all are chosen.
+
+    Parameters
+    ----------
+    linkage
+        Path of a linkage file, or the name of one that comes with the package.
+
+    Returns
+    -------
+    closures : dict of str to Closure
+        By the text that the file needs for it, such as ``'assembly: {B: left}'``.
+
+    Raises
+    ------
+    FileError
+        As in `load`; or there is no side to choose, or there are too many.
+
+    """
+    file = named_file(linkage, 'linkages')
+    content, _ = read_yaml(file)
+    return closures(content, file.stem)
+
+
+def closures(content: Section, name: str) -> dict[str, Closure]:
+    """Return the closures of a linkage file by name, as `assemblies` does."""
+    written, shorthand = written_linkage(content)
+    try:
+        sides = assembly_sides(assur_groups(written))
+    except DefinitionError as error:
+        raise content.error(shorthand or error.where, error.reason, error.remedy) from None
+    free = [name for name in sides if name not in written.assembly] or list(sides)
+    if not free:
+        reason = 'no dyad of this linkage has two assemblies'
+        raise content.error('', reason, 'draw it without --assemblies')
+    if len(free) > _MOST_SIDES:
+        reason = f'{len(free)} sides are to be chosen'
+        raise content.error('assembly', reason, f'leave out only {_MOST_SIDES} of them')
+    found = {}
+    errors = []
+    for chosen in product(*(sides[name] for name in free)):
+        assembly = dict(written.assembly) | dict(zip(free, chosen, strict=True))
+        one = replace(written, assembly=assembly)  # type: ignore[arg-type]  # sides, as above
+        # A shorthand has one side, without the name of its pin or slider.
+        text = ', '.join(chosen if shorthand else (f'{k}: {v}' for k, v in assembly.items()))
+        text = f'assembly: {text if shorthand else f"{{{text}}}"}'
+        try:
+            found[text] = closable(content, one, name, shorthand)
+        except FileError as error:
+            errors.append(error)
+    if not found:
+        raise errors[0]
+    return found

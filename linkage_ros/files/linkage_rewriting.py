@@ -61,24 +61,9 @@ _SHORT_LENGTHS = {
 
 def rewritten(text: str, name: str, linkage: Linkage) -> str:
     """
-    Return the text of a linkage file with another linkage in it.
+    Return the text of a linkage file, which is bounded, with another linkage in it.
 
-    Parameters
-    ----------
-    text
-        The text of the file; it is bounded as every file that is read.
-    name
-        Name of the file, for errors.
-    linkage
-        The linkage that the text shall hold.
-
-    Raises
-    ------
-    FileError
-        If the text is not that of a linkage.
-    LinkageError
-        If ruamel.yaml is not installed.
-
+    A FileError says that it is not that of a linkage, a LinkageError that ruamel.yaml is missing.
     """
     check_installed('ruamel.yaml', "pip install 'linkage_ros[view]'")
     from ruamel.yaml import YAML  # local import: an extra

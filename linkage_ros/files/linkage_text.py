@@ -82,20 +82,9 @@ def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
 
 def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = ()) -> None:
     """
-    Write or replace a linkage file atomically.
+    Write or replace a linkage file atomically, as `linkage_text`; a symbolic link is followed.
 
-    Parameters
-    ----------
-    linkage, comment
-        As in `linkage_text`.
-    file
-        Target; a symbolic link is followed.
-
-    Raises
-    ------
-    LinkageError
-        The file cannot be written, or its text would not be a valid linkage.
-
+    A LinkageError says that it cannot be written, or that its text would not be a valid linkage.
     """
     data = linkage_text(linkage, comment).encode()
     read_linkage(parse_yaml(data, str(file)))
@@ -237,20 +226,9 @@ _SAME = 1e-9
 
 def scene_text_for(closure: Closure, file: str) -> str:
     """
-    Return the text of a linkage's default scene.
+    Return the text of a linkage's default scene, which names its file.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    file
-        Name of the linkage file, for the scene to name.
-
-    Raises
-    ------
-    DefinitionError
-        Its pose starts where no loop closes.
-
+    A DefinitionError says that the pose starts where no loop closes.
     """
     return (
         '# What a linkage file alone stands for where a scene is expected.\n'

@@ -58,15 +58,7 @@ CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
 
 @dataclass(frozen=True, slots=True)
 class Kind(ABC):
-    """
-    Kind of a parameter.
-
-    Attributes
-    ----------
-    meaning
-        Meaning of the parameter, as text.
-
-    """
+    """Kind of a parameter, with its meaning as text."""
 
     meaning: str
     unit: ClassVar[str] = ''
@@ -163,17 +155,9 @@ class Point(Numbers):
 
 @dataclass(frozen=True, slots=True)
 class Rows(Kind):
-    """
-    A list of rows of finite numbers, one per column, each within ±most.
+    """A list of rows of finite numbers, one per column, each within ±most."""
 
-    Attributes
-    ----------
-    columns
-        The meaning of each column, with its unit.
-
-    """
-
-    columns: tuple[str, ...]
+    columns: tuple[str, ...]  # The meaning of each column, with its unit
     most: float = inf
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
@@ -303,15 +287,7 @@ class Names(Name):
 
 @dataclass(frozen=True, slots=True)
 class Each(Name):
-    """
-    A value, or a section of parameters, for each named part of the linkage.
-
-    Attributes
-    ----------
-    of
-        A `Kind`, or a type of parameters.
-
-    """
+    """A value of a `Kind`, or a section of parameters, for each named part of the linkage."""
 
     of: Any
 
@@ -499,24 +475,9 @@ def summary(parameters: Any) -> str:
 
 def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -> Any:
     """
-    Read parameters.
+    Read a section of parameters, which may name parts of the linkage and files in a folder.
 
-    Parameters
-    ----------
-    content
-        The section.
-    of
-        Parameter type.
-    parts
-        Parts of the linkage that they may name.
-    folder
-        Folder for relative paths.
-
-    Raises
-    ------
-    FileError
-        A value is wrong; the error has line and key, the expected values, and the nearest name.
-
+    A FileError has line and key of a wrong value, the expected values, and the nearest name.
     """
     entries = declared(of)
     _refuse_misplaced(content, entries, parts)
@@ -546,17 +507,7 @@ def under_part(key: str, section: str, keys: Sequence[str], names: Sequence[str]
     """
     Return the remedy for a key that belongs into a section of named parts; '' for another key.
 
-    Parameters
-    ----------
-    key
-        The key.
-    section
-        Key of the section.
-    keys
-        The keys that each of its parts has; none if a part has a single value.
-    names
-        Names of the parts.
-
+    The keys are those of each of its parts: none if a part has a single value.
     """
     if key in keys:
         name = names[0] if names else 'NAME'

@@ -42,23 +42,10 @@ SI = Units()
 
 class Section:
     """
-    A mapping of a YAML file, whose keys are taken one by one.
+    A mapping of a YAML file, whose keys are taken one by one; the getters return SI.
 
-    Every getter removes its key from the section; `finish` refuses the remaining keys.
-
-    Parameters
-    ----------
-    file
-        Name of the file, for error messages.
-    path
-        Dotted key of the mapping in the file.
-    content
-        The mapping.
-    line
-        Line of the mapping.
-    units
-        Units of its lengths and angles; the getters return SI.
-
+    Every getter removes its key from the section; `finish` refuses the remaining keys. The path is
+    the dotted key of the mapping, the line its line, for error messages.
     """
 
     def __init__(

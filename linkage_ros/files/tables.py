@@ -46,20 +46,8 @@ def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterat
     """
     Yield a function that writes blocks of a table; the file appears complete at the end, or not.
 
-    Parameters
-    ----------
-    file
-        Target; its suffix selects the format, see `KINDS`. An existing file is replaced.
-    heads
-        Headings of the columns.
-    whole
-        Headings of the columns of integers.
-
-    Raises
-    ------
-    LinkageError
-        It cannot be written.
-
+    Its suffix selects the format, see `KINDS`; an existing file is replaced. ``whole`` names the
+    columns of integers. A LinkageError says that it cannot be written.
     """
     # A link is followed: its target is replaced, not the link.
     target = Path(os.path.realpath(file))
@@ -147,7 +135,6 @@ KINDS: dict[
     str, Callable[[BinaryIO, Sequence[str], Sequence[str]], AbstractContextManager[Write]]
 ] = {'.csv': _csv, '.parquet': _parquet}
 """Writer for each suffix of a file."""
-
 
 _MOST = 1000
 _LARGEST_FILE = 10_000_000

@@ -61,19 +61,13 @@ class Units:
 
     Units of parameters are named in SI. Converted are m and rad, and these by time: m/s, m/s²,
     m/√s. All others (N·m/rad, kg·m²) stay as they are.
-
-    Attributes
-    ----------
-    length, angle
-        A key of `LENGTHS`, and one of `ANGLES`.
-    slides
-        Whether a value for a joint ('rad or m') is that of a slide; None if it is for joints of
-        both kinds.
-
     """
 
+    # A key of `LENGTHS`, and one of `ANGLES`.
     length: str = 'm'
     angle: str = 'radians'
+    # Whether a value for a joint ('rad or m') is that of a slide; None if it is for joints of both
+    # kinds.
     slides: bool | None = None
 
     @property

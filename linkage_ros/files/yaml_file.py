@@ -42,19 +42,11 @@ _LONGEST_INTEGER = 100
 
 class BoundedLoader(yaml.SafeLoader):
     """
-    PyYAML's safe loader with YAML 1.2 scalars, without aliases, and with limits.
+    PyYAML's safe loader with YAML 1.2 scalars, without aliases, and with at most some values.
 
     Ten lines of aliases can expand to gigabytes, and PyYAML takes 50 µs per value. So aliases are
     refused, and the numbers of values and levels are limited. By YAML 1.2 ``1e-3`` is a number and
     ``off`` a string.
-
-    Parameters
-    ----------
-    text
-        YAML text.
-    most
-        Most values that it may contain.
-
     """
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 (as in the base class)
@@ -86,20 +78,9 @@ class BoundedLoader(yaml.SafeLoader):
 
 def bounded_yaml(text: str, most: int = MOST_VALUES) -> Any:
     """
-    Parse a YAML text.
+    Parse a YAML text of so many values at most.
 
-    Parameters
-    ----------
-    text
-        The text.
-    most
-        Most values that it may contain.
-
-    Raises
-    ------
-    ValueError
-        It is not YAML, or exceeds a limit; the text of the error, one line, says which.
-
+    The text of a ValueError, one line, says whether it is not YAML, or which limit it exceeds.
     """
     try:
         loader = BoundedLoader(text, most)
@@ -146,7 +127,6 @@ for _tag, _pattern, _first in (
     BoundedLoader.add_implicit_resolver(
         f'tag:yaml.org,2002:{_tag}', re.compile(f'(?:{_pattern})$'), [*_first, '']
     )
-
 
 LARGEST_FILE = 1_000_000
 """Most bytes of a file."""

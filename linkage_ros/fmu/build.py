@@ -65,18 +65,7 @@ def scene_fmu(scene: Scene) -> bytes:
     """
     Return the FMU of a scene; the same scene gives the same bytes.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
-    Raises
-    ------
-    FileError
-        The scene cannot be stepped from outside; see `SteppedScene`.
-    LinkageError
-        PythonFMU3 is not installed.
-
+    A FileError says why it is not stepped from outside, a LinkageError that PythonFMU3 is missing.
     """
     check_installed('pythonfmu3', "pip install 'linkage_ros[fmu]'")
     SteppedScene(scene)

@@ -87,23 +87,10 @@ _STATUS_TEXTS = {
 
 class Content(NamedTuple):
     """
-    What an FMU holds beside the files of the scene.
+    What an FMU holds beside the files of the scene, which it names in their order.
 
-    Attributes
-    ----------
-    version
-        Version of linkage_ros that made it.
-    name
-        Name of the scene.
-    identifier
-        The name, as an identifier of C.
-    seed
-        Seed of the scene.
-    files
-        Names of the scene's files, in their order.
-    token
-        Identifies the content of the FMU.
-
+    The ``version`` of linkage_ros made it; the identifier is the name, as one of C; the token
+    identifies the content.
     """
 
     version: str

@@ -68,19 +68,7 @@ _OF_A_TICK = 1e-3
 
 
 class Variable(NamedTuple):
-    """
-    A number that goes in or comes out.
-
-    Attributes
-    ----------
-    name
-        Topic, joint and field, as ``joint_states.rocker_joint.position``.
-    unit
-        Its unit, as ``rad/s``.
-    description
-        What it is.
-
-    """
+    """A number that goes in or comes out, named as ``joint_states.rocker_joint.position``."""
 
     name: str
     unit: str
@@ -128,15 +116,7 @@ class _Sender:
 
 
 class LinkageOutputs:
-    """
-    The newest reading of a linkage, and whether it is of the last tick.
-
-    Parameters
-    ----------
-    line
-        The pipeline of the linkage.
-
-    """
+    """The newest reading of a linkage, and whether it is of the last tick."""
 
     def __init__(self, line: LinkagePipeline) -> None:
         member = line.member
@@ -228,20 +208,9 @@ class SteppedScene:
 
     def start(self, seed: int, inputs: Sequence[float]) -> None:
         """
-        Do the first tick.
+        Do the first tick, with a seed of all random numbers, and values of `inputs` at that time.
 
-        Parameters
-        ----------
-        seed
-            Seed of all random numbers.
-        inputs
-            Values of `inputs` at that time.
-
-        Raises
-        ------
-        LinkageError
-            The seed is out of bounds, or no linkage can be made of it.
-
+        A LinkageError says that the seed is out of bounds, or that no linkage can be made of it.
         """
         if not 0 <= seed <= LARGEST_SEED:
             raise LinkageError('seed', f'{seed} is out of bounds', f'write 0 to {LARGEST_SEED}')
@@ -288,13 +257,7 @@ class SteppedScene:
         """
         Take the values of the inputs at the end of the last step, then do so many ticks.
 
-        Parameters
-        ----------
-        ticks
-            Number of ticks.
-        inputs
-            Values of `inputs`; a drive takes them once, as one message.
-
+        A drive takes them once, as one message.
         """
         self._offer(inputs)
         for _ in range(ticks):

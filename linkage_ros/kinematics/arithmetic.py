@@ -192,22 +192,11 @@ def margin(*lengths: float) -> float:
 
 
 class Root(NamedTuple):
-    """
-    The root of a reach: the distance of a dyad from its limit.
+    """The root of a reach: the distance of a dyad from its limit."""
 
-    Attributes
-    ----------
-    root
-        0 at the limit.
-    missing
-        0 if the dyad closes, otherwise the amount that the sum is short of 0.
-    status
-        A toggle if the sum is zero within its rounding error, open if it is negative.
-
-    """
-
-    root: float
-    missing: float = 0.0
+    root: float  # 0 at the limit
+    missing: float = 0.0  # 0 if the dyad closes, otherwise the amount that the sum is short of 0
+    # A toggle if the sum is zero within its rounding error, open if it is negative.
     status: Status = Status.CLOSED
 
 

@@ -41,20 +41,12 @@ _SAME = 1e-6
 
 
 class Assembly(NamedTuple):
-    """
-    An assembly at the inputs of the pose.
+    """An assembly at the inputs of the pose."""
 
-    Attributes
-    ----------
-    points
-        Places of the points that the pose names, in the frame of the ground, in [m].
-    turns
-        Number of whole turns of the input after which the branch of the pose reaches it; 0 if it
-        does not.
-
-    """
-
+    # Places of the points that the pose names, in the frame of the ground, in [m].
     points: dict[str, complex]
+    # Number of whole turns of the input after which the branch of the pose reaches it; 0 if it
+    # does not.
     turns: int
 
 
@@ -62,13 +54,7 @@ def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
     """
     Return the assemblies of an iterated group at the inputs of the pose, except that of the pose.
 
-    Parameters
-    ----------
-    closure
-        A linkage with a pose.
-    number
-        Index of the group. The groups before it keep their places.
-
+    The groups before it keep their places.
     """
     group = closure.structure.groups[number]
     assert isinstance(group, Iterated)

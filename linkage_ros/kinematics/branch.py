@@ -81,24 +81,13 @@ class Node(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """
-    A piece of the curve, from one node to the next.
+    """A piece of the curve, from one node to the next."""
 
-    Attributes
-    ----------
-    begin, end
-        The nodes.
-    width
-        Distance of the end along the tangent at the begin.
-    folds
-        Whether the curve turns back in x at the end.
-
-    """
-
+    # The nodes.
     begin: Node
     end: Node
-    width: float
-    folds: bool = False
+    width: float  # Distance of the end along the tangent at the begin
+    folds: bool = False  # Whether the curve turns back in x at the end
 
     def control(self) -> Array:
         """Return the four control points of the cubic, as rows."""
@@ -139,19 +128,10 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Continuation:
-    """
-    Follows the solutions of constraints while one input changes.
+    """Follows the solutions of constraints while one input changes."""
 
-    Attributes
-    ----------
-    constraints
-        As many equations as there are unknowns.
-    known_at, rates_at
-        Functions that give the state of the links solved before.
-
-    """
-
-    constraints: Sequence[Constraint]
+    constraints: Sequence[Constraint]  # As many equations as there are unknowns
+    # Functions that give the state of the links solved before.
     known_at: KnownAt
     rates_at: RatesAt
 
@@ -183,16 +163,7 @@ class Continuation:
         Yield cell after cell, up to a toggle or to an input that must not be passed.
 
         They also end where no cell is proven to hold a single curve, as where two curves cross.
-
-        Parameters
-        ----------
-        node
-            The first node.
-        sign
-            +1 towards larger inputs, −1 towards smaller ones.
-        last
-            The input at which to end.
-
+        The sign is +1 towards larger inputs.
         """
         if node.tangent[-1] * sign < 0.0:
             node = Node(node.place, -node.tangent)
@@ -413,24 +384,14 @@ _NEXT_TO_END = 2.0**-10
 
 
 class Interval(NamedTuple):
-    """
-    The range of a branch, in the coordinate of its input.
+    """The range of a branch, in the coordinate of its input."""
 
-    Attributes
-    ----------
-    low, high
-        Its ends; of a branch that comes back, the pose and the input where it starts again.
-    limited
-        For each end whether the linkage ends there; otherwise it was not followed farther.
-    turns
-        Number of whole turns of the input after which it starts again; 0 if it does not.
-
-    """
-
+    # Its ends; of a branch that comes back, the pose and the input where it starts again.
     low: float
     high: float
+    # For each end whether the linkage ends there; otherwise it was not followed farther.
     limited: tuple[bool, bool]
-    turns: int
+    turns: int  # Number of whole turns of the input after which it starts again; 0 if it does not
 
     @property
     def period(self) -> int:
@@ -439,26 +400,12 @@ class Interval(NamedTuple):
 
 
 class Start(NamedTuple):
-    """
-    The start of Newton's method.
+    """The start of Newton's method."""
 
-    Attributes
-    ----------
-    unknowns
-        Near the solution; at an end of the branch, the solution.
-    farthest
-        Largest distance of the solution from them.
-    turned
-        Change of the unknowns' angles by the turns before, in [rad].
-    ends
-        Whether this is the end of the branch, within the last few floats: a toggle.
-
-    """
-
-    unknowns: Array
-    farthest: float
-    turned: Array
-    ends: bool
+    unknowns: Array  # Near the solution; at an end of the branch, the solution
+    farthest: float  # Largest distance of the solution from them
+    turned: Array  # Change of the unknowns' angles by the turns before, in [rad]
+    ends: bool  # Whether this is the end of the branch, within the last few floats: a toggle
 
 
 class _Side:
@@ -482,19 +429,9 @@ class _Side:
 
 class Branch:
     """
-    All solutions that lead from a pose without a toggle, for one input.
+    All solutions that lead from a pose without a toggle, for one input that turns or slides.
 
-    Parameters
-    ----------
-    continuation
-        Follows the branch.
-    unknowns, x
-        The solution at the pose, and the input there.
-    turning
-        Whether the input is an angle.
-    far
-        Least distance over which a slide is followed.
-
+    A slide is followed over the distance ``far`` at least.
     """
 
     __slots__ = ('_continuation', '_far', '_gained', '_known_at', '_sides', '_turning', '_turns',

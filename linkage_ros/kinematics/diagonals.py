@@ -46,38 +46,20 @@ from linkage_ros.kinematics.step import State
 
 
 class Diagonal(NamedTuple):
-    """
-    The vector from A to D at one state of the linkage.
+    """The vector from A to D at one state of the linkage."""
 
-    Attributes
-    ----------
-    square
-        s² = |AD|²; 0 where the direction is undefined.
-    direction
-        Direction of AD, in [rad].
-    fold, stretch
-        √(s² − lower²) and √(upper² − s²): the distance of the dyad from its limits. Signed at a
-        change point; stretch is 1 if the dyad has no upper limit.
-    gap
-        Length by which A and D are too near or too far; 0 where the dyad closes.
-    near, far
-        2·√(ad)·sin(φ/2) and 2·√(ad)·cos(φ/2) of a `CrankDiagonal`, else 0.
-    excess
-        s² minus its constant part, ``least``.
-    status
-        Status of the dyad, as far as the diagonal decides it.
-
-    """
-
-    square: float
-    direction: float
+    square: float  # s² = |AD|²; 0 where the direction is undefined
+    direction: float  # Direction of AD, in [rad]
+    # √(s² − lower²) and √(upper² − s²): the distance of the dyad from its limits. Signed at a
+    # change point; stretch is 1 if the dyad has no upper limit.
     fold: float
     stretch: float
-    gap: float
+    gap: float  # Length by which A and D are too near or too far; 0 where the dyad closes
+    # 2·√(ad)·sin(φ/2) and 2·√(ad)·cos(φ/2) of a `CrankDiagonal`, else 0.
     near: float
     far: float
-    excess: float
-    status: Status
+    excess: float  # s² minus its constant part, ``least``
+    status: Status  # Status of the dyad, as far as the diagonal decides it
 
 
 class DiagonalRate(NamedTuple):
@@ -116,15 +98,7 @@ class DiagonalAcceleration(NamedTuple):
 
 
 class AnyDiagonal(Protocol):
-    """
-    The interface of a diagonal to a dyad.
-
-    Attributes
-    ----------
-    least
-        A constant lower bound of s².
-
-    """
+    """The interface of a diagonal to a dyad; ``least`` is a constant lower bound of s²."""
 
     least: Fraction
 

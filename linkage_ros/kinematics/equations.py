@@ -331,15 +331,6 @@ class Constraints:
     planner
         Gives and places the links solved before the group.
 
-    Attributes
-    ----------
-    all
-        The constraints: as many equations as there are unknowns.
-    slides
-        The sliders of the group, by name.
-    known_pins
-        Indices of the pins that links solved before the group have in it, by name.
-
     """
 
     def __init__(
@@ -353,9 +344,10 @@ class Constraints:
         self._planner = planner
         self._links = links
         self._bodies = {link: i for i, link in enumerate(links)}
-        self.all: list[Constraint] = []
+        self.all: list[Constraint] = []  # The constraints: as many equations as there are unknowns
+        # Indices of the pins that links solved before the group have in it, by name.
         self.known_pins: dict[str, int] = {}
-        self.slides: dict[str, OnLine] = {}
+        self.slides: dict[str, OnLine] = {}  # The sliders of the group, by name
         for joint in joints:
             self._add_joint(joint)
         self._add_drives()

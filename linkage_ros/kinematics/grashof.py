@@ -27,24 +27,14 @@ from linkage_ros.kinematics.topology import Dyad, links_of, Structure
 
 
 class FourBarType(NamedTuple):
-    """
-    The type of a four-bar, after Grashof and Barker.
+    """The type of a four-bar, after Grashof and Barker."""
 
-    Attributes
-    ----------
-    code
-        Barker's code: G Grashof, S change point; then C crank or R rocker for input, coupler and
-        output. RRR1 to RRR4 are triple rockers, by the longest link.
-    name
-        The name in words.
-    margin
-        Sum of the other two links minus the sum of the shortest and the longest, in the unit of
-        the lengths; 0 at a change point.
-
-    """
-
+    # Barker's code: G Grashof, S change point; then C crank or R rocker for input, coupler and
+    # output. RRR1 to RRR4 are triple rockers, by the longest link.
     code: str
-    name: str
+    name: str  # The name in words
+    # Sum of the other two links minus the sum of the shortest and the longest, in the unit of the
+    # lengths; 0 at a change point.
     margin: float
 
 
@@ -114,26 +104,14 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
 
 
 class FourBar(NamedTuple):
-    """
-    A loop of four links and four pins: a dyad on two links that are pinned together.
+    """A loop of four links and four pins: a dyad on two links that are pinned together."""
 
-    Attributes
-    ----------
-    group
-        Number of the dyad among the groups.
-    links
-        Input, coupler, output and frame; the frame is the link that is known first.
-    lengths
-        Their lengths between the pins, in this order, in [m].
-    kind
-        Type after Grashof, seen from the frame.
-
-    """
-
-    group: int
+    group: int  # Number of the dyad among the groups
+    # Input, coupler, output and frame; the frame is the link that is known first.
     links: tuple[str, str, str, str]
+    # Their lengths between the pins, in this order, in [m].
     lengths: tuple[float, float, float, float]
-    kind: FourBarType
+    kind: FourBarType  # Type after Grashof, seen from the frame
 
 
 def four_bars(structure: Structure) -> Iterator[FourBar]:

@@ -107,44 +107,31 @@ class KnownLinks:
     structure
         Its links and sliders.
 
-    Attributes
-    ----------
-    scale
-        Metres in the unit of the lengths.
-    points
-        Points of every link, in its own frame and in the unit of the lengths.
-    blocks
-        For each slider the link that slides.
-    steps
-        The steps; ``step_groups`` has the group number of each, ``group`` the current number.
-    angles, slides
-        Of the known links and sliders, in terms of the coordinates.
-    held
-        How each known link except the ground is held.
-    turns_with
-        For each coordinate that is a sum of inputs, the factor of each input: +1, −1 or 0. Such an
-        angle is known with its whole turns; other angles are known only modulo a turn.
-
     """
 
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
         self._linkage = linkage
-        self.blocks = structure.blocks
-        self.scale = _scale(structure.links.values())
+        self.blocks = structure.blocks  # For each slider the link that slides
+        self.scale = _scale(structure.links.values())  # Metres in the unit of the lengths
+        # Points of every link, in its own frame and in the unit of the lengths.
         self.points = {
             link: {
                 name: complex(x / self.scale, y / self.scale) for name, (x, y) in points.items()
             }
             for link, points in structure.links.items()
         }
+        # The steps; ``step_groups`` has the group number of each, ``group`` the current number.
         self.steps: list[Step] = []
         self.step_groups: list[int] = []
+        # Of the known links and sliders, in terms of the coordinates.
         self.angles = {GROUND: Angle(0, 0.0, 1 + 0j)}
         self.slides: dict[str, Slide] = {}
-        self.held: dict[str, Held] = {}
+        self.held: dict[str, Held] = {}  # How each known link except the ground is held
         self.group = 0
         count = len(linkage.inputs)
         self.coordinate_count = 1 + count
+        # For each coordinate that is a sum of inputs, the factor of each input: +1, −1 or 0. Such
+        # an angle is known with its whole turns; other angles are known only modulo a turn.
         self.turns_with = {
             k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)
         }

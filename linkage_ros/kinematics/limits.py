@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.results import InputRange, Position
     from linkage_ros.kinematics.topology import Structure
 
-
 _UNDISTURBED = (Status.CLOSED, Status.CHANGE_POINT)
 """A state of these becomes limited beyond the limits; a toggle stays one, without rates."""
 
@@ -46,26 +45,14 @@ _ROUNDINGS = 4.0
 
 
 class Bound(NamedTuple):
-    """
-    The limits of one joint, ready for comparisons.
+    """The limits of one joint, ready for comparisons."""
 
-    Attributes
-    ----------
-    name
-        Of the joint.
-    number
-        Its number among the inputs, or among the published joints.
-    low, high
-        In [rad] or [m], widened by rounding.
-    middle
-        Middle of the limits of a published angle, in [rad]; None if whole turns count.
-
-    """
-
-    name: str
-    number: int
+    name: str  # Of the joint
+    number: int  # Its number among the inputs, or among the published joints
+    # In [rad] or [m], widened by rounding.
     low: float
     high: float
+    # Middle of the limits of a published angle, in [rad]; None if whole turns count.
     middle: float | None
 
     def beyond(self, value: float) -> bool:
@@ -90,20 +77,7 @@ class Bound(NamedTuple):
 
 
 class Bounds:
-    """
-    All limits of a linkage's joints.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-
-    Attributes
-    ----------
-    inputs, joints
-        Of driven joints, and of published ones.
-
-    """
+    """The limits of a linkage's driven joints, and of its published ones."""
 
     def __init__(self, linkage: Linkage) -> None:
         limits = {name: of for name, of in linkage.limits.items() if of.bounded}
@@ -182,22 +156,7 @@ def _bound(name: str, number: int, limits: Limits, *, turning: bool = False) -> 
 
 
 def zero_length(linkage: Linkage, structure: Structure, index: int) -> float | None:
-    """
-    Return the slide at which the two pins of a cylinder meet.
-
-    Parameters
-    ----------
-    linkage, structure
-        The linkage.
-    index
-        Number of the input.
-
-    Returns
-    -------
-    zero : float or None
-        In [m]; None if the input is not a cylinder.
-
-    """
+    """Return the slide in [m] at which the pins of a cylinder meet; None for other inputs."""
     name = linkage.inputs[index].slider
     if not name:
         return None
@@ -232,16 +191,6 @@ def without_mirrored(
 
     Those of negative length are returned if its pose or its limits lie there, or if there are no
     others.
-
-    Parameters
-    ----------
-    linkage, structure
-        The linkage.
-    index
-        Number of the input.
-    ranges
-        All ranges.
-
     """
     zero = zero_length(linkage, structure, index)
     if zero is None:

@@ -49,11 +49,6 @@ class LinkFrames:
     known
         Its links, all of them known.
 
-    Attributes
-    ----------
-    links
-        Names of the links and blocks, in the order of the frames.
-
     """
 
     def __init__(self, linkage: Linkage, structure: Structure, known: KnownLinks) -> None:
@@ -65,7 +60,7 @@ class LinkFrames:
             )
             for block in blocks(linkage, structure)
         }
-        self.links = tuple(carriers)
+        self.links = tuple(carriers)  # Names of the links and blocks, in the order of the frames
         self._tracker = PointTracker(known, [(link, at) for link, at, _ in carriers.values()])
         self._angles = [known.angles[turning] for _, _, turning in carriers.values()]
 

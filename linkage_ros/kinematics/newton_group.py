@@ -58,7 +58,6 @@ import numpy as np
 if TYPE_CHECKING:
     from linkage_ros.kinematics.known_links import KnownLinks
 
-
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 """Largest residual of a constraint at a solution, relative to the size of the coordinates."""
 
@@ -77,24 +76,13 @@ _EARLY_SINGULAR = 1e-6
 
 
 class IteratedPose(NamedTuple):
-    """
-    The links at one state.
+    """The links at one state."""
 
-    Attributes
-    ----------
-    status, gap
-        Whether they close; if not, the smallest residual that was reached.
-    unknowns
-        For each body its angle and the place of its point.
-    jacobian
-        Derivatives of the constraints by the unknowns.
-
-    """
-
+    # Whether they close; if not, the smallest residual that was reached.
     status: Status
     gap: float
-    unknowns: list[float]
-    jacobian: Array
+    unknowns: list[float]  # For each body its angle and the place of its point
+    jacobian: Array  # Derivatives of the constraints by the unknowns
 
 
 class Iteration:
@@ -117,13 +105,6 @@ class Iteration:
         For each input whether it is a slide.
     far
         No slide needs to be longer than this to stretch a link.
-
-    Attributes
-    ----------
-    inputs
-        As given.
-    tolerance
-        Bound of the last correction, in [rad] and in the unit of the lengths; 0 for full accuracy.
 
     """
 
@@ -150,6 +131,8 @@ class Iteration:
         self._branch: Branch | None = None
         self._solution: Array | None = None
         self._straight: _StraightSystem | None = None
+        # Bound of the last correction, in [rad] and in the unit of the lengths; 0 for full
+        # accuracy.
         self.tolerance = 0.0
 
     @property
@@ -537,26 +520,9 @@ def iteration(
     before: tuple[Step, ...],
 ) -> Iteration:
     """
-    Return the step that solves a group of links.
+    Return the step that solves a group of links, after the steps before it.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    links
-        The links of the group.
-    constraints
-        Their joints.
-    planner
-        The links solved before the group.
-    before
-        The steps before it.
-
-    Raises
-    ------
-    DefinitionError
-        If there is no pose, or if it has too few points of a link.
-
+    A DefinitionError says that there is no pose, or that it has too few points of a link.
     """
     pose, scale = linkage.pose, planner.scale
     if pose is None:

@@ -51,33 +51,21 @@ from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Structure
 _SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
 _SIDES['RPR'] = _SIDES['RRP']
 
-
 _LEVEL = Angle(0, 0.0, 1 + 0j)
 """The zero direction of angles in the frame of the ground."""
 
 
 class _Hinge(NamedTuple):
-    """
-    The pins A and D of a dyad on two links that are pinned together at O.
+    """The pins A and D of a dyad on two links that are pinned together at O."""
 
-    Attributes
-    ----------
-    a, d
-        OA and OD, in the unit of the lengths.
-    arms, offset
-        Coordinates of the two links, and the angle from OD to OA minus their difference.
-    base
-        The zero of the directions that a `CrankDiagonal` gives.
-    crank_first
-        Whether the link of A is the crank, that is the one of the two that is known later.
-
-    """
-
+    # OA and OD, in the unit of the lengths.
     a: float
     d: float
+    # Coordinates of the two links, and the angle from OD to OA minus their difference.
     arms: tuple[int, int]
     offset: float
-    base: Angle
+    base: Angle  # The zero of the directions that a `CrankDiagonal` gives
+    # Whether the link of A is the crank, that is the one of the two that is known later.
     crank_first: bool
 
     def side_at_change_point(self, diagonal: CrankDiagonal, sign: int) -> int:
@@ -92,17 +80,7 @@ class _Hinge(NamedTuple):
 
 
 class SolutionPlan(KnownLinks):
-    """
-    Makes the steps of a linkage, group after group.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    structure
-        Its groups.
-
-    """
+    """Makes the steps of a linkage, Assur group after Assur group."""
 
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
         super().__init__(linkage, structure)

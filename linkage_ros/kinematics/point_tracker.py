@@ -58,11 +58,6 @@ class PointTracker:
     points
         Each with the name of its link and its place in the frame of that link, in [m].
 
-    Attributes
-    ----------
-    indices
-        For each requested point its index in the lists.
-
     """
 
     __slots__ = ('_fixed', '_nodes', '_pins', '_scale', '_still', 'indices')
@@ -78,6 +73,7 @@ class PointTracker:
             _Node(walk.number(base), arm, way * known.scale, slide)
             for base, arm, way, slide in walk.nodes
         )
+        # For each requested point its index in the lists.
         self.indices = tuple(walk.number(place) for place in ends)
 
     def places(self, position: Position) -> list[complex]:

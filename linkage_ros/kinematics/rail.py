@@ -45,37 +45,20 @@ from linkage_ros.kinematics.step import State
 
 
 class PinOnRail(NamedTuple):
-    """
-    The pin A in the frame of the rail.
+    """The pin A in the frame of the rail."""
 
-    Attributes
-    ----------
-    place
-        (x + i·y), in the unit of the lengths.
-    below, above
-        √(b − y) and √(b + y): the distance of a link of length b, from A to the line, from its
-        limits. Signed at a change point; infinite if there is no such link.
-    gap
-        Length by which A is too far from the line; otherwise 0.
-    base
-        Coordinate of the link that carries the rail, in [rad].
-    arm
-        From O to A in the frame of a `CrankRail`, otherwise 0.
-    lean
-        dy/dψ/(below·above) of a `CrankRail` with a change point, otherwise 0: at the change point
-        dy/dψ and the product are 0, but lean is not.
-    status
-        Status of the link as far as the rail decides it, except whether it stands across the line.
-
-    """
-
-    place: complex
+    place: complex  # (x + i·y), in the unit of the lengths
+    # √(b − y) and √(b + y): the distance of a link of length b, from A to the line, from its
+    # limits. Signed at a change point; infinite if there is no such link.
     below: float
     above: float
-    gap: float
-    base: float
-    arm: complex
+    gap: float  # Length by which A is too far from the line; otherwise 0
+    base: float  # Coordinate of the link that carries the rail, in [rad]
+    arm: complex  # From O to A in the frame of a `CrankRail`, otherwise 0
+    # dy/dψ/(below·above) of a `CrankRail` with a change point, otherwise 0: at the change point
+    # dy/dψ and the product are 0, but lean is not.
     lean: float
+    # Status of the link as far as the rail decides it, except whether it stands across the line.
     status: Status
 
 

@@ -104,21 +104,12 @@ class InputRange(NamedTuple):
 
 
 class SingularInput(NamedTuple):
-    """
-    An input at which the linkage is singular.
+    """An input at which the linkage is singular."""
 
-    Attributes
-    ----------
-    value
-        In [rad] or [m].
-    status
-        ``TOGGLE`` where the linkage ends or turns back, ``CHANGE_POINT`` where it passes, and
-        ``INDETERMINATE`` where its pose is not determined: two pins coincide, or two lines are
-        parallel.
-
-    """
-
-    value: float
+    value: float  # In [rad] or [m]
+    # ``TOGGLE`` where the linkage ends or turns back, ``CHANGE_POINT`` where it passes, and
+    # ``INDETERMINATE`` where its pose is not determined: two pins coincide, or two lines are
+    # parallel.
     status: Status
 
 

@@ -32,13 +32,11 @@ from linkage_ros.kinematics.status import Status
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import LoopClosure, Position
 
-
 _SAME = 1e-9
 """Singular inputs nearer to each other than this count as one, in [rad] or [m]."""
 
 _BESIDE = 1e-6
 """Distance from a singular input at which the side of a dyad is compared, in [rad] or [m]."""
-
 
 _STATES = 4096
 """Number of states that are kept during the search for singular inputs."""

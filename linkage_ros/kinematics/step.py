@@ -35,13 +35,7 @@ class State(NamedTuple):
     """
     The known coordinates and pins; or their rates; or their accelerations.
 
-    Attributes
-    ----------
-    coordinates
-        Angles, in [rad], and slides.
-    pins
-        Places of pins in the frame of the ground.
-
+    Angles are in [rad]; pins have their places in the frame of the ground.
     """
 
     coordinates: list[float]
@@ -109,23 +103,11 @@ class FixedPoint:
 
 @dataclass(frozen=True, slots=True)
 class PointOnLink:
-    """
-    A point at a constant distance from a pin of the same link.
+    """A point at a constant distance from a pin of the same link."""
 
-    Attributes
-    ----------
-    pin
-        Index of that pin.
-    arm
-        Index, among the coordinates, of the angle of the link.
-    vector
-        Vector from the pin to the point at a coordinate of 0.
-
-    """
-
-    pin: int
-    arm: int
-    vector: complex
+    pin: int  # Index of that pin
+    arm: int  # Index, among the coordinates, of the angle of the link
+    vector: complex  # Vector from the pin to the point at a coordinate of 0
 
     def close(self, known: State) -> Pose:
         """Append the point."""
@@ -151,26 +133,12 @@ class PointOnLink:
 
 @dataclass(frozen=True, slots=True)
 class PointOnRail:
-    """
-    A point that travels along a line of a link.
+    """A point that travels along a line of a link."""
 
-    Attributes
-    ----------
-    pin
-        Index of the pin that the line starts from.
-    arm
-        Index, among the coordinates, of the angle of the link that carries the line.
-    slide
-        Index, among the coordinates, of the slide along the line.
-    unit
-        Direction in which the point travels with the slide, at a link coordinate of 0.
-
-    """
-
-    pin: int
-    arm: int
-    slide: int
-    unit: complex
+    pin: int  # Index of the pin that the line starts from
+    arm: int  # Index, among the coordinates, of the angle of the link that carries the line
+    slide: int  # Index, among the coordinates, of the slide along the line
+    unit: complex  # Direction in which the point travels with the slide, at a link coordinate of 0
 
     def close(self, known: State) -> Pose:
         """Append the point."""
@@ -200,21 +168,12 @@ class PointOnRail:
 
 @dataclass(frozen=True, slots=True)
 class RelativeAngle:
-    """
-    The angle of a link that a driven joint turns against another.
+    """The angle of a link that a driven joint turns against another."""
 
-    Attributes
-    ----------
-    arm, turn
-        Indices, among the coordinates, of the other link's angle and of the joint.
-    sign
-        +1 if the joint adds to that angle, −1 if it is subtracted.
-
-    """
-
+    # Indices, among the coordinates, of the other link's angle and of the joint.
     arm: int
     turn: int
-    sign: float
+    sign: float  # +1 if the joint adds to that angle, −1 if it is subtracted
 
     def close(self, known: State) -> Pose:
         """Append the angle."""

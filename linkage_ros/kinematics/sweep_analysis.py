@@ -122,7 +122,6 @@ _APART = 1e-4
 _MANY = 12
 """An extreme met at more places than this lists none of them; also the lines of a grid."""
 
-
 _NEAR_ZERO, _ZERO = 0.25, 1e-7
 """Upper bounds of a sample next to a zero, and of a zero, in [rad]."""
 
@@ -536,12 +535,8 @@ def check_limits(closure: LoopClosure) -> None:
     """
     Refuse limits between which a linkage cannot be.
 
-    Raises
-    ------
-    DefinitionError
-        If the pose is beyond limits, or no state of the input's range is within the limits of the
-        input, of a published joint, or of all joints together.
-
+    A DefinitionError is raised if the pose is beyond limits, or no state of the input's range is
+    within the limits of the input, of a published joint, or of all joints together.
     """
     bounds, linkage = closure.bounds, closure.linkage
     if not bounds:

@@ -56,27 +56,15 @@ class Driven:
 
 @dataclass(frozen=True, slots=True)
 class Dyad:
-    """
-    Two bodies joined to each other, and each to the known part.
+    """Two bodies joined to each other, and each to the known part."""
 
-    Attributes
-    ----------
-    kind
-        RRR, RRP, RPR, PRP or RPP: outer joint of the first body, inner joint, outer joint of the
-        second body.
-    bodies
-        The links of each body; several if driven joints hold them together.
-    outer
-        Joint of each body to the known part.
-    inner
-        Joint from the first body to the second.
-
-    """
-
+    # RRR, RRP, RPR, PRP or RPP: outer joint of the first body, inner joint, outer joint of the
+    # second body.
     kind: str
+    # The links of each body; several if driven joints hold them together.
     bodies: tuple[tuple[str, ...], tuple[str, ...]]
-    outer: tuple[Joint, Joint]
-    inner: Joint
+    outer: tuple[Joint, Joint]  # Joint of each body to the known part
+    inner: Joint  # Joint from the first body to the second
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,26 +79,13 @@ Group = Driven | Dyad | Iterated
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """
-    A linkage as bodies and joints.
+    """A linkage as bodies and joints."""
 
-    Attributes
-    ----------
-    links
-        The links and their points; a pin in a slot has an additional block.
-    blocks
-        For each slider the link that slides.
-    groups
-        The groups in the order in which they are solved.
-    joints
-        All joints; a pin of three links is two.
-
-    """
-
+    # The links and their points; a pin in a slot has an additional block.
     links: Mapping[str, Mapping[str, Point]]
-    blocks: Mapping[str, str]
-    groups: tuple[Group, ...]
-    joints: tuple[Joint, ...]
+    blocks: Mapping[str, str]  # For each slider the link that slides
+    groups: tuple[Group, ...]  # The groups in the order in which they are solved
+    joints: tuple[Joint, ...]  # All joints; a pin of three links is two
 
     @property
     def freedom(self) -> int:
@@ -164,11 +139,7 @@ def assur_groups(linkage: Linkage) -> Structure:
     """
     Find the order in which a linkage is solved.
 
-    Raises
-    ------
-    DefinitionError
-        If a link is free, over-constrained, or not joined to the ground.
-
+    A DefinitionError is raised if a link is free, over-constrained, or not joined to the ground.
     """
     links: dict[str, Mapping[str, Point]] = dict(linkage.links)
     blocks: dict[str, str] = {}

@@ -73,22 +73,11 @@ class Rejection(Enum):
 
 
 class CrankSample(NamedTuple):
-    """
-    State of all inputs in a message, in the order of the linkage.
+    """State of all inputs in a message, in the order of the linkage."""
 
-    Attributes
-    ----------
-    stamp
-        Time of the measurement, in [ns].
-    angles
-        Value of each input, in [rad]; of a sliding input in [m].
-    rates
-        Rates, in [rad/s] or [m/s]; None if the message has no velocities.
-
-    """
-
-    stamp: int
-    angles: tuple[float, ...]
+    stamp: int  # Time of the measurement, in [ns]
+    angles: tuple[float, ...]  # Value of each input, in [rad]; of a sliding input in [m]
+    # Rates, in [rad/s] or [m/s]; None if the message has no velocities.
     rates: tuple[float, ...] | None
 
 
@@ -270,20 +259,10 @@ def with_every_number(data: bytes, value: float) -> bytes:
 
 
 class EffortCommand(NamedTuple):
-    """
-    A command for one joint.
+    """A command for one joint."""
 
-    Attributes
-    ----------
-    stamp
-        Stamp of the message, in [ns]; 0 without one.
-    effort
-        Effort in [N·m]; of a sliding joint in [N].
-
-    """
-
-    stamp: int
-    effort: float
+    stamp: int  # Stamp of the message, in [ns]; 0 without one
+    effort: float  # Effort in [N·m]; of a sliding joint in [N]
 
 
 class JointEffortReader:

@@ -76,26 +76,13 @@ Key = tuple[str, str]
 
 
 class Values(NamedTuple):
-    """
-    The values in a message.
+    """The values in a message."""
 
-    Attributes
-    ----------
-    stamp
-        In [ns].
-    keys
-        Meaning of each number; the same object as long as the layout is the same.
-    names
-        The joints, in the order of the message; likewise the same object.
-    numbers
-        In [rad], [m], [N·m] or [N], and per second.
-
-    """
-
-    stamp: int
+    stamp: int  # In [ns]
+    # Meaning of each number; the same object as long as the layout is the same.
     keys: tuple[Key, ...]
-    names: tuple[str, ...]
-    numbers: tuple[float, ...]
+    names: tuple[str, ...]  # The joints, in the order of the message; likewise the same object
+    numbers: tuple[float, ...]  # In [rad], [m], [N·m] or [N], and per second
 
 
 class MessageValues:
@@ -253,15 +240,7 @@ MULTI_DOF_JOINT_STATE = declared(
 
 
 class PlanarWrenchWriter:
-    """
-    Writes a MultiDOFJointState with wrenches only, for a fixed list of joints.
-
-    Parameters
-    ----------
-    names
-        The joints, in the order of the message.
-
-    """
+    """Writes a MultiDOFJointState with wrenches only, for a fixed list of joints."""
 
     __slots__ = ('_constants', '_pack')
 

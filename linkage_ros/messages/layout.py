@@ -119,24 +119,11 @@ def byte_order(data: bytes) -> str:
 
 def parsed(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str, Any]:
     """
-    Return the fields of a message by name; bytes after its end are ignored.
+    Return the declared fields of a message by name; bytes after its end are ignored.
 
-    A string is returned as bytes, numbers as their places: `Numbers`.
-
-    Parameters
-    ----------
-    data
-        The message.
-    fields
-        Its declaration.
-    most
-        Most elements of a sequence of strings or of nested messages.
-
-    Raises
-    ------
-    MalformedError
-        It is not of this type, incomplete, or has too many elements.
-
+    A string is returned as bytes, numbers as their places: `Numbers`. A MalformedError says that
+    it is not of this type, incomplete, or has more than ``most`` elements in a sequence of strings
+    or nests.
     """
     byte_order(data)
     try:
@@ -347,12 +334,6 @@ class ArrayWriter:
     within
         The sequence, with one element, that contains the arrays; '' if none does.
 
-    Attributes
-    ----------
-    write
-        Returns a message from its stamp in [ns] and, for each array, a number per joint. All
-        arrays but the first may be empty, which is their default.
-
     """
 
     __slots__ = ('_arrays', '_fields', '_names', '_within', 'write')
@@ -380,6 +361,8 @@ class ArrayWriter:
                 condition = f'if {" and ".join(filled)}: ' if filled else ''
                 lines.append(f'    {condition}return {call.lines[0]}')
                 bound |= call.bound
+        # Returns a message from its stamp in [ns] and, for each array, a number per joint. All
+        # arrays but the first may be empty, which is their default.
         self.write = written('\n'.join(lines), 'write', bound)
 
     def call(self, numbers: Mapping[str, str], name: str = 'pack') -> Lines:

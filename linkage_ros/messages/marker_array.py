@@ -44,43 +44,21 @@ Place = tuple[float, float, float]
 
 
 class Marker(NamedTuple):
-    """
-    A marker before serialization.
+    """A marker before serialization."""
 
-    Attributes
-    ----------
-    ns, number
-        Together they identify the marker.
-    kind
-        Its type.
-    scale
-        Widths and lengths, depending on its type, in [m].
-    colour
-        Its colour.
-    points
-        Points in its own frame, in [m].
-    at, z
-        Origin of its frame, in [m].
-    text
-        The text, of a text marker.
-    action
-        `ADD` or `DELETE`.
-    lifetime
-        Time after which it disappears without an update, in [ns]; 0 for never.
-
-    """
-
+    # Together they identify the marker.
     ns: str
     number: int
-    kind: int
-    scale: Place
-    colour: Colour
-    points: Sequence[Place] = ()
+    kind: int  # Its type
+    scale: Place  # Widths and lengths, depending on its type, in [m]
+    colour: Colour  # Its colour
+    points: Sequence[Place] = ()  # Points in its own frame, in [m]
+    # Origin of its frame, in [m].
     at: complex = 0j
     z: float = 0.0
-    text: str = ''
-    action: int = ADD
-    lifetime: int = 0
+    text: str = ''  # The text, of a text marker
+    action: int = ADD  # `ADD` or `DELETE`
+    lifetime: int = 0  # Time after which it disappears without an update, in [ns]; 0 for never
 
 
 _COUNT = Struct('<I')
@@ -120,19 +98,7 @@ def _values(frame: str, marker: Marker) -> dict[str, Any]:
 
 
 class MarkerArrayWriter:
-    """
-    Writes the same markers repeatedly.
-
-    A change holds until the next change.
-
-    Parameters
-    ----------
-    frame
-        Frame of all markers.
-    markers
-        The markers, in order.
-
-    """
+    """Writes the same markers repeatedly, in their order; a change holds until the next change."""
 
     __slots__ = ('_buffer', '_where')
 

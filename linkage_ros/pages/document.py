@@ -105,15 +105,7 @@ def picture(svg: bytes) -> str:
 
 
 def plotting_library() -> str:
-    """
-    Return the script of Plotly.
-
-    Raises
-    ------
-    LinkageError
-        If it is not installed.
-
-    """
+    """Return the script of Plotly; a LinkageError if it is not installed."""
     check_installed('plotly')
     from plotly.offline import get_plotlyjs  # local import: an optional dependency, slow to load
 
@@ -156,19 +148,9 @@ def table_html(
     title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[bool]
 ) -> Iterator[str]:
     """
-    Yield a table within a figure, which the caller closes.
+    Yield a table within a figure, which the caller closes; columns of numbers align to the right.
 
-    Parameters
-    ----------
-    title
-        Its caption.
-    columns
-        Headings; if all are empty, none is written.
-    rows
-        The cells.
-    numbers
-        Which columns hold numbers and are aligned to the right.
-
+    If all headings are empty, none is written.
     """
     yield f'<figure><figcaption>{escape(title)}</figcaption>'
     yield '<div class="scroll" tabindex="0"><table>'

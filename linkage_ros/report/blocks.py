@@ -50,18 +50,12 @@ class RunClock:
     disorder
         By how much a message may come too late without a jump of the clock, in [ns].
 
-    Attributes
-    ----------
-    begin
-        Log time at which the run begins, in [ns]; None before the first message.
-    end
-        Run time of the last message, from either thread, in [ns].
-
     """
 
     def __init__(self, disorder: int = 0) -> None:
+        # Log time at which the run begins, in [ns]; None before the first message.
         self.begin: int | None = None
-        self.end = 0
+        self.end = 0  # Run time of the last message, from either thread, in [ns]
         self._disorder = disorder
         self._last = self._added = self._now = 0
         self._jumps: list[tuple[int, int]] = []
@@ -218,19 +212,7 @@ _OTHER_RECORDER = 'health'
 
 
 class Rows(NamedTuple):
-    """
-    Messages of one kind in a block.
-
-    Attributes
-    ----------
-    numbers
-        Their numbers in the block.
-    logged, published, passed
-        Their log and publish times and their run time, in [ns].
-    data
-        Their bytes.
-
-    """
+    """Messages of one kind in a block, by their numbers; all times are in [ns]."""
 
     numbers: Times
     logged: Times

@@ -14,7 +14,7 @@
 
 
 """
-The curves of a run: joint states, poses for the animation, input ages and tick lateness.
+The curves of a run: joint states, poses to animate, forces, input ages and tick lateness.
 
 Lateness follows from the tick times alone. With the period T, the i-th of consecutive ticks, at
 the time tᵢ, deviates from an even row by eᵢ = tᵢ − i·T. A tick is due on the row of the most
@@ -32,14 +32,17 @@ maximum filters*, 1992).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
+from linkage_ros.messages.joint_values import MessageValues, Values, WRENCHES
 from linkage_ros.replay.verify import turning_joints
 from linkage_ros.report.decimation import (
     capacity,
     Decimation,
     DURATION_BYTES,
     Flags,
+    FORCE_BYTES,
     FRAME_BYTES,
     Histogram,
     MinMaxCurve,
@@ -50,10 +53,13 @@ from linkage_ros.report.decimation import (
     STATE_BYTES,
     Times,
 )
+from linkage_ros.report.joint_states import MOST_JOINTS
 from linkage_ros.report.labels import short
 from linkage_ros.report.run import Column, Curves, Frames, Window
 from linkage_ros.scene.scene import Scene
 import numpy as np
+
+LATER_PINS = 'pins that turn up later'
 
 _WINDOW = 0.25
 """Window, in [s]: in a wider one the clocks drift, in a narrower one ticks still catch up."""
@@ -65,15 +71,7 @@ _NONE = 2**62
 
 
 class Lateness:
-    """
-    Computes the lateness of ticks as they come.
-
-    Parameters
-    ----------
-    rate
-        Tick rate, in [Hz], more than 0.
-
-    """
+    """Computes the lateness of ticks as they come, at a rate in [Hz], more than 0."""
 
     def __init__(self, rate: float) -> None:
         self._period = 1e9 / rate
@@ -161,24 +159,9 @@ LATENESS, AGE = Column('tick', 'lateness', 'ms'), Column('input', 'age', 'ms')
 
 class BoundedCurves:
     """
-    Curves with common times, within a window.
+    Curves with common times within a window, in a space of some bytes on the page.
 
-    Parameters
-    ----------
-    title
-        Title of the group.
-    columns
-        The columns of a row.
-    space
-        Size limit on the page, in [bytes].
-    window
-        The part of the run to show.
-
-    Attributes
-    ----------
-    left_out
-        Number of columns beyond the size limit; they are the last ones.
-
+    The columns ``left_out`` are beyond it: the last ones.
     """
 
     def __init__(self, title: str, columns: Sequence[Column], space: int, window: Window) -> None:
@@ -217,21 +200,7 @@ def joint_columns(names: Sequence[str], turning: Mapping[str, bool]) -> list[Col
 
 
 class SceneCurves:
-    """
-    Collects the curves of a run.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-    topics
-        Topics of the joint states and of the crank.
-    bodies
-        Number of links that move in the animation.
-    window
-        The part of the run to show.
-
-    """
+    """Collects the curves of a run: joint states, crank, and moving links."""
 
     def __init__(self, scene: Scene, topics: tuple[str, str], bodies: int, window: Window) -> None:
         turning = turning_joints(scene)
@@ -260,19 +229,7 @@ class SceneCurves:
     def add_states(
         self, times: Times, numbers: Numbers, inputs: Sequence[tuple[Sequence[str], Numbers]]
     ) -> None:
-        """
-        Add joint states.
-
-        Parameters
-        ----------
-        times
-            Run times, in [ns].
-        numbers
-            See `JointBlock.numbers`.
-        inputs
-            Values of driven joints from the samples, by name.
-
-        """
+        """Add joint states at run times in [ns], with driven joints from the samples."""
         self._states.add(times, numbers.reshape(len(times), numbers.shape[1] * numbers.shape[2]))
         values = np.full((len(times), len(self._places)), np.nan)
         for names, angles in inputs:
@@ -330,3 +287,66 @@ class SceneCurves:
 def _milliseconds(durations: Times) -> Numbers:
     """Return durations in [ns] as a column in [ms]."""
     return (durations * 1e-6).astype(np.float64)[:, None]
+
+
+class PinForces:
+    """
+    Collects the forces in pins and sliders, of a window, from the topics of `pin_forces`.
+
+    Messages, or pins of messages, that are ``left_out`` are counted by reason.
+    """
+
+    def __init__(self, topics: str, window: Window) -> None:
+        self._topics, self._window = topics, window
+        self._reader = MessageValues(WRENCHES)
+        self._places: dict[str, int] = {}
+        self._kept: BoundedCurves | None = None
+        self.left_out: Counter[str] = Counter()
+
+    def add(self, times: Times, messages: Sequence[bytes]) -> None:
+        """Add messages at run times in [ns]; those of one time, of several linkages, are a row."""
+        good: list[tuple[int, Values]] = []
+        for time, message in zip(times.tolist(), messages, strict=True):
+            values = self._reader.read(message)
+            if isinstance(values, str):
+                self.left_out[values] += 1
+            elif values.numbers:
+                good.append((time, values))
+        if not good:
+            return
+        if self._kept is None:
+            names = list(dict.fromkeys(name for _, values in good for name in values.names))
+            self._places = {name: place for place, name in enumerate(names[:MOST_JOINTS])}
+            columns = [
+                Column(short(name), quantity, unit)
+                for quantity, unit in (('force', 'N'), ('moment', 'N·m'))
+                for name in self._places
+            ]
+            self._kept = BoundedCurves(self._topics, columns, FORCE_BYTES, self._window)
+        rows = {time: row for row, time in enumerate(sorted({time for time, _ in good}))}
+        numbers = np.full((len(rows), 2, len(self._places)), np.nan)
+        for time, values in good:
+            wrenches = np.reshape(values.numbers, (-1, 3))
+            for name, (x, y, moment) in zip(values.names, wrenches, strict=True):
+                if name in self._places:
+                    numbers[rows[time], :, self._places[name]] = np.hypot(x, y), moment
+                else:
+                    self.left_out[LATER_PINS] += 1
+        self._kept.add(np.array([*rows]), numbers.reshape(len(rows), -1))
+
+    def curves(self) -> Curves | None:
+        """Return the curves, without moments that are zero, as in pins; None without messages."""
+        found = None if self._kept is None else self._kept.curves()
+        if found is None:
+            return None
+        first, second = found.intervals.first, found.intervals.second
+        kept = [
+            place
+            for place, column in enumerate(found.columns)
+            if column.quantity == 'force'
+            or np.nan_to_num([first[:, place], second[:, place]]).any()
+        ]
+        return found._replace(
+            columns=[found.columns[place] for place in kept],
+            intervals=found.intervals._replace(first=first[:, kept], second=second[:, kept]),
+        )

@@ -62,27 +62,15 @@ Places = Any
 
 
 class Poses(NamedTuple):
-    """
-    Poses of the links.
+    """Poses of the links."""
 
-    Attributes
-    ----------
-    links
-        The moving links, and the blocks of sliders, which are no links.
-    frames
-        Position, in [m], and angle, in (−π, π] rad, of each link's frame, of shape
-        (instants, links, 3); NaN where it is unknown.
-    apart
-        Largest distance between links at a pin, or of a point from its line, in [m]; or NaN.
-    reason
-        Why the loops were closed instead; '' if recorded joints determine every link.
-
-    """
-
-    links: tuple[str, ...]
+    links: tuple[str, ...]  # The moving links, and the blocks of sliders, which are no links
+    # Position, in [m], and angle, in (−π, π] rad, of each link's frame, of shape (instants, links,
+    # 3); NaN where it is unknown.
     frames: Numbers
+    # Largest distance between links at a pin, or of a point from its line, in [m]; or NaN.
     apart: Numbers
-    reason: str
+    reason: str  # Why the loops were closed instead; '' if recorded joints determine every link
 
 
 _Found = dict[str, tuple[Places, Places]]
@@ -208,17 +196,7 @@ Plot = dict[str, Any]
 
 
 def page_data(run: Run, wrapped: bool) -> dict[str, Any]:
-    """
-    Return the data of a page, as JSON holds them.
-
-    Parameters
-    ----------
-    run
-        The run.
-    wrapped
-        Whether published angles jump from π to −π.
-
-    """
+    """Return the data of a page, as JSON holds them; wrapped angles jump from π to −π."""
     since = max(0, run.window.since)
     until = max(since, min(run.end, run.window.until))
     frames = run.frames

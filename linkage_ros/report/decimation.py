@@ -38,7 +38,6 @@ Times = NDArray[np.int64]
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-
 PAGE_BYTES = 20_000_000
 """Size limit of a page, in [bytes]; a quarter of it is the plotting library."""
 
@@ -59,30 +58,19 @@ SHAPE_BYTES = 500_000
 TABLE_BYTES = 600_000
 """Size limit of the tables, in [bytes]."""
 
-
 _FEWEST_INTERVALS = 256
 """Minimum number of intervals of a useful curve."""
 
 
 class Intervals(NamedTuple):
-    """
-    Curves as intervals.
+    """Curves as intervals."""
 
-    Attributes
-    ----------
-    rows
-        Rows of an interval; the last may have fewer. If it is 1, all rows are kept.
-    begins, ends
-        Time of the first and the last row of each, in [ns].
-    first, second
-        Minimum and maximum of each interval and column, in the order in which they came; NaN if
-        there is none. Equal if an interval is one row.
-
-    """
-
-    rows: int
+    rows: int  # Rows of an interval; the last may have fewer. If it is 1, all rows are kept.
+    # Time of the first and the last row of each, in [ns].
     begins: Times
     ends: Times
+    # Minimum and maximum of each interval and column, in the order in which they came; NaN if
+    # there is none. Equal if an interval is one row.
     first: Numbers
     second: Numbers
 
@@ -100,17 +88,7 @@ def capacity(columns: int, space: int) -> int:
 
 
 class MinMaxCurve:
-    """
-    Curves that grow row by row.
-
-    Parameters
-    ----------
-    columns
-        Number of curves.
-    most
-        Maximum number of intervals, a power of two; twice as many for single rows.
-
-    """
+    """Curves that grow row by row, over a power of two of intervals, or twice as many rows."""
 
     def __init__(self, columns: int, most: int) -> None:
         self._most = most
@@ -126,17 +104,7 @@ class MinMaxCurve:
         self._pair = np.empty((2, columns))
 
     def add(self, times: Times, values: Numbers) -> None:
-        """
-        Add rows.
-
-        Parameters
-        ----------
-        times
-            Times in [ns], of shape (n,).
-        values
-            Values, of shape (n, columns); NaN for a missing value.
-
-        """
+        """Add rows: times in [ns], (n,), and values, (n, columns); NaN for a missing value."""
         at = 0
         while at < len(times):
             if self._open:
@@ -225,22 +193,7 @@ def _least_and_greatest(values: Numbers) -> tuple[Numbers, Numbers]:
 
 
 class Decimation:
-    """
-    Decimated rows at equal steps.
-
-    Parameters
-    ----------
-    columns
-        Number of columns.
-    most
-        Maximum number of rows, an even number.
-
-    Attributes
-    ----------
-    step
-        One row of so many is kept.
-
-    """
+    """Decimated rows at equal steps: one of ``step`` is kept, an even number at most."""
 
     def __init__(self, columns: int, most: int) -> None:
         self.step = 1

@@ -42,21 +42,7 @@ _MOST_ITEMS = 10_000
 
 
 class Status(NamedTuple):
-    """
-    The status of one task.
-
-    Attributes
-    ----------
-    level
-        0 OK, 1 WARN, 2 ERROR, 3 STALE.
-    name
-        Name of the task.
-    message
-        Text of the status.
-    values
-        Texts by key.
-
-    """
+    """The status of one task, with texts by key; level 0 is OK, 1 WARN, 2 ERROR, 3 STALE."""
 
     level: int
     name: str
@@ -115,14 +101,10 @@ class DiagnosticsSummary:
     from_beginning
         Whether the bag holds the beginning of the run; if not, counters do not start at 0.
 
-    Attributes
-    ----------
-    last_values
-        The last values, by task and key; at most `MOST_VALUES`.
-
     """
 
     def __init__(self, lanes: Mapping[str, Lane], from_beginning: bool = True) -> None:
+        # The last values, by task and key; at most `MOST_VALUES`.
         self.last_values: dict[tuple[str, str], str] = {}
         self._lanes, self._from_beginning = lanes, from_beginning
         self._before = 0

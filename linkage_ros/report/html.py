@@ -51,21 +51,7 @@ _BESIDE_CELL, _BESIDE_ROW, _BESIDE_TABLE = 25, 10, 250
 
 
 class TableOf(NamedTuple):
-    """
-    A table.
-
-    Attributes
-    ----------
-    title
-        Its heading.
-    columns
-        Headings; a leading ``>`` marks a column of numbers.
-    rows
-        The cells.
-    folded
-        Whether it is collapsed at first.
-
-    """
+    """A table, which may be collapsed at first; a leading ``>`` marks a column of numbers."""
 
     title: str
     columns: Sequence[str]
@@ -173,21 +159,9 @@ _SPEEDS = ('0.01', '0.1', '0.25', '0.5', '1', '2', '5', '10', '60')
 
 class ReportHeader(NamedTuple):
     """
-    The facts of a bag that a page shows beside its run.
+    The facts of a bag that a page shows beside its run: at its head, as warnings, and as tables.
 
-    Attributes
-    ----------
-    title
-        Title of the page.
-    facts
-        The facts at its head.
-    warnings
-        Missing or damaged parts, a line each.
-    tables
-        The tables at its end.
-    wrapped
-        Whether published angles jump from π to −π.
-
+    If ``wrapped``, published angles jump from π to −π.
     """
 
     title: str
@@ -201,11 +175,8 @@ def run_html(run: Run, header: ReportHeader) -> str:
     """
     Return the page of a run.
 
-    Raises
-    ------
-    LinkageError
-        If plotly is not installed, or the page would be larger than `PAGE_BYTES`.
-
+    A LinkageError is raised if plotly is not installed, or the page would be larger than
+    `PAGE_BYTES`.
     """
     data = page_data(run, header.wrapped)
     title = short(header.title)

@@ -48,22 +48,12 @@ TOO_MANY_JOINTS = f'joints beyond the first {MOST_JOINTS}'
 
 
 class JointBlock(NamedTuple):
-    """
-    Messages as arrays.
+    """Messages as arrays."""
 
-    Attributes
-    ----------
-    good
-        Which messages were decoded, of shape (messages,); all other arrays have a row for each.
-    stamps
-        In [ns]; 0 for a message that was not decoded.
-    numbers
-        Positions, rates and efforts, of shape (messages, 3, joints); NaN if missing.
-
-    """
-
+    # Which messages were decoded, of shape (messages,); all other arrays have a row for each.
     good: Flags
-    stamps: Times
+    stamps: Times  # In [ns]; 0 for a message that was not decoded
+    # Positions, rates and efforts, of shape (messages, 3, joints); NaN if missing.
     numbers: Numbers
 
 
@@ -78,19 +68,13 @@ class JointStates:
     others
         Whether other joints may follow; if not, they are ignored.
 
-    Attributes
-    ----------
-    joints
-        All joints so far.
-    left_out
-        Number of messages, or joints of messages, left out, by reason.
-
     """
 
     def __init__(self, joints: Sequence[str] = (), *, others: bool = True) -> None:
-        self.joints = list(joints)
+        self.joints = list(joints)  # All joints so far
         self._most = max(len(self.joints), MOST_JOINTS) if others else len(self.joints)
         self._others = others
+        # Number of messages, or joints of messages, left out, by reason.
         self.left_out: Counter[str] = Counter()
 
     def read(self, messages: Sequence[bytes]) -> JointBlock:

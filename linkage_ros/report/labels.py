@@ -86,11 +86,7 @@ def size_in_json(value: Any) -> int:
     """
     Return an upper bound of a value's size among a page's data, in [bytes].
 
-    Raises
-    ------
-    ValueError
-        If it contains a number that is not finite.
-
+    A ValueError is raised if it contains a number that is not finite.
     """
     # Escaping all characters beyond ASCII gives the longest text; a page also escapes <.
     text = json.dumps(value, allow_nan=False)

@@ -34,12 +34,18 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_values import JOINT_STATE, WRENCHES
 from linkage_ros.replay.replay import own_joint_states, recorded_scene
 from linkage_ros.report.blocks import Blocks, Entry, Progress, Rows, rows_of, RunClock, times_of
-from linkage_ros.report.curves import BoundedCurves, MOST_LINKAGES, NO_ROOM, SceneCurves, UNITS
+from linkage_ros.report.curves import (
+    BoundedCurves,
+    MOST_LINKAGES,
+    NO_ROOM,
+    PinForces,
+    SceneCurves,
+    UNITS,
+)
 from linkage_ros.report.decimation import Flags, Numbers, STATE_BYTES, Times
 from linkage_ros.report.diagnostics_summary import DiagnosticsSummary
 from linkage_ros.report.joint_states import JointBlock, JointStates
 from linkage_ros.report.labels import LANES, short
-from linkage_ros.report.pin_forces import PinForces
 from linkage_ros.report.run import APART, Column, Lane, LinkageRun, Run, Silences, Window
 from linkage_ros.report.samples import Crank, SampleJudge
 from linkage_ros.scene.scene import Scene
@@ -54,17 +60,7 @@ _LATER_JOINTS = 'messages with joints that turn up later'
 
 
 class ForeignRun:
-    """
-    Reads a bag without a scene, block by block.
-
-    Parameters
-    ----------
-    bag
-        The bag.
-    window
-        The part of the run to show.
-
-    """
+    """Reads the window of a bag without a scene, block by block."""
 
     def __init__(self, bag: Bag, window: Window) -> None:
         found = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
@@ -214,22 +210,7 @@ _NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving 
 
 
 class SceneRun:
-    """
-    Reads a run of a scene, block by block.
-
-    Parameters
-    ----------
-    bag, run, scene
-        The bag, its run account and its scene.
-    window
-        The part of the run to show.
-
-    Raises
-    ------
-    LinkageError
-        If the scene cannot be built here.
-
-    """
+    """Reads a window of a scene's run, block by block; a LinkageError if it cannot be built."""
 
     def __init__(self, bag: Bag, run: RunAccount, scene: Scene, window: Window) -> None:
         from_beginning = not lost_beginning(bag, run)

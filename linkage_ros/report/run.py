@@ -47,19 +47,7 @@ _MORE = ', and others'
 
 @dataclass(slots=True)
 class Span:
-    """
-    Consecutive events.
-
-    Attributes
-    ----------
-    begin, end
-        Run times in [ns]; equal for an instant.
-    count
-        Number of events.
-    text
-        Description of the first event.
-
-    """
+    """Consecutive events between two run times in [ns], and the description of the first one."""
 
     begin: int
     end: int
@@ -84,15 +72,6 @@ class Lane:
     window
         Begin and end, in [ns]; events outside are ignored.
 
-    Attributes
-    ----------
-    count
-        Number of events.
-    spans
-        The spans, in the order in which they were added.
-    near
-        The current value; it grows as spans are merged.
-
     """
 
     def __init__(
@@ -104,11 +83,11 @@ class Lane:
         most: int = MOST_SPANS,
         window: tuple[int, int] = (0, 2**63 - 1),
     ) -> None:
-        self.near = near
+        self.near = near  # The current value; it grows as spans are merged
         self._alike, self._longest, self._most = alike, longest, most
         self._since, self._until = window
-        self.count = 0
-        self.spans: list[Span] = []
+        self.count = 0  # Number of events
+        self.spans: list[Span] = []  # The spans, in the order in which they were added
         self._text = 0
 
     @property
@@ -231,15 +210,7 @@ class Column(NamedTuple):
     """
     A column of a group of curves.
 
-    Attributes
-    ----------
-    name
-        Name of the joint in messages.
-    quantity
-        position, rate, effort, lateness or age.
-    unit
-        Unit of its values.
-
+    The name is the joint's in messages, the quantity position, rate, effort, lateness or age.
     """
 
     name: str
@@ -248,21 +219,7 @@ class Column(NamedTuple):
 
 
 class Curves(NamedTuple):
-    """
-    Curves with common times.
-
-    Attributes
-    ----------
-    title
-        Their topic.
-    columns
-        The columns of a row.
-    rows
-        Number of rows.
-    intervals
-        The curves.
-
-    """
+    """Curves of a topic with common times, and their number of rows."""
 
     title: str
     columns: Sequence[Column]
@@ -272,23 +229,10 @@ class Curves(NamedTuple):
 
 class LinkageRun(NamedTuple):
     """
-    A linkage of a scene, as recorded.
+    A linkage of a scene, as recorded; its name is '' if it is the only one.
 
-    Attributes
-    ----------
-    name
-        Its name; '' if it is the only one.
-    prefix
-        Prefix of its joints' names.
-    closure
-        Its closure.
-    inputs, joints
-        Names of the driven and of the published joints in messages.
-    input_units
-        Units of the driven joints.
-    silent
-        Spans in which none of it was published.
-
+    Inputs and joints have their names in messages. In the silent spans nothing of it was
+    published.
     """
 
     name: str
@@ -301,69 +245,32 @@ class LinkageRun(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """
-    Instants of a run at which all joints are known, for the animation.
+    """Instants of a run at which all joints are known, for the animation."""
 
-    Attributes
-    ----------
-    step
-        One joint state of so many is kept.
-    times
-        Run times, in [ns].
-    values
-        Joint values by name in messages, in [rad] or [m]; NaN if missing.
-
-    """
-
-    step: int
-    times: Times
+    step: int  # One joint state of so many is kept
+    times: Times  # Run times, in [ns]
+    # Joint values by name in messages, in [rad] or [m]; NaN if missing.
     values: Mapping[str, Numbers]
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """
-    The contents of a bag, as a run.
+    """The contents of a bag, as a run."""
 
-    Attributes
-    ----------
-    begin
-        Log time at run time 0, in [ns]; None without messages.
-    end
-        Run time at the end, in [ns].
-    window
-        The part of the run to show.
-    contents
-        Counts of all messages, and the damage.
-    curves
-        Joints, cranks, lateness and age over time.
-    frames
-        Frames of the animation; None without a scene.
-    linkages
-        Linkages of the scene; empty without a scene.
-    lanes
-        The events, by kind.
-    lateness, age
-        Histograms; None if unknown.
-    rejected
-        Number of rejected samples, by reason.
-    left_out
-        Number of messages, or joints of messages, that were not decoded, by topic and reason.
-    last_values
-        The values of the last diagnostics, by task and key.
-
-    """
-
-    begin: int | None
-    end: int
-    window: Window
-    contents: Contents
-    curves: Sequence[Curves]
-    frames: Frames | None = None
-    linkages: Sequence[LinkageRun] = ()
-    lanes: Mapping[str, Lane] = field(default_factory=dict)
+    begin: int | None  # Log time at run time 0, in [ns]; None without messages
+    end: int  # Run time at the end, in [ns]
+    window: Window  # The part of the run to show
+    contents: Contents  # Counts of all messages, and the damage
+    curves: Sequence[Curves]  # Joints, cranks, lateness and age over time
+    frames: Frames | None = None  # Frames of the animation; None without a scene
+    linkages: Sequence[LinkageRun] = ()  # Linkages of the scene; empty without a scene
+    lanes: Mapping[str, Lane] = field(default_factory=dict)  # The events, by kind
+    # Histograms; None if unknown.
     lateness: Histogram | None = None
     age: Histogram | None = None
+    # Number of rejected samples, by reason.
     rejected: Mapping[str, int] = field(default_factory=dict)
+    # Number of messages, or joints of messages, that were not decoded, by topic and reason.
     left_out: Mapping[tuple[str, str], int] = field(default_factory=dict)
+    # The values of the last diagnostics, by task and key.
     last_values: Mapping[tuple[str, str], str] = field(default_factory=dict)

@@ -63,17 +63,7 @@ class Crank:
         """
         Add samples; return which were for this linkage.
 
-        Parameters
-        ----------
-        numbers
-            Message numbers in the block, increasing.
-        stamps
-            Their stamps, in [ns].
-        good
-            Which samples were accepted.
-        values
-            See `JointBlock.numbers`.
-
+        Message numbers increase, stamps are in [ns], ``good`` tells the accepted samples.
         """
         angles, rates = values[:, 0, self._columns], values[:, 1, self._columns]
         own: Flags = good & ~np.isnan(angles).any(axis=1)
@@ -86,15 +76,9 @@ class Crank:
 
     def at(self, numbers: Times, times: Times) -> tuple[Numbers, Times]:
         """
-        Return the crank's position at messages of the block, in [rad] or [m], and its stamp.
+        Return the crank's position in [rad] or [m], and its stamp, at messages of the block.
 
-        Parameters
-        ----------
-        numbers
-            Message numbers in the block.
-        times
-            Times that were solved for, in [ns].
-
+        The times are those that were solved for, in [ns].
         """
         places = np.searchsorted(self._number, numbers) - 1
         stamps, angles = self._stamp[places], self._angles[places]
@@ -106,24 +90,9 @@ class Crank:
 
 class SampleJudge:
     """
-    Separates accepted samples from rejected ones.
+    Separates accepted samples from rejected ones, which it counts by reason.
 
-    Parameters
-    ----------
-    bag
-        The bag.
-    scene
-        Its scene.
-    from_beginning
-        Whether the bag holds the beginning of the run; if not, faults may be on already.
-
-    Attributes
-    ----------
-    listens
-        Whether the scene takes samples.
-    rejected
-        Number of rejected samples, by reason.
-
+    If the bag lacks the beginning of the run, faults may be on already.
     """
 
     def __init__(self, bag: Bag, scene: Scene, from_beginning: bool) -> None:
@@ -145,13 +114,7 @@ class SampleJudge:
         """
         Return which samples of a block were accepted; apply faults and resets between them.
 
-        Parameters
-        ----------
-        rows
-            The messages of the block, by kind.
-        lanes
-            Lanes of the events: fault, reset and rejected.
-
+        The events get into the lanes fault, reset and rejected.
         """
         samples = rows['samples']
         good = np.zeros(len(samples.data), bool)

@@ -48,34 +48,18 @@ _GREY = (0.55, 0.55, 0.55, 1.0)
 
 
 class Solid(NamedTuple):
-    """
-    A box, or a cylinder whose axis is z.
+    """A box, or a cylinder whose axis is z."""
 
-    Attributes
-    ----------
-    kind
-        ``bar``, ``disc``, ``block`` or ``rail``.
-    name
-        Name of the point of a disc or block, or of the slider of a rail; else ''.
-    centre, z
-        In the frame of the link, in [m].
-    angle
-        Angle of a box about z, in [rad].
-    length, width
-        Of a box; both are the diameter of a cylinder. In [m].
-    height
-        Size along z, in [m].
-
-    """
-
-    kind: str
-    name: str
+    kind: str  # ``bar``, ``disc``, ``block`` or ``rail``
+    name: str  # Name of the point of a disc or block, or of the slider of a rail; else ''
+    # In the frame of the link, in [m].
     centre: complex
     z: float
-    angle: float
+    angle: float  # Angle of a box about z, in [rad]
+    # Of a box; both are the diameter of a cylinder. In [m].
     length: float
     width: float
-    height: float
+    height: float  # Size along z, in [m]
 
 
 class Body(NamedTuple):
@@ -86,19 +70,7 @@ class Body(NamedTuple):
 
 
 def bodies(closure: Closure, ranges: Mapping[str, Span], first_layer: int = 0) -> dict[str, Body]:
-    """
-    Return the shapes of each link.
-
-    Parameters
-    ----------
-    closure
-        The linkage.
-    ranges
-        Range of motion of its joints.
-    first_layer
-        Number of layers that other linkages occupy below.
-
-    """
+    """Return the shapes of each link, above the layers that other linkages occupy."""
     linkage = closure.linkage
     width = bar_width(closure)
     height = 0.5 * width

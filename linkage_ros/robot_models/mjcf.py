@@ -52,46 +52,23 @@ from linkage_ros.robot_models.xml import comment, document, number, numbers, rou
 
 
 class Branch(NamedTuple):
-    """
-    A joint of the tree.
+    """A joint of the tree."""
 
-    Attributes
-    ----------
-    kind
-        ``R`` for a pin, ``P`` for a slider.
-    name
-        Name of the pin or slider.
-    parent, child
-        The links; a block has its name in the closure's structure.
-    joint
-        Name of the joint in messages; '' if it has none.
-    sign
-        −1 if the joint counts in the opposite direction.
-
-    """
-
-    kind: str
-    name: str
+    kind: str  # ``R`` for a pin, ``P`` for a slider
+    name: str  # Name of the pin or slider
+    # The links; a block has its name in the closure's structure.
     parent: str
     child: str
-    joint: str
-    sign: int
+    joint: str  # Name of the joint in messages; '' if it has none
+    sign: int  # −1 if the joint counts in the opposite direction
 
 
 class PhysicalTree(NamedTuple):
-    """
-    A linkage as a tree.
+    """A linkage as a tree."""
 
-    Attributes
-    ----------
-    branches
-        The joints of the tree, each after the one that moves its parent.
-    cuts
-        Pins that are cut: the point, and the two links that it joins.
-
-    """
-
+    # The joints of the tree, each after the one that moves its parent.
     branches: tuple[Branch, ...]
+    # Pins that are cut: the point, and the two links that it joins.
     cuts: tuple[tuple[str, str, str], ...]
 
 
@@ -202,17 +179,6 @@ class Bodies:
     first_layer
         Number of layers that other linkages occupy below.
 
-    Attributes
-    ----------
-    cuts
-        Pins that are cut: the point, and the two links that it joins.
-    inputs
-        Inputs at the start, in [rad] or [m].
-    start
-        Value of every joint at the start, in [rad] or [m], in the order of the model.
-    joints
-        Elements of the joints that have a name in messages, by that name.
-
     """
 
     def __init__(
@@ -221,14 +187,16 @@ class Bodies:
         self._closure = closure = part.closure
         self._names = names
         tree = physical_tree(closure)
-        self.cuts = tree.cuts
+        self.cuts = tree.cuts  # Pins that are cut: the point, and the two links that it joins
         self._drawn = bodies(closure, spans(closure), first_layer)
-        self.inputs = usual_inputs(closure)
+        self.inputs = usual_inputs(closure)  # Inputs at the start, in [rad] or [m]
         self._position = closure.position(*self.inputs)
         self._driven = dict(
             zip((given.joint for given in closure.linkage.inputs), self.inputs, strict=True)
         )
+        # Elements of the joints that have a name in messages, by that name.
         self.joints: dict[str, ET.Element] = {}
+        # Value of every joint at the start, in [rad] or [m], in the order of the model.
         self.start: list[float] = []
         self._masses: dict[str, float] = {}
         self._links = {GROUND: ET.SubElement(world, 'body', name=names.own(GROUND))}
@@ -428,20 +396,9 @@ its gravity and its springs between points are."""
 
 def mjcf(name: str, parts: Sequence[Part]) -> bytes:
     """
-    Return a model for MuJoCo.
+    Return a model of linkages for MuJoCo.
 
-    Parameters
-    ----------
-    name
-        Name of the model.
-    parts
-        Its linkages.
-
-    Raises
-    ------
-    PartError
-        If one has another gravity than the first, or names that are taken.
-
+    A PartError says that one has another gravity than the first, or names that are taken.
     """
     model = ET.Element('mujoco', model=name)
     model.append(comment(_HEAD.splitlines()))

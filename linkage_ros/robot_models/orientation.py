@@ -47,23 +47,11 @@ if TYPE_CHECKING:
 
 
 class Turn(NamedTuple):
-    """
-    A term of an orientation.
+    """A term of an orientation."""
 
-    Attributes
-    ----------
-    joint
-        Name of the published joint; '' for a constant.
-    sign
-        Sign of the joint in the sum, +1 or −1.
-    constant
-        In [rad]; 0 for a joint.
-
-    """
-
-    joint: str
-    sign: int
-    constant: float = 0.0
+    joint: str  # Name of the published joint; '' for a constant
+    sign: int  # Sign of the joint in the sum, +1 or −1
+    constant: float = 0.0  # In [rad]; 0 for a joint
 
 
 def named_joints(linkage: Linkage) -> dict[str, RevoluteJoint | SlideJoint]:
@@ -78,15 +66,7 @@ def named_joints(linkage: Linkage) -> dict[str, RevoluteJoint | SlideJoint]:
 
 
 class Orientations:
-    """
-    The relative angles of links that messages determine.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-
-    """
+    """The relative angles of links that messages determine."""
 
     def __init__(self, linkage: Linkage) -> None:
         self._links = tuple(linkage.links)
@@ -139,17 +119,7 @@ _MARGIN = 1e-3
 
 
 class Span(NamedTuple):
-    """
-    The range of a joint.
-
-    Attributes
-    ----------
-    lowest, highest
-        In [rad] or [m]; −π and π for an angle without limits.
-    limited
-        Whether the two are limits.
-
-    """
+    """The range of a joint in [rad] or [m]; −π and π for an angle without limits."""
 
     lowest: float
     highest: float

@@ -27,21 +27,7 @@ from linkage_ros.robot_models.orientation import named_joints
 
 
 class Part(NamedTuple):
-    """
-    A linkage of a model.
-
-    Attributes
-    ----------
-    closure
-        The linkage.
-    prefix
-        Prefix of the names of its links and joints.
-    loads
-        Its loads; None if none are given.
-    wrapped
-        Whether its angles are published in (−π, π].
-
-    """
+    """A linkage of a model, whose links and joints get a prefix; wrapped angles are in (−π, π]."""
 
     closure: Closure
     prefix: str = ''
@@ -51,17 +37,9 @@ class Part(NamedTuple):
 
 class PartError(DefinitionError):
     """
-    A linkage that cannot be written as a model.
+    A linkage, by its number from 0, that cannot be written as a model; see `DefinitionError`.
 
-    Parameters
-    ----------
-    number
-        Number of the linkage, from 0.
-    where, reason, remedy
-        See `DefinitionError`.
-    of_linkage
-        Whether its own file is at fault, not the scene's.
-
+    ``of_linkage`` tells whether its own file is at fault, not the scene's.
     """
 
     def __init__(
@@ -89,11 +67,7 @@ class Names:
         """
         Return the names of one of its linkages; call it for all linkages before using any.
 
-        Raises
-        ------
-        PartError
-            If two linkages lead to the same name.
-
+        A PartError says that two linkages lead to the same name.
         """
         for kind, taken, found in (
             ('link', self._frames, linkage.links),

@@ -39,23 +39,11 @@ _LINE = '_line'
 
 
 class Closing(NamedTuple):
-    """
-    Frames that coincide.
+    """Frames that coincide."""
 
-    Attributes
-    ----------
-    name
-        Name of the pin or slider.
-    frames
-        Links of the URDF, two or more.
-    line
-        True if the second only has to lie on the x axis of the first.
-
-    """
-
-    name: str
-    frames: tuple[str, ...]
-    line: bool = False
+    name: str  # Name of the pin or slider
+    frames: tuple[str, ...]  # Links of the URDF, two or more
+    line: bool = False  # True if the second only has to lie on the x axis of the first
 
 
 def find_closings(
@@ -64,18 +52,7 @@ def find_closings(
     """
     Return the closing constraints, and the single frames, which are points, with their names.
 
-    Parameters
-    ----------
-    urdf
-        The robot.
-    asked
-        Pairs of links whose origins coincide.
-
-    Raises
-    ------
-    FileError
-        If a named link does not exist.
-
+    The origins of each pair of asked links coincide; a FileError if one of the two does not exist.
     """
     found: dict[str, list[str]] = {}
     for joint in urdf.joints.values():
@@ -107,23 +84,11 @@ def find_closings(
 
 
 class Loops(NamedTuple):
-    """
-    The links and joints of a URDF that belong to its loops.
+    """The links and joints of a URDF that belong to its loops."""
 
-    Attributes
-    ----------
-    ground
-        The root link of the loops.
-    joints
-        Joints that move in the loops, or are driven.
-    left_out
-        All other joints, and the links connected only by them, in words.
-
-    """
-
-    ground: str
-    joints: frozenset[str]
-    left_out: tuple[str, ...]
+    ground: str  # The root link of the loops
+    joints: frozenset[str]  # Joints that move in the loops, or are driven
+    left_out: tuple[str, ...]  # All other joints, and the links connected only by them, in words
 
 
 def find_loops(urdf: UrdfFile, closings: Sequence[Closing], inputs: Sequence[str]) -> Loops:
@@ -170,32 +135,16 @@ class Frame(NamedTuple):
 
 
 class PlanarJoint(NamedTuple):
-    """
-    A joint between bodies.
+    """A joint between bodies."""
 
-    Attributes
-    ----------
-    name
-        Name of the URDF's joint.
-    kind
-        ``R`` or ``P``.
-    parent, child
-        Bodies.
-    place
-        Position on the parent, in [m]; it is the child's origin.
-    axis
-        A unit vector for a slide; +1 or −1 for a turn.
-    mimics, multiplier, offset
-        The joint that it follows, '' if none, with factor and offset.
-
-    """
-
-    name: str
-    kind: str
+    name: str  # Name of the URDF's joint
+    kind: str  # ``R`` or ``P``
+    # Bodies.
     parent: str
     child: str
-    place: complex
-    axis: complex
+    place: complex  # Position on the parent, in [m]; it is the child's origin
+    axis: complex  # A unit vector for a slide; +1 or −1 for a turn
+    # The joint that it follows, '' if none, with factor and offset.
     mimics: str
     multiplier: float
     offset: float
@@ -203,31 +152,15 @@ class PlanarJoint(NamedTuple):
 
 @dataclass(slots=True)
 class Planar:
-    """
-    A URDF in the plane.
+    """A URDF in the plane."""
 
-    Attributes
-    ----------
-    root
-        The root of the tree of bodies: the ground.
-    frames
-        Frames of all links of the URDF.
-    joints
-        Joints, parents first.
-    bodied
-        Bodies with a shape or a mass.
-    marks
-        Named positions on bodies.
-    masses
-        Masses of bodies, as far as they are given.
-
-    """
-
-    root: str
-    frames: dict[str, Frame] = field(default_factory=dict)
-    joints: list[PlanarJoint] = field(default_factory=list)
-    bodied: set[str] = field(default_factory=set)
+    root: str  # The root of the tree of bodies: the ground
+    frames: dict[str, Frame] = field(default_factory=dict)  # Frames of all links of the URDF
+    joints: list[PlanarJoint] = field(default_factory=list)  # Joints, parents first
+    bodied: set[str] = field(default_factory=set)  # Bodies with a shape or a mass
+    # Named positions on bodies.
     marks: list[tuple[str, str, complex]] = field(default_factory=list)
+    # Masses of bodies, as far as they are given.
     masses: dict[str, Mass] = field(default_factory=dict)
 
 
@@ -235,11 +168,7 @@ def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
     """
     Reduce the loops of a URDF to their plane.
 
-    Raises
-    ------
-    FileError
-        If its joints are not in one plane; it names the first that is not.
-
+    A FileError is raised if its joints are not in one plane; it names the first that is not.
     """
     turns: dict[str, Array] = {loops.ground: np.eye(3)}
     for joint in urdf.joints.values():

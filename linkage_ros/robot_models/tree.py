@@ -71,65 +71,33 @@ Kind = Literal['revolute', 'prismatic', 'fixed']
 
 
 class TreeJoint(NamedTuple):
-    """
-    A joint of the tree.
+    """A joint of the tree."""
 
-    Attributes
-    ----------
-    name
-        Name in messages, if it moves and does not mimic another.
-    kind
-        Type of the joint.
-    parent, child
-        Frames, by name.
-    place
-        Position of the child's frame in the parent's with the joint at 0, in [m].
-    turn
-        Angle of the child's frame in the parent's with the joint at 0, in [rad].
-    axis
-        For a slide a unit vector in the child's frame; for a pin +1 or −1, about z.
-    mimics
-        The joint that it mimics; '' if none.
-
-    """
-
-    name: str
-    kind: Kind
+    name: str  # Name in messages, if it moves and does not mimic another
+    kind: Kind  # Type of the joint
+    # Frames, by name.
     parent: str
     child: str
-    place: complex
-    turn: float = 0.0
+    place: complex  # Position of the child's frame in the parent's with the joint at 0, in [m]
+    turn: float = 0.0  # Angle of the child's frame in the parent's with the joint at 0, in [rad]
+    # For a slide a unit vector in the child's frame; for a pin +1 or −1, about z.
     axis: complex = 1 + 0j
-    mimics: str = ''
+    mimics: str = ''  # The joint that it mimics; '' if none
 
 
 @dataclass(slots=True)
 class Tree:
-    """
-    A linkage as a tree.
+    """A linkage as a tree."""
 
-    Attributes
-    ----------
-    linkage
-        The linkage.
-    joints
-        All joints, each after the one that moves its parent.
-    origins
-        For each link the origin of its frame in the link's own frame, in [m].
-    pins
-        Pins of the tree: the point, and the two links that it holds together.
-    slides
-        Sliders of the tree.
-    spare
-        Joints with a name in messages that attach no link.
-
-    """
-
-    linkage: Linkage
+    linkage: Linkage  # The linkage
+    # All joints, each after the one that moves its parent.
     joints: list[TreeJoint] = field(default_factory=list)
+    # For each link the origin of its frame in the link's own frame, in [m].
     origins: dict[str, complex] = field(default_factory=lambda: {GROUND: 0j})
+    # Pins of the tree: the point, and the two links that it holds together.
     pins: list[tuple[str, str, str]] = field(default_factory=list)
-    slides: list[str] = field(default_factory=list)
+    slides: list[str] = field(default_factory=list)  # Sliders of the tree
+    # Joints with a name in messages that attach no link.
     spare: list[str] = field(default_factory=list)
 
     def place(self, link: str, point: str) -> complex:
@@ -138,33 +106,17 @@ class Tree:
 
 
 class _Hang(NamedTuple):
-    """
-    A way to attach a link to another that is in the tree.
+    """A way to attach a link to another that is in the tree."""
 
-    Attributes
-    ----------
-    link, on
-        The two links.
-    at
-        Point at which they meet: on ``on``; for a slider that ``on`` carries, its ``through``.
-    point
-        Point of ``link`` that becomes its origin.
-    turns
-        Angle of ``link`` relative to ``on``.
-    slider
-        Slider between them; '' for a pin.
-    slide
-        Joint that measures the slide.
-
-    """
-
+    # The two links.
     link: str
     on: str
+    # Point at which they meet: on ``on``; for a slider that ``on`` carries, its ``through``.
     at: str
-    point: str
-    turns: tuple[Turn, ...]
-    slider: str = ''
-    slide: str = ''
+    point: str  # Point of ``link`` that becomes its origin
+    turns: tuple[Turn, ...]  # Angle of ``link`` relative to ``on``
+    slider: str = ''  # Slider between them; '' for a pin
+    slide: str = ''  # Joint that measures the slide
 
 
 def grow(linkage: Linkage, names: PrefixedNames) -> Tree:

@@ -52,24 +52,13 @@ from linkage_ros.robot_models.xml import comment, document, number, numbers, rou
 
 
 class LoopJoint(NamedTuple):
-    """
-    A pin or slider that the tree leaves open.
+    """A pin or slider that the tree leaves open."""
 
-    Attributes
-    ----------
-    kind
-        ``pin``, ``slide`` (the frames coincide as well) or ``line`` (the second lies on the x
-        axis of the first).
-    name
-        Name of the point or slider.
-    frames
-        Two or more.
-
-    """
-
+    # ``pin``, ``slide`` (the frames coincide as well) or ``line`` (the second lies on the x axis
+    # of the first).
     kind: str
-    name: str
-    frames: tuple[str, ...]
+    name: str  # Name of the point or slider
+    frames: tuple[str, ...]  # Two or more
 
 
 def add_frames(tree: Tree, names: PrefixedNames) -> list[LoopJoint]:

@@ -41,91 +41,44 @@ class Inertial(NamedTuple):
 
 
 class UrdfLink(NamedTuple):
-    """
-    A link.
+    """A link."""
 
-    Attributes
-    ----------
-    inertial
-        Its inertial data, or None.
-    bodied
-        Whether it has a shape or a mass.
-    marks
-        Names of its visuals, with their positions, in [m].
-
-    """
-
-    inertial: Inertial | None
-    bodied: bool
-    marks: tuple[tuple[str, Vector], ...]
+    inertial: Inertial | None  # Its inertial data, or None
+    bodied: bool  # Whether it has a shape or a mass
+    marks: tuple[tuple[str, Vector], ...]  # Names of its visuals, with their positions, in [m]
 
 
 class UrdfJoint(NamedTuple):
-    """
-    A joint.
+    """A joint."""
 
-    Attributes
-    ----------
-    name, kind
-        As in the file.
-    parent, child
-        Links.
-    xyz, rpy
-        Child's frame in the parent's with the joint at 0, in [m] and [rad].
-    axis
-        In the child's frame, of any length except 0.
-    mimics, multiplier, offset
-        The joint that it follows, '' if none, with factor and offset.
-    limits
-        As in ``<limit>``, without those that ``linkage urdf`` made up.
-
-    """
-
+    # As in the file.
     name: str
     kind: str
+    # Links.
     parent: str
     child: str
+    # Child's frame in the parent's with the joint at 0, in [m] and [rad].
     xyz: Vector
     rpy: Vector
-    axis: Vector
+    axis: Vector  # In the child's frame, of any length except 0
+    # The joint that it follows, '' if none, with factor and offset.
     mimics: str
     multiplier: float
     offset: float
-    limits: Limits
+    limits: Limits  # As in ``<limit>``, without those that ``linkage urdf`` made up
 
 
 class UrdfFile(NamedTuple):
-    """
-    A robot.
+    """A robot."""
 
-    Attributes
-    ----------
-    file
-        Name of the file, for messages.
-    name
-        Name of the robot.
-    root
-        The link that is no joint's child.
-    links
-        Links by name.
-    joints
-        Joints by name, parents first.
-    order
-        Names of the joints in the order of the file.
-    inputs
-        Names of driven joints, if ``linkage urdf`` wrote the file.
-    start
-        Values of joints in a pose in which all loops close, if ``linkage urdf`` wrote the file.
-
-    """
-
-    file: str
-    name: str
-    root: str
-    links: Mapping[str, UrdfLink]
-    joints: Mapping[str, UrdfJoint]
-    order: tuple[str, ...]
-    inputs: tuple[str, ...]
+    file: str  # Name of the file, for messages
+    name: str  # Name of the robot
+    root: str  # The link that is no joint's child
+    links: Mapping[str, UrdfLink]  # Links by name
+    joints: Mapping[str, UrdfJoint]  # Joints by name, parents first
+    order: tuple[str, ...]  # Names of the joints in the order of the file
+    inputs: tuple[str, ...]  # Names of driven joints, if ``linkage urdf`` wrote the file
+    # Values of joints in a pose in which all loops close, if ``linkage urdf`` wrote the file.
     start: Mapping[str, float]
 
 
@@ -134,15 +87,7 @@ _FARTHEST = 1e9
 
 
 def read_urdf(data: bytes, file: str) -> UrdfFile:
-    """
-    Read a URDF.
-
-    Raises
-    ------
-    FileError
-        With file, link or joint, and remedy.
-
-    """
+    """Read a URDF; a FileError has file, link or joint, and remedy."""
     try:
         root = ET.fromstring(data)
     except ET.ParseError as error:

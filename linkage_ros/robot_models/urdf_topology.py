@@ -201,21 +201,7 @@ class _Rail(NamedTuple):
 
 @dataclass(slots=True)
 class UrdfTopology:
-    """
-    The linkage elements of a URDF.
-
-    Attributes
-    ----------
-    links
-        Points of every link, by name, in [m].
-    bodies
-        For each link its body of the URDF.
-    sliders, joints
-        By name.
-    traced
-        Names of traced points.
-
-    """
+    """The linkage elements of a URDF by name: points in [m], bodies, sliders, joints."""
 
     links: dict[str, dict[str, complex]] = field(default_factory=dict)
     bodies: dict[str, str] = field(default_factory=dict)
@@ -231,22 +217,9 @@ def urdf_topology(
     alone: dict[str, str],
 ) -> UrdfTopology:
     """
-    Find the linkage elements of a URDF's loops.
+    Find the linkage elements of a URDF's loops; single frames are points, with their names.
 
-    Parameters
-    ----------
-    urdf, planar
-        The robot.
-    closings
-        The loop joints.
-    alone
-        Single frames, which are points, with their names.
-
-    Raises
-    ------
-    FileError
-        If a linkage cannot have such a joint or closing.
-
+    A FileError says that a linkage cannot have such a joint or closing.
     """
     return _Building(urdf, planar, closings, alone).built()
 

@@ -29,19 +29,7 @@ _MEDIAN = 2
 
 
 class JointSpread(NamedTuple):
-    """
-    A joint in all runs.
-
-    Attributes
-    ----------
-    name
-        The joint.
-    unit
-        'rad' or 'm'.
-    values
-        A row for each run, a column for each instant; not a number where nothing was published.
-
-    """
+    """A joint in all runs: a row for each run, a column for each instant; NaN if not published."""
 
     name: str
     unit: str
@@ -52,22 +40,8 @@ def draw_spread(title: str, seconds: float, joints: Sequence[JointSpread], file:
     """
     Draw a study to a file: each joint, and beside it how far the runs are from their median.
 
-    Parameters
-    ----------
-    title
-        The heading.
-    seconds
-        Duration of a run, in [s].
-    joints
-        The joints.
-    file
-        The picture; its suffix selects the format.
-
-    Raises
-    ------
-    LinkageError
-        If matplotlib is not installed, or the file cannot be written.
-
+    The suffix selects the format. A LinkageError says that matplotlib is not installed, or that
+    the file cannot be written.
     """
     context = settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load

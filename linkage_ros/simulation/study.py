@@ -52,17 +52,7 @@ Settings = tuple[tuple[str, float], ...]
 
 
 class Sweep(NamedTuple):
-    """
-    A key of a scene and the values that it takes.
-
-    Attributes
-    ----------
-    key
-        As for ``--set``.
-    values
-        The values.
-
-    """
+    """A key of a scene as for ``--set``, and the values that it takes."""
 
     key: str
     values: tuple[float, ...]
@@ -70,17 +60,9 @@ class Sweep(NamedTuple):
 
 class Study(NamedTuple):
     """
-    What all runs of a study share.
+    What all runs of a study share: the scene of `parse_scene`, and the duration of a run in [s].
 
-    Attributes
-    ----------
-    name, files, folder
-        The scene; see `linkage_ros.scene.load.parse_scene`.
-    seconds
-        Duration of a run, in [s].
-    instants
-        Number of instants at which positions are kept.
-
+    Positions are kept at a number of instants.
     """
 
     name: str
@@ -91,16 +73,9 @@ class Study(NamedTuple):
 
 
 class Statistics(NamedTuple):
-    """
-    One quantity of a joint over a run.
+    """One quantity of a joint over a run."""
 
-    Attributes
-    ----------
-    least, most, mean, rms
-        In [rad] or [m], or per second, or [N·m] or [N]; not a number without a message.
-
-    """
-
+    # In [rad] or [m], or per second, or [N·m] or [N]; not a number without a message.
     least: float
     most: float
     mean: float
@@ -108,39 +83,20 @@ class Statistics(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """
-    A run of a study.
+    """A run of a study."""
 
-    Attributes
-    ----------
-    failure
-        Why it did not run; '' if it did.
-    ticks, messages
-        Number of ticks, and of those that published a joint state.
-    statistics
-        Under the heading of a quantity, in the order of the joints.
-    positions
-        Of each joint at the instants, in [rad] or [m]; not a number where nothing was published.
-
-    """
-
-    failure: str
+    failure: str  # Why it did not run; '' if it did
+    # Number of ticks, and of those that published a joint state.
     ticks: int
     messages: int
+    # Under the heading of a quantity, in the order of the joints.
     statistics: Mapping[str, Statistics]
+    # Of each joint at the instants, in [rad] or [m]; not a number where nothing was published.
     positions: NDArray[np.float64]
 
 
 def sweep_of(text: str) -> Sweep:
-    """
-    Read KEY=LOW:HIGH:N or KEY=a,b,c.
-
-    Raises
-    ------
-    LinkageError
-        It is neither.
-
-    """
+    """Read KEY=LOW:HIGH:N or KEY=a,b,c; a LinkageError if it is neither."""
     key, equals, values = text.partition('=')
     low, *rest = values.split(':')
     try:
@@ -274,15 +230,7 @@ def _reading(seen: LinkageTick | Seen | Numbers) -> SensorReading | None:
 
 
 class _Reduction:
-    """
-    Least, greatest and mean values of many rows, in little memory.
-
-    Parameters
-    ----------
-    width
-        Number of values of a row.
-
-    """
+    """Least, greatest and mean values of many rows of one width, in little memory."""
 
     def __init__(self, width: int) -> None:
         self._rows: list[Sequence[float]] = []
@@ -328,20 +276,8 @@ def outcomes(
     """
     Yield the number of each run and its outcome, in the order in which they end.
 
-    Parameters
-    ----------
-    study, runs
-        The study and the settings of its runs.
-    workers
-        Number of processes here.
-    dask
-        Address of a Dask scheduler whose workers run them instead; '' for none.
-
-    Raises
-    ------
-    LinkageError
-        The workers failed.
-
+    They run in a number of processes here, or on the workers of a Dask scheduler, if its address
+    is not ''. A LinkageError says that the workers failed.
     """
     work = partial(_numbered, study)
     parts = enumerate(runs)

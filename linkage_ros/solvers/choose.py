@@ -54,17 +54,7 @@ _NAMES = {'closed_form': 'closed form', 'newton': "Newton's method", 'table': 't
 
 
 def choose(linkage: Linkage, accuracy: float) -> Closure:
-    """
-    Return the fastest closure of those that are proven to reach an accuracy.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    accuracy
-        Accuracy of the published positions, in [rad] or [m].
-
-    """
+    """Return the fastest closure of those that are proven to reach an accuracy in [rad] or [m]."""
     closed = Solver(Closure(linkage))
     able: dict[str, Solver] = {'closed_form': closed}
     against = {}

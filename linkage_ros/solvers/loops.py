@@ -37,26 +37,12 @@ Turns = tuple[tuple[int, float], ...]
 
 
 class Vector(NamedTuple):
-    """
-    c·e^{iφ}·s.
+    """c·e^{iφ}·s."""
 
-    Attributes
-    ----------
-    factor
-        c, in the unit of the closure's lengths.
-    turns
-        Terms of φ.
-    slide
-        Index of the coordinate s; −1 for 1.
-    pin
-        Index of a pin whose place replaces e^{iφ}·s; −1 for none.
-
-    """
-
-    factor: complex
-    turns: Turns = ()
-    slide: int = -1
-    pin: int = -1
+    factor: complex  # c, in the unit of the closure's lengths
+    turns: Turns = ()  # Terms of φ
+    slide: int = -1  # Index of the coordinate s; −1 for 1
+    pin: int = -1  # Index of a pin whose place replaces e^{iφ}·s; −1 for none
 
 
 class Balance(NamedTuple):
@@ -68,40 +54,17 @@ class Balance(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """
-    The equations of a group of links.
+    """The equations of a group of links."""
 
-    Attributes
-    ----------
-    coordinates, pins
-        Indices of those that it appends.
-    equations
-        Sums of vectors, each equal to 0.
-    balances
-        Constraints on angles and slides; a dyad has none.
-
-    """
-
+    # Indices of those that it appends.
     coordinates: tuple[int, ...]
     pins: tuple[int, ...]
-    equations: tuple[tuple[Vector, ...], ...]
-    balances: tuple[Balance, ...] = ()
+    equations: tuple[tuple[Vector, ...], ...]  # Sums of vectors, each equal to 0
+    balances: tuple[Balance, ...] = ()  # Constraints on angles and slides; a dyad has none
 
 
 class LoopFinder:
-    """
-    Finds the loops of a closure.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    structure
-        Its groups.
-    known
-        All its links, from a closure.
-
-    """
+    """Finds the loops of a closure, from all its known links."""
 
     def __init__(self, linkage: Linkage, structure: Structure, known: KnownLinks) -> None:
         self._known = known

@@ -70,19 +70,9 @@ _MOST = 2**16
 
 class Knot(NamedTuple):
     """
-    The closed form at a knot.
+    The closed form at a knot: all coordinates, and for each input the derivatives of all.
 
-    Attributes
-    ----------
-    inputs
-        Values of the inputs, as coordinates.
-    coordinates
-        All coordinates.
-    slopes
-        For each input the derivatives of all coordinates.
-    signs
-        Assembly of each dyad: +1 or −1.
-
+    The sign of a dyad is its assembly: +1 or −1.
     """
 
     inputs: tuple[float, ...]
@@ -426,11 +416,6 @@ class NewtonClosure(Solver):
         True: start from the last state. False: start from the pose of the file each time. None:
         start from the nearest knot, so that a state depends on its inputs alone.
 
-    Attributes
-    ----------
-    exact_states
-        Number of states that the closed form has solved so far.
-
     """
 
     by_steps = False
@@ -438,7 +423,7 @@ class NewtonClosure(Solver):
     def __init__(self, linkage: Linkage, tolerance: float, warm: bool | None = None) -> None:
         super().__init__(Closure(linkage))
         self.tolerance = tolerance
-        self.exact_states = 0
+        self.exact_states = 0  # Number of states that the closed form has solved so far
         self._warm = warm is True
         self._last: list[float] | None = None
         self._plan, self._iterates = self._planned(tolerance)

@@ -43,17 +43,7 @@ if TYPE_CHECKING:
 
 
 class Choice(NamedTuple):
-    """
-    The solver chosen for a scene that specifies an accuracy.
-
-    Attributes
-    ----------
-    solver, parameters
-        As the scene could have named them.
-    why
-        The reason, in words.
-
-    """
+    """The solver chosen for a scene with an accuracy, as it could have named it, and why."""
 
     solver: str
     parameters: Mapping[str, float]
@@ -64,20 +54,8 @@ class Solver(Closure):
     """
     A closure that subclasses solve differently; itself, it uses the closed form.
 
-    Its methods are those of `Closure`.
-
-    Parameters
-    ----------
-    closed
-        The same linkage in closed form.
-
-    Attributes
-    ----------
-    closed
-        The closed form.
-    choice
-        The reason for this solver, if the scene named none.
-
+    Its methods are those of `Closure`. ``choice`` is the reason for this solver, if the scene
+    named none.
     """
 
     def __init__(self, closed: Closure) -> None:

@@ -59,29 +59,14 @@ _NARROWER = 'write solver: closed_form, or a span: [low, high] that keeps away f
 
 
 class TableRequest(NamedTuple):
-    """
-    The table to be proven.
+    """The table to be proven."""
 
-    Attributes
-    ----------
-    closed
-        A linkage of one input, in closed form.
-    groups
-        Its loops.
-    joints
-        Its published joints, each as factor·(Σ ±x_j) + constant.
-    tolerance
-        Bound of the error, in [rad] or [m].
-    order
-        Interpolation between the knots: 'linear' or 'hermite'.
-
-    """
-
-    closed: Closure
-    groups: Sequence[Loops]
+    closed: Closure  # A linkage of one input, in closed form
+    groups: Sequence[Loops]  # Its loops
+    # Its published joints, each as factor·(Σ ±x_j) + constant.
     joints: Sequence[tuple[Turns, float, float]]
-    tolerance: float
-    order: str
+    tolerance: float  # Bound of the error, in [rad] or [m]
+    order: str  # Interpolation between the knots: 'linear' or 'hermite'
 
 
 def refuse_trouble(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> None:
@@ -134,31 +119,18 @@ _ROUNDING = 2.0**-49
 
 
 class _Bounds(NamedTuple):
-    """
-    The bounds over each cell of a range.
+    """The bounds over each cell of a range."""
 
-    Attributes
-    ----------
-    low, high
-        The cell, in the coordinate of the input.
-    proven
-        Whether the bounds are proven.
-    bound, middle
-        Of the joints' Taylor coefficient: a bound over the cell, and its value at the middle.
-    slope
-        A bound of the joints' first derivative.
-    unknowns, boxes
-        For all groups, (cells, unknowns): the closed form at the middle, and the distance within
-        which there is no other solution.
-
-    """
-
+    # The cell, in the coordinate of the input.
     low: Array
     high: Array
-    proven: Mask
+    proven: Mask  # Whether the bounds are proven
+    # Of the joints' Taylor coefficient: a bound over the cell, and its value at the middle.
     bound: Array
     middle: Array
-    slope: Array
+    slope: Array  # A bound of the joints' first derivative
+    # For all groups, (cells, unknowns): the closed form at the middle, and the distance within
+    # which there is no other solution.
     unknowns: Array
     boxes: Array
 
@@ -379,23 +351,11 @@ class _ClosedForm:
 
 
 class Proven(NamedTuple):
-    """
-    The result of the proof.
+    """The result of the proof."""
 
-    Attributes
-    ----------
-    knots
-        Number of cells in each range.
-    position
-        Bound of the error of positions, in [rad] or [m].
-    rate
-        Bound of the error of their derivatives by the input.
-
-    """
-
-    knots: int
-    position: float
-    rate: float
+    knots: int  # Number of cells in each range
+    position: float  # Bound of the error of positions, in [rad] or [m]
+    rate: float  # Bound of the error of their derivatives by the input
 
 
 def knots_for(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> Proven:

@@ -120,83 +120,35 @@ _UP_MATRIX = 1.0 + 2.0**-40
 
 
 class Cells(NamedTuple):
-    """
-    Cells of the input, in the coordinate of the input, and the closed form at their middles.
+    """Cells of the input, in the coordinate of the input, and the closed form at their middles."""
 
-    Attributes
-    ----------
-    middle, half
-        Middle and half width of each cell.
-    coordinates
-        A row for each coordinate, NaN if the loops do not close.
-    pins
-        Likewise for the pins that iterations have placed.
-
-    """
-
+    # Middle and half width of each cell.
     middle: Array
     half: Array
-    coordinates: Array
-    pins: NDArray[np.complex128]
+    coordinates: Array  # A row for each coordinate, NaN if the loops do not close
+    pins: NDArray[np.complex128]  # Likewise for the pins that iterations have placed
 
 
 class Unknowns(NamedTuple):
-    """
-    The solution of a group over each cell; arrays of shape (cells, unknowns).
+    """The solution of a group over each cell; arrays of shape (cells, unknowns)."""
 
-    Attributes
-    ----------
-    middle
-        Values of the closed form.
-    box
-        ρ: within this distance there is no other solution.
-    radius
-        Within this distance there is the solution.
-    turning
-        For each unknown whether it is an angle.
-
-    """
-
-    middle: Array
-    box: Array
-    radius: Array
-    turning: Mask
+    middle: Array  # Values of the closed form
+    box: Array  # ρ: within this distance there is no other solution
+    radius: Array  # Within this distance there is the solution
+    turning: Mask  # For each unknown whether it is an angle
 
 
 class Enclosure(NamedTuple):
-    """
-    The enclosure of each cell.
+    """The enclosure of each cell."""
 
-    Attributes
-    ----------
-    proven
-        Whether there is exactly one solution.
-    jets
-        For each coordinate its Taylor coefficients by the coordinate of the input.
-    groups
-        The unknowns of each group.
-
-    """
-
-    proven: Mask
+    proven: Mask  # Whether there is exactly one solution
+    # For each coordinate its Taylor coefficients by the coordinate of the input.
     jets: dict[int, Jet]
-    groups: list[Unknowns]
+    groups: list[Unknowns]  # The unknowns of each group
 
 
 def enclose(groups: Sequence[Loops], cells: Cells, order: int) -> Enclosure:
-    """
-    Enclose all coordinates.
-
-    Parameters
-    ----------
-    groups
-        The loops of a linkage of one input.
-    cells
-        The cells.
-    order
-        Largest order of the Taylor coefficients.
-
-    """
+    """Enclose all coordinates over the cells, up to an order of the Taylor coefficients."""
     zero = [ZERO] * (order + 1)
     given: Jet = [Disc(cells.middle, cells.half), Disc(1.0, 0.0), *zero][: order + 1]
     jets: dict[int, Jet] = {0: zero, 1: given}

@@ -247,28 +247,15 @@ _FAR = 10.0
 
 
 class Needs(NamedTuple):
-    """
-    The requirements on a design.
+    """The requirements on a design."""
 
-    Attributes
-    ----------
-    kind
-        A word for the links that turn: crank-rocker, rocker-crank, double-crank or drag-link,
-        double-rocker, triple-rocker, grashof, non-grashof, turning (the crank turns fully); '' for
-        any.
-    transmission
-        Lower bound of the transmission angle over the travel, in [rad].
-    link_ratio
-        Upper bound of the ratio of the longest link to the shortest.
-    usable
-        Whether it must have no defects.
-
-    """
-
+    # A word for the links that turn: crank-rocker, rocker-crank, double-crank or drag-link,
+    # double-rocker, triple-rocker, grashof, non-grashof, turning (the crank turns fully); '' for
+    # any.
     kind: str = ''
-    transmission: float = 0.0
-    link_ratio: float = inf
-    usable: bool = False
+    transmission: float = 0.0  # Lower bound of the transmission angle over the travel, in [rad]
+    link_ratio: float = inf  # Upper bound of the ratio of the longest link to the shortest
+    usable: bool = False  # Whether it must have no defects
 
     @property
     def turning(self) -> bool:
@@ -276,15 +263,7 @@ class Needs(NamedTuple):
         return self.kind in _TURNING
 
     def check(self) -> None:
-        """
-        Refuse requirements that no design can meet.
-
-        Raises
-        ------
-        SynthesisError
-            With the most similar word.
-
-        """
+        """Raise a SynthesisError, with the most similar word, if no design can meet them."""
         if not 0.0 <= self.transmission <= 0.5 * pi:
             raise SynthesisError(
                 'transmission angle',

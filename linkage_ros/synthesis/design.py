@@ -42,32 +42,15 @@ Assembly = Literal['left', 'right']
 
 @dataclass(frozen=True, slots=True)
 class FourBar:
-    """
-    A four-bar with its pivots; all places in [m].
+    """A four-bar with its pivots; all places in [m]."""
 
-    Attributes
-    ----------
-    pivots
-        Pivots of crank and rocker, O2 and O4, in the frame of the ground.
-    crank
-        The crank's pin A in the crank's frame, whose origin is O2.
-    coupler
-        The coupler's pins A and B in the coupler's frame.
-    rocker
-        The rocker's pin B in the rocker's frame, whose origin is O4.
-    side
-        The side of A→O4 on which B lies.
-    traced
-        A point P of the coupler, in its frame, or None.
-
-    """
-
+    # Pivots of crank and rocker, O2 and O4, in the frame of the ground.
     pivots: tuple[complex, complex]
-    crank: complex
-    coupler: tuple[complex, complex]
-    rocker: complex
-    side: Assembly
-    traced: complex | None = None
+    crank: complex  # The crank's pin A in the crank's frame, whose origin is O2
+    coupler: tuple[complex, complex]  # The coupler's pins A and B in the coupler's frame
+    rocker: complex  # The rocker's pin B in the rocker's frame, whose origin is O4
+    side: Assembly  # The side of A→O4 on which B lies
+    traced: complex | None = None  # A point P of the coupler, in its frame, or None
 
     @classmethod
     def of_lengths(
@@ -140,25 +123,12 @@ class FourBar:
 
 
 class Wanted(NamedTuple):
-    """
-    One wanted position.
+    """One wanted position."""
 
-    Attributes
-    ----------
-    crank
-        The crank's angle, given or computed, in [rad].
-    rocker
-        The rocker's angle, in [rad], or None.
-    coupler
-        The coupler's angle to the ground, in [rad], or None.
-    place
-        Place of the traced point in the frame of the ground, in [m], or None.
-
-    """
-
-    crank: float
-    rocker: float | None = None
-    coupler: float | None = None
+    crank: float  # The crank's angle, given or computed, in [rad]
+    rocker: float | None = None  # The rocker's angle, in [rad], or None
+    coupler: float | None = None  # The coupler's angle to the ground, in [rad], or None
+    # Place of the traced point in the frame of the ground, in [m], or None.
     place: complex | None = None
 
 

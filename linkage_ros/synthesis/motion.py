@@ -127,26 +127,13 @@ Place: TypeAlias = tuple[Twofold, Twofold]
 
 
 class Circle(NamedTuple):
-    """
-    A circle; inf or NaN if the places lie on a line, or two of them are equal.
+    """A circle; inf or NaN if the places lie on a line, or two of them are equal."""
 
-    Attributes
-    ----------
-    centre
-        Centre, (…).
-    spokes
-        From the centre to the places, (…, 3).
-    chords
-        Between the places, each opposite to its place: A₃ − A₂, A₁ − A₃ and A₂ − A₁, (…, 3).
-    pull
-        dc/dg of each place, as above, (…, 3).
-
-    """
-
-    centre: Complex
-    spokes: Complex
+    centre: Complex  # Centre, (…)
+    spokes: Complex  # From the centre to the places, (…, 3)
+    # Between the places, each opposite to its place: A₃ − A₂, A₁ − A₃ and A₂ − A₁, (…, 3).
     chords: Complex
-    pull: Complex
+    pull: Complex  # dc/dg of each place, as above, (…, 3)
 
 
 def circle(places: Place) -> Circle:
@@ -214,28 +201,17 @@ inputs, and one for the computation, whose measured error is a third of that."""
 
 
 class Links(NamedTuple):
-    """
-    Links from fixed pivots to moving ones; any number of them at once.
+    """Links from fixed pivots to moving ones; any number of them at once."""
 
-    Attributes
-    ----------
-    pivots
-        The computed pivots, (…), in [m]: fixed ones in the frame of the ground, moving ones in
-        that of the coupler. Infinite or NaN if there is none.
-    arms
-        From the fixed pivot to the moving one in the frame of the ground, at each pose, (…, 3).
-    sensitivity
-        Σ|x ∂p/∂x| + ``abs(p)`` of each pivot p over poses and given pivot x; (…). Times 2⁻⁵³ it
-        bounds the error of the pivot that rounding these alone causes.
-    chords
-        Between the places of the given pivot, each opposite to its place, (…, 3).
-
-    """
-
+    # The computed pivots, (…), in [m]: fixed ones in the frame of the ground, moving ones in that
+    # of the coupler. Infinite or NaN if there is none.
     pivots: Complex
+    # From the fixed pivot to the moving one in the frame of the ground, at each pose, (…, 3).
     arms: Complex
+    # Σ|x ∂p/∂x| + ``abs(p)`` of each pivot p over poses and given pivot x; (…). Times 2⁻⁵³ it
+    # bounds the error of the pivot that rounding these alone causes.
     sensitivity: Array
-    chords: Complex
+    chords: Complex  # Between the places of the given pivot, each opposite to its place, (…, 3)
 
     @property
     def lengths(self) -> Array:

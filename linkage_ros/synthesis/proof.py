@@ -52,47 +52,24 @@ SAME = 1e-9
 
 
 class Mobility(NamedTuple):
-    """
-    The mobility of four-bars.
+    """The mobility of four-bars."""
 
-    Attributes
-    ----------
-    excess
-        Sum of the other two links minus the sum of the shortest and the longest; above 0 if some
-        link turns fully, 0 if the linkage can fold flat; (…).
-    turns
-        Whether the crank turns fully; (…).
-
-    """
-
+    # Sum of the other two links minus the sum of the shortest and the longest; above 0 if some
+    # link turns fully, 0 if the linkage can fold flat; (…).
     excess: Array
-    turns: Flags
+    turns: Flags  # Whether the crank turns fully; (…)
 
 
 class Course(NamedTuple):
-    """
-    The way of four-bars through their positions.
+    """The way of four-bars through their positions."""
 
-    Attributes
-    ----------
-    turns
-        Whether the crank turns fully; (…).
-    one_branch
-        Whether all positions are on one assembly; (…).
-    one_circuit
-        Whether all can be reached without taking the linkage apart; (…).
-    in_order
-        Whether the crank visits them in their order, going one way, for one turn at most; (…).
-    directions
-        Directions of the crank at each position, with the turns between them: the first as given,
-        and the shorter way if both ways are in order; (…, n). Meaningless if none is.
-
-    """
-
-    turns: Flags
-    one_branch: Flags
-    one_circuit: Flags
+    turns: Flags  # Whether the crank turns fully; (…)
+    one_branch: Flags  # Whether all positions are on one assembly; (…)
+    one_circuit: Flags  # Whether all can be reached without taking the linkage apart; (…)
+    # Whether the crank visits them in their order, going one way, for one turn at most; (…).
     in_order: Flags
+    # Directions of the crank at each position, with the turns between them: the first as given,
+    # and the shorter way if both ways are in order; (…, n). Meaningless if none is.
     directions: Array
 
     @property

@@ -12,22 +12,32 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The requests of open pages: each is answered in its turn, and an old drag gives way to a new."""
+"""
+The requests of open pages: each is answered in its turn, and an old drag gives way to a new.
+
+Pages may save the user's linkage file, unless someone else has changed it.
+"""
 
 from __future__ import annotations
 
 import asyncio
 from collections import deque
+from hashlib import sha256
 from itertools import count
 import json
+import os
+from pathlib import Path
 
 from aiohttp import web, WSMsgType
 from linkage_ros.errors import LinkageError
+from linkage_ros.files.file_access import atomic_write, read_regular
+from linkage_ros.files.yaml_file import LARGEST_FILE
 from linkage_ros.view.requests import encoded, failed, read_request, Request, RequestError
 from linkage_ros.view.sensors import SceneFiles
 from linkage_ros.view.server import Server, SERVER_KEY
-from linkage_ros.view.user_file import UserFile
 from linkage_ros.view.worker import Worker
+
+_REMEDY = 'download this version, or load the page again to go on from the file'
 
 _MOST_WAITING = 16
 """Most requests of a page that wait for one process."""
@@ -43,19 +53,7 @@ _SLOW = ('export',)
 
 
 class Conversation:
-    """
-    Answers what all pages of a server ask for.
-
-    Parameters
-    ----------
-    name
-        Name of the linkage.
-    scene
-        The scene whose sensors are read; None if there is none.
-    file
-        The user's file, if pages may save it; else None.
-
-    """
+    """Answers all pages of a server: of a linkage, a scene's sensors, a user's file."""
 
     def __init__(self, name: str, scene: SceneFiles | None, file: UserFile | None) -> None:
         self._file = file
@@ -110,17 +108,7 @@ class Conversation:
 
 
 class _Page:
-    """
-    An open page.
-
-    Attributes
-    ----------
-    number
-        Its number.
-    state
-        State of the user's file that it has seen.
-
-    """
+    """An open page, and the state of the user's file that it has seen."""
 
     def __init__(
         self, number: int, socket: web.WebSocketResponse, of: Conversation, server: Server
@@ -163,11 +151,7 @@ class _Queue:
         """
         Put a request at the end; return the numbers of those that it replaces.
 
-        Raises
-        ------
-        RequestError
-            Too many wait.
-
+        A RequestError says that too many wait.
         """
         kind = _REPLACED.get(request.do, '')
         replaced = [old for old in self._waiting if kind and _REPLACED.get(old[0].do) == kind]
@@ -188,3 +172,38 @@ class _Queue:
                 await self._socket.send_str(answer)
             except ConnectionError:  # the page has gone
                 return
+
+
+class UserFile:
+    """A linkage file that pages may save."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path.absolute()
+
+    @property
+    def writable(self) -> bool:
+        """Return whether the user may write it."""
+        return os.access(self.path, os.W_OK)
+
+    def state(self) -> str:
+        """Return what tells its content from another one; '' if it cannot be read."""
+        try:
+            return digest(read_regular(self.path, LARGEST_FILE))
+        except (OSError, ValueError):
+            return ''
+
+    def save(self, data: bytes, known: str) -> str:
+        """
+        Replace the content that the page has seen as the state ``known``; return the new state.
+
+        A LinkageError says that the content is another, or that it cannot be written.
+        """
+        if self.state() != known:
+            raise LinkageError(self.path.name, 'has changed since this page read it', _REMEDY)
+        atomic_write(self.path, data)
+        return digest(data)
+
+
+def digest(data: bytes) -> str:
+    """Return a digest of the content of a file."""
+    return sha256(data).hexdigest()

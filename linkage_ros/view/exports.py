@@ -36,19 +36,7 @@ _DERIVATIVES = 2
 
 
 class Export(NamedTuple):
-    """
-    A file to download.
-
-    Attributes
-    ----------
-    name
-        Its name.
-    media_type
-        Its type, for the browser.
-    data
-        Its content.
-
-    """
+    """A file to download, with its type for the browser."""
 
     name: str
     media_type: str

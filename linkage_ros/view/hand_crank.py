@@ -56,19 +56,9 @@ class HandCrank:
 
     def turn(self, number: int, target: float, at: Sequence[float], now: float) -> None:
         """
-        Turn an input to a value.
+        Turn an input to a target in [rad] or [m], at a time in [s].
 
-        Parameters
-        ----------
-        number
-            Number of the input.
-        target
-            Where it is to go, in [rad] or [m].
-        at
-            Where all inputs are if no hand has held them, in [rad] or [m].
-        now
-            Time, in [s].
-
+        All inputs are ``at`` these values if no hand has held them.
         """
         if not self.is_held(now):
             self._targets, self._values = list(at), list(at)

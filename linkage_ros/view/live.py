@@ -49,15 +49,7 @@ _PATIENCE = 90.0
 
 
 class Bridge(Protocol):
-    """
-    A running node, as pages see it.
-
-    Attributes
-    ----------
-    name
-        Name of the node.
-
-    """
+    """A running node, as pages see it."""
 
     name: str
 
@@ -192,15 +184,7 @@ _SCRIPTS = [
 
 
 def live_page(bridge: Bridge) -> str:
-    """
-    Return the page of a running node.
-
-    Raises
-    ------
-    LinkageError
-        If plotly is not installed.
-
-    """
+    """Return the page of a running node; a LinkageError if plotly is not installed."""
     body = [f'<h1 id="title">{escape(bridge.name)}</h1>', _BODY]
     data = {
         'mode': 'live',

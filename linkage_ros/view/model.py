@@ -20,8 +20,8 @@ The page moves it by the program: JavaScript that `kinematics.compiling` writes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import combinations
+from collections.abc import Iterator, Sequence
+from itertools import chain, combinations
 from math import degrees, dist, inf, isfinite, radians
 from typing import Any, NamedTuple
 
@@ -29,21 +29,21 @@ from linkage_ros.drawing.drawing_data import drawn_in_frames, pose_in_frames
 from linkage_ros.drawing.figure import view
 from linkage_ros.drawing.shapes import driven_links
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.files.assemblies import closures
-from linkage_ros.files.linkage_file import closable, written_linkage
+from linkage_ros.files.linkage_file import closable, closures, written_linkage
 from linkage_ros.files.section import Section
 from linkage_ros.files.units import Units
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.javascript import JavaScript
-from linkage_ros.kinematics.compiling.source import source, Subject
+from linkage_ros.kinematics.compiling.source import source, STATUSES, Subject
 from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage
 from linkage_ros.kinematics.plan import assembly_sides
 from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.scene.notes import linkage_notes
-from linkage_ros.view.poses import pose
+
+_STATUSES = {name: number for number, name in enumerate(STATUSES)}
 
 _SAMPLES = 180
 """Number of inputs at which transmission angle and margin are told."""
@@ -290,3 +290,37 @@ def _warnings(closure: Closure, angles: list[float]) -> Iterator[str]:
 def _finite(value: float) -> float | None:
     """Return a number that JSON can hold; None for one that is not finite."""
     return value if isfinite(value) else None
+
+
+def pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
+    """Return a pose as the program would, if a linkage has none; rates at a first input of 1."""
+    position = closure.position(*inputs)
+    found: dict[str, Any] = {
+        'status': _STATUSES[position.status.name],
+        'joints': list(position.joints),
+        'rates': [],
+        'accelerations': [],
+        'frames': [],
+        'frameRates': [],
+    }
+    if not position.joints:
+        return found
+    frames = closure.link_frames
+    found['frames'] = _flat(frames.at(position))
+    if position.status.has_rates:
+        rest = [0.0] * (len(inputs) - 1)
+        velocity = closure.velocity(position, 1.0, *rest)
+        acceleration = closure.acceleration(position, velocity, 0.0, *rest)
+        motion = {
+            'rates': list(velocity.joints),
+            'accelerations': list(acceleration.joints),
+            'frameRates': _flat(frames.rates(position, velocity)),
+        }
+        # Beside a toggle they may be larger than a number can be.
+        if all(map(isfinite, chain(*motion.values()))):
+            found |= motion
+    return found
+
+
+def _flat(frames: Sequence[tuple[complex, float]]) -> list[float]:
+    return [value for place, angle in frames for value in (place.real, place.imag, angle)]

@@ -43,8 +43,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.resources import linkage_names, shipped
 from linkage_ros.view.edit import edited, pin_of
 from linkage_ros.view.exports import export
-from linkage_ros.view.model import model, Shown
-from linkage_ros.view.poses import pose
+from linkage_ros.view.model import model, pose, Shown
 from linkage_ros.view.sensors import SceneFiles, Sensors
 
 LARGEST = 1_000_000
@@ -59,19 +58,7 @@ _LONGEST_NAME = 80
 
 
 class Request(NamedTuple):
-    """
-    A request of a page.
-
-    Attributes
-    ----------
-    number
-        The ``id``, which the answer repeats.
-    do
-        What is to be done.
-    content
-        The whole message.
-
-    """
+    """A request of a page: the ``id`` that its answer repeats, what to do, the whole message."""
 
     number: float
     do: str
@@ -79,19 +66,11 @@ class Request(NamedTuple):
 
 
 class RequestError(LinkageError):
-    """
-    A message that is no request.
-
-    Attributes
-    ----------
-    number
-        The ``id``, as far as it can be read.
-
-    """
+    """A message that is no request."""
 
     def __init__(self, reason: str, remedy: str, number: float | None = None) -> None:
         super().__init__('message', reason, remedy)
-        self.number = number
+        self.number = number  # The ``id``, as far as it can be read
 
 
 def read_request(message: str) -> Request:
@@ -189,17 +168,9 @@ class Answers:
 
 class _Asked(NamedTuple):
     """
-    What a request holds.
+    What a request holds: the message, and the name of the linkage that the server opened.
 
-    Attributes
-    ----------
-    content
-        The message.
-    opened
-        Name of the linkage with which the server was opened.
-    sensors
-        Returns the sensors of the page, for the text of a linkage.
-
+    ``sensors`` returns the sensors of the page, for the text of a linkage.
     """
 
     content: Mapping[str, Any]
@@ -323,15 +294,7 @@ _ANSWERS: dict[str, Callable[[_Asked], dict[str, Any]]] = {
 
 @lru_cache(maxsize=4)
 def closure_of(text: str, name: str) -> Closure:
-    """
-    Return the closure of a linkage file's text.
-
-    Raises
-    ------
-    FileError
-        As `linkage_ros.load`.
-
-    """
+    """Return the closure of a linkage file's text; errors are those of `linkage_ros.load`."""
     return read_closure(parse_yaml(encoded(text, name), name), name)
 
 

@@ -45,19 +45,7 @@ _FASTEST = 2000.0
 
 
 class SceneFiles(NamedTuple):
-    """
-    A scene as it goes to another process.
-
-    Attributes
-    ----------
-    name
-        Name of the scene.
-    files
-        Texts of the scene and its linkages, by name, as `Scene.files` has them.
-    folder
-        Folder of the paths in the scene.
-
-    """
+    """A scene as it goes to another process: texts as in `Scene.files`, folder of its paths."""
 
     name: str
     files: Mapping[str, str]
@@ -66,27 +54,9 @@ class SceneFiles(NamedTuple):
 
 class Sensors:
     """
-    The first linkage of a scene, ticked for one page.
+    The first linkage of a scene, ticked for one page; the page may have changed its text.
 
-    Parameters
-    ----------
-    files
-        The scene.
-    text
-        The linkage as the page has changed it; None for that of the scene.
-
-    Attributes
-    ----------
-    text
-        As given.
-    count
-        Number of inputs.
-
-    Raises
-    ------
-    FileError
-        The changed linkage does not fit the scene.
-
+    A FileError says that the changed linkage does not fit the scene.
     """
 
     def __init__(self, files: SceneFiles, text: str | None = None) -> None:

@@ -65,24 +65,10 @@ def serve(
     port: int = 0,
 ) -> None:
     """
-    Serve a page until the stop event is set.
+    Serve a page as `Server` until the stop event is set; 0 is a free port.
 
-    Parameters
-    ----------
-    page, routes, report
-        As for `Server`.
-    stop
-        Set by a signal.
-    ready
-        Called with the address as soon as the server answers.
-    port
-        The port; 0 for a free one.
-
-    Raises
-    ------
-    LinkageError
-        The port is taken.
-
+    ``ready`` is called with the address as soon as the server answers. A LinkageError says that
+    the port is taken.
     """
     asyncio.run(_serve(Server(page, routes, report), stop, ready, port))
 
@@ -111,13 +97,6 @@ class Server:
     report
         Called with one line where something is refused for the first time, and with each defect.
 
-    Attributes
-    ----------
-    address
-        Its address, with the token; '' before `start`.
-    refused
-        Number of refused requests and messages, by reason.
-
     """
 
     def __init__(
@@ -127,22 +106,15 @@ class Server:
         self._routes = routes
         self._report = report
         self._token = token_urlsafe(24)
-        self.address = ''
+        self.address = ''  # Its address, with the token; '' before `start`
+        # Number of refused requests and messages, by reason.
         self.refused: Counter[str] = Counter()
         self._hosts: tuple[str, ...] = ()
         self._sockets: dict[web.WebSocketResponse, str] = {}
         self._runner: web.AppRunner | None = None
 
     async def start(self, port: int = 0) -> None:
-        """
-        Listen on a port; 0 for a free one.
-
-        Raises
-        ------
-        LinkageError
-            The port is taken.
-
-        """
+        """Listen on a port, 0 for a free one; a LinkageError if it is taken."""
         within = web.Application()
         within[SERVER_KEY] = self
         within.router.add_get('/', self._answer_page)

@@ -47,22 +47,9 @@ _SPARE = 5.0
 
 class Worker:
     """
-    Answers requests in a process of its own, one after the other.
+    Answers requests in a process of its own, one after the other, within a time limit in [s].
 
-    Parameters
-    ----------
-    name
-        Name of the linkage with which the server was opened.
-    scene
-        The scene with which it was opened; None for a linkage.
-    longest
-        Time limit of a request, in [s].
-
-    Attributes
-    ----------
-    longest
-        As given.
-
+    It has the name of the linkage and the scene with which the server was opened.
     """
 
     def __init__(self, name: str, scene: SceneFiles | None, longest: float) -> None:
@@ -84,22 +71,9 @@ class Worker:
 
     async def ask(self, page: int, do: str, message: str) -> str:
         """
-        Return the answer to a request, as JSON.
+        Return the answer to a page's request, as JSON.
 
-        Parameters
-        ----------
-        page
-            Number of the page that asks.
-        do
-            What it asks for.
-        message
-            Its message.
-
-        Raises
-        ------
-        LinkageError
-            There is no answer in time, or the process ended.
-
+        A LinkageError says that there is no answer in time, or that the process ended.
         """
         async with self._one:
             answered = False

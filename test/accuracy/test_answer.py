@@ -17,9 +17,8 @@
 
 from itertools import pairwise
 
-from linkage_ros.accuracy.answer import replies, reply
-from linkage_ros.accuracy.choices import scene_choices
-from linkage_ros.accuracy.results import Choice, Part, Results
+from linkage_ros.accuracy.results import Choice, Part, replies, reply, Results
+from linkage_ros.accuracy.solving import scene_choices
 from linkage_ros.measuring import Spread
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene

@@ -17,9 +17,9 @@
 from itertools import combinations
 import re
 
-from linkage_ros.accuracy.answer import replies, reply
 from linkage_ros.accuracy.page.diagrams import places
 from linkage_ros.accuracy.page.files import PAGE, write_page
+from linkage_ros.accuracy.results import replies, reply
 import pytest
 
 from .shown import DIAGRAMS, EMPTY, FAILED, LONG, METHODS, POSITION, RESULTS

@@ -19,8 +19,8 @@ from html import unescape
 import json
 import re
 
-from linkage_ros.accuracy.answer import replies
 from linkage_ros.accuracy.page.files import write_markdown
+from linkage_ros.accuracy.results import replies
 from linkage_ros.pages.markdown import marks
 from markdown_it import MarkdownIt
 import pytest

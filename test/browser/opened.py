@@ -24,23 +24,11 @@ from typing import Any, NamedTuple
 
 
 class Opened(NamedTuple):
-    """
-    A page in a browser.
+    """A page in a browser."""
 
-    Attributes
-    ----------
-    page
-        The page, as Playwright has it.
-    said
-        What came on its console, and its uncaught errors: none is good.
-    asked
-        Addresses that it has asked for, its own the first.
-
-    """
-
-    page: Any
-    said: list[str]
-    asked: list[str]
+    page: Any  # The page, as Playwright has it
+    said: list[str]  # What came on its console, and its uncaught errors: none is good
+    asked: list[str]  # Addresses that it has asked for, its own the first
 
     def is_wider_than_its_window(self) -> bool:
         """Say whether one has to scroll sideways."""
@@ -53,19 +41,9 @@ def opened(
     browser: Any, file: Path, *, width: int = 1000, height: int = 900, **context: Any
 ) -> Iterator[Opened]:
     """
-    Open a file.
+    Open a file in a running browser, in a window of some pixels.
 
-    Parameters
-    ----------
-    browser
-        A running browser; see `chromium.browser`.
-    file
-        The page.
-    width, height
-        Of its window, in pixels.
-    **context
-        What else Playwright is told: ``color_scheme='dark'``, ``has_touch=True``.
-
+    The context is what else Playwright is told: ``color_scheme='dark'``, ``has_touch=True``.
     """
     viewport = {'width': width, 'height': height}
     # It is not offline: a request must be seen, not fail.

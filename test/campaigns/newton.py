@@ -31,15 +31,7 @@ DIGITS = 150
 
 
 class Newton:
-    """
-    A mechanism's equations.
-
-    Parameters
-    ----------
-    mechanism
-        What to solve.
-
-    """
+    """A mechanism's equations."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism

@@ -37,7 +37,6 @@ A state within 16 u of a limit position is reported as this limit position. At a
 error of the position is √δ and κ is 1/(2·√δ), which makes 32 u·κ.
 """
 
-
 ONCE_BEYOND = {
     'RRR': ('10231:27', '12126:40', '3985:0'),
     'RRP': ('1609:25', '1609:48', '1609:30'),

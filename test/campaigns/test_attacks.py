@@ -33,7 +33,6 @@ import pytest
 
 SEED = 20261122
 
-
 """Another seed than the campaign's."""
 
 
@@ -112,9 +111,7 @@ def test_the_judge_detects_faults(command, code, errors, is_fault) -> None:
 
 BAG_SEED = 20261123
 
-
 """Another seed than the campaign's, whose findings are fixed."""
-
 
 SAMPLE = 20
 

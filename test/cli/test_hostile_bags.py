@@ -49,9 +49,7 @@ from ..support.commands import environment, linkage
 
 DEEP = '[' * 100_000
 
-
 LONG = '9' * 100_000
-
 
 ACCOUNTS = {
     'nothing': b'',
@@ -61,7 +59,6 @@ ACCOUNTS = {
     'a deep object': b'{"a":' * 100_000,
     'cut': b'{"scene": "s", ',
 }
-
 
 # The replacement of each key, as JSON.
 VALUES = {
@@ -76,9 +73,7 @@ VALUES = {
     'half a character': '"\\ud800"',
 }
 
-
 KEYS = ('scene', 'joint_states_topic', 'crank_topic', 'withheld_topic', 'extra_topics')
-
 
 # A file may have any name, and a scene has the name of its file.
 GOOD = {('scene', 'control characters'), ('scene', 'half a character')}
@@ -199,7 +194,6 @@ ODD = {
     'long': 'x' * 50_000,
 }
 
-
 COMMANDS = {
     'info': [],
     'info --json': [],
@@ -287,18 +281,14 @@ def test_lines_stay_lines(capsys: pytest.CaptureFixture[str]) -> None:
 
 ROOT = Path(__file__).parents[2]
 
-
 EFFECT = 'canary.effect'
 
-
 RAN = 'ran'
-
 
 CANARY = f"""
 from pathlib import Path
 Path(__file__).parents[1].joinpath('{RAN}').write_text('')
 """
-
 
 DOES_NOTHING = """
 from dataclasses import dataclass
@@ -312,7 +302,6 @@ AFTER = 'bias'
 def sensor(parameters, context):
     return lambda now, reading: reading
 """
-
 
 # Arguments after the bag, by command; at least one line for each command that takes a bag.
 TYPED = {
@@ -330,10 +319,8 @@ TYPED = {
     ],
 }
 
-
 # Commands that take a scene; its drive may play a bag.
 FOLLOWS = 'linkage: l.yaml\ndrive: {bag: {file: bag}}\n'
-
 
 WITH_A_SCENE = (['scene', 'follows.yaml'], ['cost', 'follows.yaml', '--ticks', '5'])
 

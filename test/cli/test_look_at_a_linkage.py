@@ -34,15 +34,11 @@ from ..support.commands import environment
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 
-
 FILES = sorted(LINKAGES.glob('*.yaml'))
-
 
 NAMES = [file.stem for file in FILES]
 
-
 FOUR_BAR = str(LINKAGES / 'four_bar.yaml')
-
 
 COMMANDS = ('check', 'solve', 'draw')
 

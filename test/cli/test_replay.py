@@ -36,7 +36,9 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.replay.compare import At, Comparison, ulps
-from linkage_ros.replay.replay import versions_here
+from linkage_ros.replay.replay import recorded_scene, versions_here
+from linkage_ros.replay.replay import replay as replayed
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 import pytest
 
@@ -57,15 +59,11 @@ from ..support.messages import read_joint_state
 
 TICKS = 300
 
-
 LINKAGE = (Path(__file__).parents[2] / 'config/linkages/four_bar.yaml').read_text()
-
 
 TWO = 'linkages: [{name: a, linkage: l.yaml}, {name: b, linkage: l.yaml}]\n'
 
-
 NOISE = 'noise: {joints: {rocker_joint: {white: 1.0e-3, walk: 1.0e-2}}}'
-
 
 SCENES = {
     'positions': '',
@@ -98,7 +96,6 @@ def recorded(folder: Path, text: str, ticks: int = TICKS, **options: Any) -> Pat
 
 
 Edit = Callable[[int, BagMessage], BagMessage | None]
-
 
 """Makes of a message, by its number, what is written; nothing for none."""
 
@@ -465,12 +462,9 @@ class BagWriterOf:
 
 NAMES = ['crank', 'slide']
 
-
 WRITE = JointStateWriter(NAMES).write
 
-
 AT = At(7, 70)
-
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -573,3 +567,33 @@ def test_deviations_are_those_of_all_messages():
     assert crank.at == At(4, 4)
     slide = found.topics[0].deviations['slide', 'position']
     assert (slide.compared, slide.differing, slide.rms) == (4, 0, 0.0)
+
+
+# A run whose solver was chosen by an accuracy.
+
+
+@pytest.mark.ros
+def test_a_solver_that_was_chosen_is_not_chosen_again(
+    linkage: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Choosing takes times, and another machine, or another hour, has others.
+    (tmp_path / 'scene.yaml').write_text(
+        f'linkage: {shipped("linkages/class_3.yaml")}\ndrive: {{constant_rate: {{rate: 2.0}}}}\n'
+        'accuracy: 1.0e-6\nrecord: {name: run}\n'
+    )
+    ran = linkage('run', 'scene.yaml', '--seconds', '1', '--plain')
+    assert ran.returncode == 0, ran.stderr
+    bag = read_bag(tmp_path / 'runs' / 'run')
+    chosen = json.loads(bag.attachments['run.json'])['solver']
+    assert list(chosen['']) == ['table'], 'of class III it is forty times as fast'
+
+    def again(*_: object) -> None:
+        pytest.fail('chosen again')
+
+    monkeypatch.setattr('linkage_ros.solvers.choose.choose', again)
+    ticks = list(replayed(bag, recorded_scene(bag)))
+    assert len(ticks) > 100
+    assert [tick.tick.message for tick in ticks] == [tick.recorded for tick in ticks]
+    answer = linkage('replay', 'runs/run')
+    assert answer.returncode == 0
+    assert 'identical' in answer.stdout

@@ -34,10 +34,8 @@ from ..support.commands import environment
 
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
-
 # Arguments and input of each command. Where a command computes, it closes loops.
 PARSE = 'linkage_ros.files.yaml_file:parse_yaml'
-
 
 READS = {
     'check': (['four.yaml'], PARSE),
@@ -58,7 +56,6 @@ READS = {
     'synthesize': (['--pairs', 'x.csv'], 'csv:reader'),
 }
 
-
 COMPUTE = (
     'check',
     'solve',
@@ -73,12 +70,9 @@ COMPUTE = (
     'accuracy',
 )
 
-
 CLOSES = 'linkage_ros.kinematics.closure:Closure.position'
 
-
 WRITES = 'os:fsync'
-
 
 # The command, with a step that takes for ever and reports when it begins.
 PROGRAM = """
@@ -93,7 +87,6 @@ def stuck(*_, **__):
 setattr(owner, name, stuck)
 sys.exit(main())
 """
-
 
 # An exception in a finalizer is lost: Python only prints it.
 FINALIZER = """
@@ -112,7 +105,6 @@ yaml_file.parse_yaml = parse
 sys.exit(main())
 """
 
-
 # A library takes whatever its import raises for an error of its own.
 CONVERTED = """
 import os, sys, time
@@ -127,7 +119,6 @@ def load(*_):
 main.import_module = load
 sys.exit(main.main())
 """
-
 
 # The main thread waits for the stop event again and again, while signals keep coming.
 STORM = """
@@ -271,9 +262,7 @@ def test_a_signal_that_comes_while_its_wish_is_waited_for_is_no_deadlock(folder)
 
 SIZE = 50_000_000
 
-
 MESSAGES = 30_000  # in a chunk
-
 
 # Arguments beside the bag, and the output of the stopped command.
 COMMANDS = {

@@ -106,7 +106,6 @@ READS = {
     'info: file': ['info', 'bag_of_one'],
 }
 
-
 KINDS = {'pipe': 'a pipe', 'socket': 'a socket', 'device': 'a device'}
 
 
@@ -145,9 +144,7 @@ def make(kind: str, place: Path) -> None:
 
 COMMAND = 'from linkage_ros.cli.main import main'
 
-
 NODE = 'from linkage_ros.node.linkage_node import main'
-
 
 NEED_BAGS = (
     ['run', 'x.yaml'], ['demo'], ['play', 'bag'], ['plot', 'bag'], ['info', 'bag'],
@@ -221,12 +218,9 @@ def test_without_ros_a_run_says_how_to_get_it(folder) -> None:
 
 ATTACKS = Path(__file__).parent / 'attacks'
 
-
 TINY = 'four_bar: {a: 5e-324, b: 0.12, c: 0.08, d: 0.1}\n'
 
-
 LONG = 'x' * 300_000
-
 
 ANSWERED = [
     # file, its content, and what is typed before it
@@ -238,12 +232,9 @@ ANSWERED = [
     *[('tiny.yaml', TINY, command) for command in ('check', 'solve', 'urdf', 'mjcf', 'scene')],
 ]
 
-
 LINKS = ', '.join(f'l{i}: {{A: [0, 0]}}' for i in range(401))
 
-
 POINTS = ', '.join(f'P{i}: [0, {i}]' for i in range(10_001))
-
 
 REFUSED = [
     # content, what is typed before the file, what the answer names
@@ -292,9 +283,7 @@ def test_a_file_without_measure_is_refused_in_a_line(
 
 BESIDE = re.compile(r'(\w+: \[[^]]*\]), (\w+): \[[^]]*\]')
 
-
 """Two points of a link."""
-
 
 LINKAGES = [
     file

@@ -36,21 +36,7 @@ COMMANDS = ('sh', 'console')
 
 
 class Block(NamedTuple):
-    """
-    A fenced block.
-
-    Attributes
-    ----------
-    page, line
-        Its page and line.
-    language
-        The first word of its fence.
-    more
-        The rest of its fence.
-    text
-        Its content.
-
-    """
+    """A fenced block: the first word of its fence is the language, ``more`` the rest."""
 
     page: str
     line: int

@@ -25,8 +25,7 @@ from linkage_ros.drawing import figure as drawing
 from linkage_ros.drawing.figure import picture, view
 from linkage_ros.drawing.painting import degree_step
 from linkage_ros.errors import FileError
-from linkage_ros.files.assemblies import assemblies
-from linkage_ros.files.linkage_file import load
+from linkage_ros.files.linkage_file import assemblies, load
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.resources import linkage_names
 import pytest

@@ -47,7 +47,6 @@ INERTIA = 0.05 + 2.0 * 0.3**2
 LIMITED = PENDULUM.replace('child: crank}\n', 'child: crank, limits: [-2, 1]}\n', 1)
 METHODS = ('rk4', 'gauss_legendre')
 
-
 # What a load does, as (load, start, rate) and the motion q(t).
 WAVE = sqrt(4.0 / INERTIA)
 DECAY = 0.5 * 0.3 / INERTIA
@@ -322,7 +321,6 @@ SQUEEZED = {
     'phi': -0.5347301163226948, 'delta': 0.5244099658805304, 'omega': 0.5347301163226948,
     'epsilon': 1.048080741042263,
 }  # fmt: skip
-
 
 SQUEEZER = """
 rate: 1000

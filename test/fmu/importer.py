@@ -28,19 +28,7 @@ _KINDS = ('Float64', 'Int64', 'Boolean', 'Enumeration')
 
 
 class Bench:
-    """
-    One instance of an FMU.
-
-    Parameters
-    ----------
-    fmu
-        The file.
-    folder
-        Where it is extracted to.
-    logged
-        Takes what the instance logs: status and text.
-
-    """
+    """One instance of an FMU, extracted to a folder; ``logged`` takes status and text."""
 
     def __init__(self, fmu: Path, folder: Path, logged: list[tuple[int, str]]) -> None:
         description = read_model_description(fmu)

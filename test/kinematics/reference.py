@@ -97,17 +97,7 @@ def four_bar(a: Any, b: Any, c: Any, d: Any, phi: Any, side: int, digits: int = 
     """
     Solve crank a, coupler b, rocker c on ground d by intersecting the circles about A and D.
 
-    Parameters
-    ----------
-    a, b, c, d
-        Lengths.
-    phi
-        Direction of the crank, in [rad].
-    side
-        +1: B lies left of A→D, -1: right.
-    digits
-        To work with.
-
+    The crank is at φ in [rad]; B lies left of A→D if the side is +1. It works with so many digits.
     """
     with mp.workdps(digits):
         a, b, c, d, phi = map(mpf, (a, b, c, d, phi))

@@ -15,9 +15,9 @@
 """Forces in pins that were recorded are plotted, and what is zero throughout is not."""
 
 from linkage_ros.messages.joint_values import MessageValues, PlanarWrenchWriter, WRENCHES
+from linkage_ros.report.curves import LATER_PINS, PinForces
 from linkage_ros.report.data import plots, zero_plots
 from linkage_ros.report.html import ReportHeader, run_html
-from linkage_ros.report.pin_forces import LATER_PINS, PinForces
 from linkage_ros.report.run import Window
 from linkage_ros.resources import shipped
 import numpy as np

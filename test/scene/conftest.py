@@ -13,13 +13,28 @@
 # limitations under the License.
 
 
-"""Fixtures of the tests of scenes."""
+"""Files that the tests of scenes start from, and what every error about a file has to be."""
 
+from pathlib import Path
+import re
+
+from linkage_ros.errors import FileError
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest
 
-from .files import FOUR_BAR, SCENE
+CONFIG = Path(__file__).parents[2] / 'config'
+SCENE = b'linkage: linkage.yaml\n'
+FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
+
+
+def is_one_line(error: FileError) -> bool:
+    """Return whether an error is one line: file, line and key where there are; a remedy."""
+    text = str(error)
+    place = f'{error.file}:{error.line}' if error.line else error.file
+    key = ' '.join(error.key.split())
+    rest = text.removeprefix(f'{place}: {key}: ' if key else f'{place}: ')
+    return rest != text and text.isprintable() and re.match(r'\S.*; \S', rest) is not None
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from linkage_ros.errors import FileError
 from linkage_ros.scene.load import load_scene
 import pytest
 
-from .files import CONFIG, FOUR_BAR, is_one_line, SCENE
+from .conftest import CONFIG, FOUR_BAR, is_one_line, SCENE
 
 # An invalid scene: one line with place, reason and remedy.
 #

@@ -32,7 +32,7 @@ from linkage_ros.scene.load import load_scene, parse_scene
 import pytest
 import yaml
 
-from .files import CONFIG, is_one_line
+from .conftest import CONFIG, is_one_line
 
 # The shipped files, damaged at random: each still runs, or is refused in one line.
 

@@ -30,7 +30,7 @@ from linkage_ros.kinematics.linkage import Limits, Linkage, Mass, Pose, Revolute
 import pytest
 import yaml
 
-from .files import CONFIG, FOUR_BAR
+from .conftest import CONFIG, FOUR_BAR
 
 FILES = sorted((CONFIG / 'linkages').glob('*.yaml'))
 

@@ -23,7 +23,7 @@ from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.linkage import Limits, Mass
 import pytest
 
-from .files import CONFIG, is_one_line
+from .conftest import CONFIG, is_one_line
 from ..support.scenes import linkage_of, scene_of, symmetric_five_bar
 
 # The masses of a linkage file: valid ones, and one line for invalid ones.

@@ -19,7 +19,7 @@ from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.notes import scene_notes
 import pytest
 
-from .files import CONFIG
+from .conftest import CONFIG
 
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 SINE = 'drive: {sine: {amplitude: 45, frequency: 1}}\n'

@@ -28,7 +28,7 @@ from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.scene import RecordParameters, StorageParameters
 import pytest
 
-from .files import CONFIG, FOUR_BAR, is_one_line, SCENE
+from .conftest import CONFIG, FOUR_BAR, is_one_line, SCENE
 from ..support.scenes import four_bar_text
 
 # Content of scene and linkage files: the shipped ones, defaults, numbers, shorthands.

@@ -71,7 +71,7 @@ import pytest
 import yaml
 
 from . import test_bad_files as bad
-from .files import CONFIG, SCENE
+from .conftest import CONFIG, SCENE
 from .test_bad_files import WRITTEN_OUT
 
 Validator = pytest.importorskip('jsonschema').Draft202012Validator
@@ -201,7 +201,6 @@ SEEN_BY_THE_READER = {
     'link that does not exist': 'faults: {f: {broken_link: {link: boom}}}',
     'effort of an input that is not published': 'publish_input: false\neffects: {effort: {}}',
 }
-
 
 ALL_BAD_SCENES = of_yaml(bad.SCENES, SCENE) | {
     kind: SCENE + text.encode() for kind, text in (BAD_SCENES | SEEN_BY_THE_READER).items()

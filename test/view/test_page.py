@@ -22,14 +22,14 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import linkage_ros as lr
 from linkage_ros.files.linkage_file import load, read_closure
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.resources import linkage_names, shipped
-from linkage_ros.view.conversation import Conversation
+from linkage_ros.view.conversation import Conversation, UserFile
 from linkage_ros.view.model import model
 from linkage_ros.view.page import page as page_of
-from linkage_ros.view.user_file import UserFile
 import pytest
 
 from .served import Served, served
@@ -423,3 +423,33 @@ def test_two_assemblies_are_seen_and_instant_centres_on_request(
         assert complex(x, y) == pytest.approx(meets, abs=1e-9)
         page.check('#centres')
         assert shown.said == []
+
+
+# The page of a linkage in a notebook: it moves in its cell, and reaches nothing else.
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'slider_crank'])
+def test_a_notebook_shows_the_page_of_a_closure(browser: Any, tmp_path: Path, name: str) -> None:
+    closure = lr.load(name)
+    notebook = tmp_path / 'notebook.html'
+    notebook.write_text(
+        f'<!doctype html><meta charset="utf-8"><body>{closure.view()._repr_html_()}', 'utf-8'
+    )
+    with opened(browser, notebook) as page:
+        cell = page.page.frame_locator('iframe')
+        cell.locator('#inputs input').focus()
+        page.page.keyboard.press('End')
+        (frame,) = page.page.main_frame.child_frames
+        shown = frame.evaluate('() => View.state()')
+        assert page.said == []
+        assert shown['inputs'][0] == pytest.approx(6.283185307179586)
+        joints = closure.position(*shown['inputs']).joints
+        assert shown['joints'] == pytest.approx(joints, abs=1e-12)
+        assert frame.evaluate('() => window.origin') == 'null'
+        assert cell.locator('h1').inner_text() == name
+
+
+def test_a_linkage_without_a_name_has_a_page() -> None:
+    page = lr.Closure(lr.load('four_bar').linkage).view()
+    assert '<h1 id="title">linkage</h1>' in page.text
+    assert '<title>linkage' in page.text

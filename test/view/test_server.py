@@ -40,10 +40,9 @@ import aiohttp
 from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
 from linkage_ros.report.run import Window
-from linkage_ros.view.conversation import Conversation
+from linkage_ros.view.conversation import Conversation, UserFile
 from linkage_ros.view.requests import LARGEST
 from linkage_ros.view.server import MOST_PAGES
-from linkage_ros.view.user_file import UserFile
 from linkage_ros.view.worker import Worker
 import pytest
 

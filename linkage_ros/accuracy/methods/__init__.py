@@ -37,39 +37,19 @@ NOTHING: Motion = ((), (), ())
 
 
 class Method(NamedTuple):
-    """
-    A method with a setting, for one linkage.
+    """A method with a setting, for one linkage."""
 
-    Attributes
-    ----------
-    name
-        Name of the method.
-    setting
-        The setting, as text; '' for none.
-    position
-        Takes the inputs of one state; None if single states are never solved.
-    motion
-        The same with rates and accelerations, at `RATE` and `ACCELERATION` of the inputs.
-    batch
-        Takes an array for each input and the number of derivatives; returns arrays of joints and
-        their derivatives, each of shape (joints, states).
-    memory
-        Memory that it needs, in [bytes]; None if negligible.
-    build
-        Time to build it, in [s]; None if negligible.
-    remembers
-        Whether an answer depends on the previous states.
-    together
-        Whether a position comes with its rates and accelerations, in one call.
-
-    """
-
-    name: str
-    setting: str = ''
+    name: str  # Name of the method
+    setting: str = ''  # The setting, as text; '' for none
+    # Takes the inputs of one state; None if single states are never solved.
     position: Callable[..., Joints] | None = None
+    # The same with rates and accelerations, at `RATE` and `ACCELERATION` of the inputs.
     motion: Callable[..., Motion] | None = None
+    # Takes an array for each input and the number of derivatives; returns arrays of joints and
+    # their derivatives, each of shape (joints, states).
     batch: Callable[[Sequence[Any], int], Sequence[Any]] | None = None
-    memory: int | None = None
-    build: float | None = None
-    remembers: bool = False
+    memory: int | None = None  # Memory that it needs, in [bytes]; None if negligible
+    build: float | None = None  # Time to build it, in [s]; None if negligible
+    remembers: bool = False  # Whether an answer depends on the previous states
+    # Whether a position comes with its rates and accelerations, in one call.
     together: bool = False

@@ -52,15 +52,7 @@ import numpy as np
 
 
 class VelocityEquations:
-    """
-    The constraint equations in the angles and positions of the links, without dyads.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-
-    """
+    """The constraint equations in the angles and positions of the links, without dyads."""
 
     def __init__(self, linkage: Linkage) -> None:
         self._linkage = linkage
@@ -162,17 +154,7 @@ STEPS = (1, 4, 16, 64)
 
 
 def integrations(path: Poses, quick: bool) -> Iterator[Method]:
-    """
-    Yield the integration methods; their positions hold along a path, from its first state.
-
-    Parameters
-    ----------
-    path
-        States that follow each other.
-    quick
-        Whether a few steps are to do.
-
-    """
+    """Yield the integration methods; their positions hold along a path, from its first state."""
     for name in ORDERS:
         for projected in (False, True):
             for steps in STEPS[:2] if quick else STEPS:

@@ -51,33 +51,20 @@ import numpy as np
 
 
 class PlainFourBar(NamedTuple):
-    """
-    A linkage that is a single four-bar with its crank on the ground.
+    """A linkage that is a single four-bar with its crank on the ground."""
 
-    Attributes
-    ----------
-    a, b, c, d
-        Lengths of crank, coupler, rocker and ground, in [m].
-    side
-        1 where the pin of coupler and rocker lies left of what leads from the crank's to the
-        ground's, −1 where right.
-    turn
-        What the input is multiplied by, ±1, to be a crank that turns counter-clockwise.
-    offset
-        What is added then, to be measured from the line of the ground, in [rad].
-    terms
-        For each published joint the numbers of two directions and a constant: the first less the
-        second, and the constant. The directions are those of ground (0), crank, coupler, rocker.
-
-    """
-
+    # Lengths of crank, coupler, rocker and ground, in [m].
     a: float
     b: float
     c: float
     d: float
+    # 1 where the pin of coupler and rocker lies left of what leads from the crank's to the
+    # ground's, −1 where right.
     side: float
-    turn: float
-    offset: float
+    turn: float  # What the input is multiplied by, ±1, to be a crank that turns counter-clockwise
+    offset: float  # What is added then, to be measured from the line of the ground, in [rad]
+    # For each published joint the numbers of two directions and a constant: the first less the
+    # second, and the constant. The directions are those of ground (0), crank, coupler, rocker.
     terms: tuple[tuple[int, int, float], ...]
 
     def joints(self, directions: Sequence[Any]) -> tuple[Any, ...]:

@@ -119,19 +119,7 @@ STARTS = {FROM_KNOTS: None, WARM: True, COLD: False}
 
 
 def newton(linkage: Linkage, tolerance: float, name: str) -> Method:
-    """
-    Return Newton's method from a given start.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    tolerance
-        Upper bound of the last correction, in [rad] or [m].
-    name
-        Start of the iteration, of `STARTS`.
-
-    """
+    """Return Newton's method from one of `STARTS`, to a last correction in [rad] or [m]."""
     closure = NewtonClosure(linkage, tolerance, warm=STARTS[name])
     method = closure_method(closure, name, f'tolerance {tolerance:.0e}')
     # It solves the states of an array one after the other.

@@ -45,17 +45,7 @@ _EMPTY = (0.1, 10.0)
 
 
 class Range(NamedTuple):
-    """
-    The range of an axis.
-
-    Attributes
-    ----------
-    axis
-        The axis.
-    low, high
-        Its ends, in its unit.
-
-    """
+    """The range of an axis; its ends are in its unit."""
 
     axis: Axis
     low: float
@@ -74,46 +64,24 @@ class Range(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """
-    A point with its position in the diagram.
+    """A point with its position in the diagram."""
 
-    Attributes
-    ----------
-    x, y
-        Its position.
-    x_arms, y_arms
-        Distances to the lower and the upper quartile, both positive; 0 without quartiles.
-    on_edge
-        Whether it stands for a value that the axis cannot show.
-    pale
-        Whether it is drawn pale: another point is better on both axes.
-    text
-        Its description, in lines.
-
-    """
-
+    # Its position.
     x: float
     y: float
+    # Distances to the lower and the upper quartile, both positive; 0 without quartiles.
     x_arms: tuple[float, float]
     y_arms: tuple[float, float]
-    on_edge: bool
-    pale: bool
-    text: tuple[str, ...]
+    on_edge: bool  # Whether it stands for a value that the axis cannot show
+    pale: bool  # Whether it is drawn pale: another point is better on both axes
+    text: tuple[str, ...]  # Its description, in lines
 
 
 class PlacedCurve(NamedTuple):
     """
-    A curve with the positions of its points.
+    A curve with the positions of its points; None where the line is broken.
 
-    Attributes
-    ----------
-    curve
-        The curve.
-    points
-        Its points; None where the line is broken.
-    named
-        The point beside which its name stands; None if no point is drawn.
-
+    The name stands beside the point ``named``; None if no point is drawn.
     """
 
     curve: Curve
@@ -132,27 +100,14 @@ class PlacedCurve(NamedTuple):
 
 
 class Places(NamedTuple):
-    """
-    A diagram with the positions of its curves.
+    """A diagram with the positions of its curves."""
 
-    Attributes
-    ----------
-    x, y
-        Ranges of its axes.
-    curves
-        Its curves.
-    front
-        Its best points, in the order of x; empty if more is not worse.
-    on_edge
-        Meaning of the marks on its edges: '0', '∞', '0 or ∞'; '' if there are none.
-
-    """
-
+    # Ranges of its axes.
     x: Range
     y: Range
-    curves: tuple[PlacedCurve, ...]
-    front: tuple[Placed, ...]
-    on_edge: str
+    curves: tuple[PlacedCurve, ...]  # Its curves
+    front: tuple[Placed, ...]  # Its best points, in the order of x; empty if more is not worse
+    on_edge: str  # Meaning of the marks on its edges: '0', '∞', '0 or ∞'; '' if there are none
 
     @property
     def empty(self) -> bool:
@@ -285,15 +240,7 @@ def _all(values: Sequence[tuple[float, Spread | None]]) -> Iterable[float]:
 
 
 class Mark(NamedTuple):
-    """
-    A marker, by its names in both libraries.
-
-    Attributes
-    ----------
-    plotly, matplotlib
-        Its names.
-
-    """
+    """A marker, by its names in both libraries."""
 
     plotly: str
     matplotlib: str
@@ -318,15 +265,7 @@ class Style(NamedTuple):
     """
     Style of a curve. Seven colours and eight markers make 56 different pairs.
 
-    Attributes
-    ----------
-    colour
-        As #rrggbb; black stands for the colour of the text.
-    mark
-        Marker of a point.
-    dash
-        Line style; one of `DASHES`.
-
+    The colour is #rrggbb; black stands for the colour of the text. The dash is one of `DASHES`.
     """
 
     colour: str

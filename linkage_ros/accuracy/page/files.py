@@ -25,12 +25,11 @@ import re
 import shutil
 
 from linkage_ros.accuracy import PARTS
-from linkage_ros.accuracy.answer import replies, reply
 from linkage_ros.accuracy.page.diagrams import Styles, styles_of
 from linkage_ros.accuracy.page.html import field_html, results_html
 from linkage_ros.accuracy.page.numbers import diagram_csv, number_text, table_csv
 from linkage_ros.accuracy.page.svg import diagram_svg
-from linkage_ros.accuracy.results import Diagram, Results
+from linkage_ros.accuracy.results import Diagram, replies, reply, Results
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.pages.markdown import filled, marks, table_lines
 
@@ -44,11 +43,7 @@ def check_folder(folder: Path) -> None:
     """
     Check that a page can be written, before anything is measured for it.
 
-    Raises
-    ------
-    LinkageError
-        If the folder exists, or a plotting library is not installed.
-
+    A LinkageError is raised if the folder exists, or a plotting library is not installed.
     """
     check_installed('matplotlib')
     check_installed('plotly')

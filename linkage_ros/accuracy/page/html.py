@@ -24,7 +24,6 @@ from math import log10
 from textwrap import wrap
 from typing import Any
 
-from linkage_ros.accuracy.answer import replies, Reply
 from linkage_ros.accuracy.page.diagrams import (
     Placed,
     PlacedCurve,
@@ -34,7 +33,7 @@ from linkage_ros.accuracy.page.diagrams import (
     Styles,
 )
 from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
-from linkage_ros.accuracy.results import Diagram, Part, Results, Table
+from linkage_ros.accuracy.results import Diagram, Part, replies, Reply, Results, Table
 from linkage_ros.pages.document import document, facts_html, picture, table_html
 
 _HERE = 'linkage_ros.accuracy.page'
@@ -42,22 +41,9 @@ _HERE = 'linkage_ros.accuracy.page'
 
 def results_html(results: Results, styles: Styles, pictures: Mapping[str, bytes]) -> str:
     """
-    Return the page.
+    Return the page; a LinkageError if plotly is not installed.
 
-    Parameters
-    ----------
-    results
-        The results.
-    styles
-        Style of each method.
-    pictures
-        The diagrams as SVG, by their keys; for print, and for browsers without scripts.
-
-    Raises
-    ------
-    LinkageError
-        If plotly is not installed.
-
+    The pictures are the diagrams as SVG, by key: for print, and for browsers without scripts.
     """
     title = title_of(results)
     diagrams = [diagram for part in results.parts for diagram in part.diagrams]
@@ -90,15 +76,7 @@ def _body(title: str, results: Results, pictures: Mapping[str, bytes]) -> Iterat
 
 
 def field_html(answers: Mapping[str, Sequence[Reply]]) -> str:
-    """
-    Return the field for a wanted accuracy, which field.js fills with its input and answers.
-
-    Parameters
-    ----------
-    answers
-        The answers by scene.
-
-    """
+    """Return the field for a wanted accuracy; field.js fills it with the answers by scene."""
     data = {scene: [each._asdict() for each in some] for scene, some in answers.items()}
     return f'<div class="wanted" data-replies="{escape(json.dumps(data, allow_nan=False))}"></div>'
 

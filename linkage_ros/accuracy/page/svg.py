@@ -112,15 +112,7 @@ _MOST_MARKS = 40
 
 
 def diagram_svg(diagram: Diagram, styles: Styles) -> bytes:
-    """
-    Return the picture of a diagram.
-
-    Raises
-    ------
-    LinkageError
-        If matplotlib is not installed.
-
-    """
+    """Return the picture of a diagram; a LinkageError if matplotlib is not installed."""
     context = settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
 

@@ -39,7 +39,6 @@ function copysign(size, sign) {
 }
 """
 
-
 _FOR_A_PAGE = ('joints', 'rates', 'accelerations', 'frames', 'frameRates')
 """What the function of a page returns beside its status."""
 

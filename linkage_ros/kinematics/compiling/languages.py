@@ -32,7 +32,6 @@ LANGUAGES: dict[str, Callable[[Subject], Language]] = {
 }
 """The languages, by file suffix."""
 
-
 C_NAME = re.compile('[A-Za-z][0-9A-Za-z_]*')
 """An identifier of C, as far as a linkage needs one."""
 

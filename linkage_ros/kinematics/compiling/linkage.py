@@ -42,15 +42,9 @@ _TRIED_ITERATED = 2
 
 class Answer(NamedTuple):
     """
-    The result of a compiled linkage at a state.
+    The result of a compiled linkage at a state; status and gap are those of `Position`.
 
-    Attributes
-    ----------
-    status, gap
-        As in `Position`.
-    values
-        The requested numbers, in groups; a group without a result is empty.
-
+    The requested numbers are in groups; a group without a result is empty.
     """
 
     status: Status
@@ -77,19 +71,6 @@ class Compiled:
     within_limits
         Whether a state with a joint beyond its limits has the status limited.
 
-    Attributes
-    ----------
-    driven
-        Number of inputs.
-    derivatives, wanted
-        As given.
-    paths
-        The paths of the steps where the linkage is closed; several if the steps take different
-        forms in different regions.
-    fast
-        Takes the inputs, their rates and their accelerations, in this order; returns the values,
-        or None if the plain steps must answer.
-
     """
 
     def __init__(
@@ -101,9 +82,11 @@ class Compiled:
     ) -> None:
         self._closure = closure
         self._within_limits = within_limits
-        self.driven = len(closure.linkage.inputs)
+        self.driven = len(closure.linkage.inputs)  # Number of inputs
         self.derivatives = derivatives
         self.wanted = wanted
+        # The paths of the steps where the linkage is closed; several if the steps take different
+        # forms in different regions.
         self.paths: list[Path] = []
         self._functions: list[Callable[..., Values | None]] = []
         self._bodies: dict[str, Body] = {}
@@ -112,6 +95,8 @@ class Compiled:
         if not self.paths and (self.driven > 1 or closure.input_ranges):
             # This starts an additional search, which takes longer.
             self._follow(usual_inputs(closure))
+        # Takes the inputs, their rates and their accelerations, in this order; returns the values,
+        # or None if the plain steps must answer.
         self.fast: Callable[..., Values | None] = _first_of(self._functions)
 
     def _follow(self, inputs: tuple[float, ...]) -> None:

@@ -393,13 +393,6 @@ class BlockFunction:
     condition
         Where the numbers are valid.
 
-    Attributes
-    ----------
-    rows, masks
-        Number of scratch rows of floats, and of truth values.
-    source
-        The source of the function.
-
     """
 
     def __init__(
@@ -410,6 +403,7 @@ class BlockFunction:
         condition: Number = True,
     ) -> None:
         writer = _Writer(arrays, roots, condition)
+        # Number of scratch rows of floats, and of truth values.
         self.rows, self.masks = writer.rows.count, writer.masks.count
         names = [
             (inputs, 'given'),
@@ -419,7 +413,7 @@ class BlockFunction:
         ]
         head = [f'{", ".join(each)}, = {of}' for each, of in names if each]
         lines = '\n'.join(f'    {line}' for line in (*head, *writer.lines))
-        self.source = f'def run(given, out, rows, masks):\n{lines}\n'
+        self.source = f'def run(given, out, rows, masks):\n{lines}\n'  # The source of the function
         functions = (*_FUNCTIONS.values(), np.copyto, np.count_nonzero)
         namespace: dict[str, Any] = {'inf': inf, 'nan': nan}
         namespace |= {function.__name__: function for function in functions}

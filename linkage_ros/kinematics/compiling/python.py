@@ -46,23 +46,11 @@ _ATTRIBUTES = frozenset(('real', 'imag'))
 
 
 class Body(NamedTuple):
-    """
-    A path as lines of Python.
+    """A path as lines of Python."""
 
-    Attributes
-    ----------
-    lines
-        The lines; they use the inputs by their names in the path.
-    outputs
-        The expressions of the outputs, in groups; they follow the lines.
-    bound
-        The names that the lines and expressions use, with their values.
-
-    """
-
-    lines: list[str]
-    outputs: list[list[str]]
-    bound: dict[str, Any]
+    lines: list[str]  # The lines; they use the inputs by their names in the path
+    outputs: list[list[str]]  # The expressions of the outputs, in groups; they follow the lines
+    bound: dict[str, Any]  # The names that the lines and expressions use, with their values
 
 
 def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]:
@@ -81,17 +69,7 @@ def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]
 
 
 def python_body(path: Path, leave: str) -> Body:
-    """
-    Return a path as lines of Python.
-
-    Parameters
-    ----------
-    path
-        The path.
-    leave
-        The statement that leaves the lines if the path is not valid.
-
-    """
+    """Return a path as lines of Python; ``leave`` is the statement if it is not valid."""
     constants: dict[str, Any] = {}
     conditions = [decision.condition for decision in path.decisions]
     outputs = [number for group in path.outputs for number in group]
@@ -162,23 +140,12 @@ def _atom(text: str) -> str:
 
 
 class StraightFunction(NamedTuple):
-    """
-    A function of numbers as straight-line code, without loops, lists and calls.
+    """A function of numbers as straight-line code, without loops, lists and calls."""
 
-    Attributes
-    ----------
-    varying
-        Takes the arguments and returns those results that depend on them.
-    places
-        The indices of these among all results.
-    results
-        All results, with 0 for those that vary.
-
-    """
-
+    # Takes the arguments and returns those results that depend on them.
     varying: Callable[..., tuple[float, ...]]
-    places: tuple[int, ...]
-    results: tuple[float, ...]
+    places: tuple[int, ...]  # The indices of these among all results
+    results: tuple[float, ...]  # All results, with 0 for those that vary
 
 
 def straight(

@@ -36,15 +36,7 @@ _IMPORTS = 'from math import atan2, copysign, cos, inf, isfinite, sin, sqrt'
 
 
 class PythonModule(Language):
-    """
-    Python.
-
-    Parameters
-    ----------
-    derivatives
-        Number of derivatives that the function gives.
-
-    """
+    """Python; the function gives a number of derivatives."""
 
     infinity = 'inf'
     finite = 'isfinite'

@@ -235,7 +235,6 @@ _BY_SQUARES: dict[str, Callable[..., Any]] = {
     'abs': _length_by_squares,
 }
 
-
 # All paths of a linkage's position, as one tree of conditions in real numbers.
 #
 # A leaf gives the status of the linkage, and its numbers if there are any. The tree follows the
@@ -248,40 +247,20 @@ _MOST_SOLVED = 32
 
 
 class Program(NamedTuple):
-    """
-    A linkage as a tree in real numbers.
+    """A linkage as a tree in real numbers."""
 
-    Attributes
-    ----------
-    inputs
-        The values of the driven joints, then their rates and accelerations, if requested.
-    tree
-        The decisions and results for finite inputs.
-
-    """
-
+    # The values of the driven joints, then their rates and accelerations, if requested.
     inputs: tuple[Operation, ...]
-    tree: Tree
+    tree: Tree  # The decisions and results for finite inputs
 
 
 def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
     """
     Return the tree of a linkage, ignoring its limits.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    derivatives
-        0: positions; 1: velocities too; 2: accelerations too.
-    wanted
-        Selects the numbers of the leaves.
-
-    Raises
-    ------
-    DefinitionError
-        If links are solved by iteration, or no closed state is found.
-
+    ``wanted`` selects the numbers of the leaves. Derivatives are 0 for positions, 1 with
+    velocities, 2 with accelerations. A DefinitionError says that links are solved by iteration, or
+    that no closed state is found.
     """
     if iterated(closure):
         raise DefinitionError(

@@ -62,19 +62,10 @@ _LOST = (Status.OPEN, Status.INDETERMINATE)
 
 
 class _Program(NamedTuple):
-    """
-    A path over arrays.
+    """A path over arrays."""
 
-    Attributes
-    ----------
-    values
-        The requested numbers, and where the path is valid.
-    fates
-        Where the path is not valid: which states are open, and which are indeterminate.
-
-    """
-
-    values: BlockFunction
+    values: BlockFunction  # The requested numbers, and where the path is valid
+    # Where the path is not valid: which states are open, and which are indeterminate.
     fates: BlockFunction
 
 
@@ -181,25 +172,12 @@ class Solver:
 
 
 class _Block(NamedTuple):
-    """
-    A block of states.
+    """A block of states."""
 
-    Attributes
-    ----------
-    given
-        The inputs, their rates and their accelerations, each an array or a number.
-    status
-        The code of each state.
-    values
-        The requested numbers, (width, N), of positions and derivatives.
-    rows, masks
-        Scratch.
-
-    """
-
-    given: list[Any]
-    status: Codes
-    values: list[Array]
+    given: list[Any]  # The inputs, their rates and their accelerations, each an array or a number
+    status: Codes  # The code of each state
+    values: list[Array]  # The requested numbers, (width, N), of positions and derivatives
+    # Scratch.
     rows: Array
     masks: Mask
 

@@ -34,29 +34,14 @@ Kind: TypeAlias = Literal['real', 'complex', 'truth', 'other']
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Operation:
-    """
-    A number of the tape.
+    """A number of the tape."""
 
-    Attributes
-    ----------
-    name
-        The operation: the name of an input, ``+``, ``sin``, ``where``, ``call``, and so on.
-    arguments
-        Other operations, and constants.
-    kind
-        Type of the result.
-    number
-        Index on the tape.
-    value
-        Value at the state of the linkage at which the tape is recorded.
-
-    """
-
+    # The operation: the name of an input, ``+``, ``sin``, ``where``, ``call``, and so on.
     name: str
-    arguments: tuple[Any, ...]
-    kind: Kind
-    number: int
-    value: Any
+    arguments: tuple[Any, ...]  # Other operations, and constants
+    kind: Kind  # Type of the result
+    number: int  # Index on the tape
+    value: Any  # Value at the state of the linkage at which the tape is recorded
 
     @property
     def is_input(self) -> bool:
@@ -131,18 +116,11 @@ _REALS = frozenset(_VALUES) - _TRUTHS - _COMPLEX - _OF_EITHER
 
 
 class Tape:
-    """
-    All operations on symbols, and the decisions by them.
-
-    Attributes
-    ----------
-    decisions
-        The decisions in the order in which the steps made them, each condition once.
-
-    """
+    """All operations on symbols, and the decisions by them."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[Any, ...], Operation] = {}
+        # The decisions in the order in which the steps made them, each condition once.
         self.decisions: list[Decision] = []
         self._decided: dict[int, bool] = {}
         self._ahead: Sequence[bool | None] = ()
@@ -196,17 +174,7 @@ class Tape:
 
 
 class Symbol:
-    """
-    A number that is not known yet.
-
-    Parameters
-    ----------
-    tape
-        The tape that records the operations on it.
-    operation
-        The operation that it stands for.
-
-    """
+    """A number that is not known yet: the result of an operation on the tape that records it."""
 
     __slots__ = ('operation', 'tape')
 

@@ -25,7 +25,6 @@ from linkage_ros.kinematics.status import Status
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import Acceleration, LoopClosure, Position, Velocity
 
-
 Number = Operation | float
 """A result of a program: an operation, or a constant."""
 
@@ -43,26 +42,14 @@ Wanted = Callable[[Motion], Sequence[Sequence[float]]]
 
 
 class Path(NamedTuple):
-    """
-    The operations of the steps while their decisions are the same.
+    """The operations of the steps while their decisions are the same."""
 
-    Attributes
-    ----------
-    inputs
-        The values of the driven joints, then their rates and accelerations, if requested.
-    decisions
-        The decisions in order. If one of them differs, the path is not valid.
-    outputs
-        The returned numbers, in groups.
-    tape
-        The tape of the operations.
-
-    """
-
+    # The values of the driven joints, then their rates and accelerations, if requested.
     inputs: tuple[Operation, ...]
+    # The decisions in order. If one of them differs, the path is not valid.
     decisions: tuple[Decision, ...]
-    outputs: tuple[tuple[Number, ...], ...]
-    tape: Tape
+    outputs: tuple[tuple[Number, ...], ...]  # The returned numbers, in groups
+    tape: Tape  # The tape of the operations
 
 
 def joints(motion: Motion) -> Sequence[Sequence[float]]:
@@ -187,15 +174,7 @@ def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
 
     The status is that of the first step that is not closed. If that step has a pose, as at a
     toggle, a later step may have a worse status. None if the steps continue on another path, and
-    only they give the status.
-
-    Parameters
-    ----------
-    closure
-        The linkage.
-    path
-        The path, traced without limits.
-
+    only they give the status. The path is traced without limits.
     """
     tape = path.tape
     inputs: list[Any] = [

@@ -37,30 +37,15 @@ from linkage_ros.kinematics.step import State
 
 
 class PRPPose(NamedTuple):
-    """
-    The dyad at one state of the linkage.
+    """The dyad at one state of the linkage."""
 
-    Attributes
-    ----------
-    status
-        Whether the lines cross.
-    gap
-        Distance of parallel lines, otherwise 0, in the unit of the lengths.
-    first, second
-        s1 and s2, or r1 and r2, in the unit of the lengths.
-    across
-        e^{iδ}.
-    units
-        û1 and û2 of a `PRPDyad`.
-
-    """
-
-    status: Status
-    gap: float
+    status: Status  # Whether the lines cross
+    gap: float  # Distance of parallel lines, otherwise 0, in the unit of the lengths
+    # s1 and s2, or r1 and r2, in the unit of the lengths.
     first: float
     second: float
-    across: complex
-    units: tuple[complex, complex] = (0j, 0j)
+    across: complex  # e^{iδ}
+    units: tuple[complex, complex] = (0j, 0j)  # û1 and û2 of a `PRPDyad`
 
 
 class _CrossingLines:

@@ -41,25 +41,15 @@ _STILL = (0.0, 0.0)
 
 
 class RPPPose(NamedTuple):
-    """
-    The dyad at one state of the linkage.
+    """The dyad at one state of the linkage."""
 
-    Attributes
-    ----------
-    status, gap
-        Closed, 0.
-    first, second
-        s1 and s2, in the unit of the lengths.
-    sight
-        A in the frame of the link that carries the known line.
-
-    """
-
+    # Closed, 0.
     status: Status
     gap: float
+    # s1 and s2, in the unit of the lengths.
     first: float
     second: float
-    sight: PinOnRail
+    sight: PinOnRail  # A in the frame of the link that carries the known line
 
 
 class RPPDyad:

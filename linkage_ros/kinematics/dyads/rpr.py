@@ -53,29 +53,13 @@ from linkage_ros.kinematics.step import State
 
 
 class RPRPose(NamedTuple):
-    """
-    The dyad at one state of the linkage.
+    """The dyad at one state of the linkage."""
 
-    Attributes
-    ----------
-    status
-        Whether it closes.
-    gap
-        Distance by which the rail's line misses D, or 0, in the unit of the lengths.
-    rail
-        ψ, the direction of the rail's line, in [rad].
-    slide
-        r, along the line from the foot of A on it to D, in the unit of the lengths.
-    diagonal
-        From A to D.
-
-    """
-
-    status: Status
-    gap: float
-    rail: float
-    slide: float
-    diagonal: Diagonal
+    status: Status  # Whether it closes
+    gap: float  # Distance by which the rail's line misses D, or 0, in the unit of the lengths
+    rail: float  # ψ, the direction of the rail's line, in [rad]
+    slide: float  # r, along the line from the foot of A on it to D, in the unit of the lengths
+    diagonal: Diagonal  # From A to D
 
 
 class RPRDyad:

@@ -40,32 +40,14 @@ from linkage_ros.kinematics.step import State
 
 
 class RRPPose(NamedTuple):
-    """
-    The dyad at one state of the linkage.
+    """The dyad at one state of the linkage."""
 
-    Attributes
-    ----------
-    status
-        Whether it closes.
-    gap
-        Distance by which the link misses the line, or 0, in the unit of the lengths.
-    link
-        Direction of A→B, in [rad].
-    slide
-        r, in the unit of the lengths.
-    along
-        w, from A to B along the line.
-    sight
-        A in the frame of the rail.
-
-    """
-
-    status: Status
-    gap: float
-    link: float
-    slide: float
-    along: float
-    sight: PinOnRail
+    status: Status  # Whether it closes
+    gap: float  # Distance by which the link misses the line, or 0, in the unit of the lengths
+    link: float  # Direction of A→B, in [rad]
+    slide: float  # r, in the unit of the lengths
+    along: float  # w, from A to B along the line
+    sight: PinOnRail  # A in the frame of the rail
 
 
 class RRPRates(NamedTuple):

@@ -75,32 +75,16 @@ from linkage_ros.kinematics.step import State
 
 
 class RRRPose(NamedTuple):
-    """
-    The dyad at one state of the linkage.
+    """The dyad at one state of the linkage."""
 
-    Attributes
-    ----------
-    status
-        Whether it closes.
-    gap
-        Distance by which the links miss each other, or 0, in the unit of the lengths.
-    first, second
-        θ3 and θ4, directions of A→B and D→B, in [rad].
-    cross
-        K = 2·AB × DB, signed; 0 at a toggle.
-    diagonal
-        From A to D.
-    more, less
-        (b² − c²) ± s².
-
-    """
-
-    status: Status
-    gap: float
+    status: Status  # Whether it closes
+    gap: float  # Distance by which the links miss each other, or 0, in the unit of the lengths
+    # θ3 and θ4, directions of A→B and D→B, in [rad].
     first: float
     second: float
-    cross: float
-    diagonal: Diagonal
+    cross: float  # K = 2·AB × DB, signed; 0 at a toggle
+    diagonal: Diagonal  # From A to D
+    # (b² − c²) ± s².
     more: float
     less: float
 
@@ -229,27 +213,14 @@ def triangle_accelerations(
 
 
 class FoldingRRRRates(NamedTuple):
-    """
-    The rates, and the terms that the accelerations start from.
+    """The rates, and the terms that the accelerations start from."""
 
-    Attributes
-    ----------
-    swing
-        φ̇.
-    first, second
-        ω3 and ω4 for φ̇ = 1, relative to OD.
-    side
-        σ, with the opposite sign if far is below 0.
-    constant
-        k.
-
-    """
-
-    swing: float
+    swing: float  # φ̇
+    # ω3 and ω4 for φ̇ = 1, relative to OD.
     first: float
     second: float
-    side: float
-    constant: float
+    side: float  # σ, with the opposite sign if far is below 0
+    constant: float  # k
 
 
 class FoldingRRRDyad(RRRDyad):

@@ -227,24 +227,14 @@ class FunctionTask:
 
 
 class FunctionError(NamedTuple):
-    """
-    An error of the rocker, read on the scale of the function.
+    """An error of the rocker, read on the scale of the function."""
 
-    Attributes
-    ----------
-    x, y
-        Where the error occurs, and the value of the function there.
-    error
-        The shown value minus y.
-    percent
-        The same, in percent of the change of y over the range; above 0 in the direction of that
-        change.
-
-    """
-
+    # Where the error occurs, and the value of the function there.
     x: float
     y: float
-    error: float
+    error: float  # The shown value minus y
+    # The same, in percent of the change of y over the range; above 0 in the direction of that
+    # change.
     percent: float
 
 
@@ -256,11 +246,7 @@ def chebyshev(low: float, high: float, count: int) -> Array:
     degree n that deviates least from 0 over the range; computed by half angles, which do not
     cancel near ``low``.
 
-    Raises
-    ------
-    SynthesisError
-        If there are too many points.
-
+    A SynthesisError is raised if there are too many points.
     """
     if count > _MOST:
         raise SynthesisError('points', f'{count} of them', f'{_MOST} do')
@@ -275,11 +261,7 @@ def pairs(task: FunctionTask, xs: ArrayLike) -> tuple[list[float], list[float]]:
     """
     Return the angles of crank and rocker at precision points, in [rad].
 
-    Raises
-    ------
-    SynthesisError
-        If a point lies outside of the range, or is repeated.
-
+    A SynthesisError is raised if a point lies outside of the range, or is repeated.
     """
     points = [float(x) for x in np.asarray(xs, np.float64).ravel()]
     low, high = sorted(task.x_range)
@@ -306,19 +288,7 @@ def wanted_rocker(task: FunctionTask, crank: ArrayLike) -> Array:
 
 
 def on_scale(task: FunctionTask, crank: float, error: float) -> FunctionError:
-    """
-    Return an error of the rocker on the scale of the function.
-
-    Parameters
-    ----------
-    task
-        The function.
-    crank
-        Angle of the crank, in [rad].
-    error
-        The rocker's angle minus the wanted one, in [rad].
-
-    """
+    """Return an error of the rocker's angle, at a crank angle, as one of the function."""
     x = float(_x(task, np.array(crank)))
     (start, end), (first, last) = task.y_range, task.rocker_range
     part = error / (last - first)
@@ -434,33 +404,16 @@ _SAME = 1e-9
 
 
 class StructuralError(NamedTuple):
-    """
-    The error over a range of the crank.
+    """The error over a range of the crank."""
 
-    Attributes
-    ----------
-    crank
-        Angles of the crank from one end of the range to the other, in [rad]; (n,).
-    error
-        The rocker's angle minus the wanted one there, in (−π, π] rad, NaN if the loop is open;
-        (n,).
-    greatest
-        The error that is farthest from 0, in [rad]; NaN if the loop closes nowhere.
-    at
-        Angle of the crank at that error, in [rad].
-    rms
-        Root of the mean square where the loop closes, in [rad].
-    opens_at
-        Angle of the crank, on its way through the range, at which the loop opens, in [rad]; None
-        if it closes all the way.
-
-    """
-
-    crank: Array
+    crank: Array  # Angles of the crank from one end of the range to the other, in [rad]; (n,)
+    # The rocker's angle minus the wanted one there, in (−π, π] rad, NaN if the loop is open; (n,).
     error: Array
-    greatest: float
-    at: float
-    rms: float
+    greatest: float  # The error that is farthest from 0, in [rad]; NaN if the loop closes nowhere
+    at: float  # Angle of the crank at that error, in [rad]
+    rms: float  # Root of the mean square where the loop closes, in [rad]
+    # Angle of the crank, on its way through the range, at which the loop opens, in [rad]; None if
+    # it closes all the way.
     opens_at: float | None
 
 

@@ -89,48 +89,25 @@ _VAGUE = 0.1
 
 
 class Differences(NamedTuple):
-    """
-    The equations of the other pairs minus the first, as rows of length 1.
+    """The equations of the other pairs minus the first, as rows of length 1."""
 
-    Attributes
-    ----------
-    theta, phi
-        All angles; (n,).
-    p, q, r
-        As above, complex, divided by the size; (n − 1,).
-    size
-        Root of abs(p)² + abs(q)² + abs(r)²; (n − 1,).
-    noise
-        Effect of rounding the angles on each row; (n − 1,).
-
-    """
-
+    # All angles; (n,).
     theta: Array
     phi: Array
+    # As above, complex, divided by the size; (n − 1,).
     p: NDArray[np.complex128]
     q: NDArray[np.complex128]
     r: NDArray[np.complex128]
-    size: Array
-    noise: Array
+    size: Array  # Root of abs(p)² + abs(q)² + abs(r)²; (n − 1,)
+    noise: Array  # Effect of rounding the angles on each row; (n − 1,)
 
 
 class Solution(NamedTuple):
-    """
-    A four-bar on a ground of length 1.
+    """A four-bar on a ground of length 1."""
 
-    Attributes
-    ----------
-    lengths
-        Lengths of crank, coupler and rocker, the first and the last signed; (3,).
-    zeros
-        α and β, in [−π/2, π/2]; (2,).
-    condition, sensitivity
-        As in `free_zeros.FreeZeros`.
-
-    """
-
-    lengths: Array
-    zeros: Array
+    lengths: Array  # Lengths of crank, coupler and rocker, the first and the last signed; (3,)
+    zeros: Array  # α and β, in [−π/2, π/2]; (2,)
+    # As in `free_zeros.FreeZeros`.
     condition: float
     sensitivity: Array
 
@@ -318,25 +295,12 @@ _NEARLY_REAL = 1e-3
 
 
 class Count(NamedTuple):
-    """
-    The number of solutions of the equations; a double one counts once.
+    """The number of solutions of the equations; a double one counts once."""
 
-    Attributes
-    ----------
-    real
-        Real four-bars.
-    imaginary
-        Solutions whose zeros are not real angles.
-    infinite
-        Solutions with a crank or rocker of infinite length, or of no length.
-    vague
-        Solutions with uncertain links: rounding the angles alone changes one by a tenth or more.
-
-    """
-
-    real: int
-    imaginary: int
-    infinite: int
+    real: int  # Real four-bars
+    imaginary: int  # Solutions whose zeros are not real angles
+    infinite: int  # Solutions with a crank or rocker of infinite length, or of no length
+    # Solutions with uncertain links: rounding the angles alone changes one by a tenth or more.
     vague: int
 
     def __str__(self) -> str:
@@ -348,42 +312,27 @@ class Count(NamedTuple):
 
 
 class FreeZeros(NamedTuple):
-    """
-    A solution with free zeros.
+    """A solution with free zeros."""
 
-    Attributes
-    ----------
-    design
-        The four-bar; the places of its pins in the frames of crank and rocker make the angles
-        those of the pairs.
-    moved
-        The link whose zero was free.
-    lengths
-        Lengths of crank, coupler and rocker, in [m]; crank and rocker are negative if the link
-        points the other way.
-    alpha, beta
-        Zeros of crank and rocker, in [rad], in [−π/2, π/2]: the angle of the pin minus that of the
-        link; 0 if it was not free.
-    condition
-        Condition number of the differences' derivatives by k1, k2 and the free zeros, by the
-        2-norm, with rows and columns scaled to length 1. It does not include the nearness of the
-        angles; the sensitivity does.
-    sensitivity
-        Σ|x ∂L/∂x| + ``abs(L)`` of crank, coupler, rocker, α and β over all angles x. Times 2⁻⁵³ it
-        bounds the error that rounding the angles alone causes; errors are within twice that.
-    among
-        The number of all solutions of the pairs, including this one.
-
-    """
-
+    # The four-bar; the places of its pins in the frames of crank and rocker make the angles those
+    # of the pairs.
     design: Design
-    moved: Moved
+    moved: Moved  # The link whose zero was free
+    # Lengths of crank, coupler and rocker, in [m]; crank and rocker are negative if the link
+    # points the other way.
     lengths: tuple[float, float, float]
+    # Zeros of crank and rocker, in [rad], in [−π/2, π/2]: the angle of the pin minus that of the
+    # link; 0 if it was not free.
     alpha: float
     beta: float
+    # Condition number of the differences' derivatives by k1, k2 and the free zeros, by the 2-norm,
+    # with rows and columns scaled to length 1. It does not include the nearness of the angles; the
+    # sensitivity does.
     condition: float
+    # Σ|x ∂L/∂x| + ``abs(L)`` of crank, coupler, rocker, α and β over all angles x. Times 2⁻⁵³ it
+    # bounds the error that rounding the angles alone causes; errors are within twice that.
     sensitivity: tuple[float, ...]
-    among: Count
+    among: Count  # The number of all solutions of the pairs, including this one
 
     @property
     def digits(self) -> tuple[float, float, float]:
@@ -403,19 +352,8 @@ def four_pairs(
     Return all four-bars for four pairs, with the zero of the rocker free, then the crank's.
 
     Of each the best conditioned comes first. A four-bar with both zeros at 0 is listed once.
-
-    Parameters
-    ----------
-    crank, rocker
-        Four angles each, in [rad].
-    ground
-        Length of the ground, in [m].
-
-    Raises
-    ------
-    SynthesisError
-        If none is real with finite links, or infinitely many exist.
-
+    Angles are in [rad], the ground in [m]. A SynthesisError says that none is real with finite
+    links, or that infinitely many exist.
     """
     check_pairs(crank, rocker, ground)
     rows = differences(crank, rocker)
@@ -457,20 +395,7 @@ def five_pairs(
     """
     Return all four-bars for five pairs with the zeros of crank and rocker free.
 
-    The best conditioned comes first.
-
-    Parameters
-    ----------
-    crank, rocker
-        Five angles each, in [rad].
-    ground
-        Length of the ground, in [m].
-
-    Raises
-    ------
-    SynthesisError
-        If none is real with finite links, or infinitely many exist.
-
+    The best conditioned comes first. Units and errors are those of `four_pairs`.
     """
     check_pairs(crank, rocker, ground)
     rows = differences(crank, rocker)

@@ -69,39 +69,21 @@ from numpy.typing import ArrayLike
 
 
 class System(NamedTuple):
-    """
-    Freudenstein's equation for three pairs, and its solution for a ground of length 1.
+    """Freudenstein's equation for three pairs, and its solution for a ground of length 1."""
 
-    Attributes
-    ----------
-    theta, phi
-        Angles of crank and rocker, in [rad]; (3, n).
-    P, Q, R
-        cos φ, cos θ and cos(θ − φ) of the second and third pair minus those of the first, divided
-        by −2; (2, n).
-    last
-        P and Q of the third pair minus those of the second; (2, n).
-    determinant
-        P0·Q1 − P1·Q0; (n,).
-    k
-        k1, k2 and k3; (3, n).
-    lengths
-        Lengths of crank, coupler and rocker, the first and the last signed; (3, n).
-    coupler
-        Vector of the coupler in the first pair, x and y; (2, n).
-
-    """
-
+    # Angles of crank and rocker, in [rad]; (3, n).
     theta: Array
     phi: Array
+    # cos φ, cos θ and cos(θ − φ) of the second and third pair minus those of the first, divided by
+    # −2; (2, n).
     P: Array
     Q: Array
     R: Array
-    last: Array
-    determinant: Array
-    k: Array
-    lengths: Array
-    coupler: Array
+    last: Array  # P and Q of the third pair minus those of the second; (2, n)
+    determinant: Array  # P0·Q1 − P1·Q0; (n,)
+    k: Array  # k1, k2 and k3; (3, n)
+    lengths: Array  # Lengths of crank, coupler and rocker, the first and the last signed; (3, n)
+    coupler: Array  # Vector of the coupler in the first pair, x and y; (2, n)
 
 
 def solved(theta: Array, phi: Array) -> System:
@@ -377,50 +359,30 @@ _BLOCK = 2048
 
 
 class Links(NamedTuple):
-    """
-    The links of a four-bar with a ground of length 1; any number of them at once.
+    """The links of a four-bar with a ground of length 1; any number of them at once."""
 
-    Attributes
-    ----------
-    k
-        Freudenstein's k1, k2, k3; (…, 3).
-    lengths
-        Lengths of crank, coupler and rocker; (…, 3). Crank and rocker are negative if the link
-        points the other way. Infinite or NaN if there is no such link.
-
-    """
-
-    k: Array
+    k: Array  # Freudenstein's k1, k2, k3; (…, 3)
+    # Lengths of crank, coupler and rocker; (…, 3). Crank and rocker are negative if the link
+    # points the other way. Infinite or NaN if there is no such link.
     lengths: Array
 
 
 class ThreePairs(NamedTuple):
-    """
-    The solution of three pairs, and its accuracy; any number of them at once.
+    """The solution of three pairs, and its accuracy; any number of them at once."""
 
-    Attributes
-    ----------
-    k, lengths
-        As in `Links`.
-    condition
-        Condition number of the matrix of rows (cos φ, cos θ, 1), by the 2-norm; (…).
-    doubt
-        Σ|x ∂y/∂x| over the six angles x; (…, 2). Of the logarithm y of the system's determinant,
-        and of the coupler's angle y in the first pair, in [rad].
-    sensitivity
-        Σ|x ∂L/∂x| + ``abs(L)`` of each length L over the six angles x; (…, 3). Times 2⁻⁵³ it
-        bounds the error of a length that rounding the angles alone causes.
-    gradient
-        ∂L/∂x of each length by the three crank angles, then by the three rocker angles, per
-        [rad]; (…, 3, 6).
-
-    """
-
+    # As in `Links`.
     k: Array
     lengths: Array
+    # Condition number of the matrix of rows (cos φ, cos θ, 1), by the 2-norm; (…).
     condition: Array
+    # Σ|x ∂y/∂x| over the six angles x; (…, 2). Of the logarithm y of the system's determinant, and
+    # of the coupler's angle y in the first pair, in [rad].
     doubt: Array
+    # Σ|x ∂L/∂x| + ``abs(L)`` of each length L over the six angles x; (…, 3). Times 2⁻⁵³ it bounds
+    # the error of a length that rounding the angles alone causes.
     sensitivity: Array
+    # ∂L/∂x of each length by the three crank angles, then by the three rocker angles, per [rad];
+    # (…, 3, 6).
     gradient: Array
 
     @property
@@ -446,15 +408,9 @@ class ThreePairs(NamedTuple):
 
 def links(crank: ArrayLike, rocker: ArrayLike) -> Links:
     """
-    Solve for three pairs, or for many triples at once.
+    Solve for three pairs of angles θ and φ in [rad], or for many triples at once, (…, 3).
 
     No error is raised: a link that does not exist is infinite or NaN.
-
-    Parameters
-    ----------
-    crank, rocker
-        Angles θ and φ, in [rad]; (…, 3).
-
     """
     theta, phi = _columns(crank), _columns(rocker)
     k, lengths = np.empty((2, *theta.shape))
@@ -466,17 +422,7 @@ def links(crank: ArrayLike, rocker: ArrayLike) -> Links:
 
 
 def three_pairs(crank: ArrayLike, rocker: ArrayLike) -> ThreePairs:
-    """
-    Solve for three pairs, or for many triples at once, with the accuracy of the result.
-
-    No error is raised: a link that does not exist is infinite or NaN.
-
-    Parameters
-    ----------
-    crank, rocker
-        Angles θ and φ, in [rad]; (…, 3).
-
-    """
+    """Solve as `links`, with the accuracy of the result."""
     theta, phi = _columns(crank), _columns(rocker)
     count = theta.shape[1]
     k, lengths, kappa = np.empty((3, 3, count))

@@ -54,17 +54,7 @@ _ROUNDS = 24
 
 @dataclass(frozen=True, slots=True)
 class ZeroProblem:
-    """
-    The candidates of `study.search`: zeros of crank and rocker, (α, β), in [rad].
-
-    Attributes
-    ----------
-    crank, rocker
-        Three angles each, in [rad].
-    needs
-        The requirements on the design.
-
-    """
+    """The candidates of `study.search`: zeros (α, β) of three angle pairs, all in [rad]."""
 
     crank: tuple[float, ...]
     rocker: tuple[float, ...]

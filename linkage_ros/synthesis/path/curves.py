@@ -151,23 +151,11 @@ def _size(points: tuple[complex, ...]) -> float:
 
 
 class Fitted(NamedTuple):
-    """
-    Four-bars, and their crank angles at the points.
+    """Four-bars, and their crank angles at the points."""
 
-    Attributes
-    ----------
-    rows
-        Dimensions by `COLUMNS`, (n, 9).
-    angles
-        Crank angles from the ground line at the points, (n, N).
-    side
-        1 for left and −1 for right, (n,).
-
-    """
-
-    rows: Array
-    angles: Array
-    side: Array
+    rows: Array  # Dimensions by `COLUMNS`, (n, 9)
+    angles: Array  # Crank angles from the ground line at the points, (n, N)
+    side: Array  # 1 for left and −1 for right, (n,)
 
     def some(self, chosen: NDArray[np.intp]) -> Fitted:
         """Return the four-bars with these indices."""
@@ -176,29 +164,14 @@ class Fitted(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """
-    The target of a fit.
+    """The target of a fit."""
 
-    Attributes
-    ----------
-    points
-        (N,), of a path around the origin whose size is 1.
-    timing
-        Crank angles at the points, (N,); None if they are free.
-    zero_free
-        Whether the zero of the timing is free, so that only differences count.
-    full_turn
-        Whether the loop must close at every crank angle.
-    shortest, longest
-        Bounds of the links; the traced point may be at most ``longest`` from the crank's pin,
-        along x and along y.
-
-    """
-
-    points: Complex
-    timing: Array | None
-    zero_free: bool
-    full_turn: bool
+    points: Complex  # (N,), of a path around the origin whose size is 1
+    timing: Array | None  # Crank angles at the points, (N,); None if they are free
+    zero_free: bool  # Whether the zero of the timing is free, so that only differences count
+    full_turn: bool  # Whether the loop must close at every crank angle
+    # Bounds of the links; the traced point may be at most ``longest`` from the crank's pin, along
+    # x and along y.
     shortest: float
     longest: float
 
@@ -216,17 +189,9 @@ _SPARE = 1e-9
 
 class Slopes(NamedTuple):
     """
-    Places of the traced point, and their derivatives.
+    Places of the traced point, (n, N), and their derivatives.
 
-    Attributes
-    ----------
-    places
-        (n, N).
-    by_dimension
-        (n, N, 9), in the order of `COLUMNS`.
-    by_angle
-        (n, N), by the crank angle θ.
-
+    By dimension, in the order of `COLUMNS`, they are (n, N, 9); by the crank angle θ (n, N).
     """
 
     places: Complex
@@ -332,13 +297,7 @@ def diagonals(a: Array, d: Array, low: Array, high: Array) -> tuple[Array, Array
     """
     Return the shortest and the longest diagonal from the crank's pin to the rocker's pivot.
 
-    Parameters
-    ----------
-    a, d
-        Lengths of crank and ground.
-    low, high
-        First and last crank angle, from the ground line, in [rad].
-
+    Crank angles are from the ground line, in [rad].
     """
     first, last = np.cos(low), np.cos(high)
     nearest = np.where(_holds(low, high, 0.0), 1.0, np.maximum(first, last))
@@ -383,13 +342,7 @@ def theta_at(way: Array, wanted: Array) -> Array:
     """
     Return the places at relative distances along curves, as a fraction of their steps.
 
-    Parameters
-    ----------
-    way
-        From `along`, (n, M).
-    wanted
-        Relative distances from 0 to 1, (N,), or (n, N).
-
+    The ways are from `along`, (n, M), the distances from 0 to 1, (N,) or (n, N).
     """
     before, part = _segment(way, wanted)
     part += before

@@ -103,25 +103,12 @@ def step(now: Fitted, seen: Slopes, damping: Array, aim: Aim, guard: float) -> F
 
 
 class _Equations(NamedTuple):
-    """
-    The equations of a step: derivatives times step = gaps, by least squares.
+    """The equations of a step: derivatives times step = gaps, by least squares."""
 
-    Attributes
-    ----------
-    by
-        Derivatives by the unknowns common to all points, (n, parts, N, m).
-    turns
-        Derivatives by the crank angle of the point, (n, parts, N).
-    gaps
-        Right sides, (n, parts, N).
-    more, aside
-        Derivatives of equations without a point, (n, k, m), and their gaps, (n, k).
-
-    """
-
-    by: Array
-    turns: Array
-    gaps: Array
+    by: Array  # Derivatives by the unknowns common to all points, (n, parts, N, m)
+    turns: Array  # Derivatives by the crank angle of the point, (n, parts, N)
+    gaps: Array  # Right sides, (n, parts, N)
+    # Derivatives of equations without a point, (n, k, m), and their gaps, (n, k).
     more: Array
     aside: Array
 
@@ -337,20 +324,12 @@ _EXACT = 1e-9
 
 
 class PathResult(NamedTuple):
-    """
-    A linkage that passes near the points.
+    """A linkage that passes near the points."""
 
-    Attributes
-    ----------
-    design
-        The design, with the crank angle at each point; without timing the crank's x axis is along
-        the link.
-    rms, greatest
-        Root mean square and largest of the distances from the points, in [m].
-
-    """
-
+    # The design, with the crank angle at each point; without timing the crank's x axis is along
+    # the link.
     design: Design
+    # Root mean square and largest of the distances from the points, in [m].
     rms: float
     greatest: float
 
