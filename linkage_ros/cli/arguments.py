@@ -92,8 +92,9 @@ def add_set(parser: argparse.ArgumentParser) -> None:
         action='append',
         default=[],
         metavar='KEY=VALUE',
-        help='set a key of the scene, as --set rate=500 or --set drive.sine.amplitude=0.3; '
-        'VALUE is YAML; may be repeated',
+        help='set a key of the scene, as --set rate=500 or --set drive.sine.amplitude=0.3, or '
+        'of one of its linkages, as --set linkages.left.accuracy=1e-6; VALUE is YAML; may be '
+        'repeated',
     )
 
 

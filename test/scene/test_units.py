@@ -19,6 +19,7 @@ from math import pi
 
 from hypothesis import given
 from hypothesis import strategies as st
+from linkage_ros.cli.main import main
 from linkage_ros.drives.clocked import LARGEST
 from linkage_ros.errors import FileError
 from linkage_ros.files.linkage_file import load
@@ -288,6 +289,54 @@ def test_an_error_in_a_scene_is_told_in_its_units(write, kind):
     with pytest.raises(FileError) as caught:
         Pipeline(load_scene(write(f'linkage: linkage.yaml\nangles: degrees\n{text}')))
     assert str(caught.value).endswith(f'/{line}')
+
+
+def test_what_is_set_has_the_units_of_the_scene(write):
+    write(IN_SI, 'linkage.yaml')
+    settings = ['drive.sine.amplitude=30', 'effects.tolerance.given={crank.A: [0.2, 0]}']
+    (member,) = load_scene(write(SCENE), settings).members
+    assert member.drive[1].amplitude == 0.5235987755982989
+    assert member.effects['tolerance'].given == {'crank.A': (0.0002, 0.0)}
+    in_metres = [*settings, 'units=m', 'loads.gravity=[0, -9.81]']
+    (metres,) = load_scene(write(SCENE), in_metres).members
+    assert metres.drive[1].amplitude == 0.5235987755982989
+    assert metres.effects['tolerance'].given == {'crank.A': (0.2, 0.0)}
+
+
+def test_an_error_in_what_is_set_is_told_in_the_units_of_the_scene(write):
+    write(IN_SI, 'linkage.yaml')
+    with pytest.raises(FileError) as caught:
+        load_scene(write(SCENE), ['loads.gravity=[0, -1.0e+9]'])
+    assert str(caught.value) == (
+        '--set loads.gravity=[0, -1.0e+9]: loads.gravity: [0, -1000000000.0] is out of bounds; '
+        'write numbers of at most 1e+06 [mm/s²]'
+    )
+
+
+def test_a_linkage_in_units_comes_back_from_its_urdf_in_si(write, tmp_path):
+    tree = IN_MM.replace('joints: {', 'joints: {coupler_joint: {parent: crank, child: coupler}, ')
+    linkage, urdf, back = write(tree), tmp_path / 'x.urdf', tmp_path / 'back.yaml'
+    assert main(['urdf', str(linkage), '-o', str(urdf)]) == 0
+    assert main(['import', str(urdf), '-o', str(back)]) == 0
+    assert 'units' not in back.read_text()
+    there, here = load(linkage).linkage, load(back).linkage
+    assert here.inputs[0].limits == there.inputs[0].limits
+    assert here.joints['rocker_joint'].limits.velocity == pi
+    closures = load(linkage), load(back)
+    one, other = (closure.position(0.5) for closure in closures)
+    assert other.joints == pytest.approx(one.joints, abs=1e-12)
+    assert other.gap == one.gap == 0.0
+
+
+def test_a_design_in_millimetres_needs_one_line_more(write, tmp_path):
+    pairs = ['--pair', '50', '100', '--pair', '80', '110', '--pair', '110', '125']
+    files = {ground: tmp_path / f'{ground}.yaml' for ground in ('0.1', '100')}
+    for ground, file in files.items():
+        assert main(['synthesize', *pairs, '--ground', ground, '-o', str(file)]) == 0
+    in_mm = write('units: mm\n' + files['100'].read_text(), 'in_mm.yaml')
+    one, other = (load(file).position(1.0) for file in (files['0.1'], in_mm))
+    assert other.joints == pytest.approx(one.joints, abs=1e-12)
+    assert abs(other.points['B'] - one.points['B']) < 1e-12
 
 
 IN_MM_AND_DEGREES = {
