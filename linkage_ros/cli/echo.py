@@ -73,7 +73,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='the topic; without it, /joint_states',
     )
     parser.add_argument(
-        '--count', type=bounded(1, 10**9, int), default=inf, help='end after so many messages'
+        '--count',
+        type=bounded(1, 10**9, int),
+        default=inf,
+        metavar='N',
+        help='end after so many messages',
     )
     parser.add_argument(
         '--seconds', type=bounded(1e-9, 1e9), default=inf, help='how long; without it, to Ctrl-C'

@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--seconds',
         type=bounded(0.0, 1e9),
         default=10.0,
-        help='duration of a run, in the time of the scene (default 10)',
+        help='duration of a run, in the time of the scene (default: 10)',
     )
     parser.add_argument(
         '-o',
@@ -82,7 +82,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_set(parser)
     study = parser.add_argument_group('a study')
     study.add_argument(
-        '--seeds', type=bounded(1, 1e12, int), default=1, help='number of seeds, each in a run'
+        '--seeds',
+        type=bounded(1, 1e12, int),
+        default=1,
+        metavar='N',
+        help='number of seeds, each in a run',
     )
     study.add_argument(
         '--sweep',
@@ -92,9 +96,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='run with each value of a key of the scene: KEY=LOW:HIGH:N or KEY=a,b,c; of several '
         'all combinations',
     )
-    study.add_argument('--picture', type=Path, help='the picture, beside a table')
     study.add_argument(
-        '--workers', type=bounded(1, 1024, int), help='processes (default: one a processor)'
+        '--picture', type=Path, metavar='OUTPUT', help='the picture, beside a table'
+    )
+    study.add_argument(
+        '--workers',
+        type=bounded(1, 1024, int),
+        metavar='N',
+        help='processes (default: one a processor)',
     )
     study.add_argument('--dask', metavar='ADDRESS', default='', help='scheduler whose workers run')
 

@@ -161,7 +161,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     written = parser.add_argument_group('what is written')
     add_output(written, LINKAGES, 'no linkage file is written')
     written.add_argument(
-        '--pick', type=int, default=1, metavar='N', help='the solution to write (here the first)'
+        '--pick', type=int, default=1, metavar='N', help='the solution to write (default: 1)'
     )
     written.add_argument(
         '--draw',
@@ -186,7 +186,7 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         '--pairs', type=Path, metavar='CSV', help='the same as a CSV of two columns'
     )
     pairs.add_argument(
-        '--ground', type=float, default=1.0, metavar='M', help='length of the ground (here 1)'
+        '--ground', type=float, default=1.0, metavar='M', help='length of the ground (default: 1)'
     )
     function = parser.add_argument_group('a function')
     function.add_argument('--function', metavar='FORMULA', help='of x, such as "log10(x)"')
@@ -204,7 +204,7 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         type=bounded(0, 2**53 - 1, int),
         default=3,
         metavar='N',
-        help='points, by Chebyshev (here 3)',
+        help='points, by Chebyshev (default: 3)',
     )
     function.add_argument(
         '--at', nargs='+', type=float, metavar='X', help='points of your own, instead'
@@ -256,19 +256,23 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
         'best are searched for, with four and five all are listed, with more they are fitted',
     )
     freedoms.add_argument(
-        '--seed', type=bounded(0, 2**53 - 1, int), default=0, help='of the search (here 0)'
+        '--seed',
+        type=bounded(0, 2**53 - 1, int),
+        default=0,
+        metavar='N',
+        help='of the search (default: 0)',
     )
     freedoms.add_argument(
         '--candidates',
         type=bounded(1, 2**53 - 1, int),
         default=CANDIDATES,
         metavar='N',
-        help=f'how many are tried in a search (here {CANDIDATES})',
+        help=f'how many are tried in a search (default: {CANDIDATES})',
     )
     freedoms.add_argument(
         '--best',
         type=bounded(1, 2**53 - 1, int),
-        metavar='K',
+        metavar='N',
         help=f'how many are listed (of a search {_LISTED}, else all)',
     )
     freedoms.add_argument(

@@ -21,6 +21,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from math import tau
 from pathlib import Path
+import re
 import shlex
 import subprocess
 import sys
@@ -178,6 +179,18 @@ def test_arguments_have_the_same_name_in_all_commands() -> None:
     assert {
         str(action.metavar) for _, action in options() if not action.option_strings
     } == METAVARS
+
+
+def test_numbers_of_things_and_defaults_are_told_in_one_way() -> None:
+    typed = [(c, o) for c, o in options() if o.option_strings and o.nargs != 0 and not o.choices]
+    several = {'output', 'rate', 'at', 'input'}  # of kinds of their own in some commands
+    for command, action in typed:
+        where = command, action.dest
+        assert not re.search(r'\((here|default) ', action.help or ''), where
+        if getattr(action.type, '__name__', '') in {'whole number', 'int'}:
+            assert action.metavar == 'N', where
+        names = {str(o.metavar or o.dest.upper()) for _, o in typed if o.dest == action.dest}
+        assert len(names) == 1 or action.dest in several, (*where, names)
 
 
 def test_every_output_file_refuses_a_suffix_that_it_cannot_write(tmp_path: Path) -> None:
