@@ -117,7 +117,7 @@ def _draw(page: str) -> Iterator[tuple[Path, int]]:
             figure = draw[name](yaml.safe_load(section.scene))
             paper.save(figure, section.scene, file)
             yield file, LARGEST
-            yield paper.save_small(file, PICTURES / 'thumbnails' / file.name), LARGEST_SMALL
+            yield paper.save_small(figure, PICTURES / 'thumbnails' / file.name), LARGEST_SMALL
 
 
 def sections(page: str) -> list[Section]:

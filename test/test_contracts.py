@@ -189,7 +189,7 @@ REFUSED_EFFECTS = {
     'measuring_range': [
         ('{}', 'joints'),
         ('{joints: {rocker: {low: 0}}}', "there is no joint 'rocker'"),
-        ('{joints: {rocker_joint: {low: 2, high: 1}}}', 'low 2 is not below high 1'),
+        ('{joints: {rocker_joint: {low: 2, high: 1}}}', 'low 2 rad is not below high 1 rad'),
         ('{joints: {rocker_joint: {rate: -1}}}', 'at least 0'),
     ],
     'encoder': [

@@ -23,10 +23,11 @@ from linkage_ros.effects.markers import MESSAGE
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch
+from matplotlib.patheffects import Normal, Stroke
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
-from .paper import empty_sheet
+from .paper import empty_sheet, GREEN, PURPLE
 from .runs import extra_messages, Scene, Values
 
 _STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -43,21 +44,23 @@ _INCH = 72.0
 def markers(scene: Scene) -> Figure:
     """Draw the display at three times of a run."""
     figure = empty_sheet()
-    figure.set_size_inches(8.0, 5.0)
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.2, 1.0))
-    axes = [figure.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1])]
+    figure.set_size_inches(8.0, 7.4)
+    grid = figure.add_gridspec(2, 2, height_ratios=(1.7, 1.0))
+    axes = [figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1])]
     lines: list[tuple[Any, float]] = []
     for place, (moment, label) in zip(axes, _MOMENTS, strict=True):
         shown: Display = {}
         for message in extra_messages(scene, MESSAGE, moment):
             receive(shown, message)
-        lines += show(place, shown)
+        lines += show(place, shown, 2.4 if place is axes[0] else 1.5)
         place.set_xlim(-0.85, 1.65)
         place.set_ylim(-0.75, 0.85)
         place.set_title(f'{moment:g} s, {label}')
         place.set_ylabel('y [m]')
-    axes[0].set_xlabel('x [m]')
-    axes[2].set_xlabel('x [m]')
+        place.set_xlabel('x [m]')
+    for colour, label in ((PURPLE, 'force in a pin'), (GREEN, 'effort of the drive')):
+        axes[0].plot([], [], color=colour, linewidth=2.4, label=label)
+    axes[0].legend(loc='lower right')
     figure.draw_without_rendering()  # fixes the scale of the axes
     for line, width in lines:
         (low, _), (high, _) = line.axes.transData.transform(((0.0, 0.0), (1.0, 0.0)))
@@ -75,14 +78,16 @@ def receive(shown: Display, message: bytes) -> None:
             shown[key] = marker
 
 
-def show(axes: Any, shown: Display) -> list[tuple[Any, float]]:
-    """Draw the markers from above; return the lines, each with its width in [m]."""
+def show(axes: Any, shown: Display, width: float) -> list[tuple[Any, float]]:
+    """Draw the markers, arrows with a width in points; return the lines with theirs in [m]."""
     drawn: list[tuple[Any, float]] = []
     axes.set_aspect('equal')
     axes.grid(False)
     for marker in shown.values():
         places, height = _placed(marker)
         style = {'color': _colour(marker), 'zorder': 10.0 + 1e3 * height}
+        if marker.ns in ('forces', 'efforts'):
+            style['zorder'] = 3e4
         if marker.type == _TRIANGLES:
             triangles = places.reshape(-1, 3, 2)
             faces = PolyCollection(triangles, facecolors=[style['color']], zorder=style['zorder'])
@@ -94,9 +99,11 @@ def show(axes: Any, shown: Display) -> list[tuple[Any, float]]:
             for place in places:
                 axes.add_patch(Circle(place, 0.5 * marker.scale.x, linewidth=0.0, **style))
         elif marker.type == _ARROW:
-            look = {'arrowstyle': '-|>', 'mutation_scale': 9, 'linewidth': 1.6}
-            arrow = FancyArrowPatch(*places, shrinkA=0.0, shrinkB=0.0, **look, **style)
-            axes.add_patch(arrow)
+            # A white edge sets them off from the links.
+            edge = [Stroke(linewidth=2.0 * width, foreground='white'), Normal()]
+            look = {'arrowstyle': '-|>', 'mutation_scale': 6.0 * width, 'linewidth': width}
+            look |= {**style, 'path_effects': edge}
+            axes.add_patch(FancyArrowPatch(*places, shrinkA=0.0, shrinkB=0.0, **look))
         elif marker.type == _TEXT:
             axes.text(*places[0], marker.text, ha='center', va='center', fontsize=7, **style)
     return drawn

@@ -86,11 +86,23 @@ def save(figure: Figure, scene: str, file: Path) -> None:
         few.save(file, optimize=True, pnginfo=about)
 
 
-def save_small(file: Path, small: Path) -> Path:
-    """Store a saved picture again, half as wide, for an overview."""
-    with Image.open(file) as image:
-        half = image.convert('RGB').resize((image.width // 2, image.height // 2))
-        half.quantize(_FEW_COLOURS, dither=Image.Dither.NONE).save(small, optimize=True)
+def save_small(figure: Figure, small: Path) -> Path:
+    """Store a picture half as wide, for an overview: without letters, which would be too small."""
+    for axes in figure.axes:
+        axes.set(xlabel='', ylabel='', title='')
+        axes.tick_params(which='both', length=0.0, labelbottom=False, labelleft=False)
+        for letters in (*axes.texts, axes.get_legend()):
+            if letters is not None:
+                letters.remove()
+    for legend_of_all in (*figure.legends, *figure.texts):
+        legend_of_all.remove()
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(0.5 * width, 0.5 * height)
+    drawn = BytesIO()
+    figure.savefig(drawn, format='png')
+    with Image.open(drawn) as image:
+        few = image.convert('RGB').quantize(_FEW_COLOURS, dither=Image.Dither.NONE)
+        few.save(small, optimize=True)
     return small
 
 

@@ -93,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--output',
         type=Path,
         metavar='FOLDER',
-        help='where the page goes; nothing is overwritten (here accuracy_SCENE)',
+        help='where the page goes; nothing is overwritten (default: accuracy_SCENE)',
     )
     parser.add_argument(
         '--quick',

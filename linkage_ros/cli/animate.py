@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--seconds',
         type=float,
-        metavar='S',
+        metavar='SECONDS',
         help=f'how long it lasts; without it {_TURN:g} s, or as long as the run, up to 10 s',
     )
     add_window(parser)

@@ -20,6 +20,7 @@ import argparse
 from collections.abc import Callable, Collection, Sequence
 from math import degrees, isfinite, pi, radians, remainder, tau
 from pathlib import Path
+import re
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import LinkageError, listed
@@ -90,8 +91,9 @@ def add_set(parser: argparse.ArgumentParser) -> None:
         action='append',
         default=[],
         metavar='KEY=VALUE',
-        help='set a key of the scene, as --set rate=500 or --set drive.sine.amplitude=0.3; '
-        'VALUE is YAML; may be repeated',
+        help='set a key of the scene, as --set rate=500 or --set drive.sine.amplitude=0.3, or '
+        'of one of its linkages, as --set linkages.left.accuracy=1e-6; VALUE is YAML; may be '
+        'repeated',
     )
 
 
@@ -191,6 +193,16 @@ class AngleUnit(NamedTuple):
         """Return an angle in [rad], or its rate, in this unit."""
         return degrees(angle) if self.in_degrees else angle
 
+    def read(self, typed: float) -> float:
+        """Return a typed angle in [rad]."""
+        return radians(typed) if self.in_degrees else typed
+
+    def told(self, text: str) -> str:
+        """Return a text whose angles, such as ``-1.5°``, are in this unit."""
+        if self.in_degrees:
+            return text
+        return _IN_DEGREES.sub(lambda one: f'{radians(float(one[1])):.6g} rad', text)
+
     def text(self, angle: float, digits: int = 3) -> str:
         """Return an angle in [rad] as text; ``digits`` are the decimals of degrees."""
         return angle_text(angle, digits) if self.in_degrees else f'{angle + 0.0:.6g} rad'
@@ -199,6 +211,8 @@ class AngleUnit(NamedTuple):
         """Return the value of an input or a joint, in [rad] if it turns, else in [m]."""
         return self.text(value) if turning else f'{value + 0.0:.6g} m'
 
+
+_IN_DEGREES = re.compile(r'([-+]?(?:nan|inf|\d[\d.]*(?:e[-+]?\d+)?))°')
 
 DEGREES, RADIANS = AngleUnit('°'), AngleUnit('rad')
 

@@ -138,7 +138,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--ticks',
         type=bounded(1, _MOST_TICKS, int),
         default=_TICKS,
-        help=f'how often each variant of the scene ticks (here {_TICKS})',
+        metavar='N',
+        help=f'how often each variant of the scene ticks (default: {_TICKS})',
     )
     parser.add_argument('--json', action='store_true', help='the same as JSON, in microseconds')
     add_set(parser)

@@ -60,8 +60,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
     parts = parser.add_argument_group('parts, in a DXF')
-    parts.add_argument('--width', type=bounded(1e-6, 1e6), help='width of a bar, in mm')
-    parts.add_argument('--hole', type=bounded(1e-6, 1e6), help='diameter of a hole, in mm')
+    parts.add_argument(
+        '--width', type=bounded(1e-6, 1e6), metavar='MM', help='width of a bar, in mm'
+    )
+    parts.add_argument(
+        '--hole', type=bounded(1e-6, 1e6), metavar='MM', help='diameter of a hole, in mm'
+    )
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:

@@ -17,7 +17,7 @@
 Print the messages of a topic as YAML, or their rate, to Ctrl-C.
 
 It is for installations without ros2 topic echo and ros2 topic hz. Values are those of the message:
-in SI units and radians. Exit code 1: no message came within --seconds.
+in SI units and radians. Exit code 1: no message came, or fewer than --count.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import inf
+from math import inf, isfinite
 import sys
 from threading import Event
 from time import monotonic
@@ -46,6 +46,9 @@ EXAMPLE = 'linkage echo /joint_states --count 3'
 
 _PATIENCE = 2.0
 """Time without a message after which the topics that exist are listed, in [s]."""
+
+_TIMEOUT = 10.0
+"""Time without a message after which a command with a count ends, in [s]."""
 
 _LOOK = 0.1
 """Time between two looks at the stop event, in [s]."""
@@ -70,10 +73,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='the topic; without it, /joint_states',
     )
     parser.add_argument(
-        '--count', type=bounded(1, 10**9, int), default=inf, help='end after so many messages'
+        '--count',
+        type=bounded(1, 10**9, int),
+        default=inf,
+        metavar='N',
+        help='end after so many messages',
     )
     parser.add_argument(
         '--seconds', type=bounded(1e-9, 1e9), default=inf, help='how long; without it, to Ctrl-C'
+    )
+    parser.add_argument(
+        '--timeout',
+        type=bounded(1e-9, 1e9),
+        metavar='SECONDS',
+        help='end when no message comes for so long; without it, '
+        f'{_TIMEOUT:g} with --count, else never',
     )
     parser.add_argument(
         '--rate', action='store_true', help='print once a second how often messages come'
@@ -81,33 +95,71 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Print messages; return 1 if none came within the time limit."""
+    """Print messages; return 1 if fewer came than were asked for."""
     topic = arguments.topic if arguments.topic.startswith('/') else f'/{arguments.topic}'
     end = monotonic() + arguments.seconds
+    timeout = arguments.timeout or (_TIMEOUT if isfinite(arguments.count) else inf)
+    seen = 0
     with heeded(), player_node([], 'linkage_echo') as node:
-        kind = _await_type(node, topic, end, stop)
-        if kind is None:
-            return int(not stop.is_set())
-        arrivals: list[float] = []
-        _receive(node, topic, kind, arguments, arrivals, end, stop)
-    if len(arrivals) > 1 and not arguments.rate:
-        text = f'{topic}: {len(arrivals)} messages, {rate_text(arrivals)}'
-        print(f'linkage echo: {text}', file=sys.stderr)
-    return int(not arrivals and not stop.is_set())
+        silence = _Silence(node, topic, timeout)
+        kind = _await_type(node, topic, silence, end, stop)
+        if kind is not None:
+            seen = _receive(node, topic, kind, arguments, silence, end, stop)
+    missing = not seen or (isfinite(arguments.count) and seen < arguments.count)
+    return int(missing and not stop.is_set())
 
 
-def _await_type(node: Node, topic: str, end: float, stop: Event) -> str | None:
-    """Return the type of a topic when it exists; None after the time limit or a stop request."""
-    patient = monotonic() + _PATIENCE
-    while not stop.is_set() and monotonic() < end:
+class _Silence:
+    """
+    The time without a message: reported once, and too long after a timeout.
+
+    Parameters
+    ----------
+    node
+        The node that listens.
+    topic
+        The topic.
+    timeout
+        Time without a message after which it is too long, in [s].
+
+    """
+
+    def __init__(self, node: Node, topic: str, timeout: float) -> None:
+        self._node, self._topic, self._timeout = node, topic, timeout
+        self._reported = False
+        self.since = monotonic()
+
+    def too_long(self) -> bool:
+        """Report the silence if it is time to; return whether it is too long."""
+        silent = monotonic() - self.since
+        patience = min(_PATIENCE, self._timeout)
+        if silent >= patience and not self._reported:
+            self._reported = True
+            _say(f'{self._topic}: no message for {patience:g} s {self._whereabouts()}')
+        if silent < self._timeout:
+            return False
+        _say(f'{self._topic}: ended after {self._timeout:g} s without a message (--timeout)')
+        return True
+
+    def _whereabouts(self) -> str:
+        """Return how many publishers the topic has, and which topics have some."""
+        topics = {
+            name: self._node.count_publishers(name)
+            for name, _ in self._node.get_topic_names_and_types()
+        }
+        others = [name for name, count in topics.items() if count and name != self._topic]
+        remedy = did_you_mean(self._topic, others, f'topics: {listed(others) or "none"}')
+        return f'({topics.get(self._topic, 0)} publishers); {remedy}'
+
+
+def _await_type(node: Node, topic: str, silence: _Silence, end: float, stop: Event) -> str | None:
+    """Return the type of a topic when it exists; None if the wait ended before."""
+    while not stop.is_set() and monotonic() < end and not silence.too_long():
         types = dict(node.get_topic_names_and_types()).get(topic, [])
         if len(types) > 1:
             raise LinkageError(topic, f'has several types: {listed(types)}', 'end one publisher')
         if types:
             return str(types[0])
-        if monotonic() >= patient:
-            patient = inf
-            _say_silence(node, topic)
         stop.wait(_LOOK)
     return None
 
@@ -117,12 +169,13 @@ def _receive(
     topic: str,
     kind: str,
     arguments: argparse.Namespace,
-    arrivals: list[float],
+    silence: _Silence,
     end: float,
     stop: Event,
-) -> None:
-    """Print messages, or their rate, until the end; collect their times of arrival, in [s]."""
+) -> int:
+    """Print messages, or their rate, until the end; return how many came."""
     seen = 0
+    arrivals: list[float] = []
 
     def arrive(message: Any) -> None:
         nonlocal seen
@@ -130,28 +183,32 @@ def _receive(
         if seen >= arguments.count:
             return
         seen += 1
-        arrivals.append(monotonic())
+        silence.since = monotonic()
+        arrivals.append(silence.since)
         if not arguments.rate:
             print(f'{as_yaml(message, kind)}---', flush=True)
 
     node.create_subscription(
         message_type(kind, topic), topic, arrive, _qos(node, topic), raw=arguments.rate
     )
-    begin = told = monotonic()
+    told = monotonic()
     while not stop.is_set() and monotonic() < end and seen < arguments.count:
         rclpy.spin_once(node, timeout_sec=min(_LOOK, max(0.0, end - monotonic())))
+        if silence.too_long():
+            break
         now = monotonic()
-        if not seen and begin + _PATIENCE <= now:
-            begin = inf
-            _say_silence(node, topic)
         if arguments.rate and now - told >= 1.0:
             told = now
             if len(arrivals) > 1:
                 print(f'{topic}: {rate_text(arrivals)}', flush=True)
             # The next rate counts from the last message of this one.
             del arrivals[:-1]
-    if arguments.rate and len(arrivals) > 1:
-        print(f'{topic}: {rate_text(arrivals)}', flush=True)
+    if len(arrivals) > 1:
+        if arguments.rate:
+            print(f'{topic}: {rate_text(arrivals)}', flush=True)
+        else:
+            _say(f'{topic}: {seen} messages, {rate_text(arrivals)}')
+    return seen
 
 
 def _qos(node: Node, topic: str) -> QoSProfile:
@@ -168,13 +225,8 @@ def _qos(node: Node, topic: str) -> QoSProfile:
     )
 
 
-def _say_silence(node: Node, topic: str) -> None:
-    """Report on standard error that no message came, and which topics have publishers."""
-    topics = {name: node.count_publishers(name) for name, _ in node.get_topic_names_and_types()}
-    others = [name for name, count in topics.items() if count and name != topic]
-    remedy = did_you_mean(topic, others, f'topics: {listed(others) or "none"}')
-    text = f'{topic}: no message for {_PATIENCE:g} s ({topics.get(topic, 0)} publishers)'
-    print(clean(f'linkage echo: {text}; {remedy}'), file=sys.stderr, flush=True)
+def _say(text: str) -> None:
+    print(clean(f'linkage echo: {text}'), file=sys.stderr, flush=True)
 
 
 def rate_text(arrivals: Sequence[float]) -> str:

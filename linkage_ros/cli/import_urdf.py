@@ -64,7 +64,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_value,
         default=[],
         metavar='JOINT=VALUE',
-        help='value of a joint in a pose in which the loops close, in radians or metres (here 0)',
+        help='value of a joint in a pose in which the loops close, in radians or metres '
+        '(default: 0)',
     )
     parser.add_argument(
         '--no-limits', action='store_true', help='leave out what <limit> says of the joints'

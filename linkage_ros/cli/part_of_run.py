@@ -40,7 +40,10 @@ def add_window(parser: argparse.ArgumentParser) -> None:
     """Declare the options for a part of a run, and the one for the effects of its scene."""
     for name, end in (('since', 'beginning'), ('until', 'end')):
         parser.add_argument(
-            f'--{name}', type=float, metavar='S', help=f'{end} of a part, in seconds of the run'
+            f'--{name}',
+            type=float,
+            metavar='SECONDS',
+            help=f'{end} of a part, in seconds of the run',
         )
     add_trust(parser)
 

@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--rate',
         type=bounded(0.01, 1000.0),
         default=1.0,
-        metavar='R',
+        metavar='FACTOR',
         help='seconds of the bag a second, 0.01 to 1000; without it 1',
     )
     parser.add_argument(

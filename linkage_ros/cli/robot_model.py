@@ -52,7 +52,7 @@ EXAMPLE = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('file', metavar='FILE', help=SCENE_HELP)
+    parser.add_argument('file', metavar='SCENE', help=SCENE_HELP)
     add_output(parser, SUFFIXES[parser.get_default('command')], 'the model is printed')
 
 

@@ -38,6 +38,7 @@ from linkage_ros.files.file_access import check_suffix
 from linkage_ros.files.tables import check_kind, KINDS, table_file
 from linkage_ros.messages.joint_values import EFFORT, POSITION, RATE, UNITS
 from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.notes import scene_notes
 from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
 from linkage_ros.simulation.run import check_simulated, simulate
@@ -68,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--seconds',
         type=bounded(0.0, 1e9),
         default=10.0,
-        help='duration of a run, in the time of the scene (default 10)',
+        help='duration of a run, in the time of the scene (default: 10)',
     )
     parser.add_argument(
         '-o',
@@ -82,7 +83,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_set(parser)
     study = parser.add_argument_group('a study')
     study.add_argument(
-        '--seeds', type=bounded(1, 1e12, int), default=1, help='number of seeds, each in a run'
+        '--seeds',
+        type=bounded(1, 1e12, int),
+        default=1,
+        metavar='N',
+        help='number of seeds, each in a run',
     )
     study.add_argument(
         '--sweep',
@@ -92,9 +97,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='run with each value of a key of the scene: KEY=LOW:HIGH:N or KEY=a,b,c; of several '
         'all combinations',
     )
-    study.add_argument('--picture', type=Path, help='the picture, beside a table')
     study.add_argument(
-        '--workers', type=bounded(1, 1024, int), help='processes (default: one a processor)'
+        '--picture', type=Path, metavar='OUTPUT', help='the picture, beside a table'
+    )
+    study.add_argument(
+        '--workers',
+        type=bounded(1, 1024, int),
+        metavar='N',
+        help='processes (default: one a processor)',
     )
     study.add_argument('--dask', metavar='ADDRESS', default='', help='scheduler whose workers run')
 
@@ -123,7 +133,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if output.suffix:
         check_suffix(output, KINDS)
         check_kind(output)
-    scene = load_scene(arguments.scene, arguments.set)
+    scene = _loaded(arguments)
     ticks = check_simulated(scene, arguments.seconds)
     if not output.suffix:
         counts = _simulated(scene, output, ticks, stop)
@@ -142,6 +152,14 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             return 1
     print(f'{output}: {found.rows} rows, {4 + len(found.keys)} columns')
     return 0
+
+
+def _loaded(arguments: argparse.Namespace) -> Scene:
+    """Read the scene, and show the notes on it."""
+    scene = load_scene(arguments.scene, arguments.set)
+    for note in scene_notes(scene):
+        print(f'linkage simulate: note: {note}', file=sys.stderr)
+    return scene
 
 
 def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str, int]:
@@ -173,7 +191,7 @@ def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) 
         settings()  # without matplotlib, say so before the study is run
     if output.suffix in KINDS:
         check_kind(output)
-    scene = load_scene(arguments.scene, arguments.set)
+    scene = _loaded(arguments)
     ticks = check_simulated(scene, arguments.seconds)
     runs = runs_of(sweeps, arguments.seeds, scene.seed)
     instants = instants_of(len(runs), len(scene.joints), ticks)

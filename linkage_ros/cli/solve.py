@@ -85,15 +85,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--sweep', action='store_true', help='solve over the range; the default where no --at is'
     )
     parser.add_argument(
-        '--from', dest='first', type=bounded(-_MOST, _MOST), help='where a sweep begins'
+        '--from',
+        dest='first',
+        type=bounded(-_MOST, _MOST),
+        metavar='VALUE',
+        help='where a sweep begins',
     )
     parser.add_argument(
-        '--to', dest='last', type=bounded(-_MOST, _MOST), help='where a sweep ends'
+        '--to',
+        dest='last',
+        type=bounded(-_MOST, _MOST),
+        metavar='VALUE',
+        help='where a sweep ends',
     )
     parser.add_argument(
         '--steps',
         type=bounded(1, 1_000_000, int),
         default=_STEPS,
+        metavar='N',
         help=f'steps of a sweep (default: {_STEPS})',
     )
     add_radians(parser, 'type angles, and show them in the table,')

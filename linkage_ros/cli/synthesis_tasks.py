@@ -13,7 +13,11 @@
 # limitations under the License.
 
 
-"""Solve the tasks of ``linkage synthesize``: angle pairs, function, path, motion."""
+"""
+Solve the tasks of ``linkage synthesize``: angle pairs, function, path, motion.
+
+Angles in texts are in degrees; whoever shows them in another unit converts them there.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +27,7 @@ from collections.abc import Iterator, Sequence
 from math import degrees, hypot, isfinite, pi, radians, remainder
 from typing import NamedTuple, TYPE_CHECKING
 
+from linkage_ros.cli.arguments import AngleUnit
 from linkage_ros.cli.terminal import ProgressCallback
 from linkage_ros.errors import LinkageError, listed
 from linkage_ros.files.tables import numbers_of
@@ -95,7 +100,7 @@ def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
 
 def _pairs(typed: argparse.Namespace, search: Search) -> list[Answer]:
     rows = typed.pair or numbers_of(typed.pairs, (2,))
-    crank, rocker = ([radians(row[i]) for row in rows] for i in (0, 1))
+    crank, rocker = ([typed.angles.read(row[i]) for row in rows] for i in (0, 1))
     return _of_pairs(crank, rocker, typed, search)
 
 
@@ -227,8 +232,8 @@ def _function(typed: argparse.Namespace, search: Search) -> list[Answer]:
     task = FunctionTask(
         Expression(typed.function),
         tuple(typed.range),
-        _radians(typed.crank_range),
-        _radians(typed.rocker_range),
+        _read_range(typed.angles, typed.crank_range),
+        _read_range(typed.angles, typed.rocker_range),
     )
     low, high = typed.range
     points = typed.at or chebyshev(low, high, typed.points)
@@ -257,8 +262,8 @@ def _structural(task: FunctionTask, error: StructuralError) -> Iterator[tuple[st
         yield '', f'at x = {worst.x:.6g}, where y = {worst.y:.6g} is off by {part}'
 
 
-def _radians(angles: Sequence[float]) -> tuple[float, float]:
-    start, end = map(radians, angles)
+def _read_range(angles: AngleUnit, typed: Sequence[float]) -> tuple[float, float]:
+    start, end = map(angles.read, typed)
     return start, end
 
 
@@ -273,7 +278,7 @@ def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
     task = PathTask(
         tuple(complex(row[0], row[1]) for row in rows),
         typed.closed,
-        None if timing is None else tuple(map(radians, timing)),
+        None if timing is None else tuple(map(typed.angles.read, timing)),
         typed.free_zeros,
         search.needs.turning,
     )
@@ -312,7 +317,7 @@ def _motion(typed: argparse.Namespace, _search: Search) -> list[Answer]:
     if len(pivots) != 2:
         reason = f'was given {len(pivots)} time(s)'
         raise LinkageError(f'--{kind}-pivot', reason, "name the crank's and the rocker's")
-    poses = [Pose(complex(x, y), radians(angle)) for x, y, angle in typed.pose]
+    poses = [Pose(complex(x, y), typed.angles.read(angle)) for x, y, angle in typed.pose]
     solve = from_fixed_pivots if fixed else from_moving_pivots
     design, links = solve(poses, *pivots)
     (one, one_digits), (other, other_digits) = (

@@ -15,14 +15,14 @@
 """
 Design a four-bar: from pairs of angles, a function, a traced curve or poses of the coupler.
 
-Angles are typed and shown in degrees, lengths in metres.
+Angles are typed and shown in degrees, or in radians with --radians; lengths in metres.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from math import degrees, inf, radians
+from math import inf
 from pathlib import Path
 from shlex import quote
 import sys
@@ -30,7 +30,8 @@ from threading import Event
 
 from linkage_ros.cli.arguments import (
     add_output,
-    angle_text,
+    add_radians,
+    AngleUnit,
     bounded,
     LINKAGES,
     output,
@@ -46,13 +47,14 @@ from linkage_ros.synthesis.design import FourBar
 # Tables of a designed four-bar: its links, its proof, its quality.
 
 
-def tables(answer: Answer, title: str, needs: Needs) -> Iterator[Table]:
+def tables(answer: Answer, title: str, needs: Needs, angles: AngleUnit) -> Iterator[Table]:
     """Yield the tables of a solution."""
-    yield Table(title, ('link', '>length [m]', ''), list(_links(answer.design.four_bar)))
+    four_bar = answer.design.four_bar
+    yield Table(angles.told(title), ('link', '>length [m]', ''), list(_links(four_bar)))
     if answer.facts:
-        yield Table('', ('', ''), answer.facts)
-    yield _proof(answer)
-    yield Table('', ('', ''), list(_worth(answer.assessment, needs)))
+        yield Table('', ('', ''), [tuple(map(angles.told, fact)) for fact in answer.facts])
+    yield _proof(answer, angles)
+    yield Table('', ('', ''), list(_worth(answer.assessment, needs, angles)))
 
 
 def _links(four_bar: FourBar) -> Iterator[tuple[str, str, str]]:
@@ -65,7 +67,7 @@ def _links(four_bar: FourBar) -> Iterator[tuple[str, str, str]]:
         yield name, f'{length:.10g}', note
 
 
-def _proof(answer: Answer) -> Table:
+def _proof(answer: Answer, angles: AngleUnit) -> Table:
     """Return how each position is met; optional columns appear only if they were asked for."""
     wanted = answer.design.wanted
     columns = ['>', '>crank']
@@ -78,47 +80,47 @@ def _proof(answer: Answer) -> Table:
     columns += ['>coupler'] if coupler else []
     columns += ['assembly']
     columns += ['>off [m]'] if place else []
-    columns += ['>off [°]'] if rocker or coupler else []
+    columns += [f'>off [{angles.name}]'] if rocker or coupler else []
     rows = []
     for number, (one, met) in enumerate(zip(wanted, answer.assessment.met, strict=True), 1):
-        row = [str(number), angle_text(one.crank)]
+        row = [str(number), angles.text(one.crank)]
         if place:
             at = one.place
             row += ['', ''] if at is None else [f'{at.real:.6g}', f'{at.imag:.6g}']
         for asked, angle in ((rocker, one.rocker), (coupler, one.coupler)):
             if asked:
-                row.append('' if angle is None else angle_text(angle))
+                row.append('' if angle is None else angles.text(angle))
         row.append(met.side if met.closed else f'open by {met.gap:.3g} m')
         if place:
             row.append(f'{met.distance:.2e}' if met.closed else '')
         if rocker or coupler:
-            row.append(f'{degrees(met.angle):+.2e}' if met.closed else '')
+            row.append(f'{angles.of(met.angle):+.2e}' if met.closed else '')
         rows.append(row)
     return Table('Proof: each position, analysed again', columns, rows)
 
 
-def _worth(assessment: Assessment, needs: Needs) -> Iterator[tuple[str, str]]:
+def _worth(assessment: Assessment, needs: Needs, angles: AngleUnit) -> Iterator[tuple[str, str]]:
     kind = assessment.kind
     turns = 'the crank turns fully' if assessment.turns else 'the crank does not turn fully'
     yield 'kind', f'{kind.name} ({kind.code}), {turns}'
     if assessment.travel is not None:
-        start, end = map(angle_text, assessment.travel)
+        start, end = map(angles.text, assessment.travel)
         yield 'crank goes', f'{start} to {end}, through all positions'
     where = 'on the way' if assessment.travel is not None else 'of the positions'
-    least = angle_text(assessment.transmission, 2)
+    least = angles.text(assessment.transmission, 2)
     yield (
         'transmission',
-        f'{least} at least {where}, with the crank at {angle_text(assessment.at)}',
+        f'{least} at least {where}, with the crank at {angles.text(assessment.at)}',
     )
     if assessment.full_transmission is not None:
-        yield '', f'{angle_text(assessment.full_transmission, 2)} over the full turn'
+        yield '', f'{angles.text(assessment.full_transmission, 2)} over the full turn'
     yield 'link ratio', f'{assessment.link_ratio:.4g}, longest to shortest'
     for defect in assessment.defects:
-        yield f'{defect.name} defect', defect.text
+        yield f'{defect.name} defect', angles.told(defect.text)
     if not assessment.defects:
         yield 'defects', 'none: order, branch and circuit are right'
     for missed in misses(assessment, needs):
-        yield 'lacks what is needed', missed
+        yield 'lacks what is needed', angles.told(missed)
 
 
 _NOT_MET = 1
@@ -134,6 +136,7 @@ EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.y
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    add_radians(parser, 'type angles, also in CSV files, and show them')
     _add_tasks(parser)
     _add_freedoms(parser)
     needs = parser.add_argument_group('what a solution needs')
@@ -144,8 +147,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--min-transmission',
         type=float,
         default=0.0,
-        metavar='DEG',
-        help='least transmission angle from the first to the last position, in degrees',
+        metavar='ANGLE',
+        help='least transmission angle from the first to the last position',
     )
     needs.add_argument(
         '--max-link-ratio',
@@ -158,7 +161,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     written = parser.add_argument_group('what is written')
     add_output(written, LINKAGES, 'no linkage file is written')
     written.add_argument(
-        '--pick', type=int, default=1, metavar='N', help='the solution to write (here the first)'
+        '--pick', type=int, default=1, metavar='N', help='the solution to write (default: 1)'
     )
     written.add_argument(
         '--draw',
@@ -177,11 +180,13 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         type=float,
         action='append',
         metavar=('CRANK', 'ROCKER'),
-        help='angles of crank and rocker in one position, in degrees; three or more times',
+        help='angles of crank and rocker in one position; three or more times',
     )
-    pairs.add_argument('--pairs', type=Path, metavar='CSV', help='CSV of two columns, in degrees')
     pairs.add_argument(
-        '--ground', type=float, default=1.0, metavar='M', help='length of the ground (here 1)'
+        '--pairs', type=Path, metavar='CSV', help='the same as a CSV of two columns'
+    )
+    pairs.add_argument(
+        '--ground', type=float, default=1.0, metavar='M', help='length of the ground (default: 1)'
     )
     function = parser.add_argument_group('a function')
     function.add_argument('--function', metavar='FORMULA', help='of x, such as "log10(x)"')
@@ -192,14 +197,14 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
             nargs=2,
             type=float,
             metavar=('FROM', 'TO'),
-            help=f"the {link}'s angles over the range, in degrees",
+            help=f"the {link}'s angles over the range",
         )
     function.add_argument(
         '--points',
         type=bounded(0, 2**53 - 1, int),
         default=3,
         metavar='N',
-        help='points, by Chebyshev (here 3)',
+        help='points, by Chebyshev (default: 3)',
     )
     function.add_argument(
         '--at', nargs='+', type=float, metavar='X', help='points of your own, instead'
@@ -212,7 +217,7 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         '--path',
         type=Path,
         metavar='CSV',
-        help='columns x, y in metres, and the crank angle in degrees where that is wanted too',
+        help='columns x, y in metres, and the crank angle where that is wanted too',
     )
     path.add_argument('--closed', action='store_true', help='the last point leads to the first')
     path.add_argument(
@@ -220,7 +225,7 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         nargs='+',
         type=float,
         metavar='CRANK',
-        help="the crank's angle at each point, in degrees",
+        help="the crank's angle at each point",
     )
     motion = parser.add_argument_group('poses of the coupler')
     motion.add_argument(
@@ -229,7 +234,7 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         type=float,
         action='append',
         metavar=('X', 'Y', 'ANGLE'),
-        help='in metres and degrees; three times',
+        help='place in metres, and angle; three times',
     )
     for kind, frame in (('fixed', 'ground'), ('moving', 'coupler')):
         motion.add_argument(
@@ -251,19 +256,23 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
         'best are searched for, with four and five all are listed, with more they are fitted',
     )
     freedoms.add_argument(
-        '--seed', type=bounded(0, 2**53 - 1, int), default=0, help='of the search (here 0)'
+        '--seed',
+        type=bounded(0, 2**53 - 1, int),
+        default=0,
+        metavar='N',
+        help='of the search (default: 0)',
     )
     freedoms.add_argument(
         '--candidates',
         type=bounded(1, 2**53 - 1, int),
         default=CANDIDATES,
         metavar='N',
-        help=f'how many are tried in a search (here {CANDIDATES})',
+        help=f'how many are tried in a search (default: {CANDIDATES})',
     )
     freedoms.add_argument(
         '--best',
         type=bounded(1, 2**53 - 1, int),
-        metavar='K',
+        metavar='N',
         help=f'how many are listed (of a search {_LISTED}, else all)',
     )
     freedoms.add_argument(
@@ -276,13 +285,23 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Design; return 1 if no solution meets the requirements."""
+    try:
+        return _design(arguments)
+    except LinkageError as error:
+        if arguments.angles.in_degrees:
+            raise
+        told = arguments.angles.told
+        raise LinkageError(told(error.where), told(error.reason), told(error.remedy)) from None
+
+
+def _design(arguments: argparse.Namespace) -> int:
     with progress('candidates') as advance:
         found, meeting = solutions(arguments, advance)
     if not meeting:
         print(f'None of {len(found)} solution(s) has what is needed. Nearest to it:\n')
     needs = needs_of(arguments)
     shown = found[: arguments.best]
-    _show(shown, needs)
+    _show(shown, needs, arguments.angles)
     _draw(arguments.draw, shown)
     if not meeting:
         return _NOT_MET
@@ -304,15 +323,15 @@ def solutions(typed: argparse.Namespace, advance: ProgressCallback) -> tuple[lis
 
 def needs_of(typed: argparse.Namespace) -> Needs:
     """Return the requirements; if there are any, a solution must also be free of defects."""
-    needs = Needs(typed.need, radians(typed.min_transmission), typed.max_link_ratio)
+    needs = Needs(typed.need, typed.angles.read(typed.min_transmission), typed.max_link_ratio)
     needs.check()
     return needs._replace(usable=typed.usable or needs != Needs())
 
 
-def _show(shown: Sequence[Answer], needs: Needs) -> None:
+def _show(shown: Sequence[Answer], needs: Needs, angles: AngleUnit) -> None:
     for number, answer in enumerate(shown, 1):
         title = answer.title if len(shown) == 1 else f'{number}: {answer.title}'
-        for table in tables(answer, title, needs):
+        for table in tables(answer, title, needs, angles):
             show(table)
             print()
 
@@ -339,7 +358,8 @@ def _write(arguments: argparse.Namespace, shown: Sequence[Answer]) -> None:
     first = answer.design.wanted[0].crank
     command = ' '.join(['linkage synthesize', *map(quote, sys.argv[2:])])
     defects = [f'{one.name} defect: {one.text}' for one in answer.assessment.defects]
-    lines = [f'Designed: {answer.title}', command, *defects]
+    told = arguments.angles.told
+    lines = [told(f'Designed: {answer.title}'), command, *map(told, defects)]
     write_linkage(answer.design.four_bar.linkage(first), arguments.output, lines)
     names = ' and '.join(one.name for one in answer.assessment.defects)
     print(f'{arguments.output}  ({names} defect: see above)' if names else arguments.output)

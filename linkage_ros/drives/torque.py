@@ -254,7 +254,8 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     if start is None:
         raise DefinitionError(
             'drive.torque.start',
-            f'at {parameters.start:g} nothing can be moved: a toggle, or no inertia',
+            f'at {parameters.start:g} {closure.linkage.inputs[0].unit} nothing can be moved: '
+            'a toggle, or no inertia',
             'start elsewhere',
         )
     low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
@@ -348,7 +349,8 @@ def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]
             return low, high
     raise DefinitionError(
         'drive.torque.start',
-        f'{start:g} is not between the stops; reachable: {describe(closure.input_ranges)}',
+        f'{start:g} {closure.linkage.inputs[0].unit} is not between the stops; '
+        f'reachable: {describe(closure.input_ranges)}',
         f'start there, {margin:g} of the range or more from its ends',
     )
 

@@ -447,11 +447,15 @@ def _check(closure: Closure, applied: AppliedLoads) -> None:
                 'the joint has no limits',
                 'write limits: [low, high] for it into the linkage file',
             )
-    loads: list[tuple[str, JointLoad | PointLoad]] = []
-    loads += [(f'loads.efforts.{name}', load) for name, load in applied.efforts.items()]
+    units = {given.joint: given.unit for given in linkage.inputs}
+    units |= {name: joint.unit for name, joint in linkage.joints.items()}
+    loads: list[tuple[str, JointLoad | PointLoad, str]] = []
+    loads += [
+        (f'loads.efforts.{name}', load, units[name]) for name, load in applied.efforts.items()
+    ]
     for name, force in applied.forces.items():
         key = f'loads.forces.{name}'
-        loads.append((key, force))
+        loads.append((key, force, linkage.inputs[0].unit))
         if name.rpartition('.')[0] == GROUND:
             raise DefinitionError(
                 key, 'lies on the ground, which a force does not move', 'name another point'
@@ -472,25 +476,24 @@ def _check(closure: Closure, applied: AppliedLoads) -> None:
                 f'{quoted(wrench.point)} is not a point of {quoted(link)}',
                 did_you_mean(wrench.point, points, f'name one of {listed(sorted(points))}'),
             )
-    for key, load in loads:
-        tables = {
-            over: getattr(load, over) for over in ('over_time', 'over_position', 'over_rate')
-        }
-        if not load.constant and not any(tables.values()):
+    for key, load, unit in loads:
+        tables = {'over_time': 's', 'over_position': unit, 'over_rate': f'{unit}/s'}
+        if not load.constant and not any(getattr(load, over) for over in tables):
             raise DefinitionError(
                 key, 'is a load of 0', f'write constant, or one of {", ".join(tables)}'
             )
-        for over, table in tables.items():
-            _check_table(f'{key}.{over}', table)
+        for over, given_in in tables.items():
+            _check_table(f'{key}.{over}', getattr(load, over), given_in)
 
 
-def _check_table(key: str, table: Sequence[tuple[float, float]]) -> None:
+def _check_table(key: str, table: Sequence[tuple[float, float]], unit: str) -> None:
     if len(table) == 1:
         raise DefinitionError(key, 'has one row', 'write two or more, or constant')
     for row, ((before, _), (after, _)) in enumerate(pairwise(table), 2):
         if after <= before:
             raise DefinitionError(
                 key,
-                f'row {row} begins with {after:g}, not after {before:g} of row {row - 1}',
+                f'row {row} begins with {after:g} {unit}, not after {before:g} {unit} of row '
+                f'{row - 1}',
                 'write rows in which the first number increases',
             )

@@ -83,11 +83,13 @@ def sensor(parameters: MeasuringRangeParameters, context: Context) -> Sensor:
         The limits of a joint cross.
 
     """
+    joints = context.closure.linkage.joints
     for joint, limits in parameters.joints.items():
         if limits.low >= limits.high:
+            unit = joints[joint].unit
             raise DefinitionError(
                 f'effects.measuring_range.joints.{joint}',
-                f'low {limits.low:g} is not below high {limits.high:g}',
+                f'low {limits.low:g} {unit} is not below high {limits.high:g} {unit}',
                 'write the lower limit as low',
             )
     ranges = [parameters.joints.get(joint, JointRange()) for joint in context.joints]

@@ -39,7 +39,7 @@ _KEY = 'parameter'
 Schema = dict[str, Any]
 
 Parts = Mapping[str, Sequence[str]]
-"""The existing names for each kind of part; those of 'slide' are joints that slide."""
+"""The existing names for each kind of part; of joints and pins, 'slide' and 'slider' slide."""
 
 KINDS = {
     'joint': 'published joint',
@@ -51,6 +51,9 @@ KINDS = {
     'point': 'point: LINK.POINT',
 }
 """Kinds of parts that a parameter can name, and their terms in messages."""
+
+_SLIDING = {'joint': 'slide', 'input': 'slide', 'any_joint': 'slide', 'pin': 'slider'}
+"""Kinds whose parts turn or slide, and the names of those that slide."""
 
 CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
 """Pattern of a printable character."""
@@ -299,8 +302,8 @@ class Each(Name):
         inner, values = content.section(key), {}
         for name in inner:
             part = self._known(inner, name, name, parts)
-            if self.kind in {'joint', 'input', 'any_joint'}:
-                inner.units = replace(inner.units, slides=name in parts.get('slide', ()))
+            if sliding := _SLIDING.get(self.kind):
+                inner.units = replace(inner.units, slides=name in parts.get(sliding, ()))
             values[part] = self._value.read(inner, name, parts, folder)
         return values
 

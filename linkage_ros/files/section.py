@@ -241,13 +241,12 @@ class Section:
     def numbers(self, key: str, *, most: float = inf, unit: str = '') -> list[float]:
         """Return a list of finite numbers, each within ±most."""
         value = self._take(key, None, 'a list of numbers')
-        found = None
-        if isinstance(value, list) and all(map(_is_number, value)):
-            found = [self._si(key, v, unit) for v in value]
-        if found is None or not all(abs(v) <= most for v in found):
+        if not _is_list_of_finite(value):
             raise self.error(
                 key, f'{quoted(value)} is no list of finite numbers', 'write [0.1, 0.2]'
             )
+        found = [self._si(key, v, unit) for v in value]
+        self._check_most(key, value, found, most, unit)
         return found
 
     def rows(
@@ -261,22 +260,17 @@ class Section:
             for column, unit in zip(columns, units, strict=True)
         ]
         row = f'[{", ".join(names)}]'
-        table = []
+        table: list[tuple[float, ...]] = []
         if not isinstance(value, list) or not value:
             raise self.error(key, f'{quoted(value)} is no list of rows', f'write [{row}, …]')
         for number, found in enumerate(value, 1):
-            values = None
-            if (
-                isinstance(found, list)
-                and len(found) == len(units)
-                and all(map(_is_number, found))
-            ):
-                values = tuple(map(self._si, repeat(key), found, units))
-            if values is None or not all(abs(v) <= most for v in values):
+            if not _is_list_of_finite(found) or len(found) != len(units):
                 raise self.error(
                     key, f'row {number}, {quoted(found)}, is not {row}', 'write finite numbers'
                 )
-            table.append(values)
+            table.append(tuple(map(self._si, repeat(key), found, units)))
+            for value, unit in zip(table[-1], units, strict=True):
+                self._check_most(key, found, (value,), most, unit)
         return tuple(table)
 
     def texts(self, key: str) -> list[str]:
@@ -334,10 +328,12 @@ class Section:
         self, key: str, value: Any, found: Iterable[float], most: float, unit: str
     ) -> None:
         if any(abs(one) > most for one in found):
+            name = self.units.name(unit)
             raise self.error(
                 key,
                 f'{quoted(value)} is out of bounds',
-                f'write numbers of at most {self.units.shown(most, unit):g}',
+                f'write numbers of at most {self.units.shown(most, unit):g}'
+                f'{name and f" [{name}]"}',
             )
 
     def _take(self, key: str, default: Any, expected: str) -> Any:
@@ -351,6 +347,10 @@ class Section:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_list_of_finite(value: Any) -> bool:
+    return isinstance(value, list) and all(_is_number(v) and isfinite(v) for v in value)
 
 
 def _is_pair(value: Any) -> bool:

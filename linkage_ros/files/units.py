@@ -46,7 +46,9 @@ _EXACT = Context(prec=80)
 
 _CONVERTED = re.compile(r'(rad|m)(/s²|/s|/√s|)')
 _NUMBER = r'-?(?:inf|\d[\d.]*(?:e[-+]?\d+)?)'
-_QUANTITY = re.compile(rf'({_NUMBER}|\[[^][]*\]) ((?:rad|m)(?:/s²|/s)?)(?![\w·/²])')
+_QUANTITY = re.compile(
+    rf'({_NUMBER}(?: to {_NUMBER})?|\[[^][]*\]) ((?:rad|m)(?:/s²|/s)?)(?![\w·/²])'
+)
 
 
 def unit_of(column: str) -> str:
@@ -102,7 +104,11 @@ class Units:
         return re.sub(r'\[([^][]*)\]', lambda unit: f'[{self.name(unit[1])}]', text)
 
     def told(self, text: str) -> str:
-        """Return a text whose quantities in SI, ``1.5 rad`` or ``[0, 2] m``, have these units."""
+        """
+        Return a text whose quantities in SI have these units.
+
+        Quantities are ``1.5 rad``, ``0 to 2 m`` and ``[0, 2] m``; a unit in brackets stays.
+        """
         return text if self.si else _QUANTITY.sub(self._converted_quantity, text)
 
     def _converted_quantity(self, found: re.Match[str]) -> str:

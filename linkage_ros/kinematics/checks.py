@@ -193,7 +193,7 @@ def _check_limits(key: str, limits: Limits, name: str, unit: str) -> None:
     if isnan(low) or isnan(high) or low == inf or high == -inf:
         raise DefinitionError(
             f'{key}.limits',
-            f'{limits} of {quoted(name)} are not valid limits',
+            f'{limits} {unit} of {quoted(name)} are not valid limits',
             'write [low, high]; -.inf or .inf for none on a side',
         )
     if low >= high:

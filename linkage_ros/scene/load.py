@@ -376,7 +376,7 @@ def _member(
     parts = parts_of(linkage)
     kinds = {bool(given.slider) for given in linkage.inputs}
     slides = kinds.pop() if len(kinds) == 1 else None
-    for section in (drives, effects, own, scene):
+    for section in (drives, effects, *([] if loads is None else [loads]), own, scene):
         section.units = replace(section.units, slides=slides)
     not_imported = () if trust_effects else tuple(name for name in effects if '.' in name)
     for effect in not_imported:

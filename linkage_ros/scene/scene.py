@@ -268,5 +268,6 @@ def parts_of(linkage: Linkage) -> Parts:
             *(given.joint for given in linkage.inputs if given.slider),
             *(name for name, joint in linkage.joints.items() if isinstance(joint, SlideJoint)),
         ),
+        'slider': tuple(linkage.sliders),
         'point': tuple(f'{link}.{p}' for link, carried in linkage.links.items() for p in carried),
     }

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from linkage_ros.errors import FileError, quoted
+from linkage_ros.errors import did_you_mean, FileError, listed, quoted
 from linkage_ros.files.section import LinedDict, Section
 from linkage_ros.files.yaml_file import BoundedLoader, parse_yaml
 import yaml
@@ -43,12 +43,14 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
     content
         The scene, which is changed; no key of it may have been taken.
     settings
-        One ``KEY=VALUE`` each: a dotted key, and a value in YAML.
+        One ``KEY=VALUE`` each: a dotted key, and a value in YAML. Of several linkages one is
+        named: ``linkages.left.drive.sine.amplitude=0.3``.
 
     Raises
     ------
     FileError
-        A setting is no ``KEY=VALUE``, or its key lies within something other than a mapping.
+        A setting is no ``KEY=VALUE``, its key lies within something other than a mapping, or
+        there is no such linkage.
 
     """
     for setting in settings:
@@ -59,14 +61,41 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
             raise _error(setting, f'{quoted(setting)} is no setting', 'write KEY=VALUE: rate=500')
         within: Any = content.mapping
         for part in outer:
-            within.lines.setdefault(part, 0)
-            within = within.setdefault(part, LinedDict())
-            if not isinstance(within, LinedDict):
-                raise _error(setting, f'{part} is {quoted(within)}', 'name a key in a mapping')
+            within = _inner(setting, within, part)
+        within = _mapping(setting, outer[-1] if outer else '', within)
         within.lines.setdefault(last, 0)
         within[last] = _value(setting, text)
     head = ''.join(f'# --set {setting}\n' for setting in settings)
     return (head + yaml.dump(content.mapping, Dumper=_Dumper, sort_keys=False)).encode()
+
+
+def _inner(setting: str, within: Any, part: str) -> Any:
+    """Return what a key of a mapping holds, or the linkage of a name in a list of them."""
+    if isinstance(within, list):
+        names = _names(within)
+        if part not in names:
+            raise _error(
+                setting,
+                f'there is no linkage {quoted(part)}',
+                did_you_mean(part, names, f'there are: {listed(names)}'),
+            )
+        return within[names.index(part)]
+    within.lines.setdefault(part, 0)
+    inner = within.setdefault(part, LinedDict())
+    return inner if part == 'linkages' and _names(inner) else _mapping(setting, part, inner)
+
+
+def _mapping(setting: str, part: str, inner: Any) -> LinedDict:
+    if not isinstance(inner, LinedDict):
+        raise _error(setting, f'{part} is {quoted(inner)}', 'name a key in a mapping')
+    return inner
+
+
+def _names(entries: Any) -> list[str]:
+    """Return the names of the linkages in a list; [] for anything else."""
+    if not isinstance(entries, list):
+        return []
+    return [str(one.get('name')) if isinstance(one, LinedDict) else '' for one in entries]
 
 
 def _value(setting: str, text: str) -> Any:
@@ -80,9 +109,17 @@ def blamed(error: FileError, content: Section, settings: Sequence[str]) -> FileE
     """Return an error of a scene; it names the setting that it is about instead of the file."""
     for setting in reversed(settings):
         key, _, _ = setting.partition('=')
-        if error.file == content.file and _is_within(error.key, key):
+        if error.file == content.file and _is_within(error.key, _counted(content, key)):
             return _error(setting, f'{error.key}: {error.reason}', error.remedy)
     return error
+
+
+def _counted(content: Section, key: str) -> str:
+    """Return a key as errors have it, which count the linkages: ``linkages[1].drive``."""
+    first, _, rest = key.partition('.')
+    names = _names(content.mapping.get(first)) if first == 'linkages' else []
+    name, dot, last = rest.partition('.')
+    return f'{first}[{names.index(name) + 1}]{dot}{last}' if name in names else key
 
 
 def _is_within(key: str, other: str) -> bool:

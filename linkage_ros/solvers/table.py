@@ -291,7 +291,9 @@ class TableClosure(Solver):
             low, high = span
             if not low < high:
                 raise DefinitionError(
-                    'solver.table.span', f'{low:g} to {high:g} is empty', 'write [low, high]'
+                    'solver.table.span',
+                    f'{low:g} to {high:g} {self.closed.linkage.inputs[0].unit} is empty',
+                    'write [low, high]',
                 )
             return 0.0, [(low, high)]
         ranges = InputSweep(self.closed).ranges

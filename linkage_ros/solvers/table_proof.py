@@ -92,9 +92,10 @@ def place(request: TableRequest, value: float) -> str:
 
 def refusal(request: TableRequest, reason: str, remedy: str = _NARROWER) -> DefinitionError:
     """Return the error for a tolerance that is not proven."""
+    # A unit in brackets is not converted to the file's: tolerances are in SI in all files.
     unit = 'rad' if any(request.closed.turning) else 'm'
     return DefinitionError(
-        'solver.table', f'tolerance {request.tolerance:g} {unit} {reason}', remedy
+        'solver.table', f'tolerance {request.tolerance:g} [{unit}] {reason}', remedy
     )
 
 

@@ -268,7 +268,7 @@ class Needs(NamedTuple):
             raise SynthesisError(
                 'transmission angle',
                 f'{degrees(self.transmission):g}° is not in its range',
-                'write 0 to 90 degrees',
+                'write 0° to 90°',
             )
         if not self.link_ratio >= 1.0:
             raise SynthesisError(

@@ -63,9 +63,19 @@ def on_terminal(folder: Path, *arguments: str, columns: int = 120) -> str:
 
 def json_keys(command: str) -> set[str]:
     """Return the keys that the reference documents for ``linkage COMMAND --json``."""
+    return set(re.findall(r'^\| `(\w+)` ', _json_section(command), re.MULTILINE))
+
+
+def json_keys_of(command: str, key: str) -> set[str]:
+    """Return the keys that the reference names in the value of a key."""
+    row = rf'^\| `{key}` \| (.*) \|$'
+    (value,) = re.findall(row, _json_section(command), re.MULTILINE)
+    return set(re.findall(r'`(\w+)`', value))
+
+
+def _json_section(command: str) -> str:
     page = (Path(__file__).parents[2] / 'docs' / 'reference' / 'json.md').read_text('utf-8')
-    section = page.split(f'\n## linkage {command}\n')[1].split('\n## ')[0]
-    return set(re.findall(r'^\| `(\w+)` ', section, re.MULTILINE))
+    return page.split(f'\n## linkage {command}\n')[1].split('\n## ')[0]
 
 
 @pytest.fixture

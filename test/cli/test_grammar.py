@@ -21,6 +21,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from math import tau
 from pathlib import Path
+import re
 import shlex
 import subprocess
 import sys
@@ -180,6 +181,18 @@ def test_arguments_have_the_same_name_in_all_commands() -> None:
     } == METAVARS
 
 
+def test_numbers_of_things_and_defaults_are_told_in_one_way() -> None:
+    typed = [(c, o) for c, o in options() if o.option_strings and o.nargs != 0 and not o.choices]
+    several = {'output', 'rate', 'at', 'input'}  # of kinds of their own in some commands
+    for command, action in typed:
+        where = command, action.dest
+        assert not re.search(r'\((here|default) ', action.help or ''), where
+        if getattr(action.type, '__name__', '') in {'whole number', 'int'}:
+            assert action.metavar == 'N', where
+        names = {str(o.metavar or o.dest.upper()) for _, o in typed if o.dest == action.dest}
+        assert len(names) == 1 or action.dest in several, (*where, names)
+
+
 def test_every_output_file_refuses_a_suffix_that_it_cannot_write(tmp_path: Path) -> None:
     written = {command: action for command, action in options() if action.dest == 'output'}
     folders = {command for command, action in written.items() if action.metavar == 'FOLDER'}
@@ -292,6 +305,51 @@ def test_the_files_of_a_scene_hold_what_was_set(scene: Path) -> None:
 def test_keys_of_the_scene_of_a_linkage_are_set() -> None:
     assert load_scene('jansen_leg', ['rate=250']).rate == 250.0
     assert load_scene(named_file('hoeken', 'linkages'), ['rate=250']).rate == 250.0
+
+
+TWO = """\
+rate: 100
+linkages:
+- {name: left, linkage: l.yaml, drive: {sine: {amplitude: 0.5, frequency: 1.0}}}
+- {name: right, linkage: l.yaml}
+drive: {sine: {amplitude: 0.4, frequency: 1.0}}
+"""
+
+
+def test_keys_of_one_of_several_linkages_are_set_by_its_name(tmp_path: Path) -> None:
+    scene = scene_file(tmp_path, TWO)
+    settings = [
+        'linkages.left.drive.sine.amplitude=0.3',
+        'linkages.right.accuracy=1e-6',
+        'linkages.right.effects={velocity: {}}',
+    ]
+    loaded = load_scene(scene, settings)
+    left, right = loaded.members
+    assert (left.drive[1].amplitude, right.drive[1].amplitude) == (0.3, 0.4)
+    assert (left.accuracy, right.accuracy) == (None, 1e-6)
+    assert (list(left.effects), list(right.effects)) == ([], ['velocity'])
+    scene.write_bytes(loaded.files[SCENE_FILE])
+    assert load_scene(scene).members == loaded.members
+
+
+OF_SEVERAL = {
+    'linkages.lft.accuracy=1e-6': "there is no linkage 'lft'; did you mean 'left'?",
+    'linkages.1.accuracy=1e-6': "there is no linkage '1'; there are: left, right",
+    'linkages.left=3': "linkages is [{'name': 'left', 'linkage': 'l.yaml'",
+    'linkages.left.linkage.a=3': "linkage is 'l.yaml'; name a key in a mapping",
+    'linkages.left.rate=5': 'linkages[1].rate: unknown key; ',
+    'linkages.right.accuracy=5': 'linkages[2].accuracy: 5 is out of bounds',
+    'linkages=3': 'linkages: 3 is not a mapping',
+}
+
+
+@pytest.mark.parametrize('setting', OF_SEVERAL)
+def test_a_setting_of_one_of_several_linkages_that_is_wrong_is_named(
+    tmp_path: Path, setting: str
+) -> None:
+    with pytest.raises(LinkageError) as caught:
+        load_scene(scene_file(tmp_path, TWO), [setting])
+    assert str(caught.value).startswith(f'--set {setting}: {OF_SEVERAL[setting]}')
 
 
 WRONG = {

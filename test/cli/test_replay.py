@@ -42,7 +42,7 @@ from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 import pytest
 
-from .conftest import Run
+from .conftest import json_keys, json_keys_of, Run
 from .recorded import (
     answer,
     BEGIN,
@@ -221,6 +221,28 @@ def test_one_bit_of_one_position_is_named(tmp_path, capsys):
     assert 'tick 123, at +0.122000 s' in text
     assert 'linkage_ros 9.8.7, Python 3.99.1, on abacus' in text
     assert f'replayed by linkage_ros {versions_here()["linkage_ros"]}' in text
+
+
+def test_json_has_the_documented_keys(tmp_path, capsys):
+    bag = recorded(tmp_path, SCENES['rates'])
+    assert set(told(capsys, bag)[1]) == json_keys('replay')
+
+    def edit(_: int, message: BagMessage) -> BagMessage:
+        if message.topic != '/joint_states':
+            return message
+        return message._replace(data=spoil(message.data, 1, 1)[0])
+
+    _, account = told(capsys, rewritten(bag, 'spoilt', edit))
+    assert set(account) == json_keys('replay')
+    assert set(account['topics'][0]) == json_keys_of('replay', 'topics')
+    assert set(account['first_difference']) | {'null'} == json_keys_of(
+        'replay', 'first_difference'
+    )
+    assert set(account['last_different_tick']) | {'null'} == json_keys_of(
+        'replay', 'last_different_tick'
+    )
+    (row,) = account['greatest']
+    assert set(row) | set(row['ulp_at']) == json_keys_of('replay', 'greatest')
 
 
 def test_a_bag_of_another_machine_is_told_by_how_much_it_differs(tmp_path, capsys):

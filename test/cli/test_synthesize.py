@@ -230,6 +230,65 @@ def test_what_is_not_met_is_said_with_the_nearest_and_nothing_is_written(
     assert not (tmp_path / 'x.yaml').exists()
 
 
+IN_DEGREES = {
+    'pairs': SOURCE_003,
+    'pairs with free zeros': [
+        *('--pair', '0', '0', '--pair', '30', '20', '--pair', '60', '45', '--pair', '80', '70'),
+        '--free-zeros',
+    ],
+    'more pairs': [*SOURCE_003, '--pair', '70', '75'],
+    'a function': [*LOG, *RANGES],
+    'a timed curve': [
+        *('--point', '0.1', '0.1', '--point', '0.13', '0.12', '--point', '0.15', '0.1'),
+        *('--timing', '10', '40', '75', '--candidates', '2000', '--best', '1'),
+    ],
+    'poses': [*POSES, *MOVING],
+    'what is not met': [*SOURCE_003, '--min-transmission', '30'],
+}
+ANGLES = {
+    '--pair': slice(0, 2),
+    '--crank-range': slice(0, 2),
+    '--rocker-range': slice(0, 2),
+    '--timing': slice(0, 3),
+    '--min-transmission': slice(0, 1),
+    '--pose': slice(2, 3),
+}
+"""Which values after an option are angles."""
+
+
+def in_radians(typed: list[str]) -> list[str]:
+    words = list(typed)
+    for place, word in enumerate(typed):
+        if word in ANGLES:
+            values = range(place + 1, len(typed))[ANGLES[word]]
+            for value in values:
+                words[value] = repr(radians(float(typed[value])))
+    return [*words, '--radians']
+
+
+@pytest.mark.parametrize('kind', IN_DEGREES)
+def test_in_radians_the_same_linkages_are_designed_and_no_angle_is_in_degrees(
+    linkage: Run, kind: str
+) -> None:
+    typed = IN_DEGREES[kind]
+    degrees_, radians_ = linkage('synthesize', *typed), linkage('synthesize', *in_radians(typed))
+    assert radians_.returncode == degrees_.returncode
+    for link in ('crank', 'coupler', 'rocker', 'ground'):
+        assert length(link, radians_.stdout) == length(link, degrees_.stdout)
+    assert '°' in degrees_.stdout
+    assert '°' not in radians_.stdout
+    first = float(proof(radians_.stdout)[0][1])
+    assert degrees(first) == pytest.approx(float(proof(degrees_.stdout)[0][1][:-1]), abs=1e-3)
+    assert 'off [rad]' in radians_.stdout or kind == 'a timed curve'
+
+
+def test_an_error_in_radians_is_told_in_radians(linkage: Run) -> None:
+    pairs = ['--pair', '0.5', '1', '--pair', '0.5', '2', '--pair', '1', '1.5']
+    answer = linkage('synthesize', '--radians', *pairs)
+    assert answer.returncode == 2
+    assert 'rocker at 1 rad and at 2 rad for the same crank angle, 0.5 rad' in answer.stderr
+
+
 WRONG = [
     # what is typed, what the answer names
     ([], 'nothing is asked for; name one of --pair'),

@@ -20,6 +20,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -136,6 +137,18 @@ def test_the_commands_of_a_page_have_its_output(page, tmp_path):
 def test_blocks_that_are_not_run_have_a_reason_and_are_counted():
     reasons = [block.why_not for block in ALL if block.why_not]
     assert {reason: reasons.count(reason) for reason in sorted({*reasons})} == NOT_RUN
+
+
+@pytest.mark.parametrize('page', WITH_COMMANDS)
+def test_blocks_that_are_not_run_name_only_files_that_the_page_has_made(page):
+    made: set[str] = set()
+    for block in BLOCKS[page]:
+        if block.language in COMMANDS:
+            text = re.sub(r' #.*|\$PWD/', '', block.text)
+            made |= set(re.findall(r'(?:> |-o )([\w.]+)', text))
+            if block.why_not:
+                named = set(re.findall(r'(?<![\w/])\w+\.(?:yaml|urdf)\b', text))
+                assert named <= made, f'{page}:{block.line}'
 
 
 def test_the_readme_has_at_most_160_lines():

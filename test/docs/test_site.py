@@ -161,7 +161,7 @@ def test_every_command_is_in_its_reference(pages):
 @pytest.mark.parametrize(
     ('page', 'text'),
     [
-        ('reference/commands.html', '--min-transmission DEG'),
+        ('reference/commands.html', '--min-transmission ANGLE'),
         ('reference/commands.html', '--set KEY=VALUE'),
         ('reference/commands.html', 'one line names it, the place and the remedy'),
         ('reference/commands.html', 'linkage gallery worn_press -o my_press.yaml'),

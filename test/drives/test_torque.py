@@ -325,7 +325,7 @@ def test_a_start_whole_turns_away_is_in_the_same_range(turns):
 MASSLESS = Closure(replace(shipped('four_bar'), masses={}))
 
 OUT_OF_REACH = (
-    'drive.torque.start: {} is not between the stops; reachable: -1.2987 to 1.2987 rad; '
+    'drive.torque.start: {} rad is not between the stops; reachable: -1.2987 to 1.2987 rad; '
     'start there, {} of the range or more from its ends'
 )
 UNBUILT = {
@@ -340,7 +340,7 @@ UNBUILT = {
     ),
     'no start for a slide': (
         EXCAVATOR, {},
-        'drive.torque.start: 0 is not between the stops; reachable: 0.682846 to 1.32285 m; ',
+        'drive.torque.start: 0 m is not between the stops; reachable: 0.682846 to 1.32285 m; ',
     ),
     'a brake without a moment': (
         WHEEL, {'on_timeout': 'brake'},
@@ -366,7 +366,7 @@ def test_where_nothing_has_inertia_nothing_starts():
     still = Closure(
         replace(WHEEL.linkage, masses=dict.fromkeys(WHEEL.linkage.masses, Mass(5e-324, (0, 0), 0)))
     )
-    with pytest.raises(DefinitionError, match='at 0 nothing can be moved'):
+    with pytest.raises(DefinitionError, match='at 0 rad nothing can be moved'):
         drive(still)
 
 

@@ -283,7 +283,7 @@ REFUSED = {
     'forces: {crank.end: {direction: [0, 0], constant: 1}}': '[0, 0] is no direction',
     'forces: {crank.end: {direction: [1, 0]}}': 'is a load of 0',
     'efforts: {crank_joint: {over_time: [[0, 1]]}}': 'has one row',
-    'efforts: {crank_joint: {over_time: [[1, 1], [0, 2]]}}': 'row 2 begins with 0, not after 1',
+    'efforts: {crank_joint: {over_time: [[1, 1], [0, 2]]}}': 'row 2 begins with 0 s, not after',
     'efforts: {crank_joint: {over_rate: [[0, 1], [1, .nan]]}}': 'efforts.crank_joint.over_rate',
     'efforts: {crank_joint: {constant: 1, over_angle: [[0, 1], [1, 1]]}}': 'unknown key',
     'stops: {drive_joint: {stiffness: 10}}': 'the joint has no limits',

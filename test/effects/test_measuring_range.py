@@ -47,7 +47,7 @@ def test_without_rates_and_efforts_there_are_none():
 
 
 def test_limits_that_cross_are_refused():
-    with pytest.raises(DefinitionError, match='low 2 is not below high 1; write the lower limit'):
+    with pytest.raises(DefinitionError, match='low 2 rad is not below high 1 rad; write'):
         limited(low=2.0, high=1.0)
 
 

@@ -13,7 +13,11 @@
 # limitations under the License.
 
 
-"""A configuration that is wrong: one line on stderr, exit code 2, and no traceback."""
+"""
+A configuration that is wrong: one line on stderr, exit code 2, and no traceback.
+
+One that only looks wrong: the node warns, and starts.
+"""
 
 import os
 import subprocess
@@ -78,3 +82,33 @@ def test_a_bad_argument(stderr_of, kind):
     arguments, expected = ARGUMENTS[kind]
     (line,) = stderr_of(*arguments).splitlines()
     assert expected in line
+
+
+LONG_COUPLER = """\
+links:
+  ground:  {O2: [0, 0], O4: [120, 0]}
+  crank:   {O2: [0, 0], A: [0.04, 0]}
+  coupler: {A: [0, 0], B: [120.01, 0]}
+  rocker:  {O4: [0, 0], B: [0.08, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {B: left}
+joints: {rocker_joint: {parent: ground, child: rocker}}
+"""
+
+
+def test_lengths_and_angles_of_another_unit_are_warned_of(start, write_scene):
+    sine = 'rate: 100\ndrive: {sine: {amplitude: 45, frequency: 1}}'
+    scene = write_scene('odd_units', sine, LONG_COUPLER)
+    log = start(scene).log
+    linkage = scene.with_name('odd_units_linkage.yaml')
+    warned = [line.partition(']: ')[2] for line in log.splitlines() if line.startswith('[WARN]')]
+    assert warned[:2] == [
+        (
+            f"{linkage}:4: links.coupler: is 3000 times as long as 'crank'; "
+            'write all lengths in metres, or all in millimetres with units: mm'
+        ),
+        (
+            f'{scene}:3: drive.sine.amplitude: 45 rad is more than a turn; '
+            'if it is in degrees, write angles: degrees'
+        ),
+    ]

@@ -23,6 +23,7 @@ import sys
 from linkage_ros.cli.echo import as_yaml, rate_text
 from linkage_ros.messages.joint_values import JOINT_STATE
 import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 import yaml
@@ -31,6 +32,7 @@ from .graph import PATIENCE
 from ..support import commands
 
 TEXT = 'std_msgs/msg/String'
+LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @pytest.fixture
@@ -103,6 +105,53 @@ def test_in_silence_the_topics_that_exist_are_listed(say, echo, graph):
     assert answer.returncode == 1
     assert '/silent: no message for 2 s (1 publishers); topics: ' in answer.stderr
     assert '/words' in answer.stderr
+
+
+SILENCES = {
+    'a count that is not reached': (
+        ['/two', '--count', '3', '--timeout', '3'],
+        (1, 2, ['/two: ended after 3 s without a message (--timeout)', '/two: 2 messages, ']),
+    ),
+    'messages that end, without a count': (
+        ['/two', '--timeout', '3'],
+        (0, 2, ['/two: ended after 3 s without a message (--timeout)', '/two: 2 messages, ']),
+    ),
+    'a topic that nobody has': (
+        ['/nothing', '--timeout', '1'],
+        (
+            1,
+            0,
+            [
+                '/nothing: no message for 1 s (0 publishers); topics: ',
+                '/nothing: ended after 1 s without a message (--timeout)',
+            ],
+        ),
+    ),
+    'a count has a timeout without being told': (
+        ['/nothing', '--count', '1'],
+        (1, 0, ['/nothing: ended after 10 s without a message (--timeout)']),
+    ),
+}
+
+
+@pytest.mark.parametrize('kind', SILENCES)
+def test_a_silence_that_is_too_long_ends_it(graph, echo, kind):
+    latched = graph.node.create_publisher(String, '/two', LATCHED)
+    for word in ('one', 'other'):
+        latched.publish(String(data=word))
+    typed, (code, messages, lines) = SILENCES[kind]
+    answer = echo(*typed)
+    assert (answer.returncode, answer.stdout.count('---\n')) == (code, messages)
+    told = answer.stderr.splitlines()[-len(lines) :]
+    for line, beginning in zip(told, lines, strict=True):
+        assert line.startswith(f'linkage echo: {beginning}')
+
+
+def test_a_count_that_is_not_reached_in_time_is_1(say, echo):
+    say('/words', String(data='x'))
+    answer = echo('/words', '--count', '1000000', '--seconds', '5')
+    assert answer.returncode == 1
+    assert answer.stdout
 
 
 def test_a_signal_ends_it_with_0(graph, tmp_path):

@@ -190,7 +190,7 @@ REFUSED = {
     'equal': ([', limits: [1, 1]'], ":7: input.limits: [1, 1] rad of 'crank_joint' are the same"),
     'both infinite above': (
         [', limits: [.inf, .inf]'],
-        ":7: input.limits: [inf, inf] of 'crank_joint' are not valid limits; write [low, high]; ",
+        ":7: input.limits: [inf, inf] rad of 'crank_joint' are not valid limits; write ",
     ),
     'beyond machines': ([', limits: [0, 1e12]'], ':7: input.limits: [0, 1000000000000.0] is out'),
     'no rate': (

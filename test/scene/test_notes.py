@@ -93,6 +93,15 @@ def test_a_link_of_another_unit_is_noted_by_check_and_scene(tmp_path, capsys):
         )
 
 
+def test_a_simulation_notes_what_is_in_its_scene_and_what_is_set(tmp_path, capsys):
+    scene = folder_with(tmp_path, FOUR_BAR, SINE) / 'scene.yaml'
+    typed = ['simulate', str(scene), '--seconds', '0.01', '-o', str(tmp_path / 'x.csv')]
+    note = 'drive.sine.amplitude: 45 rad is more than a turn'
+    for more, count in (([], 1), (['--set', 'angles=degrees'], 0)):
+        assert main([*typed, *more]) == 0
+        assert capsys.readouterr().err.count(note) == count
+
+
 @pytest.mark.parametrize('kind', ['linkages', 'scenes'])
 def test_no_shipped_file_is_noted(kind):
     files = sorted((CONFIG / kind).glob('*.yaml'))

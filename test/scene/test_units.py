@@ -19,6 +19,7 @@ from math import pi
 
 from hypothesis import given
 from hypothesis import strategies as st
+from linkage_ros.cli.main import main
 from linkage_ros.drives.clocked import LARGEST
 from linkage_ros.errors import FileError
 from linkage_ros.files.linkage_file import load
@@ -190,6 +191,15 @@ joints: {crank_joint: {parent: ground, child: crank}}
 """
 
 
+SLIDE_WITH_MASSES = f"""{SLIDE}
+masses:
+  crank: {{mass: 1, center: [10, 0], inertia: 0.1}}
+  rod: {{mass: 1, center: [10, 0], inertia: 0.1}}
+"""
+TORQUE = 'drive: {torque: {start: 30}}\n'
+PUSHED = 'drive: {torque: {start: 500}}\n'
+
+
 def test_a_driven_slide_is_given_as_a_length(write):
     write(SLIDE, 'linkage.yaml')
     drive = 'drive: {sine: {amplitude: 40, frequency: 1, mean: 500, phase: 90}}'
@@ -213,6 +223,20 @@ MESSAGES = {
     'a unit that is not one': (
         'units: ft\nfour_bar: {a: 1}',
         "file.yaml:1: units: 'ft' is not a choice; write m or cm or mm or in",
+    ),
+    'a limit that is never met': (
+        IN_MM.replace('pose: {inputs: [30]}\n', '').replace('velocity: 180', 'limits: [0, 10]'),
+        (
+            "file.yaml:11: joints.rocker_joint.limits: [0, 10] deg of 'rocker_joint' are never "
+            'met: it goes from 55.372 to 80.552 deg; widen them'
+        ),
+    ),
+    'a limit that is none': (
+        IN_MM.replace('limits: [0, 90]', 'limits: [.inf, 90]'),
+        (
+            "file.yaml:9: input.limits: [inf, 90] deg of 'crank_joint' are not valid limits; "
+            'write [low, high]; -.inf or .inf for none on a side'
+        ),
     ),
     'a pose beyond its limits': (
         IN_MM.replace('inputs: [30]', 'inputs: [135]'),
@@ -265,6 +289,169 @@ def test_an_error_in_a_scene_is_told_in_its_units(write, kind):
     with pytest.raises(FileError) as caught:
         Pipeline(load_scene(write(f'linkage: linkage.yaml\nangles: degrees\n{text}')))
     assert str(caught.value).endswith(f'/{line}')
+
+
+def test_what_is_set_has_the_units_of_the_scene(write):
+    write(IN_SI, 'linkage.yaml')
+    settings = ['drive.sine.amplitude=30', 'effects.tolerance.given={crank.A: [0.2, 0]}']
+    (member,) = load_scene(write(SCENE), settings).members
+    assert member.drive[1].amplitude == 0.5235987755982989
+    assert member.effects['tolerance'].given == {'crank.A': (0.0002, 0.0)}
+    in_metres = [*settings, 'units=m', 'loads.gravity=[0, -9.81]']
+    (metres,) = load_scene(write(SCENE), in_metres).members
+    assert metres.drive[1].amplitude == 0.5235987755982989
+    assert metres.effects['tolerance'].given == {'crank.A': (0.2, 0.0)}
+
+
+def test_an_error_in_what_is_set_is_told_in_the_units_of_the_scene(write):
+    write(IN_SI, 'linkage.yaml')
+    with pytest.raises(FileError) as caught:
+        load_scene(write(SCENE), ['loads.gravity=[0, -1.0e+9]'])
+    assert str(caught.value) == (
+        '--set loads.gravity=[0, -1.0e+9]: loads.gravity: [0, -1000000000.0] is out of bounds; '
+        'write numbers of at most 1e+06 [mm/s²]'
+    )
+
+
+def test_a_linkage_in_units_comes_back_from_its_urdf_in_si(write, tmp_path):
+    tree = IN_MM.replace('joints: {', 'joints: {coupler_joint: {parent: crank, child: coupler}, ')
+    linkage, urdf, back = write(tree), tmp_path / 'x.urdf', tmp_path / 'back.yaml'
+    assert main(['urdf', str(linkage), '-o', str(urdf)]) == 0
+    assert main(['import', str(urdf), '-o', str(back)]) == 0
+    assert 'units' not in back.read_text()
+    there, here = load(linkage).linkage, load(back).linkage
+    assert here.inputs[0].limits == there.inputs[0].limits
+    assert here.joints['rocker_joint'].limits.velocity == pi
+    closures = load(linkage), load(back)
+    one, other = (closure.position(0.5) for closure in closures)
+    assert other.joints == pytest.approx(one.joints, abs=1e-12)
+    assert other.gap == one.gap == 0.0
+
+
+def test_a_design_in_millimetres_needs_one_line_more(write, tmp_path):
+    pairs = ['--pair', '50', '100', '--pair', '80', '110', '--pair', '110', '125']
+    files = {ground: tmp_path / f'{ground}.yaml' for ground in ('0.1', '100')}
+    for ground, file in files.items():
+        assert main(['synthesize', *pairs, '--ground', ground, '-o', str(file)]) == 0
+    in_mm = write('units: mm\n' + files['100'].read_text(), 'in_mm.yaml')
+    one, other = (load(file).position(1.0) for file in (files['0.1'], in_mm))
+    assert other.joints == pytest.approx(one.joints, abs=1e-12)
+    assert abs(other.points['B'] - one.points['B']) < 1e-12
+
+
+IN_MM_AND_DEGREES = {
+    'the start of a torque drive': (
+        IN_MM,
+        'drive: {torque: {start: 120}}',
+        'drive.torque.start: 120 deg is not between the stops; reachable: 0 to 90 deg; start',
+    ),
+    'the start of a driven slide': (
+        SLIDE_WITH_MASSES,
+        'drive: {torque: {start: 600}}',
+        'drive.torque.start: 600 mm is not between the stops; reachable: 450 to 550 mm; start',
+    ),
+    'a table over the position of a joint': (
+        IN_MM,
+        f'{TORQUE}loads: {{efforts: {{rocker_joint: {{over_position: [[90, 1], [45, 2]]}}}}}}',
+        (
+            'loads.efforts.rocker_joint.over_position: row 2 begins with 45 deg, '
+            'not after 90 deg of row 1; write rows'
+        ),
+    ),
+    'a table over the rate of a slide': (
+        SLIDE_WITH_MASSES,
+        f'{PUSHED}loads: {{efforts: {{push: {{over_rate: [[90, 1], [45, 2]]}}}}}}',
+        (
+            'loads.efforts.push.over_rate: row 2 begins with 45 mm/s, '
+            'not after 90 mm/s of row 1; write rows'
+        ),
+    ),
+    'a table over time': (
+        IN_MM,
+        f'{TORQUE}loads: {{efforts: {{rocker_joint: {{over_time: [[9, 1], [4, 2]]}}}}}}',
+        'loads.efforts.rocker_joint.over_time: row 2 begins with 4 s, not after 9 s of row 1',
+    ),
+    'a force over the position of a driven slide': (
+        SLIDE_WITH_MASSES,
+        (
+            f'{PUSHED}loads: {{forces: {{rod.P: {{direction: [1, 0], '
+            'over_position: [[550, 1], [500, 2]]}}}'
+        ),
+        (
+            'loads.forces.rod.P.over_position: row 2 begins with 500 mm, '
+            'not after 550 mm of row 1; write rows'
+        ),
+    ),
+    'a row beyond its bound': (
+        IN_MM,
+        f'{TORQUE}loads: {{efforts: {{rocker_joint: {{over_rate: [[0, 1], [1.0e+30, 2]]}}}}}}',
+        (
+            'loads.efforts.rocker_joint.over_rate: [1e+30, 2] is out of bounds; '
+            'write numbers of at most 5.72958e+10 [deg/s]'
+        ),
+    ),
+    'gravity beyond its bound': (
+        IN_MM,
+        f'{TORQUE}loads: {{gravity: [0, -1.0e+9]}}',
+        (
+            'loads.gravity: [0, -1000000000.0] is out of bounds; '
+            'write numbers of at most 1e+06 [mm/s²]'
+        ),
+    ),
+    'the length of a spring': (
+        IN_MM,
+        (
+            f'{TORQUE}loads: {{springs: {{s: {{from: ground.O4, to: coupler.B, stiffness: 5, '
+            'free_length: -10}}}'
+        ),
+        (
+            'loads.springs.s.free_length: -10 is out of bounds; '
+            'write a finite number, at least 0 and at most 1e+12 [mm]'
+        ),
+    ),
+    'the range of a sensor': (
+        IN_MM,
+        'effects: {measuring_range: {joints: {rocker_joint: {low: 90, high: 45}}}}',
+        'effects.measuring_range.joints.rocker_joint: low 90 deg is not below high 45 deg; write',
+    ),
+    'the span of a table': (
+        SLIDE_WITH_MASSES,
+        'solver: {table: {tolerance: 1.0e-6, span: [550, 500]}}',
+        'solver.table.span: 550 to 500 mm is empty; write [low, high]',
+    ),
+    'the tolerance of a table, which stays in SI': (
+        'four_bar: {a: 0.04, b: 0.1, c: 0.04, d: 0.1}',
+        'solver: {table: {tolerance: 1.0e-6}}',
+        'solver.table: tolerance 1e-06 [rad] cannot be proven near the toggle or change point at',
+    ),
+}
+
+
+@pytest.mark.parametrize('kind', IN_MM_AND_DEGREES)
+def test_an_error_in_a_scene_is_told_in_millimetres_and_degrees(write, kind):
+    linkage, text, beginning = IN_MM_AND_DEGREES[kind]
+    write(linkage, 'linkage.yaml')
+    with pytest.raises(FileError) as caught:
+        Pipeline(load_scene(write(f'linkage: linkage.yaml\nunits: mm\nangles: degrees\n{text}')))
+    assert str(caught.value).partition('.yaml:')[2].partition(': ')[2].startswith(beginning)
+
+
+FORCES = """
+linkage: linkage.yaml
+drive: {{torque: {{start: {start}}}}}
+loads: {{forces: {{rod.P: {{direction: [1, 0], over_rate: [[0, 1], [{rate}, 2]]}}}}}}
+effects:
+  friction: {{joints: {{s: {{coulomb: 1, stribeck: {stribeck}}}, O: {{stribeck: {turn}}}}}}}
+"""
+
+
+def test_tables_over_an_input_and_rates_of_pins_have_the_unit_of_what_moves(write):
+    write(SLIDE_WITH_MASSES, 'linkage.yaml')
+    in_si = load_scene(
+        write(FORCES.format(start=0.5, rate=0.045, stribeck=0.005, turn=0.5 * pi), 'si.yaml')
+    )
+    in_mm = FORCES.format(start=500, rate=45, stribeck=5, turn=90)
+    assert load_scene(write(f'{in_mm}units: mm\nangles: degrees\n')).members == in_si.members
 
 
 WORDS = {

@@ -182,7 +182,7 @@ def test_a_toggle_in_the_way_is_refused(name):
     lengths, span, said = TOGGLES[name]
     with pytest.raises(DefinitionError) as caught:
         TableClosure(four_bar_linkage(lengths, 'left'), 1e-6, span=span)
-    assert str(caught.value).startswith('solver.table: tolerance 1e-06 rad ')
+    assert str(caught.value).startswith('solver.table: tolerance 1e-06 [rad] ')
     assert said in str(caught.value)
     assert str(caught.value).endswith(
         'write solver: closed_form, or a span: [low, high] that keeps away from it'
@@ -200,7 +200,7 @@ def test_the_toggle_is_named_where_it_is():
     ('name', 'span', 'said'),
     [
         ('five_bar', None, 'needs a linkage with one input, and this one has 2'),
-        ('four_bar', (2.0, 1.0), '2 to 1 is empty'),
+        ('four_bar', (2.0, 1.0), '2 to 1 rad is empty'),
         ('jansen_leg', None, 'is finer than rounding allows here'),
     ],
 )

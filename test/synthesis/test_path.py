@@ -317,12 +317,12 @@ def test_size_and_place_of_a_path_do_not_matter(size, at):
 UP = (0.0, 0.1, 0.2)
 HOOK = (0j, 1.0 + 0j, 1.0 + 1.0j)
 WHOLE = (
-    'timing: the crank travels 360 degrees; the points must be within one turn, '
+    'timing: the crank travels 360°; the points must be within one turn, '
     'the last before the first again'
 )
 NEITHER = (
     'timing: the crank angles go neither up nor down all the way; '
-    'write on beyond 360 or below 0 degrees where they wrap'
+    'write on beyond 360° or below 0° where they wrap'
 )
 
 
@@ -343,11 +343,11 @@ NEITHER = (
     ({'points': HOOK, 'timing': (0.0, nan, 0.1)}, NEITHER),
     (
         {'points': HOOK, 'timing': (0.0, 1.0, 2.5 * pi)},
-        'timing: the crank travels 450 degrees; the points must be within one turn',
+        'timing: the crank travels 450°; the points must be within one turn',
     ),
     (
         {'points': HOOK, 'timing': (0.0, -1.0, -inf)},
-        'timing: the crank travels inf degrees; the points must be within one turn',
+        'timing: the crank travels inf°; the points must be within one turn',
     ),
     ({'points': HOOK, 'timing': (0.0, 1.0, tau), 'closed': True}, WHOLE),
     (

@@ -132,14 +132,14 @@ def _check_timing(timing: tuple[float, ...], points: int, closed: bool) -> None:
         raise SynthesisError(
             'timing',
             'the crank angles go neither up nor down all the way',
-            'write on beyond 360 or below 0 degrees where they wrap',
+            'write on beyond 360° or below 0° where they wrap',
         )
     travel = abs(timing[-1] - timing[0])
     # A few rounding errors of degrees are no more than a turn.
     if not travel < tau * (1.0 + 1e-12) or (closed and travel > tau * (1.0 - 1e-12)):
         raise SynthesisError(
             'timing',
-            f'the crank travels {degrees(travel):g} degrees',
+            f'the crank travels {degrees(travel):g}°',
             'the points must be within one turn'
             + (', the last before the first again' if closed else ''),
         )
