@@ -142,8 +142,8 @@ def test_a_silence_that_is_too_long_ends_it(graph, echo, kind):
     typed, (code, messages, lines) = SILENCES[kind]
     answer = echo(*typed)
     assert (answer.returncode, answer.stdout.count('---\n')) == (code, messages)
-    told = answer.stderr.splitlines()[-len(lines) :]
-    for line, beginning in zip(told, lines, strict=True):
+    first = -len(lines)
+    for line, beginning in zip(answer.stderr.splitlines()[first:], lines, strict=True):
         assert line.startswith(f'linkage echo: {beginning}')
 
 
