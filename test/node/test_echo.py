@@ -109,12 +109,12 @@ def test_in_silence_the_topics_that_exist_are_listed(say, echo, graph):
 
 SILENCES = {
     'a count that is not reached': (
-        ['/two', '--count', '3', '--timeout', '3'],
-        (1, 2, ['/two: ended after 3 s without a message (--timeout)', '/two: 2 messages, ']),
+        ['/two', '--count', '3', '--timeout', '5'],
+        (1, 2, ['/two: ended after 5 s without a message (--timeout)', '/two: 2 messages, ']),
     ),
     'messages that end, without a count': (
-        ['/two', '--timeout', '3'],
-        (0, 2, ['/two: ended after 3 s without a message (--timeout)', '/two: 2 messages, ']),
+        ['/two', '--timeout', '5'],
+        (0, 2, ['/two: ended after 5 s without a message (--timeout)', '/two: 2 messages, ']),
     ),
     'a topic that nobody has': (
         ['/nothing', '--timeout', '1'],
@@ -142,8 +142,8 @@ def test_a_silence_that_is_too_long_ends_it(graph, echo, kind):
     typed, (code, messages, lines) = SILENCES[kind]
     answer = echo(*typed)
     assert (answer.returncode, answer.stdout.count('---\n')) == (code, messages)
-    told = answer.stderr.splitlines()[-len(lines) :]
-    for line, beginning in zip(told, lines, strict=True):
+    first = -len(lines)
+    for line, beginning in zip(answer.stderr.splitlines()[first:], lines, strict=True):
         assert line.startswith(f'linkage echo: {beginning}')
 
 
