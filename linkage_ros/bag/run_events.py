@@ -56,24 +56,13 @@ class SampleEvent(NamedTuple):
 
 
 class WrenchEvent(NamedTuple):
-    """
-    Message with a wrench that a tick took.
+    """Message with a wrench that a tick took."""
 
-    Attributes
-    ----------
-    log_time, publish_time
-        The tick's time and the source's, in [ns].
-    data
-        The message.
-    number
-        Index of its topic among those of the run.
-
-    """
-
+    # The tick's time and the source's, in [ns].
     log_time: int
     publish_time: int
-    data: bytes
-    number: int
+    data: bytes  # The message
+    number: int  # Index of its topic among those of the run
 
 
 class FaultEvent(NamedTuple):
@@ -93,21 +82,13 @@ class Reset(NamedTuple):
 
 
 class TickEvent(NamedTuple):
-    """
-    Result of a tick.
+    """Result of a tick."""
 
-    Attributes
-    ----------
-    log_time, time
-        Time of the tick, and time it solved for, in [ns].
-    messages
-        The joint state and the auxiliary messages, each empty if there is none; all are empty for
-        a tick that the bag records as one without messages.
-
-    """
-
+    # Time of the tick, and time it solved for, in [ns].
     log_time: int
     time: int
+    # The joint state and the auxiliary messages, each empty if there is none; all are empty for a
+    # tick that the bag records as one without messages.
     messages: tuple[bytes, ...]
 
 
@@ -115,43 +96,25 @@ Event = SampleEvent | WrenchEvent | FaultEvent | Reset | TickEvent
 
 
 class RunAccount(NamedTuple):
-    """
-    The run's account in its bag; '' for missing topics.
+    """The run's account in its bag; '' for missing topics."""
 
-    Attributes
-    ----------
-    scene, scene_folder
-        Name of the scene, and the folder for its relative paths.
-    crank_topic, joint_states_topic, faults_topic, withheld_topic, resets_topic, extras
-        Names of the topics.
-    wrenches
-        Names of the topics with wrenches, in the order of the scene.
-    begun
-        When the bag was begun, as in `MID_RUN`; '' if it does not say.
-    versions
-        Versions of the software of the run, by name.
-    solvers
-        Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
-    user_effects
-        Modules of the user-defined effects, by name.
-    seed
-        Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
-
-    """
-
+    # Name of the scene, and the folder for its relative paths.
     scene: str = ''
     scene_folder: str = ''
+    # Names of the topics.
     crank_topic: str = ''
     joint_states_topic: str = ''
     faults_topic: str = ''
     withheld_topic: str = ''
     resets_topic: str = ''
     extras: tuple[str, ...] = ()
-    wrenches: tuple[str, ...] = ()
-    begun: str = ''
-    versions: Mapping[str, str] = {}
+    wrenches: tuple[str, ...] = ()  # Names of the topics with wrenches, in the order of the scene
+    begun: str = ''  # When the bag was begun, as in `MID_RUN`; '' if it does not say
+    versions: Mapping[str, str] = {}  # Versions of the software of the run, by name
+    # Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
     solvers: Mapping[str, Any] = {}
-    user_effects: Mapping[str, str] = {}
+    user_effects: Mapping[str, str] = {}  # Modules of the user-defined effects, by name
+    # Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
     seed: int = 0
 
 

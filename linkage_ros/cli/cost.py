@@ -176,26 +176,15 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 class Costs(NamedTuple):
-    """
-    Measured costs.
+    """Measured costs."""
 
-    Attributes
-    ----------
-    scene
-        Cost of a scene, or of the scene of all effects.
-    drives
-        What each drive takes beyond the topic drive; empty unless all are measured.
-    faults
-        What each fault takes while it is not injected; empty unless all are measured.
-    under_torque
-        What each part, friction and load takes under the torque drive; empty unless all are
-        measured.
-
-    """
-
-    scene: SceneCost
+    scene: SceneCost  # Cost of a scene, or of the scene of all effects
+    # What each drive takes beyond the topic drive; empty unless all are measured.
     drives: Mapping[str, Times] = MappingProxyType({})
+    # What each fault takes while it is not injected; empty unless all are measured.
     faults: Mapping[str, Times] = MappingProxyType({})
+    # What each part, friction and load takes under the torque drive; empty unless all are
+    # measured.
     under_torque: Mapping[str, Times] = MappingProxyType({})
 
 

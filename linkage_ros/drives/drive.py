@@ -86,17 +86,10 @@ _CRANK = ', '.join(CrankState._fields)
 
 
 class CrankBehindPlay(CrankState):
-    """
-    State of the inputs at a tick, after the play between them and their motors.
+    """State of the inputs at a tick, after the play between them and their motors."""
 
-    Attributes
-    ----------
-    free_motors
-        For each input the acceleration of its motor, in [rad/s²] or [m/s²], while the motor moves
-        within the play and transmits no force; None while it drives the input.
-
-    """
-
+    # For each input the acceleration of its motor, in [rad/s²] or [m/s²], while the motor moves
+    # within the play and transmits no force; None while it drives the input.
     free_motors: tuple[float | None, ...] = ()
 
 

@@ -46,30 +46,17 @@ _SAMPLES = 90
 
 
 class JointCoordinate(NamedTuple):
-    """
-    A joint, driven or published.
+    """A joint, driven or published."""
 
-    Attributes
-    ----------
-    number, driven
-        Its number among the driven joints, or among the published ones.
-    turns
-        Whether it is an angle.
-    slider
-        The slider whose slide it is; '' for an angle.
-    child, parent
-        The links whose angle it is; '' for a slide.
-    one, other, factor
-        Its rate is factor·(v[one] − v[other]) of the closure's coordinates.
-
-    """
-
+    # Its number among the driven joints, or among the published ones.
     number: int
     driven: bool
-    turns: bool
-    slider: str
+    turns: bool  # Whether it is an angle
+    slider: str  # The slider whose slide it is; '' for an angle
+    # The links whose angle it is; '' for a slide.
     child: str
     parent: str
+    # Its rate is factor·(v[one] − v[other]) of the closure's coordinates.
     one: int
     other: int
     factor: float
@@ -107,27 +94,14 @@ def joint_coordinate(closure: Closure, name: str) -> JointCoordinate:
 
 
 class LoadedPoint(NamedTuple):
-    """
-    A point of a link under a force.
+    """A point of a link under a force."""
 
-    Attributes
-    ----------
-    link, number
-        Its link, and its number among the loaded points.
-    place
-        Its index among the tracked points.
-    unit
-        Direction of the force, a unit vector.
-    coordinate
-        Index of the closure's coordinate that turns the direction; 0 for none.
-
-    """
-
+    # Its link, and its number among the loaded points.
     link: str
     number: int
-    place: int
-    unit: complex
-    coordinate: int
+    place: int  # Its index among the tracked points
+    unit: complex  # Direction of the force, a unit vector
+    coordinate: int  # Index of the closure's coordinate that turns the direction; 0 for none
 
     def direction(self, position: Position) -> complex:
         """Return the direction in the frame of the ground."""

@@ -49,23 +49,12 @@ class Law(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """
-    A force that is linear between the rows of a table, and constant before and after them.
+    """A force that is linear between the rows of a table, and constant before and after them."""
 
-    Attributes
-    ----------
-    over
-        What the first column is: 'time', 'position' or 'rate'.
-    rows
-        Pairs of it and the force; the first column increases.
-    middle
-        Of the positions of a joint that turns: whole turns are left out so that its angle is
-        nearest to this one, in [rad]. None if turns count, and for the others.
-
-    """
-
-    over: str
-    rows: tuple[tuple[float, float], ...]
+    over: str  # What the first column is: 'time', 'position' or 'rate'
+    rows: tuple[tuple[float, float], ...]  # Pairs of it and the force; the first column increases
+    # Of the positions of a joint that turns: whole turns are left out so that its angle is nearest
+    # to this one, in [rad]. None if turns count, and for the others.
     middle: float | None = None
 
     def segment(self, value: float, rate: float, time: float) -> int:
@@ -99,23 +88,11 @@ class Table:
 
 
 class LawTerm(NamedTuple):
-    """
-    A load by a law, at one value of the only input.
+    """A load by a law, at one value of the only input."""
 
-    Attributes
-    ----------
-    lever
-        λ of the load.
-    value
-        x of the law, in [rad] or [m].
-    factor
-        ẋ at a rate of the input of 1.
-
-    """
-
-    lever: float
-    value: float
-    factor: float
+    lever: float  # λ of the load
+    value: float  # x of the law, in [rad] or [m]
+    factor: float  # ẋ at a rate of the input of 1
 
 
 _LOW, _FREE, _HIGH = -1, 0, 1
@@ -130,25 +107,14 @@ class Contact:
     that leaves the stop faster than the damper follows is free (P. Flores, H. M. Lankarani,
     Contact Force Models for Multibody Dynamics, 2016, ch. 3, on the Kelvin-Voigt model and its
     pull at the end of a contact).
-
-    Attributes
-    ----------
-    low, high
-        The limits, in [rad] or [m]; infinite for none.
-    stiffness
-        k, in [N·m/rad] or [N/m].
-    damping
-        c, in [N·m·s/rad] or [N·s/m].
-    middle
-        As in `Table`.
-
     """
 
+    # The limits, in [rad] or [m]; infinite for none.
     low: float
     high: float
-    stiffness: float
-    damping: float
-    middle: float | None = None
+    stiffness: float  # k, in [N·m/rad] or [N/m]
+    damping: float  # c, in [N·m·s/rad] or [N·s/m]
+    middle: float | None = None  # As in `Table`
 
     def segment(self, value: float, rate: float, _time: float) -> int:
         """Return -1 at the lower stop, 1 at the upper one, or 0."""
@@ -189,18 +155,10 @@ class Stribeck:
     The excess of friction at low rates: −e·sign(ẋ)·exp(−(ẋ/s)²).
 
     Its segments are the directions of motion. The value x does not matter.
-
-    Attributes
-    ----------
-    excess
-        e, in [N·m] or [N].
-    rate
-        s, in [rad/s] or [m/s].
-
     """
 
-    excess: float
-    rate: float
+    excess: float  # e, in [N·m] or [N]
+    rate: float  # s, in [rad/s] or [m/s]
 
     def segment(self, _value: float, rate: float, _time: float) -> int:
         """Return the sign of the rate."""

@@ -35,30 +35,17 @@ class Spring:
 
     It pulls with k·(ℓ − ℓ0) + c·ℓ̇ at the length ℓ. If its ends coincide it has no direction and
     no force.
-
-    Attributes
-    ----------
-    from_link, from_point, to_link, to_point
-        Its ends.
-    stiffness
-        k, in [N/m].
-    free_length
-        ℓ0, in [m].
-    damping
-        c, in [N·s/m].
-    name
-        Its name in messages.
-
     """
 
+    # Its ends.
     from_link: str
     from_point: str
     to_link: str
     to_point: str
-    stiffness: float
-    free_length: float
-    damping: float = 0.0
-    name: str = ''
+    stiffness: float  # k, in [N/m]
+    free_length: float  # ℓ0, in [m]
+    damping: float = 0.0  # c, in [N·s/m]
+    name: str = ''  # Its name in messages
 
     @property
     def ends(self) -> tuple[tuple[str, str], tuple[str, str]]:
@@ -203,25 +190,14 @@ class AppliedLoads:
 
 @dataclass(frozen=True, slots=True)
 class Loads:
-    """
-    Gravity, springs, the inertia of the drive, and the loads on joints and points.
+    """Gravity, springs, the inertia of the drive, and the loads on joints and points."""
 
-    Attributes
-    ----------
-    gravity
-        Acceleration of gravity in the frame of the ground, in [m/s²].
-    springs
-        All springs.
-    drive_inertia
-        Inertia of each input's motor, seen at the input: in [kg·m²], or in [kg] for a slide.
-    applied
-        Springs, stops and efforts of joints, forces on points, and wrenches on links.
-
-    """
-
+    # Acceleration of gravity in the frame of the ground, in [m/s²].
     gravity: tuple[float, float] = (0.0, 0.0)
-    springs: tuple[Spring, ...] = ()
+    springs: tuple[Spring, ...] = ()  # All springs
+    # Inertia of each input's motor, seen at the input: in [kg·m²], or in [kg] for a slide.
     drive_inertia: float = 0.0
+    # Springs, stops and efforts of joints, forces on points, and wrenches on links.
     applied: AppliedLoads = field(default_factory=AppliedLoads)
 
 

@@ -65,40 +65,20 @@ _ROUNDING = 1e-9
 
 
 class Terms(NamedTuple):
-    """
-    The equation of motion at one value of its input, in SI units.
+    """The equation of motion at one value of its input, in SI units."""
 
-    Attributes
-    ----------
-    inertia
-        I, in [kg·m²], or in [kg] if the input slides; the units of the others follow.
-    half_slope
-        ½·dI/dq.
-    potential_slope
-        dV/dq.
-    viscous
-        C; the force on q is −C·q̇.
-    coulomb
-        F; the force on q is −F·sign(q̇), and up to F in either direction at q̇ = 0.
-    slips
-        T·ψ' of each joint with Coulomb friction, so that F is the sum of their absolute values; 0
-        if ψ' is 0 within rounding. Empty without such friction.
-    laws
-        For each law of an applied force (`linkage_ros.dynamics.laws`): the force on q is the sum
-        of λ·f(x, ẋ, t). Empty without laws.
-    breakaway
-        What friction holds at q̇ = 0 in addition to F.
-
-    """
-
-    inertia: float
-    half_slope: float
-    potential_slope: float
-    viscous: float
-    coulomb: float
+    inertia: float  # I, in [kg·m²], or in [kg] if the input slides; the units of the others follow
+    half_slope: float  # ½·dI/dq
+    potential_slope: float  # dV/dq
+    viscous: float  # C; the force on q is −C·q̇
+    coulomb: float  # F; the force on q is −F·sign(q̇), and up to F in either direction at q̇ = 0
+    # T·ψ' of each joint with Coulomb friction, so that F is the sum of their absolute values; 0 if
+    # ψ' is 0 within rounding. Empty without such friction.
     slips: tuple[float, ...] = ()
+    # For each law of an applied force (`linkage_ros.dynamics.laws`): the force on q is the sum of
+    # λ·f(x, ẋ, t). Empty without laws.
     laws: tuple[LawTerm, ...] = ()
-    breakaway: float = 0.0
+    breakaway: float = 0.0  # What friction holds at q̇ = 0 in addition to F
 
 
 class Rubbing(NamedTuple):

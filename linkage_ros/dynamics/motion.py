@@ -147,26 +147,12 @@ _SHORTEST = 0.5**30
 
 
 class Motion(NamedTuple):
-    """
-    A state of one freedom.
+    """A state of one freedom."""
 
-    Attributes
-    ----------
-    value
-        Value of the input, in [rad] or [m].
-    rate
-        Its rate, in [rad/s] or [m/s].
-    terms
-        The equation of motion at the value.
-    ahead
-        The time since the start of the step in which it was found, in [s].
-
-    """
-
-    value: float
-    rate: float
-    terms: Terms
-    ahead: float = 0.0
+    value: float  # Value of the input, in [rad] or [m]
+    rate: float  # Its rate, in [rad/s] or [m/s]
+    terms: Terms  # The equation of motion at the value
+    ahead: float = 0.0  # The time since the start of the step in which it was found, in [s]
 
 
 class _Event(Enum):
@@ -181,29 +167,14 @@ class _Event(Enum):
 
 @dataclass(frozen=True, slots=True)
 class OneFreedom:
-    """
-    A mechanism with one input that is moved by a force.
+    """A mechanism with one input that is moved by a force."""
 
-    Attributes
-    ----------
-    terms
-        The equation of motion at a value of the input; None if there is none.
-    step
-        The method of integration.
-    stops
-        Lower and upper stop, in [rad] or [m].
-    restitution
-        Ratio of the rates after and before an impact, 0 to 1.
-    laws
-        The laws of the applied forces, as in ``Terms.laws``.
-
-    """
-
+    # The equation of motion at a value of the input; None if there is none.
     terms: Callable[[float], Terms | None]
-    step: Step
-    stops: tuple[float, float] = (-inf, inf)
-    restitution: float = 0.0
-    laws: tuple[Law, ...] = ()
+    step: Step  # The method of integration
+    stops: tuple[float, float] = (-inf, inf)  # Lower and upper stop, in [rad] or [m]
+    restitution: float = 0.0  # Ratio of the rates after and before an impact, 0 to 1
+    laws: tuple[Law, ...] = ()  # The laws of the applied forces, as in ``Terms.laws``
 
     def driven_by(self, change: Callable[[OneFreedom], OneFreedom]) -> OneFreedom:
         """Return it with a change of what its motor moves: all of it."""

@@ -59,33 +59,17 @@ Line = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class MotorLaw:
-    """
-    The effort of a motor under one command, over the rate of the input.
+    """The effort of a motor under one command, over the rate of the input."""
 
-    Attributes
-    ----------
-    ends
-        The rates between its segments, in [rad/s] or [m/s], in order.
-    lines
-        The effort in each segment, in [N·m] or [N], without the friction in the gear that acts at
-        rest too.
-    resting
-        The effort at rest, without this friction.
-    holding
-        This friction: the most that the gear holds at rest.
-    torques
-        The torque of the motor before the gear in each segment, in [N·m].
-    stalled
-        The torque at rest.
-
-    """
-
-    ends: tuple[float, ...] = ()
+    ends: tuple[float, ...] = ()  # The rates between its segments, in [rad/s] or [m/s], in order
+    # The effort in each segment, in [N·m] or [N], without the friction in the gear that acts at
+    # rest too.
     lines: tuple[Line, ...] = ((0.0, 0.0),)
-    resting: float = 0.0
-    holding: float = 0.0
+    resting: float = 0.0  # The effort at rest, without this friction
+    holding: float = 0.0  # This friction: the most that the gear holds at rest
+    # The torque of the motor before the gear in each segment, in [N·m].
     torques: tuple[Line, ...] = ((0.0, 0.0),)
-    stalled: float = 0.0
+    stalled: float = 0.0  # The torque at rest
 
     def segment(self, _value: float, rate: float, _time: float) -> int:
         """Return how many ends a rate has passed; -1 at rest."""
@@ -114,35 +98,17 @@ _OFF = MotorLaw()
 
 @dataclass(frozen=True, slots=True)
 class Motor:
-    """
-    A DC motor with a gear, and its amplifier.
+    """A DC motor with a gear, and its amplifier."""
 
-    Attributes
-    ----------
-    constant
-        k, in [N·m/A] or [V·s/rad].
-    resistance
-        R, in [Ω]; 0 only without commands of voltage and without a limit of it.
-    ratio
-        N, in [rad/rad] or [rad/m].
-    forward, backward
-        η and ηᵦ.
-    most
-        iₘ, in [A].
-    supply
-        U, in [V].
-    command
-        What is commanded: 'effort' in [N·m] or [N], 'current' in [A], or 'voltage' in [V].
-
-    """
-
-    constant: float
-    resistance: float
-    ratio: float
+    constant: float  # k, in [N·m/A] or [V·s/rad]
+    resistance: float  # R, in [Ω]; 0 only without commands of voltage and without a limit of it
+    ratio: float  # N, in [rad/rad] or [rad/m]
+    # η and ηᵦ.
     forward: float
     backward: float
-    most: float
-    supply: float
+    most: float  # iₘ, in [A]
+    supply: float  # U, in [V]
+    # What is commanded: 'effort' in [N·m] or [N], 'current' in [A], or 'voltage' in [V].
     command: str
 
     def mounted(self, mechanism: Driven) -> Driven:

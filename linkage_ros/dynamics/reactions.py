@@ -235,20 +235,14 @@ class Reaction(NamedTuple):
     The force and moment of ``joint.to`` on ``joint.link``; the opposite acts on ``joint.to``.
 
     The effort of a drive is not part of it: that acts beside the joint that it drives.
-
-    Attributes
-    ----------
-    fx, fy
-        Force in the frame of the ground, in [N]. In a pin: at the pin. In a slider: at its point,
-        across the line, with friction along it.
-    moment
-        Moment about that point, counter-clockwise, in [N·m]. In a pin: friction only. In a slider:
-        the moment that keeps the block from turning.
-
     """
 
+    # Force in the frame of the ground, in [N]. In a pin: at the pin. In a slider: at its point,
+    # across the line, with friction along it.
     fx: float
     fy: float
+    # Moment about that point, counter-clockwise, in [N·m]. In a pin: friction only. In a slider:
+    # the moment that keeps the block from turning.
     moment: float
 
 

@@ -55,24 +55,14 @@ _SLOW = 1e-9
 
 
 class PlayMotion(NamedTuple):
-    """
-    A state of motor and crank.
+    """A state of motor and crank."""
 
-    Attributes
-    ----------
-    crank, motor
-        Their states, each with its own equation of motion.
-    side
-        1 if the motor touches the crank so that it pushes it forward, -1 backward, 0 in between.
-    ahead
-        The time since the start of the step, in [s].
-
-    """
-
+    # Their states, each with its own equation of motion.
     crank: Motion
     motor: Motion
+    # 1 if the motor touches the crank so that it pushes it forward, -1 backward, 0 in between.
     side: int = 0
-    ahead: float = 0.0
+    ahead: float = 0.0  # The time since the start of the step, in [s]
 
     @property
     def value(self) -> float:
@@ -87,29 +77,13 @@ class PlayMotion(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TwoMasses:
-    """
-    A motor that drives a mechanism of one input through play.
+    """A motor that drives a mechanism of one input through play."""
 
-    Attributes
-    ----------
-    crank
-        The mechanism without its motor.
-    motor
-        The motor alone.
-    joined
-        Both as one; it comes to rest at the crank's stops.
-    half
-        Half of the play, in [rad] or [m].
-    restitution
-        Ratio of the relative rates after and before a meeting, 0 to 1.
-
-    """
-
-    crank: OneFreedom
-    motor: OneFreedom
-    joined: OneFreedom
-    half: float
-    restitution: float
+    crank: OneFreedom  # The mechanism without its motor
+    motor: OneFreedom  # The motor alone
+    joined: OneFreedom  # Both as one; it comes to rest at the crank's stops
+    half: float  # Half of the play, in [rad] or [m]
+    restitution: float  # Ratio of the relative rates after and before a meeting, 0 to 1
 
     @classmethod
     def of(cls, crank: OneFreedom, inertia: float, play: float, restitution: float) -> TwoMasses:

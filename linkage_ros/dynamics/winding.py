@@ -42,25 +42,12 @@ from linkage_ros.errors import DefinitionError
 
 @dataclass(frozen=True, slots=True)
 class Winding:
-    """
-    A motor whose winding has an inductance.
+    """A motor whose winding has an inductance."""
 
-    Attributes
-    ----------
-    motor
-        The motor under a command of current, without a limit of voltage.
-    inductance
-        L, in [H].
-    supply
-        U, in [V].
-    command
-        What is commanded: 'effort' in [N·m] or [N], 'current' in [A], or 'voltage' in [V].
-
-    """
-
-    motor: Motor
-    inductance: float
-    supply: float
+    motor: Motor  # The motor under a command of current, without a limit of voltage
+    inductance: float  # L, in [H]
+    supply: float  # U, in [V]
+    # What is commanded: 'effort' in [N·m] or [N], 'current' in [A], or 'voltage' in [V].
     command: str
 
     @property
@@ -158,20 +145,10 @@ class Winding:
 
 
 class WoundMotion(NamedTuple):
-    """
-    A state of a mechanism and of the current that drives it.
+    """A state of a mechanism and of the current that drives it."""
 
-    Attributes
-    ----------
-    moved
-        The state of the mechanism.
-    current
-        The current in the winding, in [A].
-
-    """
-
-    moved: Any
-    current: float
+    moved: Any  # The state of the mechanism
+    current: float  # The current in the winding, in [A]
 
     @property
     def value(self) -> float:
@@ -191,23 +168,11 @@ class WoundMotion(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class WoundMechanism:
-    """
-    A mechanism that is driven by the current in a winding.
+    """A mechanism that is driven by the current in a winding."""
 
-    Attributes
-    ----------
-    mechanism
-        What moves, with its motor.
-    winding
-        The winding.
-    command
-        The command, in [A] or [V]; None if there is none.
-
-    """
-
-    mechanism: Any
-    winding: Winding
-    command: float | None = None
+    mechanism: Any  # What moves, with its motor
+    winding: Winding  # The winding
+    command: float | None = None  # The command, in [A] or [V]; None if there is none
 
     @property
     def stops(self) -> tuple[float, float]:

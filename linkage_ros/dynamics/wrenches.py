@@ -74,20 +74,10 @@ class HeldWrench:
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """
-    One number of a held wrench, as a law (`linkage_ros.dynamics.laws`).
+    """One number of a held wrench, as a law (`linkage_ros.dynamics.laws`)."""
 
-    Attributes
-    ----------
-    of
-        The wrench.
-    number
-        Index of the number in a `PlanarWrench`.
-
-    """
-
-    of: HeldWrench
-    number: int
+    of: HeldWrench  # The wrench
+    number: int  # Index of the number in a `PlanarWrench`
 
     def segment(self, _value: float, _rate: float, _time: float) -> int:
         """Return the only segment."""

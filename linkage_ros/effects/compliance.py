@@ -62,29 +62,15 @@ PARAMETERS = ComplianceParameters
 
 
 class _Bar(NamedTuple):
-    """
-    A link between two pins, near and far.
+    """A link between two pins, near and far."""
 
-    Attributes
-    ----------
-    coordinate
-        Index of the closure's coordinate that turns it.
-    axis
-        Unit vector from the near pin to the far one where that coordinate is 0.
-    halves
-        Joints by index, with the factor of their axial force in the tension.
-    far
-        Joints of the far pin by index; 1 where the link is the joint's ``link``, −1 where ``to``.
-    compliance
-        1/k, in [m/N].
-
-    """
-
-    coordinate: int
-    axis: complex
+    coordinate: int  # Index of the closure's coordinate that turns it
+    axis: complex  # Unit vector from the near pin to the far one where that coordinate is 0
+    # Joints by index, with the factor of their axial force in the tension.
     halves: tuple[tuple[int, float], ...]
+    # Joints of the far pin by index; 1 where the link is the joint's ``link``, −1 where ``to``.
     far: tuple[tuple[int, float], ...]
-    compliance: float
+    compliance: float  # 1/k, in [m/N]
 
 
 def stage(parameters: ComplianceParameters, context: Context) -> Stage:

@@ -79,32 +79,21 @@ def bringing(name: str, named: Collection[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """
-    An effect: the contents of its module, with None or '' for optional ones that it lacks.
+    """An effect: the contents of its module, with None or '' for optional ones that it lacks."""
 
-    Attributes
-    ----------
-    name, parameters
-        Its name in a scene, and the type of its parameters.
-    alter, drive_stage, stage, sensor, writer
-        Its functions; see `linkage_ros.effects.stage`.
-    topic, message
-        Topic and type of its own message.
-    of_reading
-        Whether that message is made of the reading alone.
-
-    """
-
+    # Its name in a scene, and the type of its parameters.
     name: str
     parameters: Any
+    # Its functions; see `linkage_ros.effects.stage`.
     alter: Callable[..., Linkage] | None
     drive_stage: Callable[..., DriveStage] | None
     stage: Callable[..., Stage] | None
     sensor: Callable[..., Sensor] | None
     writer: Callable[..., Writer] | None
+    # Topic and type of its own message.
     topic: str
     message: str
-    of_reading: bool
+    of_reading: bool  # Whether that message is made of the reading alone
 
 
 def effect_of(name: str) -> Effect:

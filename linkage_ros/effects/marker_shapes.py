@@ -60,69 +60,32 @@ class Key(NamedTuple):
 
 
 class Body(NamedTuple):
-    """
-    A marker that moves with a link.
+    """A marker that moves with a link."""
 
-    Attributes
-    ----------
-    number
-        Index of the marker.
-    at
-        Origin of its frame.
-    colour
-        Colour when not near a toggle.
-    filled
-        Whether it is a filled area; else a line.
-
-    """
-
-    number: int
-    at: Key
-    colour: Colour
-    filled: bool
+    number: int  # Index of the marker
+    at: Key  # Origin of its frame
+    colour: Colour  # Colour when not near a toggle
+    filled: bool  # Whether it is a filled area; else a line
 
 
 class MarkerShapes(NamedTuple):
-    """
-    The markers of a linkage.
+    """The markers of a linkage."""
 
-    Attributes
-    ----------
-    moving
-        Markers that change from message to message.
-    still
-        The ground, and the curves of traced points.
-    bodies
-        Moving markers that belong to a link.
-    pins
-        Moving markers for pins: each has a sphere for every place in `pin_places`.
-    pin_places
-        Positions of the pins.
-    trails, trail_places
-        Moving markers for the trails of traced points, and the positions of these points.
-    forces, efforts
-        Moving markers that are arrows.
-    status
-        Index of the text marker.
-    size
-        Half the width of a bar, in [m].
-    extent
-        Diagonal of the linkage's whole workspace, in [m].
-
-    """
-
-    moving: tuple[Marker, ...]
-    still: tuple[Marker, ...]
-    bodies: tuple[Body, ...]
+    moving: tuple[Marker, ...]  # Markers that change from message to message
+    still: tuple[Marker, ...]  # The ground, and the curves of traced points
+    bodies: tuple[Body, ...]  # Moving markers that belong to a link
+    # Moving markers for pins: each has a sphere for every place in `pin_places`.
     pins: tuple[int, ...]
-    pin_places: tuple[Key, ...]
+    pin_places: tuple[Key, ...]  # Positions of the pins
+    # Moving markers for the trails of traced points, and the positions of these points.
     trails: tuple[int, ...]
     trail_places: tuple[Key, ...]
+    # Moving markers that are arrows.
     forces: tuple[int, ...]
     efforts: tuple[int, ...]
-    status: int
-    size: float
-    extent: float
+    status: int  # Index of the text marker
+    size: float  # Half the width of a bar, in [m]
+    extent: float  # Diagonal of the linkage's whole workspace, in [m]
 
 
 def rgba(code: str) -> Colour:

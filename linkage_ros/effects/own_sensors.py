@@ -91,17 +91,9 @@ def own_sensors(
 
 
 class PartlyNew(SensorReading):
-    """
-    A reading in which some joints repeat their last one.
+    """A reading in which some joints repeat their last one."""
 
-    Attributes
-    ----------
-    new
-        Indices of the other joints; None for all.
-
-    """
-
-    new: frozenset[int] | None = None
+    new: frozenset[int] | None = None  # Indices of the other joints; None for all
 
 
 class OwnSensors:

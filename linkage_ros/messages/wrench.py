@@ -29,21 +29,12 @@ _NUMBERS = {order: Struct(f'{order}6d') for order in '<>'}
 
 
 class PlanarWrench(NamedTuple):
-    """
-    What of a wrench moves a planar linkage.
+    """What of a wrench moves a planar linkage."""
 
-    Attributes
-    ----------
-    fx, fy
-        Components of the force, in [N].
-    moment
-        Torque about the normal of the plane, counter-clockwise, in [N·m].
-
-    """
-
+    # Components of the force, in [N].
     fx: float
     fy: float
-    moment: float
+    moment: float  # Torque about the normal of the plane, counter-clockwise, in [N·m]
 
 
 def read_wrench(data: bytes) -> PlanarWrench | Rejection:

@@ -97,59 +97,28 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class DiagnosticsSummary:
-    """
-    Data for all diagnostic statuses.
+    """Data for all diagnostic statuses."""
 
-    Attributes
-    ----------
-    node
-        Name of the node.
-    scene
-        Name of the scene.
-    rate
-        Wanted ticks per second, in [Hz]; 0 for one tick per sample.
-    clock
-        Time of the node's clock, in [ns].
-    crank_topic
-        Resolved name of the drives' topic; '' for none.
-    publishers
-        Other publishers on that topic.
-    loop
-        The tick loop.
-    before, now
-        Counts of the tick at the start and at the end of the window.
-    recording_failure
-        Reason why a wanted recording does not run; '' otherwise.
-    limits
-        Warning threshold for each attribute of `Nearness`; 0 for never.
-    snapshots
-        Memory of the last seconds; None when a bag is recorded continuously.
-    clock_silence
-        Time since the last ``/clock`` message, in [s]; 0 where the node does not use it.
-    clock_refused
-        Number of ``/clock`` messages without a valid time.
-    crank_shared
-        Whether other joints share the crank's topic: it may then have several publishers.
-    system
-        Settings of middleware and operating system that affect the ticks.
-
-    """
-
-    node: str
-    scene: str
-    rate: float
-    clock: int
-    crank_topic: str
-    publishers: Sequence[str]
-    loop: TickLoop
+    node: str  # Name of the node
+    scene: str  # Name of the scene
+    rate: float  # Wanted ticks per second, in [Hz]; 0 for one tick per sample
+    clock: int  # Time of the node's clock, in [ns]
+    crank_topic: str  # Resolved name of the drives' topic; '' for none
+    publishers: Sequence[str]  # Other publishers on that topic
+    loop: TickLoop  # The tick loop
+    # Counts of the tick at the start and at the end of the window.
     before: Snapshot
     now: Snapshot
-    recording_failure: str
-    limits: Mapping[str, float]
+    recording_failure: str  # Reason why a wanted recording does not run; '' otherwise
+    limits: Mapping[str, float]  # Warning threshold for each attribute of `Nearness`; 0 for never
+    # Memory of the last seconds; None when a bag is recorded continuously.
     snapshots: RunSnapshots | None = None
+    # Time since the last ``/clock`` message, in [s]; 0 where the node does not use it.
     clock_silence: float = 0.0
-    clock_refused: int = 0
+    clock_refused: int = 0  # Number of ``/clock`` messages without a valid time
+    # Whether other joints share the crank's topic: it may then have several publishers.
     crank_shared: bool = False
+    # Settings of middleware and operating system that affect the ticks.
     system: Mapping[str, str] = field(default_factory=dict)
 
     def statuses(self) -> list[DiagnosticStatus]:

@@ -49,32 +49,15 @@ _BY_TOPIC = ('topic', 'torque')
 
 
 class FollowedRun(NamedTuple):
-    """
-    The scene of a running node.
+    """The scene of a running node."""
 
-    Attributes
-    ----------
-    scene
-        The scene.
-    account
-        The run's account of itself: its topics.
-    shown
-        The first linkage, which is drawn.
-    closure
-        The closure of that one.
-    turned
-        The linkage whose crank or effort comes from a topic; None if there is none.
-    model
-        What a page gets.
-
-    """
-
-    scene: Scene
-    account: RunAccount
-    shown: SceneLinkage
-    closure: Closure
+    scene: Scene  # The scene
+    account: RunAccount  # The run's account of itself: its topics
+    shown: SceneLinkage  # The first linkage, which is drawn
+    closure: Closure  # The closure of that one
+    # The linkage whose crank or effort comes from a topic; None if there is none.
     turned: SceneLinkage | None
-    model: dict[str, Any]
+    model: dict[str, Any]  # What a page gets
 
     @property
     def crank_topic(self) -> str:

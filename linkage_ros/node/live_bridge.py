@@ -94,27 +94,14 @@ _HAND_QOS = QoSProfile(depth=1)
 
 @dataclass(slots=True, eq=False)
 class _Call:
-    """
-    A call of a service of the node.
+    """A call of a service of the node."""
 
-    Attributes
-    ----------
-    client, request
-        The client of the service, and what is asked.
-    future
-        Has the line that the answer says.
-    until
-        When it is given up, in [s].
-    answer
-        The future of the client, as soon as the service is found and called.
-
-    """
-
+    # The client of the service, and what is asked.
     client: Any
     request: Any
-    future: Future[str]
-    until: float
-    answer: Any = None
+    future: Future[str]  # Has the line that the answer says
+    until: float  # When it is given up, in [s]
+    answer: Any = None  # The future of the client, as soon as the service is found and called
 
 
 class LiveBridge:

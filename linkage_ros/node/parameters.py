@@ -32,29 +32,13 @@ _PERIOD = 0.1, 3600.0
 
 
 class NodeParameter(NamedTuple):
-    """
-    A parameter of a node.
+    """A parameter of a node."""
 
-    Attributes
-    ----------
-    name
-        Name.
-    default
-        Default; the type of the parameter if it has none.
-    meaning
-        Meaning with its unit, for the descriptor and ``--help``.
-    bounds
-        Least and greatest value; None for no bounds.
-    changeable
-        Whether it may be changed while the node runs.
-
-    """
-
-    name: str
-    default: Any
-    meaning: str
-    bounds: tuple[float, float] | None = None
-    changeable: bool = False
+    name: str  # Name
+    default: Any  # Default; the type of the parameter if it has none
+    meaning: str  # Meaning with its unit, for the descriptor and ``--help``
+    bounds: tuple[float, float] | None = None  # Least and greatest value; None for no bounds
+    changeable: bool = False  # Whether it may be changed while the node runs
 
 
 _LIMITS = tuple(

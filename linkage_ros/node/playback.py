@@ -42,43 +42,21 @@ _LOOK = 0.1
 
 
 class Part(NamedTuple):
-    """
-    The part of a bag that is played.
+    """The part of a bag that is played."""
 
-    Attributes
-    ----------
-    first, last
-        Range of log times to play, in [ns].
-    topics
-        Topics to play.
-    loop
-        Whether to start again at the end.
-
-    """
-
+    # Range of log times to play, in [ns].
     first: int
     last: float
-    topics: Collection[str]
-    loop: bool
+    topics: Collection[str]  # Topics to play
+    loop: bool  # Whether to start again at the end
 
 
 class QueuedMessage(NamedTuple):
-    """
-    A message and its time in the playback.
+    """A message and its time in the playback."""
 
-    Attributes
-    ----------
-    base
-        Duration of the passes before this one, in [ns] of bag time.
-    log_time
-        In [ns].
-    topic, data
-        The message.
-
-    """
-
-    base: int
-    log_time: int
+    base: int  # Duration of the passes before this one, in [ns] of bag time
+    log_time: int  # In [ns]
+    # The message.
     topic: str
     data: bytes
 

@@ -53,28 +53,14 @@ _ALLOW = 'allow it in /etc/security/limits.d (USER - {limit}) and log in anew'
 
 @dataclass(slots=True)
 class RealTime:
-    """
-    Requested real-time settings, and their outcome.
+    """Requested real-time settings, and their outcome."""
 
-    Attributes
-    ----------
-    priority
-        Priority under SCHED_FIFO, 1 to 99; 0 for none.
-    processors
-        Numbers of the processors that may run the tick; () for all.
-    lock
-        Whether to lock the memory of the process into RAM.
-    in_force
-        Setting that the system reports, for each request; written by the requesting thread.
-    refused
-        One line for each refused request, with a remedy.
-
-    """
-
-    priority: int
-    processors: Sequence[int]
-    lock: bool
+    priority: int  # Priority under SCHED_FIFO, 1 to 99; 0 for none
+    processors: Sequence[int]  # Numbers of the processors that may run the tick; () for all
+    lock: bool  # Whether to lock the memory of the process into RAM
+    # Setting that the system reports, for each request; written by the requesting thread.
     in_force: dict[str, str] = field(default_factory=dict)
+    # One line for each refused request, with a remedy.
     refused: list[str] = field(default_factory=list)
 
     def lock_memory(self) -> None:

@@ -259,44 +259,21 @@ Answer = Callable[[bool, str], None]
 
 @dataclass(frozen=True, slots=True)
 class SnapshotOutcome:
-    """
-    The outcome of a snapshot.
+    """The outcome of a snapshot."""
 
-    Attributes
-    ----------
-    bag
-        Summary of the written bag; None where no bag could be made.
-    failure
-        Reason why it is incomplete; '' if it is complete.
-    line
-        The outcome as one line.
-
-    """
-
-    bag: RecordingSummary | None
-    failure: str
-    line: str
+    bag: RecordingSummary | None  # Summary of the written bag; None where no bag could be made
+    failure: str  # Reason why it is incomplete; '' if it is complete
+    line: str  # The outcome as one line
 
 
 @dataclass(frozen=True, slots=True)
 class MemorySummary:
-    """
-    Summary of a run whose last seconds were kept in memory.
+    """Summary of a run whose last seconds were kept in memory."""
 
-    Attributes
-    ----------
-    topics
-        Counts for each topic; messages that were kept to the end are gone now.
-    snapshots
-        Number of snapshots, as text.
-    failure
-        Reason why the memory has ended early, or lacks messages; '' if it is complete.
-
-    """
-
+    # Counts for each topic; messages that were kept to the end are gone now.
     topics: tuple[KeptCounts, ...]
-    snapshots: str
-    failure: str
+    snapshots: str  # Number of snapshots, as text
+    failure: str  # Reason why the memory has ended early, or lacks messages; '' if it is complete
 
     def __str__(self) -> str:
         counts = ', '.join(

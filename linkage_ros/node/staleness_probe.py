@@ -54,22 +54,11 @@ _LEAD = 300_000_000
 
 
 class TableRequest(NamedTuple):
-    """
-    Settings of a measurement.
+    """Settings of a measurement."""
 
-    Attributes
-    ----------
-    scene
-        Scene file that the node runs.
-    seconds
-        Duration of each motion, in [s].
-    crank_rate, use_rate
-        Rates of crank samples and of uses of a joint state, in [Hz].
-
-    """
-
-    scene: str
-    seconds: float
+    scene: str  # Scene file that the node runs
+    seconds: float  # Duration of each motion, in [s]
+    # Rates of crank samples and of uses of a joint state, in [Hz].
     crank_rate: float
     use_rate: float
 

@@ -80,26 +80,13 @@ _OF_FORCES = {'pin_forces'}
 
 
 class LinkageTick(NamedTuple):
-    """
-    The state of one linkage at a tick, step by step.
+    """The state of one linkage at a tick, step by step."""
 
-    Attributes
-    ----------
-    crank
-        State of the crank; None without a crank state.
-    position
-        Solution of the loops; None without a crank state.
-    motion
-        Motion of the mechanism; None where the loops do not close.
-    reading
-        Published values; None where nothing is published. A delay stage may publish a reading
-        although the linkage has no pose.
-
-    """
-
-    crank: CrankState | None
-    position: Position | None
-    motion: MechanismState | None
+    crank: CrankState | None  # State of the crank; None without a crank state
+    position: Position | None  # Solution of the loops; None without a crank state
+    motion: MechanismState | None  # Motion of the mechanism; None where the loops do not close
+    # Published values; None where nothing is published. A delay stage may publish a reading
+    # although the linkage has no pose.
     reading: SensorReading | None
 
 
@@ -133,24 +120,13 @@ class Tick(NamedTuple):
 
 
 class AuxiliaryOutput(NamedTuple):
-    """
-    A message published beside the joint states.
+    """A message published beside the joint states."""
 
-    Attributes
-    ----------
-    effect
-        The effect that asks for it.
-    topic, message
-        Name and type (package/msg/Type) of the topic.
-    writer
-        Serializes the message.
-
-    """
-
-    effect: str
+    effect: str  # The effect that asks for it
+    # Name and type (package/msg/Type) of the topic.
     topic: str
     message: str
-    writer: WriterStage
+    writer: WriterStage  # Serializes the message
 
 
 @dataclass(frozen=True)

@@ -74,28 +74,18 @@ Numbers: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
 
 
 class Straight(NamedTuple):
-    """
-    The usual tick up to its reading, as lines of Python.
+    """The usual tick up to its reading, as lines of Python."""
 
-    Attributes
-    ----------
-    lines, bound
-        Lines that compute from ``now``, and the objects that they use. They define the fields of
-        `CrankState` by name, or return through ``plain``.
-    joints, rates, accelerations, efforts
-        Values of the reading, as expressions; empty where the scene does not ask for them.
-    reactions
-        All reaction values in sequence, as expressions; likewise.
-
-    """
-
+    # Lines that compute from ``now``, and the objects that they use. They define the fields of
+    # `CrankState` by name, or return through ``plain``.
     lines: list[str]
     bound: dict[str, Any]
+    # Values of the reading, as expressions; empty where the scene does not ask for them.
     joints: list[str]
     rates: list[str]
     accelerations: list[str]
     efforts: list[str]
-    reactions: list[str]
+    reactions: list[str]  # All reaction values in sequence, as expressions; likewise
 
 
 def straight(

@@ -88,37 +88,18 @@ class RecordedTopics(NamedTuple):
 
     Only this type numbers them. The tick offers messages to the recorder by handle, and the
     topics of the bag are described by handle.
-
-    Attributes
-    ----------
-    joint_states, diagnostics
-        Published by every run.
-    crank
-        The topic of the drives.
-    wrenches
-        The topics of the wrenches on links.
-    faults
-        Begin and end of faults.
-    withheld
-        Ticks without a message that a replay must know of.
-    extras
-        The auxiliary topics of the pipeline.
-    resets
-        Resets, at which the pipeline is built again.
-    description
-        The robot model. No tick publishes it.
-
     """
 
+    # Published by every run.
     joint_states: int
     diagnostics: int
-    crank: int | None
-    wrenches: tuple[int, ...]
-    faults: int | None
-    withheld: int | None
-    extras: tuple[int, ...]
-    resets: int
-    description: int
+    crank: int | None  # The topic of the drives
+    wrenches: tuple[int, ...]  # The topics of the wrenches on links
+    faults: int | None  # Begin and end of faults
+    withheld: int | None  # Ticks without a message that a replay must know of
+    extras: tuple[int, ...]  # The auxiliary topics of the pipeline
+    resets: int  # Resets, at which the pipeline is built again
+    description: int  # The robot model. No tick publishes it.
 
 
 def recorded_topics(pipeline: Pipeline) -> RecordedTopics:
@@ -142,20 +123,10 @@ _LONGEST_DRAIN = 20_000_000
 
 
 class Stall(NamedTuple):
-    """
-    A lag that lost ticks.
+    """A lag that lost ticks."""
 
-    Attributes
-    ----------
-    duration
-        In [ns].
-    in_tick
-        Whether ticks took so long; else the operating system woke the thread so late.
-
-    """
-
-    duration: int
-    in_tick: bool
+    duration: int  # In [ns]
+    in_tick: bool  # Whether ticks took so long; else the operating system woke the thread so late
 
 
 @dataclass(slots=True)

@@ -40,28 +40,13 @@ class At(NamedTuple):
 
 
 class First(NamedTuple):
-    """
-    A difference between the two runs.
+    """A difference between the two runs."""
 
-    Attributes
-    ----------
-    at
-        The tick.
-    topic
-        The topic.
-    what
-        Description, or the quantity of a joint.
-    joint
-        Name of the joint; '' if the difference does not concern one joint.
-    recorded, now
-        The two numbers; None if the difference does not concern numbers.
-
-    """
-
-    at: At
-    topic: str
-    what: str
-    joint: str = ''
+    at: At  # The tick
+    topic: str  # The topic
+    what: str  # Description, or the quantity of a joint
+    joint: str = ''  # Name of the joint; '' if the difference does not concern one joint
+    # The two numbers; None if the difference does not concern numbers.
     recorded: float | None = None
     now: float | None = None
 

@@ -58,24 +58,13 @@ _LARGEST_LEAD = 2 * 3600 * 1_000_000_000
 
 
 class Remade(NamedTuple):
-    """
-    A tick of the other scene.
+    """A tick of the other scene."""
 
-    Attributes
-    ----------
-    log_time, time
-        Time of the tick, and the time it is solved for, in [ns].
-    recorded
-        Recorded messages of the tick; empty if the bag has none.
-    tick
-        Result of the scene; None if it does not tick then.
-
-    """
-
+    # Time of the tick, and the time it is solved for, in [ns].
     log_time: int
     time: int
-    recorded: tuple[bytes, ...]
-    tick: Tick | None
+    recorded: tuple[bytes, ...]  # Recorded messages of the tick; empty if the bag has none
+    tick: Tick | None  # Result of the scene; None if it does not tick then
 
 
 HeardEvent = SampleEvent | FaultEvent | Reset | TickEvent

@@ -129,20 +129,10 @@ def recorded_scene(
 
 
 class AnnouncedScene(NamedTuple):
-    """
-    The files of a running node's scene, as its message holds them.
+    """The files of a running node's scene, as its message holds them."""
 
-    Attributes
-    ----------
-    path
-        Name of the topic, for error messages.
-    attachments
-        The files by name, as a bag of the run has them.
-
-    """
-
-    path: str
-    attachments: dict[str, bytes]
+    path: str  # Name of the topic, for error messages
+    attachments: dict[str, bytes]  # The files by name, as a bag of the run has them
 
 
 def announced_text(files: Mapping[str, bytes]) -> str:

@@ -52,30 +52,14 @@ bit, for random latencies, for loads over the time, and for markers with a trail
 
 
 class ReplayVerification(NamedTuple):
-    """
-    Result of running the scene of a bag again.
+    """Result of running the scene of a bag again."""
 
-    Attributes
-    ----------
-    comparison
-        Comparison of the ticks that could be compared.
-    undecided
-        Number of ticks at the start that cannot be judged, since the bag lacks the start of the
-        run.
-    first_undecided
-        First difference of the first such tick.
-    beginning
-        Reason why the start of the run is missing; '' if it is there.
-    lost
-        Drives and effects that then never reproduce the run.
-
-    """
-
-    comparison: Comparison
+    comparison: Comparison  # Comparison of the ticks that could be compared
+    # Number of ticks at the start that cannot be judged, since the bag lacks the start of the run.
     undecided: int
-    first_undecided: First | None
-    beginning: str
-    lost: tuple[str, ...]
+    first_undecided: First | None  # First difference of the first such tick
+    beginning: str  # Reason why the start of the run is missing; '' if it is there
+    lost: tuple[str, ...]  # Drives and effects that then never reproduce the run
 
     @property
     def ticks(self) -> int:
@@ -192,74 +176,36 @@ _REPORT_EVERY = 1024
 
 
 class Place(NamedTuple):
-    """
-    A state of a run.
+    """A state of a run."""
 
-    Attributes
-    ----------
-    time
-        Time that was solved for, in [ns].
-    inputs
-        Inputs of the linkage, in [rad] or [m].
-
-    """
-
-    time: int
-    inputs: tuple[float, ...]
+    time: int  # Time that was solved for, in [ns]
+    inputs: tuple[float, ...]  # Inputs of the linkage, in [rad] or [m]
 
 
 class WorstResiduals(NamedTuple):
-    """
-    The worst states of a linkage over a run.
+    """The worst states of a linkage over a run."""
 
-    Attributes
-    ----------
-    member, closure
-        The linkage in its scene, and its closure.
-    states
-        Number of states that closed, and so were examined.
-    toggles, limited
-        Number of these at a toggle, and number of these beyond joint limits.
-    residual
-        Greatest `Closure.residual`, in [m], and its place; None without states.
-    nearest
-        The singularity measures at the least conditioning, and the place.
-
-    """
-
+    # The linkage in its scene, and its closure.
     member: SceneLinkage
     closure: Closure
-    states: int
+    states: int  # Number of states that closed, and so were examined
+    # Number of these at a toggle, and number of these beyond joint limits.
     toggles: int
     limited: int
+    # Greatest `Closure.residual`, in [m], and its place; None without states.
     residual: tuple[float, Place] | None
+    # The singularity measures at the least conditioning, and the place.
     nearest: tuple[SingularityMargin, Place] | None
 
 
 class Examined(NamedTuple):
-    """
-    Result of running a scene again on its bag.
+    """Result of running a scene again on its bag."""
 
-    Attributes
-    ----------
-    linkages
-        The worst states of each linkage.
-    joint_states
-        Number of joint states in the bag.
-    same
-        Number of these that were reproduced byte for byte.
-    damage
-        Damage at which reading ended, on one line.
-    stopped
-        Whether the examination was stopped early.
-
-    """
-
-    linkages: tuple[WorstResiduals, ...]
-    joint_states: int
-    same: int
-    damage: str
-    stopped: bool
+    linkages: tuple[WorstResiduals, ...]  # The worst states of each linkage
+    joint_states: int  # Number of joint states in the bag
+    same: int  # Number of these that were reproduced byte for byte
+    damage: str  # Damage at which reading ended, on one line
+    stopped: bool  # Whether the examination was stopped early
 
 
 def examine(

@@ -104,73 +104,44 @@ class StorageParameters(Storage):
 
 @dataclass(frozen=True, slots=True)
 class RecordParameters:
-    """
-    How a run is recorded.
+    """How a run is recorded."""
 
-    Attributes
-    ----------
-    directory
-        Parent folder of the bags, relative to the working directory of the node.
-    name
-        Name of the bag's folder; '' for the scene's name and the time. If it exists, a number is
-        added: NAME_2.
-    queue
-        Messages of up to 16 KiB that may wait for the disk before more are dropped; a larger
-        message counts as several.
-    storage
-        Files of the bag: size, compression, flush period.
-
-    """
-
-    directory: str
+    directory: str  # Parent folder of the bags, relative to the working directory of the node
+    # Name of the bag's folder; '' for the scene's name and the time. If it exists, a number is
+    # added: NAME_2.
     name: str
+    # Messages of up to 16 KiB that may wait for the disk before more are dropped; a larger message
+    # counts as several.
     queue: int
+    # Files of the bag: size, compression, flush period.
     storage: Storage = field(default_factory=StorageParameters)
 
 
 @dataclass(frozen=True, slots=True)
 class SceneLinkage:
-    """
-    A linkage of a scene, with its drive and its effects.
+    """A linkage of a scene, with its drive and its effects."""
 
-    Attributes
-    ----------
-    name
-        Name of the linkage, which with an underscore prefixes its joint names; '' if it is the
-        only linkage of the scene.
-    linkage, closure
-        The linkage, and its closure. Published input joints come first among its joints.
-    drive
-        Name and parameters of the drive.
-    effects
-        Parameters of each effect in the scene, by name, in physical order.
-    solver
-        Name and parameters of the solver; None for the closed form.
-    accuracy
-        Required accuracy of positions, in [rad] or [m], for the cheapest solver; None without one.
-    loads
-        Loads on it; None if the scene has none.
-    silent_beyond_limits
-        Whether nothing is published while a joint is beyond its limits.
-    not_imported
-        User-defined effects that the scene names but that were not imported, so that the linkage
-        cannot run.
-    content, linkage_content
-        Sections for error messages: in the scene, and in the linkage file.
-
-    """
-
+    # Name of the linkage, which with an underscore prefixes its joint names; '' if it is the only
+    # linkage of the scene.
     name: str
+    # The linkage, and its closure. Published input joints come first among its joints.
     linkage: Linkage
     closure: Closure = field(compare=False, repr=False)
-    drive: tuple[str, Any]
+    drive: tuple[str, Any]  # Name and parameters of the drive
+    # Parameters of each effect in the scene, by name, in physical order.
     effects: Mapping[str, Any]
-    loads: Loads | None
+    loads: Loads | None  # Loads on it; None if the scene has none
+    # Sections for error messages: in the scene, and in the linkage file.
     content: Section = field(compare=False, repr=False)
     linkage_content: Section = field(compare=False, repr=False)
+    # Name and parameters of the solver; None for the closed form.
     solver: tuple[str, Any] | None = None
+    # Required accuracy of positions, in [rad] or [m], for the cheapest solver; None without one.
     accuracy: float | None = None
+    # Whether nothing is published while a joint is beyond its limits.
     silent_beyond_limits: bool = False
+    # User-defined effects that the scene names but that were not imported, so that the linkage
+    # cannot run.
     not_imported: tuple[str, ...] = ()
 
     @property
