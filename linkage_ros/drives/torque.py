@@ -219,12 +219,6 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         raise DefinitionError(
             'drive.torque.brake', 'the brake is never applied', 'add on_timeout: brake'
         )
-    if context.friction and context.friction.loaded:
-        raise DefinitionError(
-            f'effects.friction.joints.{context.friction.loaded}.coefficient',
-            'the torque drive does not integrate friction that grows with the force in its joint',
-            'write coulomb instead, or use another drive',
-        )
     mechanics = context.mechanics
     yielding = mechanics.loads.applied.stops
     motion: Any = OneFreedom(
@@ -237,6 +231,7 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         ),
         parameters.restitution,
         mechanics.laws,
+        context.reactions.rubbing if mechanics.friction.loaded else None,
     )
     if parameters.play is not None:
         from linkage_ros.dynamics.two_masses import TwoMasses  # local import: only with play

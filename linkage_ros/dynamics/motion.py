@@ -35,6 +35,10 @@ A law of an applied force (`linkage_ros.dynamics.laws`) is smooth in segments. W
 law stays in the segment of the step's start; if a segment has been left at the end, the
 integrator finds the instant and cuts the step there, too. Without laws no instant is searched for.
 
+Friction by the forces in the joints, R(q, q̇, q̈, t), depends on q̈ itself, which is then found by
+secants on I·q̈ + R(q̈) = τ − …; without such a q̈ the mechanism jams and is held as by a stop. At
+rest it sticks up to R(q, ±0, 0, t) more. A step across a kink of R is of order 2.
+
 A stop is hard: the integrator finds the instant of the impact, the rate becomes −e·q̇, and the
 rest of the step continues from there. A mechanism that is pushed against a stop rests at it.
 
@@ -142,6 +146,9 @@ _KINKS = 20
 _BEGINNING = 1e-200
 """A rate that has a direction and no size."""
 
+_SECANTS, _FOUND = 40, 1e-14
+"""Most secants for q̈, and the change, as a fraction of its terms, at which it is found."""
+
 _SHORTEST = 0.5**30
 """Smallest fraction of a step that is integrated."""
 
@@ -175,6 +182,9 @@ class OneFreedom:
     stops: tuple[float, float] = (-inf, inf)  # Lower and upper stop, in [rad] or [m]
     restitution: float = 0.0  # Ratio of the rates after and before an impact, 0 to 1
     laws: tuple[Law, ...] = ()  # The laws of the applied forces, as in ``Terms.laws``
+    # The friction by the forces in the joints, against the motion, in [N·m] or [N], as a function
+    # of value, rate, acceleration and time; it returns None where there are no forces.
+    rubbing: Callable[[float, float, float, float], float | None] | None = None
 
     def driven_by(self, change: Callable[[OneFreedom], OneFreedom]) -> OneFreedom:
         """Return it with a change of what its motor moves: all of it."""
@@ -191,11 +201,13 @@ class OneFreedom:
         """Return q̈, in [rad/s²] or [m/s²]; the parameters are those of `advance`."""
         if self.laws:
             force += self._applied(motion.terms, motion.rate, time)
-        sense = self._sense(motion, force, brake)
+        sense = self._sense(motion, force, brake, time)
         if self.laws and not motion.rate:
             force += self._applied(motion.terms, sense * _BEGINNING, time)
             force -= self._applied(motion.terms, 0.0, time)
-        return _acceleration(motion.terms, motion.rate, force, sense * brake, sense)
+        value, rate, terms, _ = motion
+        free = _acceleration(terms, rate, force, sense * brake, sense)
+        return self._rubbed(free, terms, value, rate, sense, time) or 0.0
 
     def advance(
         self,
@@ -233,7 +245,7 @@ class OneFreedom:
             if laws:
                 now = time + (seconds - left)
                 push = force + self._applied(motion.terms, motion.rate, now)
-            sense = self._sense(motion, push, brake)
+            sense = self._sense(motion, push, brake, now)
             if sense == 0.0:
                 held = self._held(motion, left, force, brake, now) if laws else left
                 left -= held
@@ -242,7 +254,7 @@ class OneFreedom:
                 pieces += 1
                 continue
             terms = motion.terms
-            sticks = terms.coulomb + terms.breakaway + brake > 0.0
+            sticks = self.rubbing is not None or terms.coulomb + terms.breakaway + brake > 0.0
             cuts = kinks < _KINKS
             slips = terms.slips if cuts else ()
             segments = self._segments(motion, now, sense) if laws and cuts else ()
@@ -280,7 +292,7 @@ class OneFreedom:
                 return motion
         return _at_rest(motion)
 
-    def _sense(self, motion: Motion, force: float, brake: float) -> float:
+    def _sense(self, motion: Motion, force: float, brake: float, time: float) -> float:
         """Return the direction of motion, 1 or -1, or 0 if it stays at rest."""
         value, rate, terms, _ = motion
         if rate:
@@ -288,6 +300,7 @@ class OneFreedom:
         push = force - terms.potential_slope
         low, high = self.stops
         held = abs(push) <= terms.coulomb + terms.breakaway + brake
+        held = held or abs(push) <= self._sticking(motion, push, brake, time)
         if held or (value >= high and push > 0.0) or (value <= low and push < 0.0):
             return 0.0
         return copysign(1.0, push)
@@ -306,7 +319,8 @@ class OneFreedom:
         value, rate, here, _ = motion
         terms, step, reached, laws = self.terms, self.step, self._reached, self.laws
         push = force + self._applied(here, rate, now, segments) if laws else force
-        start = _acceleration(here, rate, push, braking, sense)
+        free = _acceleration(here, rate, push, braking, sense)
+        start = self._rubbed(free, here, value, rate, sense, now)
 
         def field(q: float, w: float, ahead: float) -> float | None:
             if not (-LARGEST <= q <= LARGEST and -LARGEST <= w <= LARGEST):
@@ -315,15 +329,49 @@ class OneFreedom:
             if there is None or there.inertia < _LEAST:
                 return None
             push = force + self._applied(there, w, now + ahead, segments) if laws else force
-            return _acceleration(
-                there, w, push, braking, sense, _turned(there, slips) if slips else 0.0
-            )
+            turned = _turned(there, slips) if slips else 0.0
+            free = _acceleration(there, w, push, braking, sense, turned)
+            return self._rubbed(free, there, q, w, sense, now + ahead)
 
         def reach(seconds: float) -> Motion | None:
+            if start is None:
+                return None
             end = step(field, value, rate, start, seconds)
             return None if end is None else reached(*end, seconds)
 
         return reach
+
+    def _rubbed(
+        self, free: float, terms: Terms, value: float, rate: float, sense: float, time: float
+    ) -> float | None:
+        """Return q̈ with the friction by forces, from that without it; None if it jams."""
+        rubbing = self.rubbing
+        if rubbing is None or sense == 0.0:
+            return free
+        moving = rate if rate * sense > 0.0 else sense * _BEGINNING
+        before, changed, pull = free, 0.0, free
+        for number in range(_SECANTS):
+            resisting = rubbing(value, moving, pull, time)
+            if resisting is None:
+                return None
+            slowed = sense * resisting / terms.inertia
+            change = free - slowed - pull
+            if abs(change) <= _FOUND * (abs(free) + abs(slowed)):
+                return pull + change
+            step = change
+            if number and change != changed:
+                step = change * (pull - before) / (changed - change)
+            before, changed, pull = pull, change, pull + step
+        return None
+
+    def _sticking(self, motion: Motion, push: float, brake: float, time: float) -> float:
+        """Return what friction and brake hold at rest against a push."""
+        value, _, terms, _ = motion
+        most = terms.coulomb + terms.breakaway + brake
+        if self.rubbing is None or not push:
+            return most
+        resisting = self.rubbing(value, copysign(_BEGINNING, push), 0.0, time)
+        return inf if resisting is None else most + resisting
 
     def _reached(self, value: float, rate: float, ahead: float = 0.0) -> Motion | None:
         if not (-LARGEST <= value <= LARGEST and -LARGEST <= rate <= LARGEST):
@@ -395,11 +443,10 @@ class OneFreedom:
         """Return how long a state stays at rest, while the applied forces change with the time."""
         low, high = self.stops
         value, _, terms, _ = motion
-        most = terms.coulomb + terms.breakaway + brake
 
         def margin(ahead: float) -> float:
             push = force - terms.potential_slope + self._applied(terms, 0.0, now + ahead)
-            held = most - abs(push)
+            held = self._sticking(motion, push, brake, now + ahead) - abs(push)
             if value >= high:
                 return max(held, push)
             return max(held, -push) if value <= low else held

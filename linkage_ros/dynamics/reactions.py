@@ -39,13 +39,15 @@ a link moves the linkage, to first order.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from math import hypot, isfinite
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.mechanics import Mechanics, resistance, Rubbing, sense, stretched
 from linkage_ros.kinematics.arithmetic import called, facing, is_found, vector
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.linkage import Compiled
+from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.status import Status
@@ -312,6 +314,8 @@ class Reactions:
             self._solved = partial(
                 _pressed_solved, [self._rubs_by(rubbing) for rubbing in self._pressed]
             )
+        applied = mechanics.loads.applied
+        self._changes_with_time = applied.timed or bool(applied.wrenches)
         self._published = tuple(
             (rows.get(joint.child, -1), rows.get(joint.parent, -1))
             if isinstance(joint, RevoluteJoint)
@@ -383,6 +387,65 @@ class Reactions:
             else:
                 efforts += (force * self._scale + inert,)
         return efforts
+
+    def rubbing(
+        self, value: float, rate: float, acceleration: float, seconds: float
+    ) -> float | None:
+        """
+        Return what the friction by forces resists the only input, in [N·m] or [N].
+
+        Parameters
+        ----------
+        value, rate, acceleration
+            Of the input, in [rad] or [m] and per second; the rate is not 0.
+        seconds
+            Time since the first tick.
+
+        Returns
+        -------
+        resisting
+            Against the motion; None where there are no forces.
+
+        """
+        found = None if self._changes_with_time else self._compiled.fast(value, rate, acceleration)
+        if found is not None:
+            ((resisting,),) = found
+            return float(resisting)
+        position = self._mechanics.closure.position(value)
+        if position.status not in _SOLVED:
+            return None
+        velocity = self._mechanics.closure.velocity(position, rate)
+        pull = self._mechanics.closure.acceleration(position, velocity, acceleration)
+        return self._resisting(position, velocity, pull, seconds)
+
+    @cached_property
+    def _compiled(self) -> Compiled:
+        def wanted(motion: CompiledMotion) -> Sequence[Sequence[float]]:
+            assert motion.velocity is not None
+            assert motion.acceleration is not None
+            resisting = self._resisting(motion.position, motion.velocity, motion.acceleration)
+            return [] if resisting is None else [[resisting]]
+
+        return Compiled(self._mechanics.closure, 2, wanted)
+
+    def _resisting(
+        self,
+        position: Position,
+        velocity: Velocity,
+        acceleration: Acceleration,
+        seconds: float = 0.0,
+    ) -> float | None:
+        """Return Σ T·|ψ̇/q̇| of the friction by forces, over the joints."""
+        balance = self._balance(position, velocity, acceleration, seconds)
+        if balance is None:
+            return None
+        forces, _ = balance
+        v, resisting = velocity.state.coordinates, 0.0
+        unit = self._scale if self._mechanics.closure.linkage.inputs[0].slider else 1.0
+        for i, rubbing in enumerate(self._pressed):
+            slip = rubbing.slip(v) / (unit * v[1])
+            resisting += forces[self._matrix.size + i] * abs(slip)
+        return resisting
 
     def shift(self, position: Position, offsets: Sequence[complex]) -> tuple[float, ...] | None:
         """

@@ -16,20 +16,24 @@
 
 from cmath import rect
 from dataclasses import replace
-from math import copysign, cos, hypot, sin, sqrt
+from math import copysign, cos, hypot, pi, sin, sqrt
 
 from hypothesis import given
 from hypothesis import strategies as st
+from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.loads import AppliedLoads, Friction, JointFriction, JointLoad, Loads
 from linkage_ros.dynamics.mechanics import Mechanics
+from linkage_ros.dynamics.motion import OneFreedom
 from linkage_ros.dynamics.reactions import Reactions
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.arithmetic import cross
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Mass
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
-from .loaded import closed, loads_of, STATES
+from .loaded import closed, loads_of, STATES, swing
 from ..support.messages import read_joint_state
 from ..support.scenes import closure_of, PENDULUM, pipeline_of
 
@@ -93,16 +97,21 @@ def test_a_coupler_pushes_along_a_tangent_of_both_friction_circles(angle, load, 
         assert hypot(reaction.fx, reaction.fy) == pytest.approx(force)
 
 
-@pytest.mark.parametrize('name', STATES)
-def test_each_joint_rubs_by_the_force_that_it_then_has(name):
-    # With each friction written as a constant, the forces, and the work, are the same.
+def rubbing_everywhere(name):
+    """Return a linkage and the friction of all its joints."""
     closure = closed(name)
-    joints = {
+    return closure, {
         joint.name: JointFriction(
             0.01, 0.02, coefficient=0.1, radius=0.0 if joint.kind == 'P' else 0.005
         )
         for joint in closure.structure.joints
     }
+
+
+@pytest.mark.parametrize('name', STATES)
+def test_each_joint_rubs_by_the_force_that_it_then_has(name):
+    # With each friction written as a constant, the forces, and the work, are the same.
+    closure, joints = rubbing_everywhere(name)
     loads = loads_of(closure.linkage)
     reactions = Reactions(Mechanics(closure, loads, Friction(joints)))
     for inputs in STATES[name]:
@@ -162,13 +171,59 @@ def test_a_tick_publishes_the_effort_with_it():
     assert published.effort[0] == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ('drive', 'holds', 'told'),
-    [
-        ('constant_rate: {rate: 1}', 'true', "holds: at rest the force in 'O' has no certain"),
-        ('torque: {start: 0.3}', 'false', 'joints.O.coefficient: the torque drive does not'),
-    ],
-)
-def test_it_is_refused_where_the_force_is_not_known(drive, holds, told):
-    with pytest.raises(FileError, match=told):
-        pipeline_of(SCENE.replace('DRIVE', drive).replace('HOLDS', holds), PENDULUM)
+def test_it_holds_no_load_of_which_the_force_is_not_known():
+    scene = SCENE.replace('DRIVE', 'constant_rate: {rate: 1}').replace('HOLDS', 'true')
+    with pytest.raises(FileError, match="holds: at rest the force in 'O' has no certain"):
+        pipeline_of(scene, PENDULUM)
+
+
+# Under the torque drive.
+
+
+def pendulum(angle, rate, torque, against):
+    """Return the acceleration of a pendulum of which the pin rubs by the force in it."""
+
+    def left_over(pull):
+        force = 2.0 * hypot(0.3 * rate**2 - 9.81 * sin(angle), 0.3 * pull + 9.81 * cos(angle))
+        weight = 2.0 * 9.81 * 0.3 * cos(angle)
+        return torque - weight - against * RADIUS * force - (0.05 + 2.0 * 0.3**2) * pull
+
+    return brentq(left_over, -1e4, 1e4, xtol=1e-13, rtol=1e-14)
+
+
+@pytest.mark.parametrize(('method', 'exact'), [('rk4', 1e-9), ('gauss_legendre', 1e-11)])
+def test_a_pendulum_swings_down_as_scipy_says(method, exact):
+    after = swing(friction=Friction({'O': RUBBING}), gravity=(0.0, -9.81), method=method)
+    known = solve_ivp(
+        lambda _, y: [y[1], pendulum(y[0], y[1], 0.0, -1.0)], (0.0, 0.4), [0.0, 0.0],
+        'DOP853', rtol=1e-12, atol=1e-13, dense_output=True,
+    ).sol  # fmt: skip
+    for seconds in (0.1, 0.25, 0.4):
+        value, rate, pull = after(seconds)
+        assert (value, rate) == pytest.approx(tuple(known(seconds)), abs=exact)
+        assert pull == pytest.approx(pendulum(value, rate, 0.0, -1.0), rel=1e-11)
+
+
+def test_a_pendulum_comes_to_rest_within_its_friction_circle():
+    # It stays where its weight stands within µρ of the pin: |cos(q)|·0.3 m ≤ 3 mm.
+    friction = Friction({'O': JointFriction(coefficient=0.3, radius=0.01, viscous=0.3)})
+    after = swing(friction=friction, gravity=(0.0, -9.81), step=0.005)
+    value, *rest = [after(0.5 * n) for n in range(20)][-1]
+    assert rest == [0.0, 0.0]
+    assert 1e-6 < abs(0.3 * cos(value)) <= RADIUS
+    assert abs(value + pi / 2.0) < 0.02
+
+
+@pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])
+def test_the_acceleration_is_that_whose_effort_is_the_command(name):
+    closure, joints = rubbing_everywhere(name)
+    mechanics = Mechanics(closure, loads_of(closure.linkage), Friction(joints))
+    reactions = Reactions(mechanics)
+    mechanism = OneFreedom(mechanics.equation, METHODS['rk4'].step, rubbing=reactions.rubbing)
+    for (value,) in STATES[name]:
+        for rate, force in ((1.5, 3.0), (-0.7, 0.0)):
+            motion = mechanism.at(value, rate)
+            pull = mechanism.acceleration(motion, force)
+            efforts = reactions.efforts(*moved(closure, value, rate, pull))
+            size = abs(mechanics.terms(closure.position(value)).inertia * pull) + abs(force)
+            assert efforts == pytest.approx((force,), abs=1e-10 * size)
