@@ -107,6 +107,7 @@ OF_TORQUE = {
 
 FRICTION = {
     'coulomb friction': '{coulomb: 0.002}',
+    'friction by the force': '{coefficient: 0.1, radius: 0.004}',
     'Stribeck friction': '{coulomb: 0.002, breakaway: 0.003, stribeck: 1}',
 }
 """Friction in a pin, which changes the motion under the torque drive."""

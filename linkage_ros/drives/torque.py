@@ -231,7 +231,7 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         ),
         parameters.restitution,
         mechanics.laws,
-        context.reactions.rubbing if mechanics.friction.loaded else None,
+        context.reactions.resisting if mechanics.friction.loaded else None,
     )
     if parameters.play is not None:
         from linkage_ros.dynamics.two_masses import TwoMasses  # local import: only with play

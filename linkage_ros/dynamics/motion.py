@@ -35,9 +35,9 @@ A law of an applied force (`linkage_ros.dynamics.laws`) is smooth in segments. W
 law stays in the segment of the step's start; if a segment has been left at the end, the
 integrator finds the instant and cuts the step there, too. Without laws no instant is searched for.
 
-Friction by the forces in the joints, R(q, q̇, q̈, t), depends on q̈ itself, which is then found by
-secants on I·q̈ + R(q̈) = τ − …; without such a q̈ the mechanism jams and is held as by a stop. At
-rest it sticks up to R(q, ±0, 0, t) more. A step across a kink of R is of order 2.
+Friction by the forces in the joints (`linkage_ros.dynamics.pressed_joints`) depends on q̈, and is
+found with it. Where the linkage jams, it is held as by a stop. A step across a kink of this
+friction is of order 2.
 
 A stop is hard: the integrator finds the instant of the impact, the rate becomes −e·q̇, and the
 rest of the step continues from there. A mechanism that is pushed against a stop rests at it.
@@ -146,9 +146,6 @@ _KINKS = 20
 _BEGINNING = 1e-200
 """A rate that has a direction and no size."""
 
-_SECANTS, _FOUND = 40, 1e-14
-"""Most secants for q̈, and the change, as a fraction of its terms, at which it is found."""
-
 _SHORTEST = 0.5**30
 """Smallest fraction of a step that is integrated."""
 
@@ -182,9 +179,9 @@ class OneFreedom:
     stops: tuple[float, float] = (-inf, inf)  # Lower and upper stop, in [rad] or [m]
     restitution: float = 0.0  # Ratio of the rates after and before an impact, 0 to 1
     laws: tuple[Law, ...] = ()  # The laws of the applied forces, as in ``Terms.laws``
-    # The friction by the forces in the joints, against the motion, in [N·m] or [N], as a function
-    # of value, rate, acceleration and time; it returns None where there are no forces.
-    rubbing: Callable[[float, float, float, float], float | None] | None = None
+    # What friction by the forces in the joints resists at a value, rate and time, with the q̈
+    # without it and by how much a unit of it lowers q̈; None where it jams. None without any.
+    resisting: Callable[[float, float, float, float, float], float | None] | None = None
 
     def driven_by(self, change: Callable[[OneFreedom], OneFreedom]) -> OneFreedom:
         """Return it with a change of what its motor moves: all of it."""
@@ -254,7 +251,7 @@ class OneFreedom:
                 pieces += 1
                 continue
             terms = motion.terms
-            sticks = self.rubbing is not None or terms.coulomb + terms.breakaway + brake > 0.0
+            sticks = self.resisting is not None or terms.coulomb + terms.breakaway + brake > 0.0
             cuts = kinks < _KINKS
             slips = terms.slips if cuts else ()
             segments = self._segments(motion, now, sense) if laws and cuts else ()
@@ -345,33 +342,22 @@ class OneFreedom:
         self, free: float, terms: Terms, value: float, rate: float, sense: float, time: float
     ) -> float | None:
         """Return q̈ with the friction by forces, from that without it; None if it jams."""
-        rubbing = self.rubbing
-        if rubbing is None or sense == 0.0:
+        if self.resisting is None or sense == 0.0:
             return free
+        # A rate that falls through zero within a step has the direction of the step.
         moving = rate if rate * sense > 0.0 else sense * _BEGINNING
-        before, changed, pull = free, 0.0, free
-        for number in range(_SECANTS):
-            resisting = rubbing(value, moving, pull, time)
-            if resisting is None:
-                return None
-            slowed = sense * resisting / terms.inertia
-            change = free - slowed - pull
-            if abs(change) <= _FOUND * (abs(free) + abs(slowed)):
-                return pull + change
-            step = change
-            if number and change != changed:
-                step = change * (pull - before) / (changed - change)
-            before, changed, pull = pull, change, pull + step
-        return None
+        mobility = sense / terms.inertia
+        resisted = self.resisting(value, moving, time, free, mobility)
+        return None if resisted is None else free - mobility * resisted
 
     def _sticking(self, motion: Motion, push: float, brake: float, time: float) -> float:
         """Return what friction and brake hold at rest against a push."""
         value, _, terms, _ = motion
         most = terms.coulomb + terms.breakaway + brake
-        if self.rubbing is None or not push:
+        if self.resisting is None or not push:
             return most
-        resisting = self.rubbing(value, copysign(_BEGINNING, push), 0.0, time)
-        return inf if resisting is None else most + resisting
+        resisted = self.resisting(value, copysign(_BEGINNING, push), time, 0.0, 0.0)
+        return inf if resisted is None else most + resisted
 
     def _reached(self, value: float, rate: float, ahead: float = 0.0) -> Motion | None:
         if not (-LARGEST <= value <= LARGEST and -LARGEST <= rate <= LARGEST):

@@ -24,11 +24,8 @@ across and the moment in each slider, and the effort of each drive: as many as e
 linear system A·f = b (R. L. Norton, Design of Machinery, ch. 11; E. J. Haug, Computer Aided
 Kinematics and Dynamics of Mechanical Systems, 1989, ch. 6).
 
-Friction that grows with the force in its joint is T = µ·ρ·|F| in a pin of radius ρ, and µ·|F| in a
-slider, against the motion; the moment that keeps a slider from turning does not count. It changes
-the forces. With the solutions P_k for a unit of friction in each such joint, f = f₀ + Σ T_k·P_k,
-the T_k are iterated until they stay. For some µ they grow without end: the linkage jams, and there
-are no forces.
+Friction that grows with the force in its joint changes the forces: see
+`linkage_ros.dynamics.pressed_joints`.
 
 A column of A is the effect of one unknown on each link (`JointMatrix`). By virtual work, a row of
 Aᵀ gives the displacement δ in a joint that small displacements Δ of the links cause: Aᵀ·Δ = δ.
@@ -40,10 +37,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from math import hypot, isfinite
+from itertools import islice
+from math import isfinite
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.mechanics import Mechanics, resistance, Rubbing, sense, stretched
+from linkage_ros.dynamics.pressed_joints import frictions, PressedJoint, resisting
 from linkage_ros.kinematics.arithmetic import called, facing, is_found, vector
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
@@ -228,9 +227,6 @@ def _filled(constant: Array, where: NDArray[np.intp], *values: float) -> Array:
 
 _SOLVED = (Status.CLOSED, Status.LIMITED)
 
-_ROUNDS, _STAYS = 300, 1e-15
-"""Most iterations of friction by its own forces, and the change at which it stays."""
-
 
 class Reaction(NamedTuple):
     """
@@ -309,11 +305,11 @@ class Reactions:
         )
         self._loaded = tuple(at)
         self._pressed = tuple(joint for joint in mechanics.rubbing if joint.friction.coefficient)
+        self._unknown = [self._unknowns(rubbing) for rubbing in self._pressed]
         self._solved: Callable[..., list[float] | None] = _solved
         if self._pressed:
-            self._solved = partial(
-                _pressed_solved, [self._rubs_by(rubbing) for rubbing in self._pressed]
-            )
+            self._solved = partial(_pressed_solved, self._unknown)
+        self._loaded_by = partial(_pressed_by, self._unknown)
         applied = mechanics.loads.applied
         self._changes_with_time = applied.timed or bool(applied.wrenches)
         self._published = tuple(
@@ -388,64 +384,81 @@ class Reactions:
                 efforts += (force * self._scale + inert,)
         return efforts
 
-    def rubbing(
-        self, value: float, rate: float, acceleration: float, seconds: float
+    def resisting(
+        self, value: float, rate: float, seconds: float, pull: float, mobility: float
     ) -> float | None:
         """
-        Return what the friction by forces resists the only input, in [N·m] or [N].
+        Return what the friction by the forces in the joints resists at the only input.
 
         Parameters
         ----------
-        value, rate, acceleration
+        value, rate
             Of the input, in [rad] or [m] and per second; the rate is not 0.
         seconds
             Time since the first tick.
+        pull, mobility
+            As of `linkage_ros.dynamics.pressed_joints.frictions`.
 
         Returns
         -------
         resisting
-            Against the motion; None where there are no forces.
+            In [N·m] or [N]; None where the linkage jams, or has no forces.
 
         """
-        found = None if self._changes_with_time else self._compiled.fast(value, rate, acceleration)
-        if found is not None:
-            ((resisting,),) = found
-            return float(resisting)
-        position = self._mechanics.closure.position(value)
-        if position.status not in _SOLVED:
-            return None
-        velocity = self._mechanics.closure.velocity(position, rate)
-        pull = self._mechanics.closure.acceleration(position, velocity, acceleration)
-        return self._resisting(position, velocity, pull, seconds)
+        joints = self._pressed_joints(value, rate, seconds)
+        found = frictions(joints, pull, mobility) if joints else None
+        return None if found is None else resisting(joints, found)
+
+    def _pressed_joints(self, value: float, rate: float, seconds: float) -> list[PressedJoint]:
+        """Return the joints with friction by their forces; empty where there are no forces."""
+        found: Sequence[Sequence[float]] | None = None
+        if not self._changes_with_time:
+            found = self._compiled.fast(value, rate)
+        if found is None:
+            position = self._mechanics.closure.position(value)
+            if position.status not in _SOLVED:
+                return []
+            velocity = self._mechanics.closure.velocity(position, rate)
+            found = self._pressed_by(position, velocity, seconds)
+        if not found:
+            return []
+        count, numbers = len(self._pressed), iter(found[0])
+        joints = []
+        for (_, _, factor), lever in zip(self._unknown, found[1], strict=True):
+            free, by_pull, *others = [complex(*islice(numbers, 2)) for _ in range(count + 2)]
+            joints.append(PressedJoint(factor, lever, free, by_pull, tuple(others)))
+        return joints
 
     @cached_property
     def _compiled(self) -> Compiled:
         def wanted(motion: CompiledMotion) -> Sequence[Sequence[float]]:
             assert motion.velocity is not None
-            assert motion.acceleration is not None
-            resisting = self._resisting(motion.position, motion.velocity, motion.acceleration)
-            return [] if resisting is None else [[resisting]]
+            return self._pressed_by(motion.position, motion.velocity)
 
-        return Compiled(self._mechanics.closure, 2, wanted)
+        return Compiled(self._mechanics.closure, 1, wanted)
 
-    def _resisting(
-        self,
-        position: Position,
-        velocity: Velocity,
-        acceleration: Acceleration,
-        seconds: float = 0.0,
-    ) -> float | None:
-        """Return Σ T·|ψ̇/q̇| of the friction by forces, over the joints."""
-        balance = self._balance(position, velocity, acceleration, seconds)
-        if balance is None:
-            return None
-        forces, _ = balance
-        v, resisting = velocity.state.coordinates, 0.0
-        unit = self._scale if self._mechanics.closure.linkage.inputs[0].slider else 1.0
-        for i, rubbing in enumerate(self._pressed):
-            slip = rubbing.slip(v) / (unit * v[1])
-            resisting += forces[self._matrix.size + i] * abs(slip)
-        return resisting
+    def _pressed_by(
+        self, position: Position, velocity: Velocity, seconds: float = 0.0
+    ) -> Sequence[Sequence[float]]:
+        """Return the coefficients of the forces in pressed joints, and the levers of these."""
+        closure, size = self._mechanics.closure, self._matrix.size
+        sides, more = (
+            self._sides(
+                position, velocity, closure.acceleration(position, velocity, pull), seconds
+            )
+            for pull in (0.0, 1.0)
+        )
+        by_pull = [one - other for one, other in zip(more[0][:size], sides[0], strict=False)]
+        columns = [*sides[0][:size], *by_pull, *sides[0][size:]]
+        x, places = position.state.coordinates, self._follower.places(position)
+        forces = called(self._loaded_by, self._matrix.at(x, places), *columns)
+        if not is_found(forces):
+            return []
+        v = velocity.state.coordinates
+        unit = self._scale if closure.linkage.inputs[0].slider else 1.0
+        levers = [abs(rubbing.slip(v) / (unit * v[1])) for rubbing in self._pressed]
+        count = 2 * len(self._pressed) * (len(self._pressed) + 2)
+        return [[forces[i] for i in range(count)], levers]
 
     def shift(self, position: Position, offsets: Sequence[complex]) -> tuple[float, ...] | None:
         """
@@ -520,6 +533,28 @@ class Reactions:
         """Return the solution of the system, and the friction in each joint."""
         if position.status not in _SOLVED:
             return None
+        sides, resistances = self._sides(position, velocity, acceleration, seconds)
+        x, places = position.state.coordinates, self._follower.places(position)
+        forces = called(self._solved, self._matrix.at(x, places), *sides)
+        if not is_found(forces):
+            return None
+        v = velocity.state.coordinates
+        for i, rubbing in enumerate(self._pressed):
+            resistances[rubbing.joint] += sense(rubbing, v) * forces[self._matrix.size + i]
+        return forces, resistances
+
+    def _sides(
+        self,
+        position: Position,
+        velocity: Velocity,
+        acceleration: Acceleration,
+        seconds: float,
+    ) -> tuple[list[float], list[float]]:
+        """
+        Return the right sides of the system, and the friction in each joint.
+
+        Behind the right sides stand those of a unit of each friction that grows with its force.
+        """
         loads, scale = self._mechanics.loads, self._scale
         gravity = complex(*loads.gravity)
         places = self._follower.places(position)
@@ -548,19 +583,13 @@ class Reactions:
             number = rubbing.joint
             resistances[number] = resistance(rubbing, v)
             self._rub(sides, number, resistances[number], x, places)
-        senses = [sense(rubbing, v) for rubbing in self._pressed]
-        for rubbing, against in zip(self._pressed, senses, strict=True):
+        for rubbing in self._pressed:
             of_a_unit = [0.0] * self._matrix.size
-            self._rub(of_a_unit, rubbing.joint, against, x, places)
+            self._rub(of_a_unit, rubbing.joint, sense(rubbing, v), x, places)
             sides += of_a_unit
-        forces = called(self._solved, self._matrix.at(x, places), *sides)
-        if not is_found(forces):
-            return None
-        for i, (rubbing, against) in enumerate(zip(self._pressed, senses, strict=True)):
-            resistances[rubbing.joint] += against * forces[self._matrix.size + i]
-        return forces, resistances
+        return sides, resistances
 
-    def _rubs_by(self, rubbing: Rubbing) -> tuple[int, bool, float]:
+    def _unknowns(self, rubbing: Rubbing) -> tuple[int, bool, float]:
         """Return the first unknown of a joint, whether it is a pin, and its friction by force."""
         friction, pin = rubbing.friction, rubbing.joint not in self._matrix.lines
         return 2 * rubbing.joint, pin, friction.coefficient * (friction.radius if pin else 1.0)
@@ -622,43 +651,60 @@ def _solved(matrix: Array, *sides: float) -> list[float] | None:
     return solution if all(map(isfinite, solution)) else None
 
 
+def _solutions(matrix: Array, sides: Sequence[float]) -> list[list[float]] | None:
+    """Return the solutions of a linear system for right sides one after the other, or None."""
+    try:
+        found = np.linalg.solve(matrix, np.reshape(sides, (-1, len(matrix))).T).T
+    except np.linalg.LinAlgError:
+        return None
+    return found.tolist() if np.isfinite(found).all() else None
+
+
+def _force(solution: Sequence[float], first: int, pin: bool) -> complex:
+    return complex(solution[first], solution[first + 1] if pin else 0.0)
+
+
 def _pressed_solved(
-    pressed: Sequence[tuple[int, bool, float]], matrix: Array, *sides: float
+    unknowns: Sequence[tuple[int, bool, float]], matrix: Array, *sides: float
 ) -> list[float] | None:
     """
     Return the solution of a linear system with friction by its own forces, and that friction.
 
     Parameters
     ----------
-    pressed
-        As `Reactions._rubs_by` returns them.
+    unknowns
+        As `Reactions._unknowns` returns them.
     matrix
         The matrix.
     *sides
-        The right sides: first without this friction, then what a unit of each adds.
+        The right sides: first without this friction, then of a unit of each.
 
     """
-    columns = np.reshape(sides, (len(pressed) + 1, len(matrix)))
-    try:
-        free, *units = np.linalg.solve(matrix, columns.T).T
-    except np.linalg.LinAlgError:
+    solutions = _solutions(matrix, sides)
+    if solutions is None:
         return None
-    frictions = [0.0] * len(pressed)
-    for _ in range(_ROUNDS):
-        forces = free + sum(t * unit for t, unit in zip(frictions, units, strict=True))
-        largest = float(np.abs(forces).max())
-        if not isfinite(largest):
-            return None
-        before = frictions
-        frictions = [
-            factor * hypot(forces[i], forces[i + 1] if pin else 0.0) for i, pin, factor in pressed
-        ]
-        if all(
-            abs(now - old) <= _STAYS * factor * largest
-            for now, old, (_, _, factor) in zip(frictions, before, pressed, strict=True)
-        ):
-            return [*forces.tolist(), *frictions]
-    return None
+    free, *units = solutions
+    joints = []
+    for first, pin, factor in unknowns:
+        by_frictions = tuple(_force(unit, first, pin) for unit in units)
+        joints.append(PressedJoint(factor, 0.0, _force(free, first, pin), 0j, by_frictions))
+    found = frictions(joints, 0.0)
+    if found is None:
+        return None
+    for friction, unit in zip(found, units, strict=True):
+        free = [force + friction * more for force, more in zip(free, unit, strict=True)]
+    return [*free, *found]
+
+
+def _pressed_by(
+    unknowns: Sequence[tuple[int, bool, float]], matrix: Array, *sides: float
+) -> list[float] | None:
+    """Return the force in each pressed joint, x and y, for right sides one after the other."""
+    solutions = _solutions(matrix, sides)
+    if solutions is None:
+        return None
+    forces = [_force(each, first, pin) for first, pin, _ in unknowns for each in solutions]
+    return [part for force in forces for part in (force.real, force.imag)]
 
 
 def _turned_solved(matrix: Array, *sides: float) -> list[float] | None:

@@ -26,8 +26,7 @@ with ω the rate of one of its links against the other and F the force in the pi
 likewise, with the rate of its slide and without a radius. Sources: H. Olsson, K. J. Åström, C.
 Canudas de Wit, M. Gäfvert and P. Lischinsky, Friction models and friction compensation, European
 Journal of Control 4, 1998, with Stribeck's curve in the form of eq. 5 with the exponent 2; for D,
-the friction circle, R. L. Norton, Design of Machinery, ch. 11. The torque drive refuses a
-coefficient: it would have to know the forces before the motion.
+the friction circle, R. L. Norton, Design of Machinery, ch. 11.
 
 Under the torque drive a linkage at rest sticks up to the sum of breakaway·|ψ'| over its joints. In
 an effort under another drive, friction at rest is 0; with `holds` it carries the load as far as it

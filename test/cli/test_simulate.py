@@ -73,7 +73,10 @@ effects:
   velocity: {}
   effort: {}
   pin_forces: {}
-  friction: {joints: {B: {coulomb: 0.002, breakaway: 0.004, stribeck: 2}}}
+  friction:
+    joints:
+      A: {coefficient: 0.1, radius: 0.003}
+      B: {coulomb: 0.002, breakaway: 0.004, stribeck: 2}
   noise:
     joints:
       rocker_joint: {density: 1.0e-5, drift: 0.001, correlation_time: 0.2, effort_white: 0.01}

@@ -20,6 +20,8 @@ from math import copysign, cos, hypot, pi, sin, sqrt
 
 from hypothesis import given
 from hypothesis import strategies as st
+from linkage_ros.drives.drive import Context
+from linkage_ros.drives.torque import build, TorqueParameters
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.loads import AppliedLoads, Friction, JointFriction, JointLoad, Loads
 from linkage_ros.dynamics.mechanics import Mechanics
@@ -29,11 +31,12 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics.arithmetic import cross
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Mass
+from linkage_ros.messages.joint_state import EffortCommand
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from .loaded import closed, loads_of, STATES, swing
+from .loaded import BEGIN, closed, loads_of, STATES, swing
 from ..support.messages import read_joint_state
 from ..support.scenes import closure_of, PENDULUM, pipeline_of
 
@@ -145,12 +148,16 @@ def test_each_joint_rubs_by_the_force_that_it_then_has(name):
 
 
 def test_a_linkage_that_jams_has_no_forces():
-    # The rod leans so far that the cylinder holds what it pushes, however strong: µ·tan(φ) > 1.
+    # The piston is pushed out against 100 N by a rod at φ = asin((0.04·sin(0.9) − 0.01)/0.14) =
+    # 0.153. It moves while µ·tan(φ) < 1, up to µ = 6.5; and it can always be let in.
     closure = closed('slider_crank')
-    joints = {'cylinder': JointFriction(coefficient=9.0)}
-    reactions = Reactions(Mechanics(closure, Loads((0.0, -9.81)), Friction(joints)))
-    motion = moved(closure, 0.9)
-    assert (reactions.solve(*motion), reactions.efforts(*motion)) == (None, ())
+    loads = Loads(applied=AppliedLoads(efforts={'piston_slide': JointLoad(-100.0)}))
+    for coefficient, rate, moves in ((6.4, -0.1, True), (6.6, -0.1, False), (6.6, 0.1, True)):
+        friction = Friction({'cylinder': JointFriction(coefficient=coefficient)})
+        reactions = Reactions(Mechanics(closure, loads, friction))
+        motion = moved(closure, 0.9, rate)
+        assert (reactions.solve(*motion) is not None) == moves
+        assert bool(reactions.efforts(*motion)) == moves
 
 
 SCENE = """
@@ -219,7 +226,7 @@ def test_the_acceleration_is_that_whose_effort_is_the_command(name):
     closure, joints = rubbing_everywhere(name)
     mechanics = Mechanics(closure, loads_of(closure.linkage), Friction(joints))
     reactions = Reactions(mechanics)
-    mechanism = OneFreedom(mechanics.equation, METHODS['rk4'].step, rubbing=reactions.rubbing)
+    mechanism = OneFreedom(mechanics.equation, METHODS['rk4'].step, resisting=reactions.resisting)
     for (value,) in STATES[name]:
         for rate, force in ((1.5, 3.0), (-0.7, 0.0)):
             motion = mechanism.at(value, rate)
@@ -227,3 +234,18 @@ def test_the_acceleration_is_that_whose_effort_is_the_command(name):
             efforts = reactions.efforts(*moved(closure, value, rate, pull))
             size = abs(mechanics.terms(closure.position(value)).inertia * pull) + abs(force)
             assert efforts == pytest.approx((force,), abs=1e-10 * size)
+
+
+def test_a_linkage_that_jams_stands_under_any_command():
+    # As above: the piston, pushed out against 100 N, jams from µ = 6.5 on.
+    closure = closed('slider_crank')
+    loads = Loads(applied=AppliedLoads(efforts={'piston_slide': JointLoad(-100.0)}))
+    for coefficient, stands in ((6.0, False), (7.0, True)):
+        friction = Friction({'cylinder': JointFriction(coefficient=coefficient)})
+        context = Context(closure, 1000.0, True, 'seed', loads, friction)
+        drive = build(TorqueParameters(start=0.9, rate=-0.1), context)
+        drive.state(BEGIN)
+        drive.offer(EffortCommand(0, -300.0), BEGIN)
+        state = drive.state(BEGIN + 5_000_000)
+        assert (state.rates == (0.0,)) == stands
+        assert (state.angles[0] < 0.89) != stands

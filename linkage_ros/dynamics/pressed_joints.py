@@ -1,0 +1,101 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Friction that grows with the force in its joint, and the forces that it changes.
+
+The friction is T = µ·ρ·|F| in a pin of radius ρ, and T = µ·|F| in a slider, against the motion;
+the moment that keeps a slider from turning does not count. By the balance of all links, the force
+F in a joint is linear in the input's acceleration q̈ and in all these frictions::
+
+    F = F₀ + q̈·F₁ + Σ T_k·P_k
+
+If q̈ follows from them, as q̈ = p − Σ T_k·|ψ'_k|·sign(q̇)/I, it is found with them. Newton's method
+finds the T_k from 0 on. Where there are none, the linkage jams (R. L. Norton, Design of Machinery,
+ch. 11, on the friction circle; on self-locking F. Reuleaux, Theoretische Kinematik, 1875).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+_ROUNDS = 50
+_STAYS = 4e-15
+"""Change at which a friction stays, as a fraction of what it is made of."""
+
+
+class PressedJoint(NamedTuple):
+    """A joint with such friction, and the force in it; of a slider, the force is a real number."""
+
+    factor: float  # µ·ρ, in [m], or µ
+    lever: float  # |ψ'|, the rate of the joint at a rate of the input of 1
+    free: complex  # F₀, in [N]
+    by_acceleration: complex  # F₁, in [N] for a unit of q̈
+    by_frictions: tuple[complex, ...]  # P_k, in [N] for a unit of each T_k
+
+
+def frictions(
+    joints: Sequence[PressedJoint], pull: float, mobility: float = 0.0
+) -> list[float] | None:
+    """
+    Return the friction in each joint, in [N·m] or [N]; None if the linkage jams.
+
+    Parameters
+    ----------
+    joints
+        All joints with such friction.
+    pull
+        q̈ without this friction, in [rad/s²] or [m/s²].
+    mobility
+        How much q̈ falls with a unit of this friction at the input: sign(q̇)/I; 0 if q̈ is given.
+
+    """
+    found = [0.0] * len(joints)
+    places = range(len(joints))
+    free = [joint.free + pull * joint.by_acceleration for joint in joints]
+    more = [
+        [
+            by_friction - mobility * other.lever * joint.by_acceleration
+            for by_friction, other in zip(joint.by_frictions, joints, strict=True)
+        ]
+        for joint in joints
+    ]
+    sizes = [
+        _STAYS * joint.factor * (abs(joint.free) + abs(pull * joint.by_acceleration))
+        for joint in joints
+    ]
+    for _ in range(_ROUNDS):
+        missing, slopes = [], []
+        for i in places:
+            force = free[i] + sum(found[k] * more[i][k] for k in places)
+            size = abs(force)
+            along = joints[i].factor * force.conjugate() / size if size else 0j
+            missing.append(joints[i].factor * size - found[i])
+            slopes.append([(i == k) - (along * more[i][k]).real for k in places])
+        if all(abs(missing[i]) <= sizes[i] + _STAYS * abs(found[i]) for i in places):
+            return found
+        try:
+            steps = np.linalg.solve(slopes, missing).tolist()
+        except np.linalg.LinAlgError:
+            return None
+        found = [now + step for now, step in zip(found, steps, strict=True)]
+    return None
+
+
+def resisting(joints: Sequence[PressedJoint], found: Sequence[float]) -> float:
+    """Return how much frictions in joints resist at the input, in [N·m] or [N]."""
+    return sum(joint.lever * friction for joint, friction in zip(joints, found, strict=True))
