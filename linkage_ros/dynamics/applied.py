@@ -118,7 +118,7 @@ class LoadedPoint(NamedTuple):
 class _Lawful(NamedTuple):
     at: JointCoordinate | LoadedPoint
     of: JointCoordinate
-    force: Callable[[float, float, float], tuple[float]]
+    force: Callable[..., tuple[float]]
 
 
 class AppliedForces:
@@ -151,6 +151,7 @@ class AppliedForces:
     def __init__(self, closure: Closure, applied: AppliedLoads) -> None:
         linkage = closure.linkage
         self._closure, self._given = closure, applied
+        self.seconds = 0.0  # The time since the first tick, for `acting` without one
         _check(closure, applied)
         places = [name.rpartition('.') for name in applied.forces]
         self.points = [(link, complex(*linkage.links[link][name])) for link, _, name in places]
@@ -168,7 +169,7 @@ class AppliedForces:
 
         def add(at: JointCoordinate | LoadedPoint, of: JointCoordinate, law: Law) -> None:
             laws.append(law)
-            self._lawful.append(_Lawful(at, of, _whole(law)))
+            self._lawful.append(_Lawful(at, of, self._whole(law)))
 
         self._stops: dict[str, tuple[JointCoordinate, Contact]] = {}
         for name, stop in applied.stops.items():
@@ -342,8 +343,17 @@ class AppliedForces:
             energy += 0.5 * spring.stiffness * _stretch(joint, spring, position) ** 2
         return energy
 
+    def _whole(self, law: Law) -> Callable[..., tuple[float]]:
+        """Return a law as one function of value, rate and perhaps time, which may be `called`."""
+
+        def force(value: float, rate: float, time: float | None = None) -> tuple[float]:
+            now = self.seconds if time is None else time
+            return (law.force(law.segment(value, rate, now), value, rate, now),)
+
+        return force
+
     def acting(
-        self, position: Position, velocity: Velocity, time: float
+        self, position: Position, velocity: Velocity, time: float | None
     ) -> Iterator[tuple[JointCoordinate | LoadedPoint, float]]:
         """
         Yield each load, where it acts and how strong, in [N·m] or [N].
@@ -353,9 +363,10 @@ class AppliedForces:
         position, velocity
             The motion.
         time
-            Since the first tick, in [s].
+            Since the first tick, in [s]; None for ``seconds``, when a compiled program runs.
 
         """
+        now = () if time is None else (time,)
         for joint, spring in self._springs:
             rate = joint.lever(velocity, position, ())
             stretch = _stretch(joint, spring, position)
@@ -363,9 +374,10 @@ class AppliedForces:
         yield from self._constant
         for at, of, force in self._lawful:
             rate = of.lever(velocity, position, ())
-            yield at, called(force, of.value(position), rate, time)[0]
+            yield at, called(force, of.value(position), rate, *now)[0]
         for at, component in self._components:
-            yield at, component.force(0, 0.0, 0.0, time)
+            # A compiled program asks for the wrench each time that it runs.
+            yield at, called(component.acting, position.state.coordinates[1])[0]
 
     def work(
         self,
@@ -393,15 +405,6 @@ def _fastest(stiffness: float, damping: float) -> float:
     if half * half > stiffness:
         return half + sqrt(half * half - stiffness)
     return sqrt(stiffness)
-
-
-def _whole(law: Law) -> Callable[[float, float, float], tuple[float]]:
-    """Return a law as one function of value, rate and time, which may be `called`."""
-
-    def force(value: float, rate: float, time: float) -> tuple[float]:
-        return (law.force(law.segment(value, rate, time), value, rate, time),)
-
-    return force
 
 
 def _stretch(joint: JointCoordinate, spring: JointSpring, position: Position) -> float:

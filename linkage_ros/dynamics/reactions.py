@@ -310,8 +310,6 @@ class Reactions:
         if self._pressed:
             self._solved = partial(_pressed_solved, self._unknown)
         self._loaded_by = partial(_pressed_by, self._unknown)
-        applied = mechanics.loads.applied
-        self._changes_with_time = applied.timed or bool(applied.wrenches)
         self._published = tuple(
             (rows.get(joint.child, -1), rows.get(joint.parent, -1))
             if isinstance(joint, RevoluteJoint)
@@ -411,15 +409,15 @@ class Reactions:
 
     def _pressed_joints(self, value: float, rate: float, seconds: float) -> list[PressedJoint]:
         """Return the joints with friction by their forces; empty where there are no forces."""
-        found: Sequence[Sequence[float]] | None = None
-        if not self._changes_with_time:
-            found = self._compiled.fast(value, rate)
+        if self._mechanics.applied is not None:
+            self._mechanics.applied.seconds = seconds
+        found: Sequence[Sequence[float]] | None = self._compiled.fast(value, rate)
         if found is None:
             position = self._mechanics.closure.position(value)
             if position.status not in _SOLVED:
                 return []
             velocity = self._mechanics.closure.velocity(position, rate)
-            found = self._pressed_by(position, velocity, seconds)
+            found = self._pressed_by(position, velocity)
         if not found:
             return []
         count, numbers = len(self._pressed), iter(found[0])
@@ -437,19 +435,17 @@ class Reactions:
 
         return Compiled(self._mechanics.closure, 1, wanted)
 
-    def _pressed_by(
-        self, position: Position, velocity: Velocity, seconds: float = 0.0
-    ) -> Sequence[Sequence[float]]:
+    def _pressed_by(self, position: Position, velocity: Velocity) -> Sequence[Sequence[float]]:
         """Return the coefficients of the forces in pressed joints, and the levers of these."""
         closure, size = self._mechanics.closure, self._matrix.size
-        sides, more = (
-            self._sides(
-                position, velocity, closure.acceleration(position, velocity, pull), seconds
-            )
+        sides, pulled = (
+            self._sides(position, velocity, closure.acceleration(position, velocity, pull), None)[
+                0
+            ]
             for pull in (0.0, 1.0)
         )
-        by_pull = [one - other for one, other in zip(more[0][:size], sides[0], strict=False)]
-        columns = [*sides[0][:size], *by_pull, *sides[0][size:]]
+        by_pull = [one - other for one, other in zip(pulled[:size], sides[:size], strict=True)]
+        columns = [*sides[:size], *by_pull, *sides[size:]]
         x, places = position.state.coordinates, self._follower.places(position)
         forces = called(self._loaded_by, self._matrix.at(x, places), *columns)
         if not is_found(forces):
@@ -548,7 +544,7 @@ class Reactions:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
-        seconds: float,
+        seconds: float | None,
     ) -> tuple[list[float], list[float]]:
         """
         Return the right sides of the system, and the friction in each joint.

@@ -90,3 +90,7 @@ class Component:
     def force(self, _segment: int, _value: float, _rate: float, _time: float) -> float:
         """Return the force or the torque that acts now, in [N] or [N·m]."""
         return self.of.wrench[self.number]
+
+    def acting(self, _value: float) -> tuple[float]:
+        """Return that alone, which may be `called` at a value of the input."""
+        return (self.of.wrench[self.number],)

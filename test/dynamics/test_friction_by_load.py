@@ -23,7 +23,15 @@ from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context
 from linkage_ros.drives.torque import build, TorqueParameters
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.loads import AppliedLoads, Friction, JointFriction, JointLoad, Loads
+from linkage_ros.dynamics.loads import (
+    AppliedLoads,
+    Friction,
+    JointFriction,
+    JointLoad,
+    Loads,
+    PointLoad,
+    WrenchLoad,
+)
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.dynamics.motion import OneFreedom
 from linkage_ros.dynamics.reactions import Reactions
@@ -32,6 +40,7 @@ from linkage_ros.kinematics.arithmetic import cross
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Mass
 from linkage_ros.messages.joint_state import EffortCommand
+from linkage_ros.messages.wrench import PlanarWrench
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -249,3 +258,27 @@ def test_a_linkage_that_jams_stands_under_any_command():
         state = drive.state(BEGIN + 5_000_000)
         assert (state.rates == (0.0,)) == stands
         assert (state.angles[0] < 0.89) != stands
+
+
+def test_loads_over_time_press_too():
+    # A force on the crank's end beside its weight, which grows with the time: at rest the pin
+    # carries both, and the drive sticks up to µρ of it.
+    linkage = closure_of(PENDULUM).linkage
+    force = PointLoad((0.0, -1.0), over_time=((0.0, 0.0), (2.0, 80.0)))
+    loads = Loads((0.0, -9.81), applied=AppliedLoads(forces={'crank.end': force}))
+    reactions = Reactions(Mechanics(Closure(linkage), loads, Friction({'O': RUBBING})))
+    for seconds in (0.0, 0.5, 1.5, 3.0):
+        load = 2.0 * 9.81 + min(40.0 * seconds, 80.0)
+        for rate in (1e-200, -1e-200):
+            resisted = reactions.resisting(0.4, rate, seconds, 0.0, 0.0)
+            assert resisted == pytest.approx(RADIUS * load, rel=1e-12)
+
+
+def test_wrenches_press_too():
+    loads = Loads((0.0, -9.81), applied=AppliedLoads(wrenches={'crank': WrenchLoad('', 'end')}))
+    mechanics = Mechanics(closure_of(PENDULUM), loads, Friction({'O': RUBBING}))
+    held, reactions = mechanics.applied.wrenches['crank'], Reactions(mechanics)
+    for count, force in enumerate((0.0, 30.0, -50.0)):
+        held.take(PlanarWrench(0.0, -force, 1.0), count)
+        resisted = reactions.resisting(0.4, 1e-200, 0.0, 0.0, 0.0)
+        assert resisted == pytest.approx(RADIUS * abs(2.0 * 9.81 + force), rel=1e-12)
