@@ -59,7 +59,7 @@ ALL_EFFECTS = f"""effects:
     joints:
       O2: {{viscous: 1.0e-4, coulomb: 0.002}}
       A: {{coulomb: 0.001, breakaway: 0.002, stribeck: 1.5}}
-      B: {{viscous: 1.0e-4, coulomb: 0.001, coefficient: 0.1, radius: 0.003}}
+      B: {{viscous: 1.0e-4, coulomb: 0.001}}
       O4: {{coulomb: 0.002}}
   effort: {{}}
   pin_forces: {{}}
