@@ -21,9 +21,10 @@ F in a joint is linear in the input's acceleration q̈ and in all these friction
 
     F = F₀ + q̈·F₁ + Σ T_k·P_k
 
-If q̈ follows from them, as q̈ = p − Σ T_k·|ψ'_k|·sign(q̇)/I, it is found with them. Newton's method
-finds the T_k from 0 on. Where there are none, the linkage jams (R. L. Norton, Design of Machinery,
-ch. 11, on the friction circle; on self-locking F. Reuleaux, Theoretische Kinematik, 1875).
+If q̈ follows from them, as q̈ = p − Σ T_k·|ψ'_k|·sign(q̇)/I, it is found with them. Newton's
+method finds the T_k from 0 on. Where there are none, the linkage jams (R. L. Norton, Design of
+Machinery, ch. 11, on the friction circle; on self-locking F. Reuleaux, Theoretische Kinematik,
+1875).
 """
 
 from __future__ import annotations
