@@ -230,7 +230,7 @@ class Mechanics:
 
         Its results equal `terms` at the position to the last bit; it is straight-line code.
         """
-        compiled = Compiled(self.closure, 0, self._wanted_terms)
+        compiled = Compiled(self.closure, 0, self._wanted_terms, within_limits=False)
         fast, position, terms = compiled.fast, self.closure.position, self.terms
 
         def equation(value: float) -> Terms | None:

@@ -433,7 +433,7 @@ class Reactions:
             assert motion.velocity is not None
             return self._pressed_by(motion.position, motion.velocity)
 
-        return Compiled(self._mechanics.closure, 1, wanted)
+        return Compiled(self._mechanics.closure, 1, wanted, within_limits=False)
 
     def _pressed_by(self, position: Position, velocity: Velocity) -> Sequence[Sequence[float]]:
         """Return the coefficients of the forces in pressed joints, and the levers of these."""
