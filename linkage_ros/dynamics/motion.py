@@ -296,8 +296,7 @@ class OneFreedom:
             return copysign(1.0, rate)
         push = force - terms.potential_slope
         low, high = self.stops
-        held = abs(push) <= terms.coulomb + terms.breakaway + brake
-        held = held or abs(push) <= self._sticking(motion, push, brake, time)
+        held = abs(push) <= self._sticking(motion, push, brake, time)
         if held or (value >= high and push > 0.0) or (value <= low and push < 0.0):
             return 0.0
         return copysign(1.0, push)

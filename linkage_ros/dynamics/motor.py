@@ -213,7 +213,11 @@ class Motor:
             return voltage / self.resistance, self._falling()
         if self.command == 'current':
             return command, 0.0
-        return command / (self.constant * self.ratio * self.forward), 0.0
+        return self.current_for(command), 0.0
+
+    def current_for(self, effort: float) -> float:
+        """Return the current, in [A], that gives an effort at the input while it drives."""
+        return effort / (self.constant * self.ratio * self.forward)
 
     def _supply(self) -> tuple[Line, ...]:
         """Return the least and the greatest current by the supply; none if it has no limit."""

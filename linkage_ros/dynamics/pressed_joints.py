@@ -30,9 +30,13 @@ Machinery, ch. 11, on the friction circle; on self-locking F. Reuleaux, Theoreti
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 _ROUNDS = 50
 _STAYS = 4e-15
@@ -97,6 +101,90 @@ def frictions(
     return None
 
 
-def resisting(joints: Sequence[PressedJoint], found: Sequence[float]) -> float:
-    """Return how much frictions in joints resist at the input, in [N·m] or [N]."""
+Unknown = tuple[int, bool, float]
+"""Of a joint: its first unknown in the linear system, whether it is a pin, and its factor."""
+
+
+def resisting(
+    unknowns: Sequence[Unknown],
+    forces: Sequence[float],
+    levers: Sequence[float],
+    pull: float,
+    mobility: float,
+) -> float | None:
+    """
+    Return what the frictions resist at the input, in [N·m] or [N]; None if the linkage jams.
+
+    Parameters
+    ----------
+    unknowns
+        The joints.
+    forces
+        As of `forces_in`, for F₀, F₁ and the P_k.
+    levers
+        |ψ'| of each joint.
+    pull, mobility
+        As of `frictions`.
+
+    """
+    count, numbers = len(unknowns), iter(forces)
+    joints = []
+    for (_, _, factor), lever in zip(unknowns, levers, strict=True):
+        free, by_pull, *others = [complex(*islice(numbers, 2)) for _ in range(count + 2)]
+        joints.append(PressedJoint(factor, lever, free, by_pull, tuple(others)))
+    found = frictions(joints, pull, mobility)
+    if found is None:
+        return None
     return sum(joint.lever * friction for joint, friction in zip(joints, found, strict=True))
+
+
+def solved(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> list[float] | None:
+    """
+    Return the solution of a linear system with such friction, and the friction in each joint.
+
+    Parameters
+    ----------
+    unknowns
+        The joints.
+    matrix
+        The matrix.
+    *sides
+        The right sides: first without this friction, then of a unit of each.
+
+    """
+    solutions = _solutions(matrix, sides)
+    if solutions is None:
+        return None
+    free, *units = solutions
+    joints = []
+    for first, pin, factor in unknowns:
+        by_frictions = tuple(_force(unit, first, pin) for unit in units)
+        joints.append(PressedJoint(factor, 0.0, _force(free, first, pin), 0j, by_frictions))
+    found = frictions(joints, 0.0)
+    if found is None:
+        return None
+    for friction, unit in zip(found, units, strict=True):
+        free = [force + friction * more for force, more in zip(free, unit, strict=True)]
+    return [*free, *found]
+
+
+def forces_in(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> list[float] | None:
+    """Return the force in each joint, x and y, for right sides one after the other."""
+    solutions = _solutions(matrix, sides)
+    if solutions is None:
+        return None
+    forces = [_force(each, first, pin) for first, pin, _ in unknowns for each in solutions]
+    return [part for force in forces for part in (force.real, force.imag)]
+
+
+def _solutions(matrix: Array, sides: Sequence[float]) -> list[list[float]] | None:
+    """Return the solutions of a linear system for right sides one after the other, or None."""
+    try:
+        found = np.linalg.solve(matrix, np.reshape(sides, (-1, len(matrix))).T).T
+    except np.linalg.LinAlgError:
+        return None
+    return found.tolist() if np.isfinite(found).all() else None
+
+
+def _force(solution: Sequence[float], first: int, pin: bool) -> complex:
+    return complex(solution[first], solution[first + 1] if pin else 0.0)

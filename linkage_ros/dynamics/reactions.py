@@ -37,12 +37,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from itertools import islice
 from math import isfinite
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.mechanics import Mechanics, resistance, Rubbing, sense, stretched
-from linkage_ros.dynamics.pressed_joints import frictions, PressedJoint, resisting
 from linkage_ros.kinematics.arithmetic import called, facing, is_found, vector
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
@@ -305,11 +303,16 @@ class Reactions:
         )
         self._loaded = tuple(at)
         self._pressed = tuple(joint for joint in mechanics.rubbing if joint.friction.coefficient)
-        self._unknown = [self._unknowns(rubbing) for rubbing in self._pressed]
         self._solved: Callable[..., list[float] | None] = _solved
         if self._pressed:
-            self._solved = partial(_pressed_solved, self._unknown)
-        self._loaded_by = partial(_pressed_by, self._unknown)
+            from linkage_ros.dynamics import (
+                pressed_joints,
+            )  # local import: only with it
+
+            unknowns = [self._unknowns(rubbing) for rubbing in self._pressed]
+            self._solved = partial(pressed_joints.solved, unknowns)
+            self._forces_in = partial(pressed_joints.forces_in, unknowns)
+            self._resisting = partial(pressed_joints.resisting, unknowns)
         self._published = tuple(
             (rows.get(joint.child, -1), rows.get(joint.parent, -1))
             if isinstance(joint, RevoluteJoint)
@@ -403,29 +406,19 @@ class Reactions:
             In [N·m] or [N]; None where the linkage jams, or has no forces.
 
         """
-        joints = self._pressed_joints(value, rate, seconds)
-        found = frictions(joints, pull, mobility) if joints else None
-        return None if found is None else resisting(joints, found)
-
-    def _pressed_joints(self, value: float, rate: float, seconds: float) -> list[PressedJoint]:
-        """Return the joints with friction by their forces; empty where there are no forces."""
-        if self._mechanics.applied is not None:
-            self._mechanics.applied.seconds = seconds
+        closure, applied = self._mechanics.closure, self._mechanics.applied
+        if applied is not None:
+            applied.seconds = seconds
         found: Sequence[Sequence[float]] | None = self._compiled.fast(value, rate)
         if found is None:
-            position = self._mechanics.closure.position(value)
+            position = closure.position(value)
             if position.status not in _SOLVED:
-                return []
-            velocity = self._mechanics.closure.velocity(position, rate)
-            found = self._pressed_by(position, velocity)
+                return None
+            found = self._pressed_by(position, closure.velocity(position, rate))
         if not found:
-            return []
-        count, numbers = len(self._pressed), iter(found[0])
-        joints = []
-        for (_, _, factor), lever in zip(self._unknown, found[1], strict=True):
-            free, by_pull, *others = [complex(*islice(numbers, 2)) for _ in range(count + 2)]
-            joints.append(PressedJoint(factor, lever, free, by_pull, tuple(others)))
-        return joints
+            return None
+        forces, levers = found
+        return self._resisting(forces, levers, pull, mobility)
 
     @cached_property
     def _compiled(self) -> Compiled:
@@ -438,16 +431,13 @@ class Reactions:
     def _pressed_by(self, position: Position, velocity: Velocity) -> Sequence[Sequence[float]]:
         """Return the coefficients of the forces in pressed joints, and the levers of these."""
         closure, size = self._mechanics.closure, self._matrix.size
-        sides, pulled = (
-            self._sides(position, velocity, closure.acceleration(position, velocity, pull), None)[
-                0
-            ]
-            for pull in (0.0, 1.0)
-        )
-        by_pull = [one - other for one, other in zip(pulled[:size], sides[:size], strict=True)]
-        columns = [*sides[:size], *by_pull, *sides[size:]]
         x, places = position.state.coordinates, self._follower.places(position)
-        forces = called(self._loaded_by, self._matrix.at(x, places), *columns)
+        still, pulled = (closure.acceleration(position, velocity, pull) for pull in (0.0, 1.0))
+        sides, _ = self._sides(position, velocity, still, places, None)
+        more, _ = self._sides(position, velocity, pulled, places, None)
+        by_pull = [one - other for one, other in zip(more[:size], sides[:size], strict=True)]
+        columns = [*sides[:size], *by_pull, *sides[size:]]
+        forces = called(self._forces_in, self._matrix.at(x, places), *columns)
         if not is_found(forces):
             return []
         v = velocity.state.coordinates
@@ -529,8 +519,8 @@ class Reactions:
         """Return the solution of the system, and the friction in each joint."""
         if position.status not in _SOLVED:
             return None
-        sides, resistances = self._sides(position, velocity, acceleration, seconds)
         x, places = position.state.coordinates, self._follower.places(position)
+        sides, resistances = self._sides(position, velocity, acceleration, places, seconds)
         forces = called(self._solved, self._matrix.at(x, places), *sides)
         if not is_found(forces):
             return None
@@ -544,6 +534,7 @@ class Reactions:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
+        places: list[complex],
         seconds: float | None,
     ) -> tuple[list[float], list[float]]:
         """
@@ -553,7 +544,6 @@ class Reactions:
         """
         loads, scale = self._mechanics.loads, self._scale
         gravity = complex(*loads.gravity)
-        places = self._follower.places(position)
         pulls = self._follower.accelerations(position, velocity, acceleration, places)
         x, v, a = (part.state.coordinates for part in (position, velocity, acceleration))
         sides: list[float] = []
@@ -645,62 +635,6 @@ def _solved(matrix: Array, *sides: float) -> list[float] | None:
     except np.linalg.LinAlgError:
         return None
     return solution if all(map(isfinite, solution)) else None
-
-
-def _solutions(matrix: Array, sides: Sequence[float]) -> list[list[float]] | None:
-    """Return the solutions of a linear system for right sides one after the other, or None."""
-    try:
-        found = np.linalg.solve(matrix, np.reshape(sides, (-1, len(matrix))).T).T
-    except np.linalg.LinAlgError:
-        return None
-    return found.tolist() if np.isfinite(found).all() else None
-
-
-def _force(solution: Sequence[float], first: int, pin: bool) -> complex:
-    return complex(solution[first], solution[first + 1] if pin else 0.0)
-
-
-def _pressed_solved(
-    unknowns: Sequence[tuple[int, bool, float]], matrix: Array, *sides: float
-) -> list[float] | None:
-    """
-    Return the solution of a linear system with friction by its own forces, and that friction.
-
-    Parameters
-    ----------
-    unknowns
-        As `Reactions._unknowns` returns them.
-    matrix
-        The matrix.
-    *sides
-        The right sides: first without this friction, then of a unit of each.
-
-    """
-    solutions = _solutions(matrix, sides)
-    if solutions is None:
-        return None
-    free, *units = solutions
-    joints = []
-    for first, pin, factor in unknowns:
-        by_frictions = tuple(_force(unit, first, pin) for unit in units)
-        joints.append(PressedJoint(factor, 0.0, _force(free, first, pin), 0j, by_frictions))
-    found = frictions(joints, 0.0)
-    if found is None:
-        return None
-    for friction, unit in zip(found, units, strict=True):
-        free = [force + friction * more for force, more in zip(free, unit, strict=True)]
-    return [*free, *found]
-
-
-def _pressed_by(
-    unknowns: Sequence[tuple[int, bool, float]], matrix: Array, *sides: float
-) -> list[float] | None:
-    """Return the force in each pressed joint, x and y, for right sides one after the other."""
-    solutions = _solutions(matrix, sides)
-    if solutions is None:
-        return None
-    forces = [_force(each, first, pin) for first, pin, _ in unknowns for each in solutions]
-    return [part for force in forces for part in (force.real, force.imag)]
 
 
 def _turned_solved(matrix: Array, *sides: float) -> list[float] | None:

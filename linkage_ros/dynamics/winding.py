@@ -64,7 +64,7 @@ class Winding:
     ) -> tuple[WoundMechanism, float, float]:
         """Return a mechanism under a command, and no further force or friction on its input."""
         if self.command == 'effort':
-            command /= self.motor.constant * self.motor.ratio * self.motor.forward
+            command = self.motor.current_for(command)
         return replace(mechanism, command=command), 0.0, 0.0
 
     def torque(self, _mechanism: WoundMechanism, motion: WoundMotion) -> float:
@@ -75,18 +75,7 @@ class Winding:
         """
         Refuse a motor whose current, alone or with the rate, is too fast for the integration.
 
-        Parameters
-        ----------
-        inertia
-            The least inertia of the equation of motion, in [kg·m²] or [kg].
-        method, step
-            The method of integration, by name, and its step, in [s].
-
-        Raises
-        ------
-        DefinitionError
-            The remedy is the longest step that carries it.
-
+        Parameters and error are those of `Motor.check_step`.
         """
         motor = self.motor
         if motor.resistance and self.inductance / motor.resistance < step:
@@ -130,10 +119,8 @@ class Winding:
         if self.command == 'voltage':
             low = high = min(max(command, low), high)
         least, most = (self._after(begin, rate, volt, seconds) for volt in (low, high))
-        if self.command == 'voltage':
-            command = least
-        command = min(max(command, least), most)
-        return min(max(command, -self.motor.most), self.motor.most)
+        current = min(max(command, least), most)
+        return min(max(current, -self.motor.most), self.motor.most)
 
     def _after(self, begin: float, rate: float, voltage: float, seconds: float) -> float:
         """Return the current after some time at a constant voltage."""

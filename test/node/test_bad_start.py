@@ -25,6 +25,8 @@ import sys
 
 import pytest
 
+from ..support.scenes import LONG_COUPLER
+
 CONFIGURATION = 2
 
 FILES = {
@@ -84,21 +86,9 @@ def test_a_bad_argument(stderr_of, kind):
     assert expected in line
 
 
-LONG_COUPLER = """\
-links:
-  ground:  {O2: [0, 0], O4: [120, 0]}
-  crank:   {O2: [0, 0], A: [0.04, 0]}
-  coupler: {A: [0, 0], B: [120.01, 0]}
-  rocker:  {O4: [0, 0], B: [0.08, 0]}
-input: {joint: crank_joint, parent: ground, child: crank}
-assembly: {B: left}
-joints: {rocker_joint: {parent: ground, child: rocker}}
-"""
-
-
 def test_lengths_and_angles_of_another_unit_are_warned_of(start, write_scene):
     sine = 'rate: 100\ndrive: {sine: {amplitude: 45, frequency: 1}}'
-    scene = write_scene('odd_units', sine, LONG_COUPLER)
+    scene = write_scene('odd_units', sine, LONG_COUPLER.lstrip())
     log = start(scene).log
     linkage = scene.with_name('odd_units_linkage.yaml')
     warned = [line.partition(']: ')[2] for line in log.splitlines() if line.startswith('[WARN]')]

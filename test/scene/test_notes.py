@@ -20,6 +20,7 @@ from linkage_ros.scene.notes import scene_notes
 import pytest
 
 from .conftest import CONFIG
+from ..support.scenes import LONG_COUPLER
 
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 SINE = 'drive: {sine: {amplitude: 45, frequency: 1}}\n'
@@ -70,20 +71,8 @@ def test_a_scene_is_noted(tmp_path, kind):
     ]
 
 
-LINKAGE = """
-links:
-  ground:  {O2: [0, 0], O4: [120, 0]}
-  crank:   {O2: [0, 0], A: [0.04, 0]}
-  coupler: {A: [0, 0], B: [120.01, 0]}
-  rocker:  {O4: [0, 0], B: [0.08, 0]}
-input: {joint: crank_joint, parent: ground, child: crank}
-assembly: {B: left}
-joints: {rocker_joint: {parent: ground, child: rocker}}
-"""
-
-
 def test_a_link_of_another_unit_is_noted_by_check_and_scene(tmp_path, capsys):
-    folder = folder_with(tmp_path, LINKAGE, SINE.replace('45', '0.5'))
+    folder = folder_with(tmp_path, LONG_COUPLER, SINE.replace('45', '0.5'))
     for command, name in (('check', 'linkage'), ('scene', 'scene')):
         assert main([command, str(folder / f'{name}.yaml')]) == 0
         place = f'{folder}/linkage.yaml' + (':5' if command == 'scene' else '')

@@ -41,6 +41,17 @@ input: {joint: drive_joint, parent: ground, child: crank}
 joints: {crank_joint: {parent: ground, child: crank}}
 masses: {crank: {mass: 2, center: [0.3, 0], inertia: 0.05}}
 """
+LONG_COUPLER = """
+links:
+  ground:  {O2: [0, 0], O4: [120, 0]}
+  crank:   {O2: [0, 0], A: [0.04, 0]}
+  coupler: {A: [0, 0], B: [120.01, 0]}
+  rocker:  {O4: [0, 0], B: [0.08, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {B: left}
+joints: {rocker_joint: {parent: ground, child: rocker}}
+"""
+"""Metres that look like another unit: 120 m beside a crank of 0.04 m."""
 FIVE_BAR = """
 links:
   ground: {O1: [0, 0], O2: [0.1, 0]}
