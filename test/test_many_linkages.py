@@ -279,3 +279,31 @@ def test_the_stamp_of_a_measurement_is_of_all_linkages_or_refused(load, left, ri
         return
     with pytest.raises(FileError, match=r'effects\.delay\.stamp: measured is a stamp of its own'):
         Pipeline(scene)
+
+
+def test_the_stamp_of_all_is_that_of_the_newest_measurement(load):
+    """Each crank turns at 1 rad/s from 0 on: its angle is the time at which it was measured."""
+    turning = 'drive: {constant_rate: {rate: 1.0}}, publish_input: true'
+    pipeline = Pipeline(
+        load(f"""
+linkages:
+  - {{name: left, linkage: four_bar.yaml, {turning}}}
+  - {{name: right, linkage: four_bar.yaml, {turning}}}
+effects: {{delay: {{seconds: 0.002, spread: 0.01, stamp: measured}}}}
+""")
+    )
+    together = 0
+    for number in range(400):
+        message = pipeline.tick(BEGIN + number * MS).message
+        if not message:
+            continue
+        state = read(message)
+        measured = [
+            angle
+            for name, angle in zip(state.name, state.position, strict=True)
+            if name.endswith('crank_joint')
+        ]
+        stamp = state.header.stamp.sec * 1_000_000_000 + state.header.stamp.nanosec - BEGIN
+        assert stamp == pytest.approx(1e9 * max(measured), abs=2.0)
+        together += len(set(measured)) == 2
+    assert together >= 20

@@ -24,7 +24,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bar_type, four_bars
-from linkage_ros.kinematics.linkage import Input, Linkage, Pose, RevoluteJoint
+from linkage_ros.kinematics.linkage import Input, Limits, Linkage, Pose, RevoluteJoint
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.status import Status
@@ -261,6 +261,47 @@ def test_a_full_turn_begins_at_0():
 def test_a_single_change_point_needs_two_turns():
     assert of_lengths(1.0, 4.0, 3.0, 2.0).ranges == (InputRange(0.0, 2.0 * tau),)
     assert of_lengths(1.0, 2.0, 1.0, 2.0).ranges == (InputRange(0.0, tau),)  # a parallelogram: one
+
+
+MOST_TURNS = 8
+"""Turns of a range that are listed at most."""
+
+
+@given(
+    st.tuples(st.integers(-40, 40), st.integers(-40, 40)).map(sorted),
+    st.sampled_from(['both', 'lower', 'upper']),
+    st.floats(0.0, 0.999),
+)
+def test_of_a_range_within_wide_limits_the_turns_about_their_middle_are_listed(
+    turns, given_limits, fraction
+):
+    # The crank swings about 0, so a range lies in each turn.
+    lengths = 4.0, 8.0, 3.0, 6.0
+    (whole,) = of_lengths(*lengths).ranges
+    low = tau * (turns[0] + fraction) if given_limits != 'upper' else -inf
+    high = tau * (turns[1] + 1 + fraction) if given_limits != 'lower' else inf
+    linkage = four_bar_linkage(lengths, 'left')
+    crank = replace(linkage.inputs[0], limits=Limits(low, high))
+    parts = InputSweep(Closure(replace(linkage, inputs=(crank,)))).ranges
+    within = [
+        turn
+        for turn in range(-60, 60)
+        if whole.lowest + tau * turn < high and whole.highest + tau * turn > low
+    ]
+    listed = [
+        turn
+        for part in parts
+        for turn in within
+        if whole.lowest <= 0.5 * (part.lowest + part.highest) - tau * turn <= whole.highest
+    ]
+    assert listed == [*range(listed[0], listed[0] + min(len(within), MOST_TURNS))]
+    assert set(listed) <= set(within)
+    if given_limits == 'lower':
+        assert listed[0] == within[0]
+    elif given_limits == 'upper':
+        assert listed[-1] == within[-1]
+    else:
+        assert abs((listed[0] + listed[-1]) - (within[0] + within[-1])) <= 2
 
 
 def test_a_limited_range_lies_about_its_middle():

@@ -212,6 +212,11 @@ def test_refused_when_it_is_built(text):
         Pipeline(scene_of(text))
 
 
+@pytest.mark.parametrize('forces', ['effects: {effort: {}}', 'drive: {torque: {}}'])
+def test_the_closed_form_that_the_refusal_recommends_is_taken(forces):
+    assert Pipeline(scene_of(f'solver: closed_form\n{forces}')).lines
+
+
 def test_what_is_read_the_schema_takes():
     for text, _ in SOLVERS.values():
         content = parse_yaml(f'linkage: l.yaml\n{text}'.encode(), 'f')
