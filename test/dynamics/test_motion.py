@@ -23,6 +23,7 @@ from math import cos, exp, inf, isfinite, pi, sin, sqrt
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.dynamics.integrators import METHODS
+from linkage_ros.dynamics.laws import LawTerm, Table
 from linkage_ros.dynamics.mechanics import Terms
 from linkage_ros.dynamics.motion import LARGEST, OneFreedom
 import pytest
@@ -278,3 +279,59 @@ def test_whatever_the_force_it_stays_between_its_stops(
             assert -0.5 <= motion.value <= 0.75
             assert isfinite(motion.rate)
             assert isfinite(mass.acceleration(motion, force, brake))
+
+
+# Forces over time: a mass of 1 on a line, under the table of a force.
+
+
+def pushed(rows, friction=0.0, calls=None):
+    """Return the terms of a mass of 1 on a line under a force over time; ``calls`` counts."""
+
+    def terms(value):
+        if calls is not None:
+            calls.append(value)
+        return Terms(1.0, 0.0, 0.0, 0.0, friction, laws=(LawTerm(1.0, value, 1.0),))
+
+    return terms, (Table('time', tuple(rows)),)
+
+
+@pytest.mark.parametrize('steps', [1, 3, 150])
+@pytest.mark.parametrize('friction', [0.0, 2.0])
+@pytest.mark.parametrize('side', [1.0, -1.0], ids=['upper stop', 'lower stop'])
+def test_it_rests_at_a_stop_until_the_load_draws_it_away(side, friction, steps):
+    # 5 N into the stop until 0.05 s, then 100 N/s away from it.
+    terms, laws = pushed([(0.05, 5.0 * side), (0.15, -5.0 * side)], friction)
+    stops = (-inf, 0.0) if side > 0.0 else (0.0, inf)
+    mass = OneFreedom(terms, STEP['rk4'], stops, laws=laws)
+    motion, seconds = mass.at(0.0, 0.0), 0.15 / steps
+    for step in range(steps):
+        motion = mass.advance(motion, seconds, 0.0, time=step * seconds)
+    after = 0.15 - (0.05 + (5.0 + friction) / 100.0)
+    assert motion.rate == pytest.approx(-side * 50.0 * after**2, rel=1e-9)
+    assert motion.value == pytest.approx(-side * 50.0 / 3.0 * after**3, rel=1e-9)
+
+
+@pytest.mark.parametrize('start', [0.0, 7.0])
+@pytest.mark.parametrize('kink', [0.01, 0.05, 0.09])
+def test_a_step_across_a_row_of_a_table_is_exact(kink, start):
+    # 0 N until the kink, then 40 N/s: rk4 is exact on both sides of it.
+    terms, laws = pushed([(start + kink, 0.0), (start + 1.0, 40.0 * (1.0 - kink))])
+    mass = OneFreedom(terms, STEP['rk4'], laws=laws)
+    motion = mass.advance(mass.at(0.0, 1.0), 0.1, 0.0, time=start)
+    after = 0.1 - kink
+    assert motion.rate == pytest.approx(1.0 + 20.0 * after**2, rel=1e-12)
+    assert motion.value == pytest.approx(0.1 + 20.0 / 3.0 * after**3, rel=1e-12)
+
+
+def test_a_step_across_many_rows_goes_on_at_a_bounded_cost():
+    costs = []
+    for count in (1000, 2000):
+        # A force of 10 N all the time, in many rows.
+        calls = []
+        rows = [(0.1 * row / count, 10.0) for row in range(count + 1)]
+        terms, laws = pushed(rows, calls=calls)
+        mass = OneFreedom(terms, STEP['rk4'], laws=laws)
+        motion = mass.advance(mass.at(0.0, 0.0), 0.1, 0.0)
+        assert motion.rate == pytest.approx(1.0, rel=1e-9)
+        costs.append(len(calls))
+    assert costs[1] < 1.5 * costs[0]
