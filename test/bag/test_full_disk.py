@@ -225,6 +225,21 @@ def test_the_floor_counts_at_each_new_file_too(small_disk, topics, messages, whe
     assert found == [message.data for message in messages[:taken]]
 
 
+def test_no_file_is_begun_where_another_process_has_taken_the_room(small_disk, topics, messages):
+    storage = Storage(min_free_bytes=600_000, split_seconds=0.5)
+    writer = BagWriter(small_disk / 'run', topics, storage=storage)
+    half_a_second = [m for m in messages if m.log_time - messages[0].log_time < 400_000_000]
+    for message in half_a_second:
+        writer.write(*message)
+    writer.flush()
+    free = os.statvfs(small_disk)
+    (small_disk / 'other').write_bytes(bytes(free.f_bavail * free.f_frsize - 500_000))
+    with pytest.raises(RecordingError, match='fewer than min_free_bytes: 600,000'):
+        writer.write(*messages[-1])
+    assert sum(writer.close().counts) == len(half_a_second)
+    assert [file.name for file in small_disk.glob('run/*.mcap')] == ['run_0.mcap']
+
+
 def test_a_disk_with_too_little_room_from_the_start_gets_no_bag(small_disk, topics):
     with pytest.raises(
         RecordingError, match=r'cannot be recorded to: .* min_free_bytes: 5,000,000'

@@ -161,16 +161,17 @@ def test_a_disk_that_never_answers_does_not_keep_the_process(tmp_path, topics, m
 
 
 @pytest.mark.parametrize(
-    ('number', 'said'),
+    ('number', 'said', 'for_good'),
     [
-        (errno.ENOSPC, 'was interrupted: No space left on device'),
-        (errno.EIO, 'ended early: Input/output error'),
+        (errno.ENOSPC, 'was interrupted: No space left on device', False),
+        (errno.EIO, 'ended early: Input/output error', True),
     ],
 )
 def test_a_failure_stops_no_process_and_all_that_was_offered_is_accounted_for(
-    tmp_path, topics, messages, readers, monkeypatch, number, said
+    tmp_path, topics, messages, readers, monkeypatch, number, said, for_good
 ):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.01)
+    assert not recorder.ended
     pwrite = os.pwrite
 
     def failing(descriptor, data, offset):
@@ -191,6 +192,8 @@ def test_a_failure_stops_no_process_and_all_that_was_offered_is_accounted_for(
         threading.Event().wait(0.01)
     assert f'run: the recording {said}' in str(recorder.failure)
     assert not recorder.recording
+    # A full disk may have room again.
+    assert recorder.ended is for_good
     for message in messages[6000:]:
         recorder.offer(*message)
     looks = recorder.inspect()
