@@ -97,13 +97,12 @@ def next_whole(source: Source, at: int) -> int:
 
 def _window(source: Source, at: int) -> tuple[bytes, int]:
     """Return some bytes, and the number of them at which a record may begin."""
-    try:
-        return source.read(at, min(_WINDOW + _BEYOND, source.size - at)), _WINDOW
-    except DamagedError:
-        # The disk cannot read them all, but those before and after a bad block.
+    to_next_block = _BLOCK - at % _BLOCK
+    # The disk cannot read all of a window, but what is before and after a bad block.
+    for size, beyond in ((_WINDOW, _BEYOND), (to_next_block, _BEYOND), (to_next_block, 0)):
         with suppress(DamagedError):
-            return source.read(at, min(_BLOCK + _BEYOND, source.size - at)), _BLOCK
-    return b'', _BLOCK
+            return source.read(at, min(size + beyond, source.size - at)), size
+    return b'', to_next_block
 
 
 def _is_whole(source: Source, at: int) -> bool:
