@@ -31,7 +31,7 @@ unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLU
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema cost effects docs lint format
-.PHONY: test_nodes test_rest clean damage kills endurance disk attacks accuracy_page report lock sbom compiled
+.PHONY: test_nodes test_rest clean damage kills endurance disk attacks mutants accuracy_page report lock sbom compiled
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 sets the duration)'
@@ -48,6 +48,7 @@ help:
 	@echo 'make kills     kill recordings at 1,400 instants, into docs/recordings (10 min)'
 	@echo 'make disk      let system calls fail, disks fill and stall, into docs/recordings (10 min)'
 	@echo 'make attacks   send hostile input to commands and node, into docs/recordings (5 min)'
+	@echo 'make mutants   try 100 random mistakes in the core, which the tests have to see (30 min)'
 	@echo 'make endurance run 24 h in minutes and 10 min over DDS, into docs/recordings (25 min)'
 	@echo 'make gallery   draw the linkages that come with the package, and the moving pictures of the README'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
@@ -186,6 +187,9 @@ disk: $(STAMP)
 
 attacks: $(STAMP)
 	@$(BIN)/python -m campaigns.attacks --write
+
+mutants: $(STAMP)
+	@$(BIN)/python -m campaigns.mutants $(if $(SEED),--seed $(SEED))
 
 endurance: $(STAMP)
 	@$(BIN)/python -m campaigns.endurance --write
