@@ -28,12 +28,13 @@ from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
 from linkage_ros.drawing.curves import Curve, sweep
 from linkage_ros.drawing.figure import joint_axes, label_joints, plot_joints
 from linkage_ros.drawing.painting import save, settings, show_lengths
-from linkage_ros.errors import BagError, shortened
+from linkage_ros.errors import BagError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.messages.joint_state import JointStateReader, Rejection
+from linkage_ros.names import picture_text
 from linkage_ros.replay.replay import replay
 from linkage_ros.signals import StoppedError
 import numpy as np
@@ -144,7 +145,7 @@ def curves(
     for place, (name, joint) in enumerate(linkage.joints.items()):
         if name == driven.joint:
             continue
-        turning, label = isinstance(joint, RevoluteJoint), _plain(name, 40)
+        turning, label = isinstance(joint, RevoluteJoint), name
         values = np.array([positions[i][place] for i in order])
         breaks = begins.copy()
         if turning:
@@ -194,16 +195,13 @@ def _paint(
                 axes.set_ylabel(f'rate of {axes.get_ylabel()[:-1]}/s]')
         lowest = list(drawn[-1][0].values())[-1]
         if driven.slider:
-            show_lengths(lowest.xaxis, _plain(driven.joint, 80), max(map(abs, lowest.get_xlim())))
+            show_lengths(
+                lowest.xaxis, picture_text(driven.joint), max(map(abs, lowest.get_xlim()))
+            )
         else:
-            lowest.set_xlabel(f'{_plain(driven.joint, 80)} [°]')
-        figure.suptitle(_plain(title, 160))
+            lowest.set_xlabel(f'{picture_text(driven.joint)} [°]')
+        figure.suptitle(picture_text(title, 160))
         figure.draw_without_rendering()  # only now axes and texts have a size
         for panels, part, lines in drawn:
             label_joints(panels, part, lines)
         save(figure, picture)
-
-
-def _plain(text: str, most: int) -> str:
-    """Escape dollar signs: matplotlib reads a text between two of them as mathematics."""
-    return shortened(text, most).replace('$', r'\$')

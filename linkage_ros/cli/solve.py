@@ -51,6 +51,7 @@ from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.names import csv_text
 
 _STEPS = 36
 _MOST = 1e300
@@ -307,7 +308,7 @@ def _table(columns: Sequence[Column], rows: Sequence[Sequence[Any]], angles: Ang
 def _csv(columns: Sequence[Column], rows: Sequence[Sequence[Any]]) -> str:
     written = io.StringIO()
     writer = csv.writer(written, lineterminator='\n')
-    writer.writerow(map(str, columns))
+    writer.writerow(csv_text(str(column)) for column in columns)
     writer.writerows(
         [repr(value) if isinstance(value, float) else value for value in row] for row in rows
     )

@@ -56,6 +56,7 @@ from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.files.file_access import atomic_write, check_suffix
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.names import picture_text
 import numpy as np
 
 KINDS = ('.gif', '.mp4', '.svg')
@@ -231,7 +232,7 @@ class _Scene:
         self.canvas: Any = FigureCanvasAgg(self.figure)
         grid = self.figure.add_gridspec(1, 2, width_ratios=(wide, 4.8 if compact else 3.4))
         self.plane = self.figure.add_subplot(grid[0])
-        self.plane.set_title(motion.title, loc='left', fontsize=9)
+        self.plane.set_title(picture_text(motion.title, 100), loc='left', fontsize=9)
         set_plane(self.plane, low - margin, high + margin)
         if compact:
             self.plane.set_axis_off()

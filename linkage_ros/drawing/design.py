@@ -59,6 +59,7 @@ from linkage_ros.drawing.painting import (
 )
 from linkage_ros.drawing.shapes import shapes, skeleton
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.names import picture_text
 from linkage_ros.synthesis.design import COUPLER, CRANK, Design, FourBar, ROCKER
 from numpy.typing import ArrayLike
 
@@ -302,7 +303,7 @@ def draw_design(
     with context:
         below = (wide / max(3, len(magnified)) + 0.3) if link else 0.0
         figure = Figure(figsize=(wide + 4.6, tall + below + 0.8), dpi=110, layout='constrained')
-        figure.suptitle(title, x=0.01, ha='left', fontsize=9.5)
+        figure.suptitle(picture_text(title, 140), x=0.01, ha='left', fontsize=9.5)
         halves: Any = figure.add_gridspec(1, 2, width_ratios=(wide, 4.6))
         left, right = halves
         if link:

@@ -36,6 +36,7 @@ from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import carriers
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.names import dxf_text
 
 _MM = 1e3
 _HOLE = 0.4
@@ -99,7 +100,7 @@ def links_dxf(closure: Closure, *, width: float | None = None, hole: float | Non
             tallest = max(each.imag for each in islice(sizes, number, number + _ROW))
             place = complex(0.0, place.imag - tallest - 2.0 * wide)
         _paint(space, part, place - low + margin, 0.0, wide, bore)
-        text = space.add_text(part.name, height=wide / 3.0, dxfattribs={'layer': 'NAME'})
+        text = space.add_text(dxf_text(part.name), height=wide / 3.0, dxfattribs={'layer': 'NAME'})
         text.set_placement((place.real, place.imag - wide / 2.0))
         place += size.real + wide
     # Below the parts, as the linkage stands.

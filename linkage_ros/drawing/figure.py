@@ -48,6 +48,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.results import InputRange, Position
 from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.names import picture_text
 
 _GHOSTS = 5
 _SAME = 1e-9
@@ -200,12 +201,11 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
         grid = figure.add_gridspec(1, 2, width_ratios=(wide, 4.7))
         left, joints = figure.add_subplot(grid[0]), shown.sweep.joints
         panels = joint_axes(grid[1], joints)
-        left.set_title(
+        heading = (
             f'{title}, {_pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}'
-            f'{_beyond_text(shown)}',
-            loc='left',
-            fontsize=9,
+            f'{_beyond_text(shown)}'
         )
+        left.set_title(picture_text(heading, 120), loc='left', fontsize=9)
         set_plane(left, low - margin, high + margin)
         paint_background(left, shown)
         paint(left, drawn)
@@ -248,9 +248,9 @@ def assemblies_picture(views: Mapping[str, View], file: Path) -> None:
         first = next(iter(views.values()))
         for number, (text, shown) in enumerate(views.items(), 1):
             axes = figure.add_subplot(rows, columns, number)
-            title = fill(text, round(15.0 * wide), subsequent_indent='  ')
+            title = fill(picture_text(text, 200), round(15.0 * wide), subsequent_indent='  ')
             if shown.inputs != first.inputs:
-                title += f'\nat {_pose_text(shown.closure, shown.inputs)}'
+                title += f'\nat {picture_text(_pose_text(shown.closure, shown.inputs))}'
             axes.set_title(title, loc='left', fontsize=7.5, family='monospace')
             set_plane(axes, low - margin, high + margin)
             axes.set_axis_off()
@@ -308,7 +308,7 @@ def plot_joints(
             [degrees(y) for y in joint.y] if joint.turning else joint.y,
             color=COLOURS[number % len(COLOURS)],
             linewidth=1.3,
-            label=joint.name,
+            label=picture_text(joint.name, 40),
         )
     for turning, axes in panels.items():
         if turning:
@@ -339,7 +339,7 @@ def moved_input(shown: View) -> tuple[str, str]:
     """Return the name and the unit of the input that moves."""
     given = shown.closure.linkage.inputs[0]
     held = ', the others held' if len(shown.inputs) > 1 else ''
-    return f'{given.joint}{held}', 'm' if given.slider else '°'
+    return f'{picture_text(given.joint)}{held}', 'm' if given.slider else '°'
 
 
 def label_across(axes: Any, name: str, unit: str) -> None:

@@ -17,17 +17,20 @@
 from __future__ import annotations
 
 from cmath import rect
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from itertools import pairwise
 from math import ceil, isnan, pi
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
+from warnings import catch_warnings, filterwarnings
 
 from linkage_ros.drawing.shapes import Circle, Polygon, Segment, Shape
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.files.file_access import atomic_write
+from linkage_ros.names import picture_text
 
 _DIRECTIONS = 16
 _DISTANCES = 9
@@ -170,15 +173,28 @@ FACES = {
 }
 _STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
 STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
-_SETTINGS: Any = {'font.size': 8.0, 'svg.hashsalt': 'linkage_ros', 'axes.linewidth': 0.6}
+_SETTINGS: Any = {
+    'font.size': 8.0,
+    'svg.hashsalt': 'linkage_ros',
+    'axes.linewidth': 0.6,
+    'text.parse_math': False,  # a name between dollar signs is no formula
+}
 
 
 def settings() -> Any:
     """Return the matplotlib context of a picture; a LinkageError without matplotlib."""
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
+    return _settings()
+
+
+@contextmanager
+def _settings() -> Iterator[None]:
     import matplotlib as mpl  # local import: an extra, and slow to load
 
-    return mpl.rc_context(_SETTINGS)
+    with mpl.rc_context(_SETTINGS), catch_warnings():
+        # A letter that is not in the font is a box in the picture.
+        filterwarnings('ignore', 'Glyph', UserWarning)
+        yield
 
 
 def save(figure: Any, file: Path) -> None:
@@ -350,12 +366,12 @@ class Names:
         x, y = self._axes.transData.transform((place.real, place.imag))
         return complex(x, y)
 
-    def want(self, text: str, anchors: Sequence[complex], clear: float, **style: Any) -> None:
-        """Add a text next to one of some places, in [m], the first the best; clear in pixels."""
+    def want(self, name: str, anchors: Sequence[complex], clear: float, **style: Any) -> None:
+        """Add a name next to one of some places, in [m], the first the best; clear in pixels."""
         from matplotlib.patheffects import withStroke  # local import: an extra, and slow to load
 
         written = self._axes.text(
-            0.0, 0.0, text, ha='center', va='center', zorder=LAYERS['label'] + 1,
+            0.0, 0.0, picture_text(name, 40), ha='center', va='center', zorder=LAYERS['label'] + 1,
             path_effects=[withStroke(linewidth=2.0, foreground='white')], **style,
         )  # fmt: skip
         box = written.get_window_extent()

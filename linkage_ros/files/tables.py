@@ -33,6 +33,7 @@ from typing import Any, BinaryIO
 
 from linkage_ros.errors import FileError, LinkageError, quoted
 from linkage_ros.files.file_access import check_suffix, read_regular, replaced
+from linkage_ros.names import csv_text
 
 Row = Sequence[float | int | None]
 Write = Callable[[Sequence[Row]], None]
@@ -101,7 +102,7 @@ def _csv(stream: BinaryIO, heads: Sequence[str], _whole: Sequence[str]) -> Itera
     text = io.TextIOWrapper(stream, encoding='utf-8', newline='', write_through=True)
     writer = csv.writer(text, lineterminator='\n')  # writes floats with repr
     try:
-        writer.writerow(heads)
+        writer.writerow(map(csv_text, heads))
         yield writer.writerows
     finally:
         text.detach()  # else it would close the stream when it is garbage-collected

@@ -93,9 +93,9 @@ const Page = (() => {
     };
   }
 
-  /** Return a text in which Plotly finds neither markup nor a formula. */
+  /** Return a text in which Plotly finds no markup, no formula and no place for a number. */
   function escaped(text) {
-    return text.replace(/[&<>$]/g, (letter) => `&#${letter.codePointAt(0)};`);
+    return text.replace(/[%&<>$]/g, (letter) => `&#${letter.codePointAt(0)};`);
   }
 
   /** Draw elements now, and anew where their width or the colours change. */

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from linkage_ros.drawing.painting import COLOURS, save, settings
+from linkage_ros.names import picture_text
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,7 +49,7 @@ def draw_spread(title: str, seconds: float, joints: Sequence[JointSpread], file:
 
     with context:
         figure = Figure(figsize=(8.0, 0.6 + 2.0 * len(joints)), dpi=110, layout='constrained')
-        figure.suptitle(title, x=0.01, ha='left', fontsize=9)
+        figure.suptitle(picture_text(title, 120), x=0.01, ha='left', fontsize=9)
         grid = figure.subplots(len(joints), 2, sharex=True, squeeze=False)
         for number, ((left, right), joint) in enumerate(zip(grid, joints, strict=True)):
             colour = COLOURS[number % len(COLOURS)]
@@ -56,7 +57,7 @@ def draw_spread(title: str, seconds: float, joints: Sequence[JointSpread], file:
             levels = _levels(joint.values)
             _band(left, times, levels, colour)
             _band(right, times, levels - levels[_MEDIAN], colour)
-            left.set_ylabel(f'{joint.name} [{joint.unit}]')
+            left.set_ylabel(f'{picture_text(joint.name, 30)} [{joint.unit}]')
             right.set_ylabel(f'less the median [{joint.unit}]')
         for axes in grid[-1]:
             axes.set_xlabel('time [s]')

@@ -27,7 +27,7 @@ PACKAGE = 'linkage_ros'
 # Packages by height: a package may import from lower ones, and from its neighbours as long as no
 # two import each other.
 HEIGHTS = (
-    ('errors', 'signals', 'generated_code', 'measuring', 'processes'),
+    ('errors', 'names', 'signals', 'generated_code', 'measuring', 'processes'),
     ('kinematics', 'resources', 'messages'),
     ('files',),
     ('bag', 'pages', 'synthesis', 'dynamics', 'drawing', 'solvers', 'robot_models'),

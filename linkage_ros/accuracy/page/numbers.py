@@ -31,6 +31,7 @@ from numbers import Integral, Real
 
 from linkage_ros.accuracy.results import Cell, Diagram, Table
 from linkage_ros.measuring import Spread
+from linkage_ros.names import csv_text
 
 _SMALL, _LARGE = 1e-3, 1e6
 """Smaller and larger numbers are written with an exponent."""
@@ -149,7 +150,7 @@ def _text(columns: Sequence[str], spreads: Sequence[bool], rows: Iterable[Sequen
     writer.writerow(
         name
         for column, spread in zip(columns, spreads, strict=True)
-        for name in (_names(column) if spread else [column])
+        for name in (_names(column) if spread else [csv_text(column)])
     )
     for row in rows:
         writer.writerow(
@@ -178,4 +179,4 @@ def _one(cell: Cell | Integral) -> str:
     if isinstance(cell, Integral):
         return str(int(cell))
     # Of a numpy number, repr would name its type.
-    return repr(float(cell)) if isinstance(cell, Real) else str(cell or '')
+    return repr(float(cell)) if isinstance(cell, Real) else csv_text(str(cell or ''))

@@ -23,7 +23,6 @@ from itertools import pairwise
 from math import ceil, floor, log10, nan
 from textwrap import wrap
 from typing import Any
-from warnings import catch_warnings, filterwarnings
 
 from linkage_ros.accuracy.page.diagrams import (
     DASHES,
@@ -139,17 +138,14 @@ def diagram_svg(diagram: Diagram, styles: Styles) -> bytes:
             where='post', color=INK, linewidth=0.9, zorder=1.5, clip_on=False,
         )  # fmt: skip
         title = '\n'.join(wrap(diagram.title, _TITLE_LETTERS))
-        figure.suptitle(_plain(title), x=0.01, ha='left', fontsize=10.0, color=INK)
+        figure.suptitle(title, x=0.01, ha='left', fontsize=10.0, color=INK)
         figure.draw_without_rendering()
         # Names are placed in this layout; they must not change it.
         figure.set_layout_engine('none')
         _write_names(axes, placed, styles)
         stored = BytesIO()
         about = {'Date': None, 'Creator': 'linkage_ros', 'Title': diagram.title}
-        with catch_warnings():
-            # A letter that matplotlib's font has not is a box here; the page and its CSV have it.
-            filterwarnings('ignore', 'Glyph', UserWarning)
-            figure.savefig(stored, format='svg', metadata=about)
+        figure.savefig(stored, format='svg', metadata=about)
     return stored.getvalue()
 
 
@@ -158,7 +154,7 @@ def _set_axes(axes: Any, placed: Places) -> None:
         # The scale first: it brings locators of its own.
         getattr(axes, f'set_{which}scale')('log' if shown.axis.logarithmic else 'linear')
         _set_axis(getattr(axes, f'{which}axis'), shown)
-        getattr(axes, f'set_{which}label')(_plain(shown.axis.title), color=INK, fontsize=9.0)
+        getattr(axes, f'set_{which}label')(shown.axis.title, color=INK, fontsize=9.0)
         getattr(axes, f'set_{which}lim')(shown.low, shown.high)
     axes.set_axisbelow(True)
     axes.grid(alpha=0.3, linewidth=0.5)
@@ -259,7 +255,7 @@ def _write_names(axes: Any, placed: Places, styles: Styles) -> None:
         colour = styles[curve.curve.name].colour
         to_data = axes.transData.inverted().transform
         axes.annotate(
-            _plain(name),
+            name,
             to_data((anchor.real, anchor.imag)),
             to_data((centre.real, centre.imag)),
             ha='center', va='center', fontsize=_FONT, color=colour, annotation_clip=False,
@@ -270,8 +266,3 @@ def _write_names(axes: Any, placed: Places, styles: Styles) -> None:
 
 
 _NOWHERE = Placed(nan, nan, (0.0, 0.0), (0.0, 0.0), on_edge=False, pale=False, text=())
-
-
-def _plain(text: str) -> str:
-    """Return a text in which no dollar begins a formula."""
-    return text.replace('$', r'\$')

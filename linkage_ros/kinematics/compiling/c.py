@@ -113,7 +113,7 @@ class C(Language):
         listed = [f'{kind} {{', *statuses, '};']
         two = [_DECLARED_TWO] if any(f'{_TWO})' in line for line in body) else []
         definition = [*signature, '{', *two, *body, '}']
-        comment = ['/*', *(f' * {_harmless(line)}'.rstrip() for line in (*head, *_NOTES)), ' */']
+        comment = ['/*', *(f' * {line}'.rstrip() for line in (*head, *_NOTES)), ' */']
         if self._header:
             guard, once = f'{function.upper()}_H', f'{name.upper()}_STATUS'
             definition[0] = f'static inline {definition[0]}'
@@ -129,10 +129,3 @@ class C(Language):
             heading = '/* What a caller declares: */'
             lines = [*_CHECK, '', heading, *declared, '', *definition]
         return '\n'.join([*comment, '', *lines, ''])
-
-
-def _harmless(text: str) -> str:
-    """Return a text without ends of comments and trigraphs, whatever names it holds."""
-    for odd in ('*/', '/*', '??'):
-        text = text.replace(odd, ' '.join(odd))
-    return text.replace('\\', '/')

@@ -84,7 +84,7 @@ class JavaScript(Language):
         given = GIVEN[: 1 + subject.derivatives]
         returned = self._names if subject.frames else self._names[: 1 + subject.derivatives]
         empty = ', '.join(f'{name}: []' for name in returned)
-        comment = (f' * {line.replace("*/", "* /")}'.rstrip() for line in (*head, *_NOTES))
+        comment = (f' * {line}'.rstrip() for line in (*head, *_NOTES))
         statuses = (f'    {status}: {number},' for number, status in enumerate(STATUSES))
         name = self.function(subject.derivatives)
         lines = [

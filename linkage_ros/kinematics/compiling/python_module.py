@@ -32,6 +32,9 @@ _NOTES = (
     'It returns the status and a tuple for each group of values, empty where the status has none.',
 )
 
+_CODING = '# -*- coding: utf-8 -*-'
+"""First line: Python looks for an encoding in the second, which holds a name, only without it."""
+
 _IMPORTS = 'from math import atan2, copysign, cos, inf, isfinite, sin, sqrt'
 
 
@@ -88,7 +91,7 @@ class PythonModule(Language):
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
         name = self.function(subject.derivatives)
         lines = [
-            *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', _IMPORTS, '',
+            _CODING, *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', _IMPORTS, '',
             *(f'{status} = {number}' for number, status in enumerate(STATUSES)), '', '',
             f'def {name}({", ".join(GIVEN[: self._groups])}):', *body,
         ]  # fmt: skip

@@ -16,12 +16,13 @@
 A path in real numbers only, for languages and arrays without complex numbers.
 
 A complex number becomes its two components, by the formulas of Python's complex numbers: the bits
-are the same, except for the sign of a zero.
+are the same, also the sign of a zero, which a product with the 0.0 of a real number can decide.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+import operator
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
@@ -72,7 +73,7 @@ def lowered(path: Path, fates: tuple[Tree, ...] = (), by_squares: bool = False) 
         The status of the linkage where each decision differs.
     by_squares
         Whether lengths and quotients are computed by squares, which is fastest for arrays: the
-        last digits differ, and lengths below 1e-154 are lost.
+        last digits differ, lengths below 1e-154 are lost, and so is the sign of a zero.
 
     """
     lower = Lowering(by_squares)
@@ -89,6 +90,7 @@ class Lowering:
 
     def __init__(self, by_squares: bool = False) -> None:
         self.tape = Tape()
+        self.times, self.plus, self.minus = _SHORT if by_squares else _EXACT
         self._formulas = _BY_SQUARES if by_squares else _FORMULAS
         self._known: dict[Operation, Any] = {}
 
@@ -126,7 +128,7 @@ class Lowering:
                  for a in operation.arguments]  # fmt: skip
         if not any(isinstance(one, _Parts) for one in given) and name not in _MAKES_PARTS:
             return self.tape.write(name, *given)
-        return self._formulas[name](self.tape, *given)
+        return self._formulas[name](self, *given)
 
 
 _MAKES_PARTS = frozenset(('facing', 'vector'))
@@ -160,32 +162,42 @@ def _difference(one: Any, other: Any) -> Any:
     return -other if _zero(one) else one if _zero(other) else one - other
 
 
+_EXACT = (operator.mul, operator.add, operator.sub)
+_SHORT = (_times, _sum, _difference)
+"""Arithmetic of components, with every zero or without products with a constant 0."""
+
+
 def _both(number: Any) -> _Parts:
     return number if isinstance(number, _Parts) else _Parts(number, 0.0)
 
 
-def _add(_: Tape, one: Any, other: Any) -> _Parts:
+def _add(lower: Lowering, one: Any, other: Any) -> _Parts:
     a, b = _both(one), _both(other)
-    return _Parts(_sum(a.x, b.x), _sum(a.y, b.y))
+    return _Parts(lower.plus(a.x, b.x), lower.plus(a.y, b.y))
 
 
-def _subtract(_: Tape, one: Any, other: Any) -> _Parts:
+def _subtract(lower: Lowering, one: Any, other: Any) -> _Parts:
     a, b = _both(one), _both(other)
-    return _Parts(_difference(a.x, b.x), _difference(a.y, b.y))
+    return _Parts(lower.minus(a.x, b.x), lower.minus(a.y, b.y))
 
 
-def _multiply(_: Tape, one: Any, other: Any) -> _Parts:
+def _multiply(lower: Lowering, one: Any, other: Any) -> _Parts:
     a, b = _both(one), _both(other)
+    times = lower.times
     return _Parts(
-        _difference(_times(a.x, b.x), _times(a.y, b.y)), _sum(_times(a.x, b.y), _times(a.y, b.x))
+        lower.minus(times(a.x, b.x), times(a.y, b.y)),
+        lower.plus(times(a.x, b.y), times(a.y, b.x)),
     )
 
 
-def _divide(_: Tape, one: Any, other: Any) -> _Parts:
+def _divide(lower: Lowering, one: Any, other: Any) -> _Parts:
     """Return a quotient by Smith's method: R. L. Smith, Algorithm 116, CACM 5 (1962)."""
     a = _both(one)
     if not isinstance(other, _Parts):
-        return _Parts(a.x / other, a.y / other)
+        ratio = 0.0 / other
+        x = lower.plus(a.x, lower.times(a.y, ratio))
+        y = lower.minus(a.y, lower.times(a.x, ratio))
+        return _Parts(x / other, y / other)
     along_x = abs(other.x) >= abs(other.y)
     great, small = where(along_x, other.x, other.y), where(along_x, other.y, other.x)
     ratio = small / great
@@ -195,14 +207,15 @@ def _divide(_: Tape, one: Any, other: Any) -> _Parts:
     return _Parts((first + second * ratio) / scale, across / scale)
 
 
-def _divide_by_squares(tape: Tape, one: Any, other: Any) -> _Parts:
+def _divide_by_squares(lower: Lowering, one: Any, other: Any) -> _Parts:
     if isinstance(other, _Parts):
-        one = _multiply(tape, one, _Parts(other.x, -other.y))
+        one = _multiply(lower, one, _Parts(other.x, -other.y))
         other = _square(other)
-    return _divide(tape, one, other)
+    a = _both(one)
+    return _Parts(a.x / other, a.y / other)
 
 
-def _length_by_squares(_: Tape, one: _Parts) -> Any:
+def _length_by_squares(_: Lowering, one: _Parts) -> Any:
     return sqrt(_square(one))
 
 
@@ -210,7 +223,7 @@ def _square(one: _Parts) -> Any:
     return _sum(_times(one.x, one.x), _times(one.y, one.y))
 
 
-def _negative(_: Tape, one: _Parts) -> _Parts:
+def _negative(_: Lowering, one: _Parts) -> _Parts:
     return _Parts(-one.x, -one.y)
 
 
@@ -223,7 +236,7 @@ _FORMULAS: dict[str, Callable[..., Any]] = {
     'conjugate': lambda _, one: _Parts(one.x, -one.y),
     'real': lambda _, one: one.x,
     'imag': lambda _, one: one.y,
-    'abs': lambda tape, one: tape.write('hypot', one.x, one.y),
+    'abs': lambda lower, one: lower.tape.write('hypot', one.x, one.y),
     'phase': lambda _, one: atan2(one.y, one.x),
     'facing': lambda _, angle: _Parts(cos(angle), sin(angle)),
     'vector': lambda _, x, y: _Parts(x, y),

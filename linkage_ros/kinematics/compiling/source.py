@@ -30,7 +30,6 @@ import textwrap
 from typing import Any, ClassVar, NamedTuple
 
 from linkage_ros import __version__
-from linkage_ros.errors import clean
 from linkage_ros.kinematics.arithmetic import ROUNDING, SMALLEST
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.real_program import Program, program
@@ -40,6 +39,7 @@ from linkage_ros.kinematics.compiling.writer import uses, Writer
 from linkage_ros.kinematics.limits import Bound
 from linkage_ros.kinematics.linkage import RevoluteJoint
 from linkage_ros.kinematics.status import Status
+from linkage_ros.names import comment_text
 
 WIDTH = 99
 """Width of the lines of a source."""
@@ -168,7 +168,7 @@ class Language(ABC):
 
     @abstractmethod
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
-        """Write the source from the text of its head and the body of the function."""
+        """Write the source from the lines of its head, a comment, and of the function's body."""
 
 
 def source(subject: Subject, language: Language) -> str:
@@ -367,18 +367,18 @@ def _head(subject: Subject, function: str) -> Iterator[str]:
     """Yield the lines of the head."""
     closure = subject.closure
     linkage = closure.linkage
-    yield f'{clean(subject.name)}: a planar linkage, written by linkage_ros {__version__}'
-    yield f'from {clean(subject.file)}. Change that file, and compile it again.'
+    yield f'{comment_text(subject.name)}: a planar linkage, written by linkage_ros {__version__}'
+    yield f'from {comment_text(subject.file)}. Change that file, and compile it again.'
     yield ''
     yield f'The function {function} takes:'
     for number, given in enumerate(linkage.inputs):
         unit = given.unit
-        yield f'  {GIVEN[0]}[{number}]  {clean(given.joint)} [{unit}]'
+        yield f'  {GIVEN[0]}[{number}]  {comment_text(given.joint)} [{unit}]'
     yield from _derived(subject, GIVEN)
     yield 'and gives:'
     for number, name in enumerate(subject.joints):
         unit = 'rad' if isinstance(linkage.joints[name], RevoluteJoint) else 'm'
-        yield f'  {RETURNED[0]}[{number}]  {clean(name)} [{unit}]'
+        yield f'  {RETURNED[0]}[{number}]  {comment_text(name)} [{unit}]'
     yield from _derived(subject, RETURNED)
     yield ''
     yield 'Angles are not wrapped to one turn. The function returns a status:'
@@ -391,15 +391,15 @@ def _head(subject: Subject, function: str) -> Iterator[str]:
         yield 'Limits that are checked, in [rad] or [m]:'
         for name, limits in linkage.limits.items():
             if limits.bounded:
-                yield f'  {clean(name)} {limits}'
+                yield f'  {comment_text(name)} {limits}'
     else:
         yield 'The linkage file names no limits of joints.'
     yield ''
     yield 'The links have these points, in their own frames, in [m]:'
     for link, points in linkage.links.items():
-        text = ', '.join(f'{clean(p)} ({x:.9g}, {y:.9g})' for p, (x, y) in points.items())
+        text = ', '.join(f'{comment_text(p)} ({x:.9g}, {y:.9g})' for p, (x, y) in points.items())
         yield from textwrap.wrap(
-            f'  {clean(link)}: {text}', WIDTH - 4, subsequent_indent='      ',
+            f'  {comment_text(link)}: {text}', WIDTH - 4, subsequent_indent='      ',
             break_on_hyphens=False,
         )  # fmt: skip
     yield f'Lengths in the code are in units of {closure.scale:.9g} m. The constants k0, k1 and so'
