@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import replace
 import json
 from pathlib import Path
@@ -74,6 +75,7 @@ from linkage_ros.replay.verify import (
 )
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
+from linkage_ros.signals import heeded
 
 
 def unit_of(joint: str, quantity: str, turning: Mapping[str, bool]) -> str:
@@ -302,11 +304,14 @@ def _replayed_with(
     )
     shared = [name for name in (run.joint_states_topic, *run.extras) if name and name in kinds]
     comparison = Comparison([(name, kinds[name]) for name in shared])
-    new_bag = NewBag(output, source, scene, counterfactual, names) if output is not None else None
     own = own_joint_states(recorded) if recorded is not None else bool
     begin: list[int] = []
     published = 0
-    try:
+    new_bag = None
+    with heeded(), ExitStack() as at_end:
+        if output is not None:
+            new_bag = NewBag(output, source, scene, counterfactual, names)
+            at_end.callback(new_bag.close)
         with reading.with_progress() as messages:
             for event in counterfactual.run(recorded_events(run, own, messages, topic)):
                 if new_bag is not None:
@@ -318,9 +323,6 @@ def _replayed_with(
                     if any(then) or any(now):
                         begin = begin or [event.time]
                         comparison.add(At(comparison.ticks + 1, event.time), then, now)
-    finally:
-        if new_bag is not None:
-            new_bag.close()
     comparison.settle()
     turning = turning_joints(scene) | (turning_joints(recorded) if recorded else {})
     recorded_joints = recorded.joints if recorded is not None else ()

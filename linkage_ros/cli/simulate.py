@@ -164,18 +164,21 @@ def _loaded(arguments: argparse.Namespace) -> Scene:
 
 def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str, int]:
     """Run a scene into a bag, and return its counts; say so if a signal stopped it."""
-    done = 0
+    stopped_at: int | None = None
     with progress('ticks') as advance:
 
         def goes_on(number: int) -> bool:
-            nonlocal done
-            done = number
+            nonlocal stopped_at
             advance(number, ticks)
-            return not stop.is_set()
+            if stop.is_set():
+                stopped_at = number
+            return stopped_at is None
 
         counts = simulate(scene, folder, ticks, goes_on)
-    if stop.is_set():
-        print(f'linkage simulate: stopped after {done:,} of {ticks:,} ticks', file=sys.stderr)
+    if stopped_at is not None:
+        print(
+            f'linkage simulate: stopped after {stopped_at:,} of {ticks:,} ticks', file=sys.stderr
+        )
     return counts
 
 
