@@ -50,7 +50,6 @@ from linkage_ros.bag.reader import (
 from linkage_ros.bag.salvage import BEGINNING, Loss, Salvage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError, quoted, RecordingError
-from linkage_ros.signals import heeded
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.records import Attachment, Channel
 from mcap.writer import CompressionType, Writer
@@ -314,7 +313,7 @@ def recover(
         raise _exists(target)
     profile, compression = _foretaste(path, files, stopped)
     sizes = [file.stat().st_size for file in files]
-    with heeded(), _new_folder(target):
+    with _new_folder(target):
         bag = NewBag(target, profile, compression)
         try:
             for number, file in enumerate(files):

@@ -26,6 +26,7 @@ from linkage_ros.bag.recover import recover, Recovery
 from linkage_ros.cli.arguments import add_bag
 from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import clean
+from linkage_ros.signals import heeded
 
 WHOLE, STOPPED, LOSS = 0, 1, 3
 
@@ -45,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Recover the bag; return 0 without loss, 3 with losses, 1 if stopped."""
-    with progress('bytes') as advance:
+    # A signal within a record would cut it; `recover` asks the event.
+    with heeded(), progress('bytes') as advance:
         recovery = recover(arguments.bag, arguments.output, advance, stop.is_set)
     if recovery is None:
         print('stopped; nothing was written', file=sys.stderr)

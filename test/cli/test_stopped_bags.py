@@ -43,7 +43,7 @@ COMMANDS = {
     'recover': ['recover', '{source}', '-o'],
 }
 
-SCENE = 'linkage: four.yaml\nrate: 1000\ndrive: {constant_rate: {rate: 6.0}}\neffects: {velocity: {}}\n'
+SCENE = 'linkage: four.yaml\nrate: 1000\ndrive: {%s}\neffects: {velocity: {}}\n'
 
 # A child for each case runs the command. At its n-th piece of a record, or after a time in [s],
 # it gets the signal. It prints how many pieces there were.
@@ -86,10 +86,8 @@ for target, name, number, delay in cases:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('stopped')
     (folder / 'four.yaml').write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
-    (folder / 'demo.yaml').write_text(SCENE)
-    (folder / 'crank.yaml').write_text(
-        SCENE.replace('{constant_rate: {rate: 6.0}}', '{topic: {}}')
-    )
+    (folder / 'demo.yaml').write_text(SCENE % 'constant_rate: {rate: 6.0}')
+    (folder / 'crank.yaml').write_text(SCENE % 'topic: {}')
     for name, seconds in (('short', 0.05), ('long', 8.0)):
         made = linkage(
             folder, 'simulate', 'demo.yaml', '--seconds', f'{seconds}', '-o', f'{name}_run'
@@ -113,7 +111,7 @@ def stopped(
         word.format(source=size, seconds=0.05 if size == 'short' else 20.0)
         for word in COMMANDS[command]
     ]
-    done = subprocess.run(
+    done = subprocess.run(  # noqa: PLW1510 (its errors are shown)
         [sys.executable, '-c', DRIVER, json.dumps([words, cases])],
         cwd=folder,
         env=environment(folder),
