@@ -107,19 +107,19 @@ class Samples:
         if any(later < time for time, later in pairwise(times)):
             order = sorted(order, key=times.__getitem__)
         good = array('q')
-        for number in order:
-            angles, rates = self[number]
-            stamp, last = self._stamps[number], self._sieve.stamp
-            sample = CrankSample(stamp, angles, rates if self._has_rates[number] else None)
+        for place in order:
+            angles, rates = self[place]
+            stamp, last = self._stamps[place], self._sieve.stamp
+            sample = CrankSample(stamp, angles, rates if self._has_rates[place] else None)
             rejection = self._sieve.offer(sample, stamp)
             if rejection is not None:
                 self.rejected[rejection] += 1
                 continue
             self.offsets.append(self.offsets[-1] + stamp - last if self.offsets else 0)
-            good.append(number)
+            good.append(place)
         values = array('d')
-        for number in good:
-            for numbers in self[number]:
+        for place in good:
+            for numbers in self[place]:
                 values.extend(numbers)
         self._values = values
         del self._log_times[:], self._stamps[:], self._has_rates[:]
