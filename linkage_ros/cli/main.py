@@ -81,7 +81,7 @@ EXIT_CODES = {
     0: 'success',
     1: 'a run failed or was stopped, or no result is what was asked for',
     2: 'wrong input; one line names it, the place and the remedy',
-    3: 'something is lost (recover) or differs (replay)',
+    3: 'something is lost (recover, replay) or differs (replay)',
 }
 """The exit codes of all commands."""
 

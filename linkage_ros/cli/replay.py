@@ -16,8 +16,9 @@
 Run the scene of a bag once more over its samples, and compare.
 
 Every joint state, and what else was published, is made anew and held against the recorded bytes.
-Exit code 0: all are the same; 3: some differ; 1: it could not be told, was stopped, or the bag
-is damaged and what lies before the damage is the same.
+Exit code 0: all are the same; 3: some differ, or the bag lacks messages that its metadata promise;
+1: it could not be told, was stopped, or the bag is damaged and what lies before the damage is the
+same.
 
 With --scene another scene is run, with --set that of the bag with other values; its joints are
 compared with the recorded ones. -o writes it to a new bag, which replays by itself. Then a
@@ -93,6 +94,7 @@ def bag_account(bag: Bag, scene: Scene, reading: BagReading, begin: list[int]) -
         'unfinished': unfinished_text(bag) if bag.truncated else None,
         'gaps': list(gaps(bag)),
         'damage': reading.damage or None,
+        'missing': reading.missing,
         'stopped': reading.stopped,
     }
 
@@ -423,6 +425,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         _show_counterfactual(account)
     for line in _shortcomings(account):
         print(f'linkage replay: {line}', file=sys.stderr)
+    if reading.missing:
+        return EXIT_DIFFERENT
     return code or (EXIT_INCOMPLETE if reading.damage or reading.stopped else 0)
 
 
@@ -519,6 +523,11 @@ def _shortcomings(account: dict[str, Any]) -> Iterator[str]:
     """Yield the reasons why a part of the bag was not replayed."""
     if account['truncated']:
         yield f'{account["bag"]}: unfinished: {account["unfinished"]}; what it holds was replayed'
+    if account['missing']:
+        yield (
+            f'{account["bag"]}: {account["missing"]:,} messages that its metadata.yaml promises '
+            'are not there; the others were replayed'
+        )
     if account['damage']:
         yield f'{account["damage"]}; what lies before was replayed'
     if account['stopped']:
