@@ -173,7 +173,12 @@ def _run(arguments: Sequence[str], stop: Event) -> int:
         with missing_packages_reported():
             module = import_module(module_of(name))
             parser = parser_of(name, module)
-            return int(module.run(parser.parse_args(arguments[1:]), stop))
+            typed = parser.parse_args(arguments[1:])
+            # A local import: signals are to be handled before anything large is imported.
+            from linkage_ros.cli.arguments import refuse_existing
+
+            refuse_existing(typed)
+            return int(module.run(typed, stop))
     except LinkageError as error:
         print(f'linkage {name}: {error}', file=sys.stderr)
         return 2

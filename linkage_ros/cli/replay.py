@@ -39,7 +39,7 @@ from typing import Any
 
 from linkage_ros.bag.reader import Bag, RUN_FILE
 from linkage_ros.bag.run_events import recorded_events, run_account, RunAccount
-from linkage_ros.cli.arguments import add_bag, add_set, finite, SCENE_HELP
+from linkage_ros.cli.arguments import add_bag, add_force, add_set, finite, SCENE_HELP
 from linkage_ros.cli.bag_reading import (
     add_trust,
     BagReading,
@@ -51,6 +51,7 @@ from linkage_ros.cli.bag_reading import (
 from linkage_ros.cli.new_bag import Names, names_for, NewBag, Source
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import BagError, clean, LinkageError, listed
+from linkage_ros.files.file_access import remove_bag
 from linkage_ros.messages.joint_values import JOINT_STATE, UNITS
 from linkage_ros.replay.compare import At, Comparison, First, TopicComparison, ulps
 from linkage_ros.replay.counterfactual import (
@@ -290,7 +291,13 @@ def _number(value: float | None) -> str:
 
 
 def _replayed_with(
-    bag: Bag, reading: BagReading, scene: Scene, crank_topic: str | None, output: Path | None
+    bag: Bag,
+    reading: BagReading,
+    scene: Scene,
+    crank_topic: str | None,
+    output: Path | None,
+    *,
+    force: bool,
 ) -> dict[str, Any]:
     """Run another scene over a bag's samples; return the comparison with the recorded run."""
     check_drives(scene, scene.members[0].content.file)
@@ -312,6 +319,7 @@ def _replayed_with(
     new_bag = None
     with heeded(), ExitStack() as at_end:
         if output is not None:
+            remove_bag(output, force=force)
             new_bag = NewBag(output, source, scene, counterfactual, names)
             at_end.callback(new_bag.close)
         with reading.with_progress() as messages:
@@ -389,6 +397,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o', '--output', type=Path, metavar='FOLDER', help='new bag; with --scene or --set'
     )
+    add_force(parser)
     parser.add_argument(
         '--crank-topic',
         metavar='TOPIC',
@@ -415,7 +424,14 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         if RUN_FILE in bag.attachments and 'seed' not in scene.members[0].content:
             # The same seeds: the scene makes the difference, not the noise.
             scene = replace(scene, seed=run_account(bag).seed)
-        account = _replayed_with(bag, reading, scene, arguments.crank_topic, arguments.output)
+        account = _replayed_with(
+            bag,
+            reading,
+            scene,
+            arguments.crank_topic,
+            arguments.output,
+            force=arguments.force,
+        )
         code = 0
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
