@@ -41,6 +41,12 @@ from linkage_ros.bag.mcap_records import (
     strict,
 )
 from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY, STATS_RECORD, UNFINISHED
+from linkage_ros.bag.other_formats import (
+    BAG_SUFFIXES,
+    MCAP_SUFFIXES,
+    refuse_other_format,
+    unpacked_file,
+)
 from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
 from linkage_ros.errors import BagError, quoted
 from linkage_ros.files.file_access import read_regular
@@ -96,15 +102,15 @@ def serialized_metadata(record: Metadata) -> dict[str, Any]:
 
 
 def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
-    """Return the MCAP files of a bag, in the order of recording, if all lie in its folder."""
+    """Return the files of a bag, in the order of recording, if all lie in its folder."""
     if not path.is_dir():
-        return [path]
+        return [unpacked_file(path)]
     named = information.get('relative_file_paths')
     if isinstance(named, list) and named:
         # By name only, as rosbag2 does: old bags also name the folder, which may have moved.
         names = [_name_of(path, PurePosixPath(str(name))) for name in named]
     else:
-        names = [file.name for file in sorted(path.glob('*.mcap'), key=by_number)]
+        names = mcap_names(path) or _names(path, BAG_SUFFIXES)
     if not names:
         raise BagError(path, 'holds no .mcap file', "name a bag's folder")
     for number, name in enumerate(names):
@@ -115,12 +121,23 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
             raise BagError(
                 path / name, "leads out of the bag's folder", 'name the file that it leads to'
             )
-    return [path / name for name in names]
+    return [unpacked_file(path / name) for name in names]
+
+
+def mcap_names(folder: Path) -> list[str]:
+    """Return the names of the MCAP files in a folder, packed ones too, by number."""
+    return _names(folder, MCAP_SUFFIXES)
+
+
+def _names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
+    found = [file for file in folder.iterdir() if file.name.endswith(suffixes)]
+    return [file.name for file in sorted(found, key=by_number)]
 
 
 def by_number(file: Path) -> tuple[int, str]:
     """Return a key to sort files by number: NAME_2.mcap comes before NAME_10.mcap."""
-    return len(file.name), file.name
+    name = file.name.removesuffix('.zstd')
+    return len(name), name
 
 
 def _name_of(folder: Path, path: PurePosixPath) -> str:
@@ -159,6 +176,7 @@ def is_finished(file: Path) -> bool:
         raise unreadable(file, error) from None
     if not start:
         raise BagError(file, 'is empty', 'its recording never began, or the power failed in it')
+    refuse_other_format(file, start)
     if not start.startswith(MCAP0_MAGIC):
         text = start.isascii() and not any(code in start for code in b'\0\x1b')
         found = 'is a text file' if text else f'starts with {quoted(start[:length])}'

@@ -37,12 +37,14 @@ from linkage_ros.bag.metadata import (
     UNFINISHED,
     write_metadata,
 )
+from linkage_ros.bag.other_formats import LONGEST_MAGIC, refuse_other_format
 from linkage_ros.bag.reader import (
     by_number,
     custom_of,
     files_of,
     information_of,
     is_in_use,
+    mcap_names,
     serialized_metadata,
     topic_of,
     unreadable,
@@ -351,20 +353,21 @@ def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> l
     """Return the files of a bag: those in its metadata, and others in its folder."""
     if path.is_dir():
         named = files_of(path, information) if information else []
-        there = files_of(path, {}) if any(path.glob('*.mcap')) or not named else []
+        there = files_of(path, {}) if mcap_names(path) or not named else []
         if [file for file in there if file in named] == named:
             # By number: a file removed from a ring may remain, from before the named ones.
             files = there
         else:
             files = _in_order(named, [file for file in there if file not in named])
     else:
-        files = [path]
+        files = files_of(path, {})
     present = []
     for file in files:
         try:
             if file.is_file():
-                with file.open('rb'):
-                    present.append(file)
+                with file.open('rb') as stream:
+                    refuse_other_format(file, stream.read(LONGEST_MAGIC))
+                present.append(file)
                 continue
             reason = 'is no file' if file.exists() else 'does not exist'
         except OSError as error:

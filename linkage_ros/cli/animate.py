@@ -26,7 +26,8 @@ from pathlib import Path
 from threading import Event
 
 from linkage_ros.bag.contents import layout_of
-from linkage_ros.cli.arguments import add_output
+from linkage_ros.bag.other_formats import is_bag_name
+from linkage_ros.cli.arguments import add_output, output_or
 from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.part_of_run import add_window, read_part, window_of
 from linkage_ros.cli.terminal import progress
@@ -61,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Animate it."""
     given = Path(arguments.file)
-    file = arguments.output or Path(f'{given.stem}.gif')
+    file = output_or(arguments, Path(f'{given.stem}.gif'))
     check_kind(file)
     motion = _motion(arguments, given, stop)
     with progress('pictures') as advance:
@@ -77,7 +78,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 def _motion(arguments: argparse.Namespace, given: Path, stop: Event) -> Motion:
-    if given.is_dir() or given.suffix == '.mcap':
+    if is_bag_name(given):
         window = window_of(arguments.since, arguments.until)
         bag = opened(given, stop)
         layouts = [layout_of(path) for path in bag.files]

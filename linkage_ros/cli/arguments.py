@@ -24,7 +24,7 @@ import re
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import LinkageError, listed
-from linkage_ros.files.file_access import check_suffix
+from linkage_ros.files.file_access import check_new, check_suffix
 from linkage_ros.kinematics.linkage import Linkage
 
 PICTURES = ('.png', '.svg', '.pdf')
@@ -50,7 +50,7 @@ def add_output(
     parser: argparse._ActionsContainer, suffixes: Collection[str], otherwise: str = ''
 ) -> None:
     """
-    Declare ``-o`` for a file; one that exists is replaced when the new one is complete.
+    Declare ``-o`` for a file, and ``--force``: see `refuse_existing`.
 
     Parameters
     ----------
@@ -71,6 +71,33 @@ def add_output(
         required=not otherwise,
         help=f'file to write, {kinds}{otherwise and f"; without it {otherwise}"}',
     )
+    add_force(parser)
+
+
+def add_force(parser: argparse._ActionsContainer) -> None:
+    """Declare ``--force``."""
+    parser.add_argument(
+        '--force', action='store_true', help='overwrite what exists; without it that is refused'
+    )
+
+
+def refuse_existing(arguments: argparse.Namespace) -> None:
+    """Raise if the user names something to write that exists, unless ``--force`` is given."""
+    for name in ('output', 'picture', 'draw'):
+        path = getattr(arguments, name, None)
+        if isinstance(path, Path):
+            check_new(path, force=getattr(arguments, 'force', False))
+            bag = getattr(arguments, 'bag', None)
+            if bag is not None and bag.resolve().is_relative_to(path.resolve()):
+                raise LinkageError(path, 'is the bag that is read', 'name another with -o')
+
+
+def output_or(arguments: argparse.Namespace, default: Path) -> Path:
+    """Return the file to write: that of ``-o``, or a default one, of which the same holds."""
+    if arguments.output is not None:
+        return Path(arguments.output)
+    check_new(default, force=arguments.force)
+    return default
 
 
 def output(suffixes: Collection[str]) -> Callable[[str], Path]:

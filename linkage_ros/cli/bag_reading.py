@@ -36,7 +36,7 @@ from linkage_ros.bag.reader import (
     read_bag,
     serialized_metadata,
 )
-from linkage_ros.bag.recover import NOTHING_LOST, RECOVERED
+from linkage_ros.bag.recover import NOTHING_LOST, promised_counts, RECOVERED
 from linkage_ros.bag.run_events import lost_beginning, raw_account, run_account, RunAccount
 from linkage_ros.cli.arguments import finite
 from linkage_ros.cli.terminal import progress
@@ -150,6 +150,8 @@ class BagReading:
         """The damage, on one line; '' if the bag was read to its end."""
         self.stopped = False
         """True if a signal stopped the reading."""
+        self.missing = 0
+        """Messages that the bag's metadata promise and that are not there; known at its end."""
         self._bag, self._stop = bag, stop
         self._advance: Callable[[int, int], None] = lambda _done, _of: None
         self._size = max(1, sum(layout_of(file).content for file in bag.files) // _MIB)
@@ -177,6 +179,8 @@ class BagReading:
                 self.damage = f'{error.where}: {error.reason}'
                 return
             if message is None:
+                promised = promised_counts(_metadata(self._bag))
+                self.missing = max(0, sum(promised.values()) - (number - 1))
                 return
             read += len(message.data) + _BESIDE
             yield message
@@ -193,7 +197,7 @@ class BagReading:
 def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, Any]:
     """Return the description of any bag, recorded by this package or not."""
     begin, end = contents.begin, contents.end
-    metadata: Mapping[str, Any] = information_of(bag.path) if bag.path.is_dir() else {}
+    metadata = _metadata(bag)
     within = next((layout.rosbag2 for layout in layouts if layout.rosbag2), None)
     if not metadata and within is not None:
         metadata = serialized_metadata(within)
@@ -246,6 +250,10 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
             'written_by': ', '.join(dict.fromkeys(layout.library for layout in layouts)) or None,
         },
     }
+
+
+def _metadata(bag: Bag) -> Mapping[str, Any]:
+    return information_of(bag.path) if bag.path.is_dir() else {}
 
 
 def scene_account(scene: Scene) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from linkage_ros.cli.arguments import (
     add_output,
     bounded,
     inputs,
+    output_or,
     PICTURES,
 )
 from linkage_ros.drawing.dxf import links_dxf
@@ -81,7 +82,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     typed = [inputs(closure.linkage, at, '--at') for at in arguments.at]
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem
-    file = arguments.output or Path(f'{name}.png')
+    file = output_or(arguments, Path(f'{name}.png'))
     picture(view(closure, pose, ghosts), name, file, names=arguments.names)
     print(file)
     return 0
@@ -112,7 +113,7 @@ def _draw_assemblies(arguments: argparse.Namespace) -> int:
             text: view(each, pose if each.position(*pose).joints else usual_inputs(each))
             for text, each in found.items()
         }
-    file = arguments.output or Path(f'{Path(arguments.file).stem}.png')
+    file = output_or(arguments, Path(f'{Path(arguments.file).stem}.png'))
     assemblies_picture(views, file)
     print(file)
     return 0

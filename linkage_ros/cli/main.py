@@ -81,7 +81,7 @@ EXIT_CODES = {
     0: 'success',
     1: 'a run failed or was stopped, or no result is what was asked for',
     2: 'wrong input; one line names it, the place and the remedy',
-    3: 'something is lost (recover) or differs (replay)',
+    3: 'something is lost (recover, replay) or differs (replay)',
 }
 """The exit codes of all commands."""
 
@@ -173,7 +173,12 @@ def _run(arguments: Sequence[str], stop: Event) -> int:
         with missing_packages_reported():
             module = import_module(module_of(name))
             parser = parser_of(name, module)
-            return int(module.run(parser.parse_args(arguments[1:]), stop))
+            typed = parser.parse_args(arguments[1:])
+            # A local import: signals are to be handled before anything large is imported.
+            from linkage_ros.cli.arguments import refuse_existing
+
+            refuse_existing(typed)
+            return int(module.run(typed, stop))
     except LinkageError as error:
         print(f'linkage {name}: {error}', file=sys.stderr)
         return 2

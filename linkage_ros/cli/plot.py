@@ -23,7 +23,7 @@ from math import nan, pi, tau
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli.arguments import add_bag, add_output, PICTURES
+from linkage_ros.cli.arguments import add_bag, add_output, output_or, PICTURES
 from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
 from linkage_ros.drawing.curves import Curve, sweep
 from linkage_ros.drawing.figure import joint_axes, label_joints, plot_joints
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Draw the bag."""
-    picture = arguments.output or beside(arguments.bag, '.png')
+    picture = output_or(arguments, beside(arguments.bag, '.png'))
     draw(arguments.bag, picture, stop, trust_effects=arguments.trust_effects)
     print(picture)
     return 0

@@ -22,10 +22,12 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.recover import recover, Recovery
-from linkage_ros.cli.arguments import add_bag
+from linkage_ros.bag.recover import recover, recovered_name, Recovery
+from linkage_ros.cli.arguments import add_bag, add_force, output_or
 from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import clean
+from linkage_ros.files.file_access import remove_bag
+from linkage_ros.signals import heeded
 
 WHOLE, STOPPED, LOSS = 0, 1, 3
 
@@ -41,12 +43,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o', '--output', type=Path, metavar='FOLDER', help='new folder; without it BAG_recovered'
     )
+    add_force(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Recover the bag; return 0 without loss, 3 with losses, 1 if stopped."""
-    with progress('bytes') as advance:
-        recovery = recover(arguments.bag, arguments.output, advance, stop.is_set)
+    # A signal within a record would cut it; `recover` asks the event.
+    with heeded(), progress('bytes') as advance:
+        folder = output_or(arguments, recovered_name(arguments.bag))
+        remove_bag(folder, force=arguments.force)
+        recovery = recover(arguments.bag, folder, advance, stop.is_set)
     if recovery is None:
         print('stopped; nothing was written', file=sys.stderr)
         return STOPPED

@@ -16,8 +16,9 @@
 Run the scene of a bag once more over its samples, and compare.
 
 Every joint state, and what else was published, is made anew and held against the recorded bytes.
-Exit code 0: all are the same; 3: some differ; 1: it could not be told, was stopped, or the bag
-is damaged and what lies before the damage is the same.
+Exit code 0: all are the same; 3: some differ, or the bag lacks messages that its metadata promise;
+1: it could not be told, was stopped, or the bag is damaged and what lies before the damage is the
+same.
 
 With --scene another scene is run, with --set that of the bag with other values; its joints are
 compared with the recorded ones. -o writes it to a new bag, which replays by itself. Then a
@@ -28,6 +29,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import replace
 import json
 from pathlib import Path
@@ -37,7 +39,7 @@ from typing import Any
 
 from linkage_ros.bag.reader import Bag, RUN_FILE
 from linkage_ros.bag.run_events import recorded_events, run_account, RunAccount
-from linkage_ros.cli.arguments import add_bag, add_set, finite, SCENE_HELP
+from linkage_ros.cli.arguments import add_bag, add_force, add_set, finite, SCENE_HELP
 from linkage_ros.cli.bag_reading import (
     add_trust,
     BagReading,
@@ -49,6 +51,7 @@ from linkage_ros.cli.bag_reading import (
 from linkage_ros.cli.new_bag import Names, names_for, NewBag, Source
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import BagError, clean, LinkageError, listed
+from linkage_ros.files.file_access import remove_bag
 from linkage_ros.messages.joint_values import JOINT_STATE, UNITS
 from linkage_ros.replay.compare import At, Comparison, First, TopicComparison, ulps
 from linkage_ros.replay.counterfactual import (
@@ -74,6 +77,7 @@ from linkage_ros.replay.verify import (
 )
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
+from linkage_ros.signals import heeded
 
 
 def unit_of(joint: str, quantity: str, turning: Mapping[str, bool]) -> str:
@@ -91,6 +95,7 @@ def bag_account(bag: Bag, scene: Scene, reading: BagReading, begin: list[int]) -
         'unfinished': unfinished_text(bag) if bag.truncated else None,
         'gaps': list(gaps(bag)),
         'damage': reading.damage or None,
+        'missing': reading.missing,
         'stopped': reading.stopped,
     }
 
@@ -286,7 +291,13 @@ def _number(value: float | None) -> str:
 
 
 def _replayed_with(
-    bag: Bag, reading: BagReading, scene: Scene, crank_topic: str | None, output: Path | None
+    bag: Bag,
+    reading: BagReading,
+    scene: Scene,
+    crank_topic: str | None,
+    output: Path | None,
+    *,
+    force: bool,
 ) -> dict[str, Any]:
     """Run another scene over a bag's samples; return the comparison with the recorded run."""
     check_drives(scene, scene.members[0].content.file)
@@ -302,11 +313,15 @@ def _replayed_with(
     )
     shared = [name for name in (run.joint_states_topic, *run.extras) if name and name in kinds]
     comparison = Comparison([(name, kinds[name]) for name in shared])
-    new_bag = NewBag(output, source, scene, counterfactual, names) if output is not None else None
     own = own_joint_states(recorded) if recorded is not None else bool
     begin: list[int] = []
     published = 0
-    try:
+    new_bag = None
+    with heeded(), ExitStack() as at_end:
+        if output is not None:
+            remove_bag(output, force=force)
+            new_bag = NewBag(output, source, scene, counterfactual, names)
+            at_end.callback(new_bag.close)
         with reading.with_progress() as messages:
             for event in counterfactual.run(recorded_events(run, own, messages, topic)):
                 if new_bag is not None:
@@ -318,9 +333,6 @@ def _replayed_with(
                     if any(then) or any(now):
                         begin = begin or [event.time]
                         comparison.add(At(comparison.ticks + 1, event.time), then, now)
-    finally:
-        if new_bag is not None:
-            new_bag.close()
     comparison.settle()
     turning = turning_joints(scene) | (turning_joints(recorded) if recorded else {})
     recorded_joints = recorded.joints if recorded is not None else ()
@@ -385,6 +397,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o', '--output', type=Path, metavar='FOLDER', help='new bag; with --scene or --set'
     )
+    add_force(parser)
     parser.add_argument(
         '--crank-topic',
         metavar='TOPIC',
@@ -411,7 +424,14 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         if RUN_FILE in bag.attachments and 'seed' not in scene.members[0].content:
             # The same seeds: the scene makes the difference, not the noise.
             scene = replace(scene, seed=run_account(bag).seed)
-        account = _replayed_with(bag, reading, scene, arguments.crank_topic, arguments.output)
+        account = _replayed_with(
+            bag,
+            reading,
+            scene,
+            arguments.crank_topic,
+            arguments.output,
+            force=arguments.force,
+        )
         code = 0
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
@@ -421,6 +441,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         _show_counterfactual(account)
     for line in _shortcomings(account):
         print(f'linkage replay: {line}', file=sys.stderr)
+    if reading.missing:
+        return EXIT_DIFFERENT
     return code or (EXIT_INCOMPLETE if reading.damage or reading.stopped else 0)
 
 
@@ -517,6 +539,11 @@ def _shortcomings(account: dict[str, Any]) -> Iterator[str]:
     """Yield the reasons why a part of the bag was not replayed."""
     if account['truncated']:
         yield f'{account["bag"]}: unfinished: {account["unfinished"]}; what it holds was replayed'
+    if account['missing']:
+        yield (
+            f'{account["bag"]}: {account["missing"]:,} messages that its metadata.yaml promises '
+            'are not there; the others were replayed'
+        )
     if account['damage']:
         yield f'{account["damage"]}; what lies before was replayed'
     if account['stopped']:

@@ -32,7 +32,7 @@ from typing import Any
 
 from linkage_ros.bag.contents import layout_of
 from linkage_ros.bag.reader import Bag
-from linkage_ros.cli.arguments import add_bag, add_output, DEGREES
+from linkage_ros.cli.arguments import add_bag, add_output, DEGREES, output_or
 from linkage_ros.cli.bag_reading import (
     account_of,
     beside,
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Write the page."""
-    file = arguments.output or beside(arguments.bag, '.html')
+    file = output_or(arguments, beside(arguments.bag, '.html'))
     check_page(file)
     window = window_of(arguments.since, arguments.until)
     write_page(file, report(arguments.bag, window, stop, trust_effects=arguments.trust_effects))

@@ -26,25 +26,15 @@ from threading import Event
 from time import monotonic
 from typing import Any, NamedTuple
 
-from linkage_ros.bag.reader import read_bag
 from linkage_ros.cli.arguments import add_radians, add_set, AngleUnit, bounded, SCENE_HELP
-from linkage_ros.cli.bag_reading import gaps
 from linkage_ros.cli.page_of_run import check_page, PageOfRun, view_command
-from linkage_ros.cli.terminal import progress, show, Table
-from linkage_ros.errors import LinkageError
+from linkage_ros.cli.proof import LONGEST_PROOF, proof_of
+from linkage_ros.cli.terminal import show, Table
 from linkage_ros.kinematics.status import Status
 from linkage_ros.node.node import LinkageNode
 from linkage_ros.node.run import run_linkage_node
-from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.pipeline.tick_loop import TickLoop
-from linkage_ros.replay.replay import recorded_scene, ReplayedTick
-from linkage_ros.replay.verify import (
-    beginning_text,
-    DIFFERENT,
-    turning_joints,
-    UNDECIDED,
-    verify_replay,
-)
+from linkage_ros.replay.verify import turning_joints
 from linkage_ros.signals import heeded
 
 _RICH = find_spec('rich') is not None
@@ -55,9 +45,6 @@ if _RICH:
     from rich.text import Text
 
 _LIVE_PERIOD, _PLAIN_PERIOD = 0.25, 1.0
-_TOLD = 1000
-"""Ticks between two reports of the progress."""
-
 _MOST_SHOWN = 24
 """Maximum number of joints that fit on a screen."""
 
@@ -193,8 +180,8 @@ def _table(loop: TickLoop, rate: float, age: str, joints: Sequence[Shown]) -> An
 # The summary at the end of a run.
 
 
-def summary(node: LinkageNode) -> Table:
-    """Return the summary of a node's last run."""
+def summary(node: LinkageNode, longest: float) -> Table:
+    """Return the summary of a node's last run; the proof of its bag takes a time in [s]."""
     loop = node.loop
     if loop is None:
         return Table('', ('',), [('nothing ran',)])
@@ -240,47 +227,13 @@ def summary(node: LinkageNode) -> Table:
             for t in recording.topics
         ]
         ticks = max((t.recorded for t in recording.topics), default=0)
-        rows += [('bag', str(recording.folder)), ('proof', _proof(recording.folder, ticks))]
+        rows += [
+            ('bag', str(recording.folder)),
+            ('proof', proof_of(recording.folder, ticks, longest)),
+        ]
     if node.recording.failure:
         rows.append(('FAILED', node.recording.failure))
     return Table('', ('', ''), rows)
-
-
-def _proof(folder: Path, ticks: int) -> str:
-    """Replay a bag: check that it gives the same bytes, and how well its loop closed."""
-    worst, done = 0.0, 0
-
-    def observe(replayed: ReplayedTick) -> None:
-        nonlocal worst, done
-        done += 1
-        if done % _TOLD == 0:
-            advance(done, max(done, ticks))
-        for closure, seen in zip(closures, replayed.tick.looks, strict=True):
-            if seen.position is not None and seen.position.joints:
-                worst = max(worst, closure.residual(seen.position))
-
-    try:
-        bag = read_bag(folder)
-        # The run was the user's, and has imported these modules already.
-        scene = recorded_scene(bag, trust_effects=True)
-        pipeline = Pipeline(scene)
-        closures = pipeline.closures
-        with progress('ticks replayed') as advance:
-            proof = verify_replay(bag, scene, bag.messages(), observe)
-    except LinkageError as error:
-        return str(error)
-    if proof.verdict == UNDECIDED:
-        return f'{UNDECIDED}: {beginning_text(proof)}'
-    names = ['joint states', *(extra.topic.removeprefix('~/') for extra in pipeline.extras)]
-    same = ' and '.join(
-        f'{topic.same} of {topic.recorded} {name}'
-        for name, topic in zip(names, proof.comparison.topics, strict=True)
-    )
-    notes = [beginning_text(proof)] if proof.beginning else []
-    if proof.verdict == DIFFERENT:
-        notes += gaps(bag)
-    notes.append(f'worst loop residual {worst:.1e} m')
-    return f'{same} replay to the same bytes; {"; ".join(notes)}'
 
 
 EXAMPLE = 'linkage run worn_press --seconds 5 --set rate=500'
@@ -309,6 +262,11 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--view', action='store_true', help='serve a page of the run, as linkage view --node does'
     )
+    parser.add_argument(
+        '--prove',
+        action='store_true',
+        help='at the end replay the whole bag, not only as much of it as takes 2 s',
+    )
     add_radians(parser)
 
 
@@ -332,7 +290,7 @@ def run_scene(
 
     def at_end(node: LinkageNode) -> None:
         bags.extend(recording.folder for recording in node.recording.ended)
-        show(summary(node))
+        show(summary(node, inf if arguments.prove else LONGEST_PROOF))
 
     if arguments.view:
         check_page()

@@ -30,11 +30,11 @@ import sys
 from tempfile import TemporaryDirectory
 from threading import Event
 
-from linkage_ros.cli.arguments import add_set, bounded, PICTURES, SCENE_HELP
+from linkage_ros.cli.arguments import add_force, add_set, bounded, PICTURES, SCENE_HELP
 from linkage_ros.cli.export import export
 from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import clean, LinkageError
-from linkage_ros.files.file_access import check_suffix
+from linkage_ros.files.file_access import check_suffix, remove_bag
 from linkage_ros.files.tables import check_kind, KINDS, table_file
 from linkage_ros.messages.joint_values import EFFORT, POSITION, RATE, UNITS
 from linkage_ros.scene.load import load_scene
@@ -80,6 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='folder of a new bag; or a table of the joints, OUTPUT.csv or OUTPUT.parquet; of a '
         'study a table of its runs, or a picture of the spread, OUTPUT.png, .svg or .pdf',
     )
+    add_force(parser)
     add_set(parser)
     study = parser.add_argument_group('a study')
     study.add_argument(
@@ -136,6 +137,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     scene = _loaded(arguments)
     ticks = check_simulated(scene, arguments.seconds)
     if not output.suffix:
+        remove_bag(output, force=arguments.force)
         counts = _simulated(scene, output, ticks, stop)
         parts = ', '.join(f'{count} on {clean(name)}' for name, count in counts.items() if count)
         print(f'{output}: {parts or "no messages"}')
@@ -164,18 +166,21 @@ def _loaded(arguments: argparse.Namespace) -> Scene:
 
 def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str, int]:
     """Run a scene into a bag, and return its counts; say so if a signal stopped it."""
-    done = 0
+    stopped_at: int | None = None
     with progress('ticks') as advance:
 
         def goes_on(number: int) -> bool:
-            nonlocal done
-            done = number
+            nonlocal stopped_at
             advance(number, ticks)
-            return not stop.is_set()
+            if stop.is_set():
+                stopped_at = number
+            return stopped_at is None
 
         counts = simulate(scene, folder, ticks, goes_on)
-    if stop.is_set():
-        print(f'linkage simulate: stopped after {done:,} of {ticks:,} ticks', file=sys.stderr)
+    if stopped_at is not None:
+        print(
+            f'linkage simulate: stopped after {stopped_at:,} of {ticks:,} ticks', file=sys.stderr
+        )
     return counts
 
 

@@ -40,6 +40,7 @@ from linkage_ros.cli.arguments import (
 from linkage_ros.cli.synthesis_tasks import Answer, answers, CANDIDATES, Search
 from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
 from linkage_ros.errors import LinkageError
+from linkage_ros.files.file_access import check_new
 from linkage_ros.files.linkage_text import write_linkage
 from linkage_ros.synthesis.defects import Assessment, distance, misses, Needs
 from linkage_ros.synthesis.design import FourBar
@@ -302,7 +303,7 @@ def _design(arguments: argparse.Namespace) -> int:
     needs = needs_of(arguments)
     shown = found[: arguments.best]
     _show(shown, needs, arguments.angles)
-    _draw(arguments.draw, shown)
+    _draw(arguments.draw, shown, force=arguments.force)
     if not meeting:
         return _NOT_MET
     if arguments.output is not None:
@@ -336,13 +337,14 @@ def _show(shown: Sequence[Answer], needs: Needs, angles: AngleUnit) -> None:
             print()
 
 
-def _draw(file: Path | None, shown: Sequence[Answer]) -> None:
+def _draw(file: Path | None, shown: Sequence[Answer], *, force: bool) -> None:
     if file is None:
         return
     from linkage_ros.drawing.design import draw_design
 
     for number, answer in enumerate(shown, 1):
         own = file if len(shown) == 1 else file.with_stem(f'{file.stem}-{number}')
+        check_new(own, force=force)
         draw_design(answer.design, answer.title, own, error=answer.curve)
         print(own)
 

@@ -31,6 +31,7 @@ from threading import Event, Thread
 from typing import Any, NamedTuple
 import webbrowser
 
+from linkage_ros.bag.other_formats import is_bag_name
 from linkage_ros.cli.arguments import add_output
 from linkage_ros.cli.report import check_page, report, write_page
 from linkage_ros.errors import check_installed, clean, LinkageError, missing_packages_reported
@@ -81,7 +82,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if arguments.output:
         check_page(arguments.output)
     path = Path(arguments.file)
-    if path.is_dir() or path.suffix == '.mcap':
+    if is_bag_name(path):
         page = report(path, Window(), stop)
         if arguments.output:
             write_page(arguments.output, page)

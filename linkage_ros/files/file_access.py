@@ -90,11 +90,37 @@ def check_suffix(file: Path, suffixes: Collection[str]) -> None:
         )
 
 
+def check_new(path: Path, *, force: bool) -> None:
+    """Refuse to write what exists, unless ``force`` says so; never replace a folder but a bag."""
+    if not os.path.lexists(path):
+        return
+    if not force:
+        raise LinkageError(path, 'exists already', 'name another, or add --force to overwrite it')
+    if path.is_dir() and not all(map(_is_of_a_bag, path.iterdir())):
+        raise LinkageError(
+            path, 'is a folder that holds more than a bag', 'name another: it is not overwritten'
+        )
+
+
+def remove_bag(folder: Path, *, force: bool) -> None:
+    """Remove a bag that `check_new` has found, to make room for another."""
+    check_new(folder, force=force)
+    if folder.is_dir():
+        for file in folder.iterdir():
+            file.unlink()
+        folder.rmdir()
+
+
+def _is_of_a_bag(file: Path) -> bool:
+    return file.is_file() and (file.suffix == '.mcap' or file.name == 'metadata.yaml')
+
+
 def atomic_write(file: str | Path, data: bytes) -> None:
     """
     Write or replace a file: write it beside the target, then rename it.
 
-    A symbolic link is followed. A LinkageError says that the file cannot be written.
+    A symbolic link is followed, and an old file's permissions are kept. A LinkageError says that
+    the file cannot be written.
     """
     try:
         target = Path(file).resolve()
@@ -123,6 +149,9 @@ def replaced(target: Path) -> Iterator[BinaryIO]:
     temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
     try:
         with temporary.open('xb') as stream:
+            with suppress(FileNotFoundError):
+                # Before anything is written: what nobody else might read, nobody else may.
+                os.fchmod(stream.fileno(), stat.S_IMODE(target.stat().st_mode))
             yield stream
             stream.flush()
             os.fsync(stream.fileno())

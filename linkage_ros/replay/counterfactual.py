@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Run another scene on the crank samples of a bag.
+Run another scene on the crank samples of a bag, or on the commands that it holds.
 
 If both scenes have the same rate, the ticks are those of the bag. Where the bag has none, because
 the linkage was open or had no crank state, ticks are one period apart. At another rate ticks are
@@ -27,7 +27,7 @@ replay of them gives the same result: time jumps back where the written times do
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TYPE_CHECKING
 
@@ -42,16 +42,27 @@ from linkage_ros.bag.run_events import (
     WrenchEvent,
 )
 from linkage_ros.errors import BagError, did_you_mean, LinkageError, listed
-from linkage_ros.messages.joint_state import head_of, JointStateReader, Rejection
+from linkage_ros.messages.joint_state import (
+    head_of,
+    JointEffortReader,
+    JointStateReader,
+    Rejection,
+)
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.single_values import text_message, TIME_END
 from linkage_ros.pipeline.pipeline import Pipeline, Tick
 from linkage_ros.replay.replay import change_text, read_change
-from linkage_ros.scene.scene import Scene
+from linkage_ros.scene.scene import Scene, SceneLinkage
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
 
+
+_TOPICS = {'topic': '/crank_states', 'torque': '/crank_commands'}
+"""Drives that take messages, and the topic of each where the bag does not tell."""
+
+_LONGEST_GAP = 60 * 1_000_000_000
+"""Longest time without an event of the bag through which a torque drive ticks, in [ns]."""
 
 _LARGEST_LEAD = 2 * 3600 * 1_000_000_000
 """Bound on the lead of a sample's stamp over its tick, in [ns]."""
@@ -72,15 +83,16 @@ ReplayEvent = SampleEvent | FaultEvent | Reset | Remade
 
 
 def check_drives(scene: Scene, where: str) -> None:
-    """Raise LinkageError if a scene does not read its crank, and that alone, from a topic."""
-    for member in scene.members:
-        drive, _ = member.drive
-        if drive != 'topic':
+    """Raise LinkageError if a scene does not take crank angles, or efforts, from one topic."""
+    drives = [member.drive[0] for member in scene.members]
+    for member, drive in zip(scene.members, drives, strict=True):
+        if drive not in _TOPICS or drive != drives[0]:
+            beside = f' beside {drives[0]}' if drive in _TOPICS else ''
             raise LinkageError(
                 where,
-                f'{f"{member.name}: " if member.name else ""}its drive is {drive}, which takes no '
-                "samples of a bag's",
-                'write drive: {topic: {}}',
+                f'{f"{member.name}: " if member.name else ""}its drive is {drive}{beside}, which '
+                "takes no samples of a bag's",
+                f'write drive: {{{drives[0] if beside else "topic"}: {{}}}}',
             )
         if member.loads is not None and member.loads.applied.wrenches:
             raise LinkageError(
@@ -97,7 +109,7 @@ class Counterfactual:
     Parameters
     ----------
     scene
-        The scene; all its drives read topics.
+        The scene; all its drives take messages of one topic.
     recorded
         The recorded scene; None if unknown.
 
@@ -106,6 +118,8 @@ class Counterfactual:
     def __init__(self, scene: Scene, recorded: Scene | None) -> None:
         self._scene = scene
         self._followed: set[str] = set()
+        # Under torque the linkage moves without commands, too.
+        self._goes_on = scene.members[0].drive[0] == 'torque'
         if recorded is not None:
             self._followed = {
                 name for name, fault in scene.faults.items() if recorded.faults.get(name) == fault
@@ -221,10 +235,14 @@ class Counterfactual:
     def _catch_up(self, to: int) -> Iterator[FaultEvent | Remade]:
         """Compute the ticks that were due before a time, in [ns]."""
         while (due := self._due) is not None and due + self._slack < to:
-            age = self._clock(due) - self._pipeline.newest_stamp
+            if self._goes_on:
+                ticks = due - self._seen <= _LONGEST_GAP
+            else:
+                age = self._clock(due) - self._pipeline.newest_stamp
+                ticks = -_LARGEST_LEAD <= age <= self._pipeline.max_age
             # Without a crank state, ticks have no result, however many there are; and the times of
             # a damaged bag may span years.
-            if not -_LARGEST_LEAD <= age <= self._pipeline.max_age:
+            if not ticks:
                 self._due = due + -(-(to - self._slack - due) // self._period) * self._period
                 return
             now = max(due, self._seen)
@@ -300,9 +318,6 @@ class Counterfactual:
         self._last = now
 
 
-DEFAULT = '/crank_states'
-
-
 def find_crank_topic(
     bag: Bag,
     messages: Iterable[BagMessage],
@@ -325,8 +340,9 @@ def find_crank_topic(
     run, recorded
         The run's account in the bag, and its scene; blank and None if the bag has none.
     typed
-        The topic that the user asked for. If None, the topic of the run, `DEFAULT`, or the only
-        topic with such samples, whichever of these the bag has first.
+        The topic that the user asked for. If None, the topic of the run, that of `_TOPICS`, or
+        the only topic with such samples, whichever of these the bag has first. Commands are not
+        looked for on other topics: the efforts of joint states are none.
 
     Raises
     ------
@@ -334,9 +350,10 @@ def find_crank_topic(
         There is no such topic, or more than one.
 
     """
+    drive = scene.members[0].drive[0]
     readers = {
-        topic: [JointStateReader(member.inputs) for member in scene.members]
-        for topic in _candidates(bag, run, recorded, typed)
+        topic: [_reader(member, scene.dependent_joints) for member in scene.members]
+        for topic in _candidates(bag, drive, run, recorded, typed)
     }
     wanting = {topic: set(range(len(scene.members))) for topic in readers}
     names: dict[str, None] = {}
@@ -345,7 +362,7 @@ def find_crank_topic(
             continue
         candidates = [
             number for number in wanting[topic]
-            if not isinstance(readers[topic][number].read(data), Rejection)
+            if not isinstance(readers[topic][number](data), Rejection)
         ]  # fmt: skip
         wanting[topic].difference_update(candidates)
         if not candidates:
@@ -366,11 +383,23 @@ def find_crank_topic(
             f'holds samples of {listed(inputs)} on {listed(good, " and ")}',
             'name one with --crank-topic',
         )
+    if drive == 'torque' and not readers:
+        raise BagError(
+            bag.path,
+            'its run took no commands, which a torque drive needs',
+            'name their topic with --crank-topic, or write drive: {topic: {}}',
+        )
     raise _none(bag, inputs, list(readers), list(names))
 
 
+def _reader(member: SceneLinkage, dependent: Collection[str]) -> Callable[[bytes], object]:
+    if member.drive[0] == 'torque':
+        return JointEffortReader(member.inputs[0], dependent).read
+    return JointStateReader(member.inputs).read
+
+
 def _candidates(
-    bag: Bag, run: RunAccount, recorded: Scene | None, typed: str | None
+    bag: Bag, drive: str, run: RunAccount, recorded: Scene | None, typed: str | None
 ) -> Sequence[str]:
     held = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
     if typed is not None:
@@ -381,13 +410,13 @@ def _candidates(
                 did_you_mean(typed, held, f'it holds {listed(held) or "none"}'),
             )
         return [typed]
-    commanded = recorded is not None and any(
-        member.drive[0] != 'topic' for member in recorded.members
-    )
-    if run.crank_topic in held and not commanded:
+    other = recorded is not None and any(member.drive[0] != drive for member in recorded.members)
+    if run.crank_topic in held and not other:
         return [run.crank_topic]
-    if DEFAULT in held and not commanded:
-        return [DEFAULT]
+    if _TOPICS[drive] in held and not other:
+        return [_TOPICS[drive]]
+    if drive == 'torque':
+        return []
     return held
 
 

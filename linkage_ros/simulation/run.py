@@ -41,6 +41,7 @@ from linkage_ros.replay.replay import change_text
 from linkage_ros.replay.run_files import attachments, EXTRA, scene_files
 from linkage_ros.replay.topic_description import described, message_type
 from linkage_ros.scene.scene import Scene
+from linkage_ros.signals import heeded
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Change
@@ -53,7 +54,7 @@ MOST_TICKS = 100_000_000
 _NODE = '/linkage_node'
 _LATCHED = QosProfile(depth=100, durability='transient_local')
 _TIME = 'builtin_interfaces/msg/Time'
-_ASKED_EVERY = 500
+_ASKED_EVERY = 50
 _FLUSHED_EVERY = 50_000
 
 
@@ -111,7 +112,7 @@ def simulate(
         Number of ticks.
     goes_on
         Called now and then with the number of ticks so far; if it returns False, the run ends and
-        the bag is complete up to there.
+        the bag is complete up to there. Signals only set the stop event: it has to look at that.
 
     Returns
     -------
@@ -145,17 +146,19 @@ def simulate(
     named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
     files = scene_files(scene, named, WITH_THE_RUN, first.lines)
-    writer = BagWriter(folder, [topic for _, topic in topics], attachments(files))
-    recording = _Recording(writer, len(topics))
-    loop.recorder = cast('Recorder', recording)
-    try:
-        for number, now in enumerate(times(scene, ticks)):
-            if not number % _ASKED_EVERY and not goes_on(number):
-                break
-            loop.tick_at(now)
-    finally:
-        counts = dict(zip((topic.name for _, topic in topics), recording.written, strict=True))
-        writer.close({'linkage_ros.dropped': json.dumps(dict.fromkeys(counts, 0))})
+    # A signal ends the run between two ticks: raised here, it would cut a record of the bag.
+    with heeded():
+        writer = BagWriter(folder, [topic for _, topic in topics], attachments(files))
+        recording = _Recording(writer, len(topics))
+        loop.recorder = cast('Recorder', recording)
+        try:
+            for number, now in enumerate(times(scene, ticks)):
+                if not number % _ASKED_EVERY and not goes_on(number):
+                    break
+                loop.tick_at(now)
+        finally:
+            counts = dict(zip((topic.name for _, topic in topics), recording.written, strict=True))
+            writer.close({'linkage_ros.dropped': json.dumps(dict.fromkeys(counts, 0))})
     return counts
 
 

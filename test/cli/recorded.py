@@ -34,7 +34,7 @@ from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from rosbags.highlevel import AnyReader
 
-from ..support.messages import STORE
+from ..support.messages import joint_state, STORE
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 SECOND = 1_000_000_000
@@ -42,8 +42,11 @@ BEGIN = 1_700_000_000 * SECOND
 MS = 1_000_000
 
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
-Crank = Callable[[int], Mapping[str, tuple[float, float]]]
-"""Gives for each tick the crank joints that a sample names, with angle and rate."""
+Crank = Callable[[int], Mapping[str, Any]]
+"""Gives for each tick the joints that a sample names, with angle and rate, or with an effort."""
+
+COMMANDS = '/crank_commands'
+"""Topic of efforts."""
 
 
 def topic(name: str, kind: str, reliability: str = 'reliable') -> Topic:
@@ -134,8 +137,7 @@ class Recorded:
                 self._write(number, '/linkage/resets', now, now, time_message(now))
             if self._crank:
                 states = self._crank(number)
-                angles, rates = zip(*states.values(), strict=True) if states else ((), ())
-                message = JointStateWriter(list(states)).write(stamp, angles, rates)
+                message = self._sample(stamp, states)
                 self._write(number, self._crank_topic, now, stamp + MS // 8, message)
                 self.pipeline.offer(message, now)
             tick = self.pipeline.tick(stamp)
@@ -149,6 +151,12 @@ class Recorded:
         counts = dict.fromkeys(self._numbers, 0) | dict(dropped or {})
         self._writer.close({'linkage_ros.dropped': json.dumps(counts)})
         return self.folder
+
+    def _sample(self, stamp: int, states: Mapping[str, Any]) -> bytes:
+        if self._crank_topic == COMMANDS:
+            return joint_state(states, efforts=[*states.values()])
+        angles, rates = zip(*states.values(), strict=True) if states else ((), ())
+        return JointStateWriter(list(states)).write(stamp, angles, rates)
 
     def _write(self, number: int, name: str, log: int, publish: int, data: bytes) -> None:
         if not self._drop(number, name):

@@ -639,8 +639,9 @@ def test_a_disk_without_room_keeps_the_file_that_was_there(
 ) -> None:
     target = tmp_path / f'x{ending}'
     target.write_text('before')
+    words = ['export', str(bag), '-o', target.name, '--force']
     limited = subprocess.run(
-        [sys.executable, '-m', 'linkage_ros.cli.main', 'export', str(bag), '-o', target.name],
+        [sys.executable, '-m', 'linkage_ros.cli.main', *words],
         cwd=tmp_path,
         env=environment(tmp_path),
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)),

@@ -71,7 +71,9 @@ def test_a_whole_bag_loses_nothing_and_no_folder_is_used_twice(linkage: Run, bag
     assert answer.stdout.splitlines()[-2:] == ['nothing lost', 'bag          whole']
     answer = linkage('recover', str(bag), '-o', 'whole')
     assert answer.returncode == 2
-    assert answer.stderr == ('linkage recover: whole: exists already; name a new folder with -o\n')
+    assert answer.stderr == (
+        'linkage recover: whole: exists already; name another, or add --force to overwrite it\n'
+    )
 
 
 @pytest.mark.parametrize(

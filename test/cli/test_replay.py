@@ -21,6 +21,7 @@ from itertools import repeat
 import json
 from math import inf, nan, nextafter, sqrt, tau, ulp
 from pathlib import Path
+import shutil
 from struct import pack, unpack
 from threading import Event
 from types import SimpleNamespace
@@ -403,6 +404,27 @@ def test_a_truncated_bag_is_replayed_as_far_as_it_goes(tmp_path, capsys):
         f'linkage replay: {part}: unfinished: its recording was killed, or still runs, or goes on '
         'in another file; what it holds was replayed\n'
     )
+
+
+@pytest.fixture(scope='module')
+def long_bag(tmp_path_factory):
+    return recorded(tmp_path_factory.mktemp('long'), SCENES['rates'], 6000)
+
+
+@pytest.mark.parametrize('part', [0.09, 0.3, 0.66, 0.98])
+@pytest.mark.parametrize('more', [[], ['--set', 'angles=wrapped']])
+def test_a_bag_that_is_shorter_than_its_metadata_says_is_a_loss(
+    tmp_path, capsys, long_bag, part, more
+):
+    bag = Path(shutil.copytree(long_bag, tmp_path / 'bag'))
+    file = bag / 'bag_0.mcap'
+    whole = list(read_bag(bag).messages())
+    file.write_bytes(file.read_bytes()[: int(file.stat().st_size * part)])
+    there = list(read_bag(bag, allow_truncated=True).messages())
+    assert answer(replay, bag, *more, '--json') == 3
+    out, err = capsys.readouterr()
+    assert json.loads(out)['missing'] == len(whole) - len(there) > 0
+    assert f'{len(whole) - len(there):,} messages that its metadata.yaml promises are not' in err
 
 
 def test_a_damaged_bag_is_replayed_up_to_the_damage(tmp_path, capsys):

@@ -29,6 +29,7 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import replay
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from linkage_ros.signals import StoppedError
 import pytest
@@ -38,6 +39,7 @@ from .conftest import json_keys, json_keys_of
 from .recorded import (
     answer,
     BEGIN,
+    COMMANDS,
     FOUR_BAR,
     JOINT_STATE,
     MS,
@@ -427,3 +429,79 @@ def test_a_folder_that_exists_is_not_touched(tmp_path):
     with pytest.raises(LinkageError, match='exists already'):
         answer(replay, bag, '--scene', scene, '-o', tmp_path / 'new')
     assert list((tmp_path / 'new').iterdir()) == []
+
+
+# A scene under torque takes the commands of the bag.
+
+
+UNDER_TORQUE = """
+rate: 500
+drive: {torque: {start: 0.5, method: rk4, step: 0.002, timeout: 0.1, on_timeout: zero}}
+loads: {gravity: [0, -9.81]}
+effects: {velocity: {}, effort: {}%s}
+"""
+
+FRICTION = ', friction: {joints: {O2: {viscous: 0.01}}}'
+
+
+def commanded(folder: Path, text: str = UNDER_TORQUE % '') -> Path:
+    """Record a run under torque: efforts at every third tick, then none."""
+
+    def efforts(number: int) -> Mapping[str, float]:
+        return {'crank_joint': 0.3 * sin(0.05 * number)} if number % 3 == 0 else {'other': 1.0}
+
+    scene = scene_file(folder, text, GENERAL)
+    return Recorded(folder / 'bag', scene, efforts, COMMANDS).run(TICKS)
+
+
+def test_the_same_scene_on_the_commands_makes_the_same_bytes(tmp_path, capsys):
+    bag = commanded(tmp_path)
+    scene = other(tmp_path, UNDER_TORQUE % '', GENERAL)
+    account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new')
+    assert account['crank_topic'] == COMMANDS
+    for each in account['topics']:
+        assert (each['recorded'], each['same']) == (TICKS, TICKS)
+    assert list(read_bag(tmp_path / 'new').messages())
+    assert answer(replay, tmp_path / 'new') == 0
+
+
+def test_another_friction_moves_as_its_own_pipeline_under_the_commands(tmp_path, capsys):
+    bag = commanded(tmp_path)
+    scene = other(tmp_path, UNDER_TORQUE % FRICTION, GENERAL)
+    account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new')
+    assert row(account, 'rocker_joint')['greatest'] > 0.01
+    pipeline, made = Pipeline(load_scene(scene)), []
+    for name, log_time, time, data in read_bag(bag).messages():
+        if name == COMMANDS:
+            pipeline.offer(data, log_time)
+        elif name == '/joint_states':
+            made.append(pipeline.tick(time).message)
+    new = read_bag(tmp_path / 'new')
+    assert [each.data for each in new.messages() if each.topic == '/joint_states'] == made
+    assert answer(replay, tmp_path / 'new') == 0
+
+
+def test_at_half_the_rate_the_motion_is_the_same(tmp_path, capsys):
+    bag = commanded(tmp_path)
+    scene = other(tmp_path, (UNDER_TORQUE % '').replace('rate: 500', 'rate: 250'), GENERAL)
+    account = told(capsys, bag, '--scene', scene)
+    found = row(account, 'rocker_joint')
+    assert found['compared'] == TICKS // 2
+    assert found['greatest'] == 0.0
+
+
+WRONG_KINDS = {
+    'crank angles are no commands': (False, UNDER_TORQUE % '', 'its run took no commands'),
+    'a drive of its own takes nothing': (
+        True, 'rate: 500\ndrive: {constant_rate: {rate: 1.0}}\n', 'its drive is constant_rate'
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('case', WRONG_KINDS)
+def test_samples_of_another_kind_are_refused(tmp_path, case):
+    is_commanded, text, reason = WRONG_KINDS[case]
+    bag = commanded(tmp_path) if is_commanded else recorded(tmp_path, linkage=GENERAL)
+    scene = other(tmp_path, text, GENERAL)
+    with pytest.raises(LinkageError, match=reason):
+        answer(replay, bag, '--scene', scene)

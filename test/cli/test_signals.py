@@ -204,7 +204,7 @@ def test_a_command_that_is_stopped_while_it_writes_leaves_what_was_there(folder,
     old = folder / typed[-1]
     old.write_text('old')
     before = sorted(folder.iterdir())
-    found = ended_by(stuck_at(folder, WRITES, command, *typed), signal.SIGTERM)
+    found = ended_by(stuck_at(folder, WRITES, command, *typed, '--force'), signal.SIGTERM)
     assert found == (1, f'linkage {command}: stopped\n')
     assert sorted(folder.iterdir()) == before
     assert old.read_text() == 'old'

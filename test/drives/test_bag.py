@@ -17,6 +17,7 @@
 
 import json
 from math import inf, nan
+from random import Random
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -29,6 +30,7 @@ from linkage_ros.errors import BagError, DefinitionError
 from linkage_ros.messages.joint_state import CrankSample, JointStateWriter, Rejection
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
+from mcap.writer import IndexType, Writer
 import pytest
 
 from .contexts import one_input, readings, two_inputs
@@ -350,3 +352,45 @@ def test_in_a_scene_the_bag_lies_relative_to_it(tmp_path):
     assert readings(built, *times) == [(0.5, 2.0), (pytest.approx(0.6), 2.0), (3.0, -1.0)]
     assert built.tick(BEGIN + 351 * MS).message == b''
     assert (built.newest_stamp, built.max_age) == (BEGIN + 150 * MS, 200 * MS)
+
+
+LAYOUTS = {
+    'with an index': {'chunk_size': 256},
+    'of one chunk': {},
+    'without chunks': {'use_chunking': False},
+    'without an index': {
+        'index_types': IndexType.NONE,
+        'repeat_channels': False,
+        'repeat_schemas': False,
+        'use_statistics': False,
+        'use_summary_offsets': False,
+    },
+}
+
+TIMES = [*range(0, 8000, 200)]
+"""When messages were taken, in [ms]: they span more than any window of seconds."""
+
+ORDERS = {
+    'halves exchanged': [*TIMES[20:], *TIMES[:20]],
+    'backwards': TIMES[::-1],
+    'shuffled': Random(1).sample(TIMES, len(TIMES)),
+    'two recorders one after the other': TIMES[::2] + TIMES[1::2],
+}
+
+
+@pytest.mark.parametrize('layout', LAYOUTS)
+@pytest.mark.parametrize('order', ORDERS)
+def test_the_order_is_that_of_log_times_whatever_that_of_the_file(tmp_path, order, layout):
+    file = tmp_path / 'x.mcap'
+    with file.open('wb') as stream:
+        writer = Writer(stream, **LAYOUTS[layout])
+        writer.start(profile='ros2')
+        schema = writer.register_schema(TYPE, 'ros2msg', b'')
+        channel = writer.register_channel('/crank', 'cdr', schema)
+        for time in ORDERS[order]:
+            at = RECORDED + time * MS
+            writer.add_message(channel, at, sample(time, time * 1e-3), at)
+        writer.finish()
+    drive = build(BagParameters(str(file)), one_input())
+    states = [drive.state(BEGIN + time * MS) for time in TIMES]
+    assert [state and state.angles for state in states] == [(time * 1e-3,) for time in TIMES]
