@@ -35,7 +35,7 @@ from typing import Any, TYPE_CHECKING
 from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.motion import LARGEST, OneFreedom
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.parameters import choice, number, option, whole
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import without_limits
@@ -127,6 +127,12 @@ class PlayParameters:
     )
     restitution: float = number(
         'ratio of the relative rates after and before they meet', 0.0, least=0.0, most=1.0
+    )
+    on_chatter: str = choice(
+        'if they meet and part too often for the step: the play closes at the end of the step, '
+        'or the run ends',
+        ('close', 'end'),
+        'close',
     )
 
 
@@ -383,6 +389,7 @@ class TorqueDrive(Drive):
         '_boundary',
         '_delay',
         '_due',
+        '_ends',
         '_idle',
         '_loaded_until',
         '_made_up',
@@ -434,6 +441,7 @@ class TorqueDrive(Drive):
         self._delay = round(use.motor.delay * NANOSECONDS) if use.motor else 0
         self._quantum = use.motor.quantum if use.motor else 0.0
         self._waiting: deque[tuple[int, _Acting]] = deque()
+        self._ends = use.play is not None and use.play.on_chatter == 'end'
         self.max_age = round(use.timeout * NANOSECONDS)
         self._most = most
         self.stamp = self.lost = self.saturated = 0
@@ -486,7 +494,15 @@ class TorqueDrive(Drive):
         self._loaded_until = min(each.until for each in self._wrenches)
 
     def state(self, now: int) -> CrankState:
-        """Return the crank state at a time, in [ns]; for an earlier time, the last state."""
+        """
+        Return the crank state at a time, in [ns]; for an earlier time, the last state.
+
+        Raises
+        ------
+        LinkageError
+            Motor and crank meet and part too often, and the scene ends the run then.
+
+        """
         if self._time < 0:
             self._time = self._begun = now
             self._boundary = now + self._step
@@ -499,7 +515,20 @@ class TorqueDrive(Drive):
             time += seconds
         acceleration = mechanism.acceleration(motion, force, brake, time)
         self._shown = motion
+        if self._ends and self.chattered:
+            raise LinkageError(
+                'drive.torque.play',
+                f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
+                f'at a rate of {motion.rate:.4g}',
+                'shorten the step, look at the controller, or write on_chatter: close',
+            )
         return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
+
+    @property
+    def chattered(self) -> int:
+        """Number of steps in which motor and crank met and parted too often."""
+        coarse: int = getattr(getattr(self._motion, 'moved', self._motion), 'coarse', 0)
+        return coarse
 
     @property
     def motor(self) -> tuple[float, float, float | None]:
