@@ -51,10 +51,10 @@ from typing import NamedTuple
 from linkage_ros.dynamics.mechanics import Terms
 from linkage_ros.dynamics.motion import last_before, Motion, NARROW, OneFreedom
 
-TRIALS = 4
+TRIALS = 3
 """Trials that each step may take to find the instants of meetings and partings."""
 
-SAVED = 400
+SAVED = 200
 """Most trials that are saved for a step: enough for two runs of bounces."""
 
 _BOUNCES = 20
