@@ -93,6 +93,13 @@ class CrankBehindPlay(CrankState):
     free_motors: tuple[float | None, ...] = ()
 
 
+class CrankAtRest(CrankState):
+    """State of an input that stands, with the efforts that its drive may exert on it."""
+
+    # The least and the greatest, in [N·m] or [N]: they differ where a brake or a gear holds.
+    bearing: tuple[float, ...] = ()
+
+
 class Drive(Protocol):
     """Drive with its state; a reset builds a new one."""
 

@@ -32,9 +32,9 @@ from dataclasses import dataclass, replace
 from math import copysign, inf, isfinite, pi
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
+from linkage_ros.drives.drive import Context, CrankAtRest, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.motion import LARGEST, OneFreedom
+from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.parameters import choice, number, option, whole
 from linkage_ros.kinematics.closure import Closure
@@ -64,6 +64,9 @@ _SAMPLES = 90
 
 _LEAST_RESISTANCE = 1e-9
 """Smaller resistances count as none, in [Ω]."""
+
+_PUSHES = {1: (0.0, inf), 0: (0.0, 0.0), -1: (-inf, 0.0)}
+"""What passes through the play, by the side on which the motor touches the crank."""
 
 _Acting = tuple[Any, float, float]
 """What acts by a command: the mechanism, the force on its input, and the brake."""
@@ -410,6 +413,8 @@ class TorqueDrive(Drive):
         'stamp',
     )
 
+    exerts_effort = True
+    """Whether its effort on an input at rest does not follow from the motion."""
     stamp: int
     """Arrival of the newest good command, in [ns]; 0 before the first."""
     max_age: int
@@ -522,7 +527,26 @@ class TorqueDrive(Drive):
                 f'at a rate of {motion.rate:.4g}',
                 'shorten the step, look at the controller, or write on_chatter: close',
             )
-        return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
+        if motion.rate:
+            return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
+        standing = CrankAtRest((motion.value,), (motion.rate,), (acceleration,), 0)
+        standing.bearing = self._bearing(motion, acceleration)
+        return standing
+
+    def _bearing(self, motion: Any, acceleration: float) -> tuple[float, float]:
+        """Return the least and the greatest effort that acts on the input at rest."""
+        mechanism, force, holding = self._acting
+        if self._motor:
+            resting, within = self._motor.at_rest(mechanism, motion)
+            force, holding = force + resting, holding + within
+        least, most = force - holding, force + holding
+        behind_play = getattr(motion, 'moved', motion)
+        if not isinstance(behind_play, Motion):
+            # Through the play passes what is left after the motor's own inertia, as a push.
+            own = behind_play.motor.terms.inertia * acceleration
+            low, high = _PUSHES[behind_play.side]
+            least, most = (min(max(end - own, low), high) for end in (least, most))
+        return least, most
 
     @property
     def chattered(self) -> int:
