@@ -34,17 +34,20 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankAtRest, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
+from linkage_ros.dynamics.longest_step import check_step, EXACT
 from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.parameters import choice, number, option, whole
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import without_limits
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.messages.joint_state import EffortCommand, JointEffortReader, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.layout import NANOSECONDS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from linkage_ros.dynamics.mechanics import Mechanics, Rubbing, Terms
     from linkage_ros.dynamics.motor import Motor
     from linkage_ros.dynamics.winding import Winding
     from linkage_ros.dynamics.wrenches import HeldWrench
@@ -229,15 +232,10 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             'drive.torque.brake', 'the brake is never applied', 'add on_timeout: brake'
         )
     mechanics = context.mechanics
-    yielding = mechanics.loads.applied.stops
     motion: Any = OneFreedom(
         mechanics.equation,
         METHODS[parameters.method].step,
-        _stops(
-            Closure(without_limits(closure.linkage, yielding)) if yielding else closure,
-            parameters.start,
-            parameters.stop_margin,
-        ),
+        _stops(context.hard_limited, parameters.start, parameters.stop_margin),
         parameters.restitution,
         mechanics.laws,
         context.reactions.resisting if mechanics.friction.loaded else None,
@@ -263,10 +261,15 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             'start elsewhere',
         )
     low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
-    if motor:
+    curved = [rubbing for rubbing in mechanics.rubbing if rubbing.law]
+    if motor or curved:
         places = (low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
-        moved = [terms.inertia for terms in map(mechanics.equation, places) if terms]
-        least = min([value for value in moved if value > 0.0], default=inf)
+        moved = [terms for terms in map(mechanics.equation, places) if terms]
+        moved = [terms for terms in moved if terms.inertia > 0.0]
+    if curved:
+        _check_curves(mechanics, curved, moved, parameters)
+    if motor:
+        least = min([terms.inertia for terms in moved], default=inf)
         if parameters.play is not None:
             least = parameters.play.inertia
         motor.check_step(least, parameters.method, parameters.step)
@@ -282,6 +285,33 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     made_up = max(_MADE_UP, 2 * period)
     wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
     return TorqueDrive(motion, start, parameters, made_up, min(most, LARGEST), motor, wrenches)
+
+
+def _check_curves(
+    mechanics: Mechanics, curved: Sequence[Rubbing], moved: Sequence[Terms], use: TorqueParameters
+) -> None:
+    """Refuse friction that falls with the rate faster than a step follows."""
+    joints = mechanics.closure.structure.joints
+    names = [joints[rubbing.joint].name for rubbing in curved]
+    worst, blamed = 0.0, names[0]
+    for terms in moved:
+        # Their laws follow those of the loads.
+        falling = [
+            rubbing.law.steepest * at.factor**2 / terms.inertia
+            for rubbing, at in zip(curved, terms.laws[-len(curved) :], strict=True)
+            if rubbing.law
+        ]
+        if sum(falling) > worst:
+            worst, blamed = sum(falling), names[falling.index(max(falling))]
+    check_step(
+        f'effects.friction.joints.{blamed}.stribeck',
+        worst,
+        use.method,
+        use.step,
+        'the curve is too steep',
+        'write 0: breakaway then acts at rest only',
+        EXACT,
+    )
 
 
 def writer(parameters: TorqueParameters, context: Context, drive: TorqueDrive) -> Any:
