@@ -196,8 +196,8 @@ def build_clocked(
     for number, name in enumerate(names):
         of, key = (inputs[name], f'{where}.inputs.{name}') if name in inputs else (use, where)
         curves.append(curve(of, key))
-        if context.closure.bounds:
-            refuse_beyond(context.closure, number, key, curves[-1](0)[0], extent(of))
+        if context.hard_limited.bounds:
+            refuse_beyond(context.hard_limited, number, key, curves[-1](0)[0], extent(of))
     return ClockedDrive(tuple(curves))
 
 

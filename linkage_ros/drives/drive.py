@@ -41,6 +41,7 @@ from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import without_limits
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.loads import Friction, Loads
@@ -91,6 +92,13 @@ class CrankBehindPlay(CrankState):
     # For each input the acceleration of its motor, in [rad/s²] or [m/s²], while the motor moves
     # within the play and transmits no force; None while it drives the input.
     free_motors: tuple[float | None, ...] = ()
+
+
+class CrankAtRest(CrankState):
+    """State of an input that stands, with the efforts that its drive may exert on it."""
+
+    # The least and the greatest, in [N·m] or [N]: they differ where a brake or a gear holds.
+    bearing: tuple[float, ...] = ()
 
 
 class Drive(Protocol):
@@ -188,6 +196,14 @@ class Context:
     def generator(seed: str, effect: str) -> Random:
         """Return the random generator of an effect before its context exists."""
         return Random(f'{seed}/{effect}')
+
+    @cached_property
+    def hard_limited(self) -> Closure:
+        """Return the closure without the limits at which a stop yields."""
+        yielding = self.loads.applied.stops if self.loads else ()
+        if not yielding:
+            return self.closure
+        return Closure(without_limits(self.closure.linkage, yielding))
 
     @cached_property
     def mechanics(self) -> Mechanics:

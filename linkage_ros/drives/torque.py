@@ -32,19 +32,22 @@ from dataclasses import dataclass, replace
 from math import copysign, inf, isfinite, pi
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
+from linkage_ros.drives.drive import Context, CrankAtRest, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.motion import LARGEST, OneFreedom
-from linkage_ros.errors import DefinitionError
+from linkage_ros.dynamics.longest_step import check_step, EXACT
+from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
+from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.parameters import choice, number, option, whole
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import without_limits
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.messages.joint_state import EffortCommand, JointEffortReader, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.layout import NANOSECONDS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from linkage_ros.dynamics.mechanics import Mechanics, Rubbing, Terms
     from linkage_ros.dynamics.motor import Motor
     from linkage_ros.dynamics.winding import Winding
     from linkage_ros.dynamics.wrenches import HeldWrench
@@ -64,6 +67,9 @@ _SAMPLES = 90
 
 _LEAST_RESISTANCE = 1e-9
 """Smaller resistances count as none, in [Ω]."""
+
+_PUSHES = {1: (0.0, inf), 0: (0.0, 0.0), -1: (-inf, 0.0)}
+"""What passes through the play, by the side on which the motor touches the crank."""
 
 _Acting = tuple[Any, float, float]
 """What acts by a command: the mechanism, the force on its input, and the brake."""
@@ -127,6 +133,12 @@ class PlayParameters:
     )
     restitution: float = number(
         'ratio of the relative rates after and before they meet', 0.0, least=0.0, most=1.0
+    )
+    on_chatter: str = choice(
+        'if they meet and part too often for the step: the play closes at the end of the step, '
+        'or the run ends',
+        ('close', 'end'),
+        'close',
     )
 
 
@@ -220,15 +232,10 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             'drive.torque.brake', 'the brake is never applied', 'add on_timeout: brake'
         )
     mechanics = context.mechanics
-    yielding = mechanics.loads.applied.stops
     motion: Any = OneFreedom(
         mechanics.equation,
         METHODS[parameters.method].step,
-        _stops(
-            Closure(without_limits(closure.linkage, yielding)) if yielding else closure,
-            parameters.start,
-            parameters.stop_margin,
-        ),
+        _stops(context.hard_limited, parameters.start, parameters.stop_margin),
         parameters.restitution,
         mechanics.laws,
         context.reactions.resisting if mechanics.friction.loaded else None,
@@ -254,10 +261,15 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             'start elsewhere',
         )
     low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
-    if motor:
+    curved = [rubbing for rubbing in mechanics.rubbing if rubbing.law]
+    if motor or curved:
         places = (low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
-        moved = [terms.inertia for terms in map(mechanics.equation, places) if terms]
-        least = min([value for value in moved if value > 0.0], default=inf)
+        moved = [terms for terms in map(mechanics.equation, places) if terms]
+        moved = [terms for terms in moved if terms.inertia > 0.0]
+    if curved:
+        _check_curves(mechanics, curved, moved, parameters)
+    if motor:
+        least = min([terms.inertia for terms in moved], default=inf)
         if parameters.play is not None:
             least = parameters.play.inertia
         motor.check_step(least, parameters.method, parameters.step)
@@ -273,6 +285,33 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     made_up = max(_MADE_UP, 2 * period)
     wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
     return TorqueDrive(motion, start, parameters, made_up, min(most, LARGEST), motor, wrenches)
+
+
+def _check_curves(
+    mechanics: Mechanics, curved: Sequence[Rubbing], moved: Sequence[Terms], use: TorqueParameters
+) -> None:
+    """Refuse friction that falls with the rate faster than a step follows."""
+    joints = mechanics.closure.structure.joints
+    names = [joints[rubbing.joint].name for rubbing in curved]
+    worst, blamed = 0.0, names[0]
+    for terms in moved:
+        # Their laws follow those of the loads.
+        falling = [
+            rubbing.law.steepest * at.factor**2 / terms.inertia
+            for rubbing, at in zip(curved, terms.laws[-len(curved) :], strict=True)
+            if rubbing.law
+        ]
+        if sum(falling) > worst:
+            worst, blamed = sum(falling), names[falling.index(max(falling))]
+    check_step(
+        f'effects.friction.joints.{blamed}.stribeck',
+        worst,
+        use.method,
+        use.step,
+        'the curve is too steep',
+        'write 0: breakaway then acts at rest only',
+        EXACT,
+    )
 
 
 def writer(parameters: TorqueParameters, context: Context, drive: TorqueDrive) -> Any:
@@ -383,6 +422,7 @@ class TorqueDrive(Drive):
         '_boundary',
         '_delay',
         '_due',
+        '_ends',
         '_idle',
         '_loaded_until',
         '_made_up',
@@ -403,6 +443,8 @@ class TorqueDrive(Drive):
         'stamp',
     )
 
+    exerts_effort = True
+    """Whether its effort on an input at rest does not follow from the motion."""
     stamp: int
     """Arrival of the newest good command, in [ns]; 0 before the first."""
     max_age: int
@@ -434,6 +476,7 @@ class TorqueDrive(Drive):
         self._delay = round(use.motor.delay * NANOSECONDS) if use.motor else 0
         self._quantum = use.motor.quantum if use.motor else 0.0
         self._waiting: deque[tuple[int, _Acting]] = deque()
+        self._ends = use.play is not None and use.play.on_chatter == 'end'
         self.max_age = round(use.timeout * NANOSECONDS)
         self._most = most
         self.stamp = self.lost = self.saturated = 0
@@ -486,7 +529,15 @@ class TorqueDrive(Drive):
         self._loaded_until = min(each.until for each in self._wrenches)
 
     def state(self, now: int) -> CrankState:
-        """Return the crank state at a time, in [ns]; for an earlier time, the last state."""
+        """
+        Return the crank state at a time, in [ns]; for an earlier time, the last state.
+
+        Raises
+        ------
+        LinkageError
+            Motor and crank meet and part too often, and the scene ends the run then.
+
+        """
         if self._time < 0:
             self._time = self._begun = now
             self._boundary = now + self._step
@@ -499,7 +550,39 @@ class TorqueDrive(Drive):
             time += seconds
         acceleration = mechanism.acceleration(motion, force, brake, time)
         self._shown = motion
-        return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
+        if self._ends and self.chattered:
+            raise LinkageError(
+                'drive.torque.play',
+                f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
+                f'at a rate of {motion.rate:.4g}',
+                'shorten the step, look at the controller, or write on_chatter: close',
+            )
+        if motion.rate:
+            return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
+        standing = CrankAtRest((motion.value,), (motion.rate,), (acceleration,), 0)
+        standing.bearing = self._bearing(motion, acceleration)
+        return standing
+
+    def _bearing(self, motion: Any, acceleration: float) -> tuple[float, float]:
+        """Return the least and the greatest effort that acts on the input at rest."""
+        mechanism, force, holding = self._acting
+        if self._motor:
+            resting, within = self._motor.at_rest(mechanism, motion)
+            force, holding = force + resting, holding + within
+        least, most = force - holding, force + holding
+        behind_play = getattr(motion, 'moved', motion)
+        if not isinstance(behind_play, Motion):
+            # Through the play passes what is left after the motor's own inertia, as a push.
+            own = behind_play.motor.terms.inertia * acceleration
+            low, high = _PUSHES[behind_play.side]
+            least, most = (min(max(end - own, low), high) for end in (least, most))
+        return least, most
+
+    @property
+    def chattered(self) -> int:
+        """Number of steps in which motor and crank met and parted too often."""
+        coarse: int = getattr(getattr(self._motion, 'moved', self._motion), 'coarse', 0)
+        return coarse
 
     @property
     def motor(self) -> tuple[float, float, float | None]:

@@ -274,6 +274,7 @@ class AppliedForces:
             step,
             'it is too stiff',
             'write a smaller stiffness or damping',
+            longest_step.EXACT,
         )
 
     def _sampled(

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from math import exp, inf, tau
+from math import e, exp, inf, sqrt, tau
 from typing import NamedTuple, Protocol
 
 
@@ -171,6 +171,11 @@ class Stribeck:
     def force(self, segment: int, _value: float, rate: float, _time: float) -> float:
         """Return the force, as if the direction were that of the segment."""
         return -segment * self.excess * exp(-((rate / self.rate) ** 2))
+
+    @property
+    def steepest(self) -> float:
+        """Return the greatest fall of the friction over the rate, at s/√2, in [N·m·s/rad]."""
+        return self.excess / self.rate * sqrt(2.0 / e)
 
     def at(self, rate: float) -> tuple[float]:
         """Return the force at a rate, for `linkage_ros.kinematics.arithmetic.called`."""

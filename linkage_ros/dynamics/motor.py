@@ -149,6 +149,12 @@ class Motor:
         torque: float = law.torque(getattr(motion, 'motor', motion).rate)
         return torque
 
+    @staticmethod
+    def at_rest(mechanism: Any, _motion: Any) -> tuple[float, float]:
+        """Return the effort at rest, and what the gear holds beyond that of `driven`."""
+        *_, law = getattr(mechanism, 'motor', mechanism).laws
+        return law.resting, 0.0
+
     def check_step(self, inertia: float, method: str, step: float) -> None:
         """
         Refuse a motor whose rate follows the voltage faster than the integration can.

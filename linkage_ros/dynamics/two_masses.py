@@ -32,23 +32,40 @@ Review 42, 2000).
 A stop bears the crank, not the motor: where the crank comes to its stop, the motor goes on alone,
 or meets the crank. To a motor that pushes it against the stop a crank at rest is a wall. Friction
 in the joints takes no part in an impact.
+
+To find an instant takes trials: motions from the start of the step to a guess. Each step may
+take some, and what it leaves over may be used later, so a run of bounces fits in. A motion that
+asks for more, as one that is far too fast for its step, goes on as time-stepping does: what is
+left of a step is one piece; they do not part in it, and they meet at its end, without a bounce
+(J. J. Moreau, Numerical aspects of the sweeping process, Comput. Methods Appl. Mech. Eng. 177,
+1999). So the work is bounded, and it depends on nothing but the motion.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import copysign
+from math import copysign, ulp
 from typing import NamedTuple
 
 from linkage_ros.dynamics.mechanics import Terms
 from linkage_ros.dynamics.motion import last_before, Motion, NARROW, OneFreedom
 
-_PIECES = 50
-"""Most pieces of a step; after these both move as one."""
+TRIALS = 3
+"""Trials that each step may take to find the instants of meetings and partings."""
+
+SAVED = 200
+"""Most trials that are saved for a step: enough for two runs of bounces."""
 
 _BOUNCES = 20
 """Most bounces in a step: with more they come to rest against each other anyway."""
+
+_BRIEF = 1e-4
+"""
+Flights from one meeting to the next that are shorter, as a fraction of the step, are the last.
+
+A further one would move them by less than this squared times what the step does.
+"""
 
 _SLOW = 1e-9
 """Slower meetings, as a fraction of both rates, are without a bounce."""
@@ -63,6 +80,8 @@ class PlayMotion(NamedTuple):
     # 1 if the motor touches the crank so that it pushes it forward, -1 backward, 0 in between.
     side: int = 0
     ahead: float = 0.0  # The time since the start of the step, in [s]
+    trials: int = SAVED  # Trials that are left; negative if the last search took more than that
+    coarse: int = 0  # Steps so far that were finished without them
 
     @property
     def value(self) -> float:
@@ -130,43 +149,76 @@ class TwoMasses:
     ) -> PlayMotion:
         """Advance a state by one step; the parameters are those of `OneFreedom.advance`."""
         left, bounces = seconds, 0
-        for _ in range(_PIECES):
+        motion = motion._replace(trials=min(motion.trials + TRIALS, SAVED))
+        while True:
             now = time + (seconds - left)
             motion = motion._replace(ahead=0.0)
             if motion.side and self._pressed(motion, force, brake, now) < 0.0:
                 motion = motion._replace(side=0)
-            begin, side = motion, motion.side
+            begin, side, trials = motion, motion.side, motion.trials
 
             def reach(ahead: float, begin: PlayMotion = begin, now: float = now) -> PlayMotion:
+                nonlocal trials
+                trials -= 1
                 return self._moved(begin, ahead, force, brake, now)
 
-            def margin(state: PlayMotion, side: int = side, now: float = now) -> float:
-                if side:
-                    return self._pressed(state, force, brake, now + state.ahead)
-                return self.half - abs(state.motor.value - state.crank.value)
-
+            opening = 0.0 if side else self._opening(begin)
+            margin = self._margin(begin, opening, force, brake, now)
             length, end = left, reach(left)
             stopped = side and self._at_stop(end.crank) and not self._at_stop(begin.crank)
+            ends = margin(end) < 0.0
+            if not (ends or stopped):
+                return end._replace(trials=begin.trials)
+            if trials < 0:
+                if stopped:
+                    end = self._stopped(end, False)
+                elif not side:
+                    end = self._met(end, False)
+                return end._replace(trials=begin.trials, coarse=begin.coarse + 1)
             if stopped:
                 length, end, _ = last_before(reach, self._before_stop, begin, left, end)
-            if margin(end) < 0.0:
+                ends = margin(end) < 0.0
+            if ends:
                 length, _, _ = last_before(reach, margin, begin, length, end)
-                stopped = False
-            elif not stopped:
-                return end
+                end = reach(length)
             left -= length
-            if stopped:
+            if not ends:
                 motion = self._stopped(end, bounces < _BOUNCES)
                 bounces += not motion.side
             elif side:
-                motion = reach(length)._replace(side=0)
+                motion = end._replace(side=0)
             else:
-                motion = self._met(reach(length), bounces < _BOUNCES)
+                last = opening > 0.0 and length < _BRIEF * seconds
+                motion = self._met(end, bounces < _BOUNCES and not last)
                 bounces += not motion.side
+            motion = motion._replace(trials=trials)
             if left <= seconds * NARROW:
                 return motion
-        together = self._met(motion, False)
-        return self._moved(together, left, force, brake, time + (seconds - left))
+
+    def _margin(
+        self, begin: PlayMotion, opening: float, force: float, brake: float, now: float
+    ) -> Callable[[PlayMotion], float]:
+        """Return a function that is negative after they met or parted, since some state."""
+        if begin.side:
+            return lambda state: self._pressed(state, force, brake, now + state.ahead)
+        if not opening:
+            return self._gap
+        # A flight from one meeting to the next has the gap 0 at both ends. Divided by the time it
+        # is nearly a straight line, on which the search ends soon.
+        return lambda state: self._gap(state) / state.ahead if state.ahead else opening
+
+    def _gap(self, state: PlayMotion) -> float:
+        """Return how far they are from meeting, in [rad] or [m]; 0 within rounding."""
+        motor, crank = state.motor.value, state.crank.value
+        gap = self.half - abs(motor - crank)
+        return gap if abs(gap) > 4.0 * ulp(abs(motor) + abs(crank)) else 0.0
+
+    def _opening(self, state: PlayMotion) -> float:
+        """Return the rate at which they leave each other; 0 if they do not, or are apart."""
+        motor, crank = state.motor, state.crank
+        if self._gap(state):
+            return 0.0
+        return max(0.0, copysign(1.0, crank.value - motor.value) * (motor.rate - crank.rate))
 
     def _moved(
         self, motion: PlayMotion, seconds: float, force: float, brake: float, now: float
@@ -176,11 +228,11 @@ class TwoMasses:
         if not side:
             crank = self.crank.advance(motion.crank, seconds, 0.0, 0.0, now)
             motor = self.motor.advance(motion.motor, seconds, force, brake, now)
-            return PlayMotion(crank, motor, 0, seconds)
+            return motion._replace(crank=crank, motor=motor, ahead=seconds)
         end = self.joined.advance(self._as_one(motion.crank), seconds, force, brake, now)
         crank = end._replace(terms=self.crank.terms(end.value) or motion.crank.terms)
         motor = motion.motor._replace(value=end.value + side * self.half, rate=end.rate)
-        return PlayMotion(crank, motor, side, seconds)
+        return motion._replace(crank=crank, motor=motor, ahead=seconds)
 
     def _as_one(self, crank: Motion) -> Motion:
         """Return the state of both as one."""
@@ -196,12 +248,12 @@ class TwoMasses:
     def _stopped(self, motion: PlayMotion, bounces: bool) -> PlayMotion:
         """Return the state after a crank that touches its motor has come to its stop."""
         low, high = self.stops
-        crank, motor, side, ahead = motion
+        crank, motor, side = motion[:3]
         stop = high if crank.rate > 0.0 else low
         rate = 0.0 - self.crank.restitution * crank.rate
         crank = self.crank.at(stop, rate) or crank._replace(value=stop, rate=rate)
         motor = motor._replace(value=stop + side * self.half)
-        parted = PlayMotion(crank, motor, 0, ahead)
+        parted = motion._replace(crank=crank, motor=motor, side=0)
         return self._met(parted, bounces) if side * (motor.rate - rate) > 0.0 else parted
 
     def _pressed(self, motion: PlayMotion, force: float, brake: float, time: float) -> float:
@@ -218,11 +270,11 @@ class TwoMasses:
         if self._at_stop(crank) and crank.value == (high if side > 0 else low):
             back = self.restitution * motor.rate if bounces else 0.0
             motor = motor._replace(value=crank.value + side * self.half, rate=0.0 - back)
-            return PlayMotion(crank, motor, 0 if back else side, motion.ahead)
+            return motion._replace(crank=crank, motor=motor, side=0 if back else side)
         own, other = motor.terms.inertia, crank.terms.inertia
         common = (own * motor.rate + other * crank.rate) / (own + other)
         slow = side * closing <= _SLOW * (abs(motor.rate) + abs(crank.rate))
         back = self.restitution * closing / (own + other) if bounces and not slow else 0.0
         motor = motor._replace(value=crank.value + side * self.half, rate=common - other * back)
         crank = crank._replace(rate=common + own * back)
-        return PlayMotion(crank, motor, 0 if back else side, motion.ahead)
+        return motion._replace(crank=crank, motor=motor, side=0 if back else side)

@@ -71,6 +71,11 @@ class Winding:
         """Return the torque before the gear, in [N·m]."""
         return self.motor.constant * motion.current
 
+    def at_rest(self, _mechanism: WoundMechanism, motion: WoundMotion) -> tuple[float, float]:
+        """Return the effort at rest, and what the gear holds."""
+        law = self.motor.law(motion.current)
+        return law.resting, law.holding
+
     def check_step(self, inertia: float, method: str, step: float) -> None:
         """
         Refuse a motor whose current, alone or with the rate, is too fast for the integration.

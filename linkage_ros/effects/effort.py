@@ -21,9 +21,12 @@ With friction that grows with the forces in the joints it comes from these force
 
 It covers the inertia of links and drive, gravity, springs and friction: see
 `linkage_ros.dynamics.mechanics` for the equation and its source. It uses the crank's acceleration
-from the drive; that of a topic counts as 0 unless it is estimated. Under the torque drive, the
-effort is the one that causes the motion; where the linkage sticks or rests at a stop, this is not
-the commanded one.
+from the drive; that of a topic counts as 0 unless it is estimated.
+
+Under the torque drive, the effort that causes a motion is the commanded one. An input at rest
+shows no motion from which it follows: friction and stops bear a part. The drive then exerts its
+command. A brake, or the friction in a motor's gear, holds within a range; of it, the drive exerts
+what is nearest to the effort that the loads alone require.
 
 After backlash, a motor that moves within the play pushes nothing. Friction holds the crank, and
 the effort of that drive is for its own inertia only: drive_inertia·φ̈, with φ̈ of the motor.
@@ -35,7 +38,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from linkage_ros.drives.drive import Context, CrankBehindPlay
+from linkage_ros.drives.drive import Context, CrankAtRest, CrankBehindPlay
 from linkage_ros.effects.stage import MechanismState, Stage
 from linkage_ros.kinematics.arithmetic import all_finite
 
@@ -64,7 +67,25 @@ def stage(_parameters: EffortParameters, context: Context) -> Stage:
             return motion
         return motion._replace(efforts=efforts)
 
-    return _behind_play(effort, context) if 'backlash' in context.effects else effort
+    if 'backlash' in context.effects:
+        return _behind_play(effort, context)
+    return _at_rest(effort)
+
+
+def _at_rest(effort: Stage) -> Stage:
+    """Return the stage for drives that exert an effort, which an input at rest does not show."""
+
+    def effort_at_rest(motion: MechanismState) -> MechanismState:
+        required = effort(motion)
+        crank = motion.crank
+        if not isinstance(crank, CrankAtRest) or not crank.bearing or not motion.acceleration:
+            return required
+        # A linkage that jams requires none.
+        least, most = crank.bearing
+        (alone,) = required.efforts or (0.0,)
+        return required._replace(efforts=(min(max(alone, least), most),))
+
+    return effort_at_rest
 
 
 def _behind_play(effort: Stage, context: Context) -> Stage:

@@ -78,9 +78,10 @@ class Snapshot:
     unclosed: int = 0
     indeterminate: int = 0
     wrenches_rejected: int = 0
+    chattered: int = 0
 
     @classmethod
-    def of(cls, counts: Counts, time: int) -> Snapshot:
+    def of(cls, counts: Counts, time: int, chattered: int = 0) -> Snapshot:
         """Return the counts at a time, in [ns] of the steady clock."""
         return cls(
             time,
@@ -92,6 +93,7 @@ class Snapshot:
             counts.unclosed[Status.OPEN] + counts.unclosed[Status.INDETERMINATE],
             counts.unclosed[Status.INDETERMINATE],
             sum(sum(each.rejected.values()) for each in counts.wrenches),
+            chattered,
         )
 
 
@@ -143,6 +145,8 @@ class DiagnosticsSummary:
             level, message = WARN, f'{actual:.1f} ticks a second, {self.rate:g} wanted'
         elif lost:
             level, message = WARN, f'{lost} ticks lost'
+        elif self.now.chattered > self.before.chattered:
+            level, message = WARN, 'Motor and crank meet and part too often for the step'
         # The keys of diagnostic_updater's FrequencyStatus come first.
         values: dict[str, object] = {
             'Events in window': ticks,
@@ -185,6 +189,8 @@ class DiagnosticsSummary:
         ):
             cut = sum(drive.saturated for drive in drives if hasattr(drive, 'saturated'))
             values['Commands cut to the effort limit'] = cut
+        if self.now.chattered:
+            values['Steps with too many meetings of motor and crank'] = self.now.chattered
         return values
 
     def _crank(self) -> DiagnosticStatus:
@@ -395,6 +401,11 @@ class DiagnosticsSummary:
         )
 
 
+def chattered(lines: Sequence[LinkagePipeline]) -> int:
+    """Return the number of steps in which motor and crank met and parted too often."""
+    return sum(getattr(line.drive, 'chattered', 0) for line in lines)
+
+
 def no_clock(silence: float) -> str:
     """Return the text for a ``/clock`` that has been silent for a time, in [s]."""
     return 'No /clock yet' if silence == inf else f'No /clock for {silence:.1f} s'
@@ -496,7 +507,9 @@ class Warnings:
         self._wrenches_rejected: dict[str, dict[Rejection, int]] = {}
         self._unclosed = dict.fromkeys(Status, 0)
         self._lost = self._stalls = self._ticks = 0
+        self._chattered = 0
         self._heard = (0, 0, monotonic())
+        self._looked = (0, monotonic())
 
     def check_silence(
         self,
@@ -504,11 +517,14 @@ class Warnings:
         crank_topic: str,
         inputs: Sequence[str],
         period: float,
+        interval: float,
         max_age: int,
         publishers: Callable[[], Sequence[str]],
     ) -> None:
         """
         Warn if no message arrives, or none with the crank's joints, and nothing is published.
+
+        Messages are taken by ticks. A tick that goes on says nothing on them, and is warned of.
 
         Parameters
         ----------
@@ -520,6 +536,9 @@ class Warnings:
             Names of the joints that a sample must have.
         period
             Least time between two warnings of this kind, in [s].
+        interval
+            Time from tick to tick, in [s]; 0 for one tick per message, infinity if a simulation
+            decides.
         max_age
             Age of the newest sample above which there is no crank, in [ns]; 0 for never.
         publishers
@@ -536,11 +555,24 @@ class Warnings:
                 f'{listed(map(repr, inputs))}: name the joint so there, or remap the topic',
                 period,
             )
+        handled = counts.used + counts.superseded + counts.ignored + sum(counts.rejected.values())
+        ticks, looked = self._looked
+        if counts.ticks != ticks or (not interval and handled == counts.received):
+            looked = monotonic()
+        self._looked = counts.ticks, looked
+        late = monotonic() - looked
+        if late > _PATIENCE + 2.0 * interval:
+            self.warn(
+                'late',
+                f'no tick has ended in {late:.0f} s, so nothing is published, and messages on '
+                f'{crank_topic} wait or are lost; lower the rate, or make the scene cheaper',
+                period,
+            )
         received, published, since = self._heard
         if (counts.received, counts.published) != (received, published):
             self._heard = (counts.received, counts.published, monotonic())
             return
-        waited = monotonic() - since
+        waited = looked - since
         if (counts.received and not max_age) or waited <= max(_PATIENCE, max_age / NANOSECONDS):
             return
         number = len(publishers())
@@ -595,6 +627,18 @@ class Warnings:
                 )
                 if self.warn(status.value, line, period):
                     self._unclosed[status] = counts.unclosed[status]
+
+    def check_chatter(self, lines: Sequence[LinkagePipeline], period: float) -> None:
+        """Warn of steps in which motor and crank met and parted too often; in [s] at most once."""
+        count = chattered(lines)
+        self._chattered = min(self._chattered, count)  # a reset counts anew
+        line = (
+            f'drive.torque.play: motor and crank met and parted too often in '
+            f'{count - self._chattered} steps, at whose ends the play was closed; '
+            'shorten the step, or look at the controller'
+        )
+        if count > self._chattered and self.warn('chatter', line, period):
+            self._chattered = count
 
     def check_wrenches(self, topics: Sequence[tuple[str, WrenchCounts]], period: float) -> None:
         """

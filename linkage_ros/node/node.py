@@ -37,6 +37,7 @@ from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node import pacing
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.diagnostics import (
+    chattered,
     CLOCK_PATIENCE,
     DiagnosticsSummary,
     no_clock,
@@ -308,6 +309,7 @@ class LinkageNode(LifecycleNode):
         """Stop ticking and close the bag; do nothing if nothing runs."""
         if self.loop is not None and self.loop.running:
             self.loop.stop()
+            self._watch_failure(self.loop)
             self._diagnose()
             if self.crank_topic:
                 self.get_logger().info(f'{self.crank_topic}: {self.loop.samples}')
@@ -420,6 +422,7 @@ class LinkageNode(LifecycleNode):
         period = self.get_parameter('warning_period').value
         self._warnings.check(loop.counts, loop.pipeline.closures, self.crank_topic, period)
         wrenches = [each.topic_name for each in self._scene_topics.wrenches]
+        self._warnings.check_chatter(loop.pipeline.lines, period)
         self._warnings.check_wrenches([*zip(wrenches, loop.counts.wrenches, strict=True)], period)
         silence = self._clock_silence()
         if min(silence, (time.monotonic_ns() - self._activated) / NANOSECONDS) > CLOCK_PATIENCE:
@@ -432,20 +435,26 @@ class LinkageNode(LifecycleNode):
         assert self.scene is not None
         if listening and (loop.counts.ticks or not self.scene.rate):
             inputs = [name for member in listening for name in member.inputs]
+            simulated = self.scene.rate and self.get_parameter('use_sim_time').value
             self._warnings.check_silence(
                 loop.counts,
                 self.crank_topic,
                 inputs,
                 period,
+                inf if simulated else 1.0 / self.scene.rate if self.scene.rate else 0.0,
                 loop.pipeline.max_age,
                 self._crank_publishers,
             )
-        if loop.failure:
-            self._warnings.warn('tick', f'the tick has stopped: {loop.failure}', period)
+        self._watch_failure(loop)
         news = self.recording.check(loop)
         due = self._before.time + self.get_parameter('diagnostics_period').value * NANOSECONDS
         if news or time.monotonic_ns() >= due - 0.5 * _WATCH_PERIOD * NANOSECONDS:
             self._diagnose()
+
+    def _watch_failure(self, loop: TickLoop) -> None:
+        if loop.failure:
+            period = self.get_parameter('warning_period').value
+            self._warnings.warn('tick', f'the tick has stopped: {loop.failure}', period)
 
     def _diagnose(self) -> None:
         assert self.scene is not None
@@ -465,7 +474,9 @@ class LinkageNode(LifecycleNode):
             )
         simulated = self.get_parameter('use_sim_time').value
         clock = self.get_clock().now()
-        now = Snapshot.of(self.loop.counts, time.monotonic_ns())
+        now = Snapshot.of(
+            self.loop.counts, time.monotonic_ns(), chattered(self.loop.pipeline.lines)
+        )
         health = DiagnosticsSummary(
             node=self.get_fully_qualified_name(),
             scene=self.scene.name,

@@ -112,7 +112,8 @@ def straight(
     """
     crank = drive.straight(compiled.driven, 'return plain(now, None)')
     lines, bound = [*crank.lines], {**crank.bound}
-    state = f'CrankState({_CRANK})'
+    # A drive that is not written out names its state, which may hold more than its fields.
+    state = 'crank' if 'crank = state(now)' in lines else f'CrankState({_CRANK})'
     for number, stage in enumerate(drive_stages):
         bound[f'stage{number}'] = stage
         lines.append(f'crank = {_CRANK}, = stage{number}({state})')
@@ -149,6 +150,9 @@ def straight(
     if efforts and drive_stages:
         # Within its play, the motor moves alone and carries only itself.
         leave_unless("{*getattr(crank, 'free_motors', ())} <= {None}")
+    if efforts and getattr(drive, 'exerts_effort', False):
+        # On an input at rest the drive exerts what it is told, which no motion shows.
+        leave_unless("not getattr(crank, 'bearing', ())")
     if angles is not None:
         bound['running'] = angles
         lines.append('last = running.raw')

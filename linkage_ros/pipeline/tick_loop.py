@@ -30,6 +30,7 @@ from time import monotonic_ns
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.bag.recorder import Recorder
+from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import Rejection
@@ -475,5 +476,7 @@ class TickLoop:
         # A defect here must be reported, and without a traceback.
         try:
             pace(self, self._stopping)
+        except LinkageError as error:
+            self.failure = str(error)
         except Exception as error:  # noqa: BLE001 (see above)
             self.failure = f'{type(error).__name__}: {error}'

@@ -14,7 +14,7 @@
 
 """Effort: what the drive must give, also under torque, against closed forms."""
 
-from math import cos, pi, sin
+from math import cos, sin
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -201,34 +201,14 @@ def test_without_masses_it_is_refused_in_one_line():
     assert '\n' not in str(caught.value)
 
 
-# The published effort under the torque drive: moving freely, stuck, at a stop, braked.
-#
-# Timelines of a crank with a weight, and of a ram. The free-body diagrams are by hand: the effort
-# is what drive, brake, stop and static friction exert together.
+# The published effort under the torque drive, of a crank with a weight that moves: the free-body
+# diagrams are by hand. At rest: test_effort_at_rest.py.
 
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
 WEIGHT = 2.0 * 9.81 * 0.3
 """Largest moment of the crank's weight, in [N·m]."""
-
-
-RAM = """
-links:
-  ground: {W: [0, 0], X: [1, 0]}
-  ram: {P: [0, 0]}
-  bar: {P: [0, 0], H: [0.5, 0]}
-sliders:
-  guide: {point: P, block: ram, angle: 0, along: ground, through: W, direction: [0, 1]}
-  rail: {point: H, along: ground, through: W, direction: [1, 0]}
-input: {joint: ram_slide, slider: guide}
-assembly: {rail: ahead}
-joints: {bar_joint: {parent: ground, child: bar}}
-masses:
-  ram: {mass: 4, center: [0, 0], inertia: 0.001}
-  bar: {mass: 1.0e-9, center: [0, 0], inertia: 1.0e-12}
-"""
-"""A ram that lifts 4 kg, and is stopped where the bar stands upright, at 0.5 m."""
 
 
 def timeline(linkage, torque, commands, until, friction=''):
@@ -266,21 +246,6 @@ def test_where_no_command_holds_it_is_none():
         assert found[time][2] == pytest.approx(0.0, abs=1e-10)
 
 
-@pytest.mark.parametrize('command', [-0.4, 0.0, 1.2])
-def test_where_friction_holds_it_it_is_the_weight_and_not_the_command(command):
-    # Near the top of its circle the weight is below what friction holds, and so is what is left
-    # of it with the command: drive and friction bear the weight together, in parts that nobody
-    # can tell.
-    angle = 0.5 * pi - 0.1
-    weight = WEIGHT * cos(angle)
-    assert abs(command - weight) < 1.5
-    found = timeline(PENDULUM, f'{{start: {angle!r}}}', {0: command}, 90, RUBBING)
-    for time in range(90):
-        position, rate, effort = found[time]
-        assert (position, rate) == (angle, 0.0)
-        assert effort == pytest.approx(weight, abs=1e-12)
-
-
 def test_while_the_brake_slips_it_is_the_brakes():
     # It turns forward, and the brake exerts −2 on it; friction of the pin is no part of that.
     torque = '{start: 0.2, rate: 6.0, on_timeout: brake, brake: 2.0}'
@@ -291,26 +256,3 @@ def test_while_the_brake_slips_it_is_the_brakes():
     back = timeline(PENDULUM, torque.replace('6.0', '-6.0'), {}, 60, RUBBING)
     assert back[59][1] < 0.0
     assert back[59][2] == pytest.approx(2.0, abs=1e-10)
-
-
-def test_where_the_brake_holds_it_it_is_the_weight():
-    torque = '{start: 0.2, on_timeout: brake, brake: 20.0}'
-    found = timeline(PENDULUM, torque, {}, 60)
-    for time in range(60):
-        assert found[time][:2] == (0.2, 0.0)
-        assert found[time][2] == pytest.approx(WEIGHT * cos(0.2), abs=1e-12)
-
-
-def test_at_a_stop_it_is_the_weight_and_not_the_command():
-    # 60 N up lift 4 kg against its 39.24 N; at the stop the ground bears what is too much.
-    commands = dict.fromkeys(range(0, 1500, 90), 60.0)
-    found = timeline(RAM, '{start: 0.2, stop_margin: 0.05}', commands, 1400)
-    stop = max(position for position, _, _ in found.values())
-    moving = [time for time in found if time and found[time][1] > 0.0]
-    resting = [time for time in found if time and found[time][:2] == (stop, 0.0)]
-    assert len(moving) > 100
-    assert len(resting) > 100
-    for time in moving:
-        assert found[time][2] == pytest.approx(60.0, abs=1e-6)
-    for time in resting:
-        assert found[time][2] == pytest.approx(4.0 * 9.81, abs=1e-6)

@@ -18,7 +18,7 @@ from threading import Event
 from types import SimpleNamespace
 
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node import pacing
+from linkage_ros.node import diagnostics, pacing
 from linkage_ros.node.diagnostics import Warnings
 from linkage_ros.pipeline.tick_loop import Counts, Stall
 import pytest
@@ -97,3 +97,45 @@ def test_a_rate_that_cannot_be_held_is_to_be_lowered(run):
 
 def test_a_run_without_a_stall_is_silent(run):
     assert told(run([1] * 300)) == []
+
+
+# Messages are taken by ticks: while a tick goes on, nobody knows whether one has come. By name:
+# the time from tick to tick [s]; then in turn a time [s], the ticks, and the messages received and
+# used by then; and what is said in all, the first words of each line.
+NOTHING_CAME = 'no message on /crank in'
+NO_TICK = 'no tick has ended in'
+SILENCES = {
+    'no message comes': (0.01, [(t, t * 100, 0, 0) for t in range(6)], [NOTHING_CAME]),
+    'a tick goes on for 5 s': (0.01, [(t, 1, 1, 1) for t in range(6)], [NO_TICK]),
+    'a tick goes on after a while of messages': (
+        0.01, [(t, *[min(t, 4) * n for n in (100, 80, 80)]) for t in range(9)], [NO_TICK],
+    ),
+    'a tick goes on just after the last message was taken': (
+        0.01, [(0, 1, 1, 1), (1, 100, 50, 50), *((t, 110, 50, 50) for t in (1.2, 3, 4))],
+        [NO_TICK],
+    ),
+    'ticks as slow as they are wanted': (5.0, [(t, *[t // 5] * 3) for t in range(12)], []),
+    'a tick for each message, and none comes': (
+        0.0, [(t, 0, 0, 0) for t in range(6)], [NOTHING_CAME],
+    ),
+    'a tick for each message, and one goes on': (
+        0.0, [(0, 1, 1, 1), *((t, 1, 2, 1) for t in range(1, 6))], [NO_TICK],
+    ),
+    'a simulation stands still': (float('inf'), [(t, 5, 5, 5) for t in range(9)], []),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', SILENCES)
+def test_a_tick_that_goes_on_does_not_say_that_no_message_came(monkeypatch, name):
+    interval, timeline, expected = SILENCES[name]
+    now = [0.0]
+    monkeypatch.setattr(diagnostics, 'monotonic', lambda: now[0])
+    counts, lines = Counts(), Said()
+    warnings = Warnings(lines)
+    for seconds, ticks, received, used in timeline:
+        now[0] = float(seconds)
+        counts.ticks, counts.received, counts.used, counts.published = ticks, received, used, used
+        warnings.check_silence(
+            counts, '/crank', ['crank_joint'], 100.0, interval, NANOSECONDS, lambda: ['/other']
+        )
+    assert [line[: len(start)] for line, start in zip(lines, expected, strict=True)] == expected
