@@ -149,7 +149,10 @@ def test_arrows_of_forces_have_a_length_without_any_weight():
 
 def test_of_a_massless_link_a_robot_model_says_that_or_refuses_it(tmp_path, capsys):
     file = tmp_path / 'light.yaml'
-    file.write_text(f'{FOUR_BAR}\n{MASSLESS}', 'utf-8')
+    text = four_bar_text(A, B, C, D).replace(
+        'joints: {', 'joints: {coupler_joint: {parent: crank, child: coupler}, '
+    )
+    file.write_text(text + MASSLESS, 'utf-8')
     assert main(['urdf', str(file)]) == 0
     written = capsys.readouterr().out
     assert '<link name="rocker">' in written
