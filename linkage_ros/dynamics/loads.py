@@ -200,6 +200,12 @@ class Loads:
     # Springs, stops and efforts of joints, forces on points, and wrenches on links.
     applied: AppliedLoads = field(default_factory=AppliedLoads)
 
+    @property
+    def without_masses(self) -> bool:
+        """Whether there are loads, and none of them is a weight."""
+        loaded = self.springs or self.drive_inertia or self.applied
+        return bool(loaded) and not any(self.gravity)
+
 
 @dataclass(frozen=True, slots=True)
 class JointFriction:
@@ -254,9 +260,11 @@ class Friction:
         return next((name for name, joint in self.joints.items() if joint.coefficient), '')
 
 
-def check_masses(linkage: Linkage) -> None:
+def check_masses(linkage: Linkage, loads: Loads) -> None:
     """
     Refuse a linkage in which a link that moves has no mass.
+
+    Loads other than gravity act on a linkage without any masses, too.
 
     Raises
     ------
@@ -264,13 +272,15 @@ def check_masses(linkage: Linkage) -> None:
         With the key ``masses`` of the linkage file.
 
     """
+    if not linkage.masses and loads.without_masses:
+        return
     for link in linkage.links:
         if link != GROUND and link not in linkage.masses:
             raise DefinitionError(
                 'masses',
                 f'link {quoted(link)} has no mass, and forces are asked for',
                 f'add masses: {{{link}: {{mass: 0.1, center: [0, 0], inertia: 1.0e-5}}}} '
-                'in [kg], [m] and [kg·m²]',
+                'in [kg], [m] and [kg·m²]; mass: 0 for a massless link',
             )
 
 

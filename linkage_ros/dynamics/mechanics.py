@@ -53,7 +53,6 @@ from linkage_ros.kinematics.arithmetic import all_finite, called, copysign, wher
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
-from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
 if TYPE_CHECKING:
@@ -129,7 +128,7 @@ class Mechanics:
         self.loads = loads or Loads()
         self.friction = friction or Friction()
         linkage = closure.linkage
-        check_masses(linkage)
+        check_masses(linkage, self.loads)
         check_loads(linkage, self.loads, self.friction)
         if self.friction.holds and len(linkage.inputs) > 1:
             raise DefinitionError(
@@ -137,16 +136,17 @@ class Mechanics:
                 f'the linkage has {len(linkage.inputs)} inputs, and friction could hold either',
                 'leave it out',
             )
-        moving = [link for link in linkage.links if link != GROUND]
-        points = [(link, complex(*linkage.masses[link].center)) for link in moving]
+        heavy = {link: linkage.masses[link] for link in linkage.links if link in linkage.masses}
+        heavy = {link: body for link, body in heavy.items() if body.mass or body.inertia}
+        points = [(link, complex(*body.center)) for link, body in heavy.items()]
         for spring in self.loads.springs:
             for link, name in spring.ends:
                 points.append((link, complex(*linkage.links[link][name])))
         self._follower = closure.point_tracker(points)
         at = iter(self._follower.indices)
         self._bodies = tuple(
-            (linkage.masses[link].mass, linkage.masses[link].inertia, next(at), turn)
-            for link, turn in ((link, closure.angles[link].coordinate) for link in moving)
+            (body.mass, body.inertia, next(at), closure.angles[link].coordinate)
+            for link, body in heavy.items()
         )
         self._springs = tuple(
             (spring.stiffness, spring.free_length, spring.damping, next(at), next(at))

@@ -311,7 +311,8 @@ class Arrows:
         self._closure = closure
         self._scale = scale
         self._eighth = 0.125 * shapes.extent
-        self._weight = _GRAVITY * sum(each.mass for each in closure.linkage.masses.values())
+        weight = _GRAVITY * sum(each.mass for each in closure.linkage.masses.values())
+        self._weight = weight or 1.0  # of a massless linkage: one newton
         self._shortest = _SHORTEST * shapes.size
         self._radius = 8.0 * shapes.size
         self._head = 2.0 * shapes.size

@@ -274,7 +274,7 @@ def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
             )
         link = content.section(name)
         masses[name] = Mass(
-            link.number('mass', above=0.0, most=HEAVIEST, unit='kg'),
+            link.number('mass', least=0.0, most=HEAVIEST, unit='kg'),
             link.point('center', most=FARTHEST, unit='m'),
             link.number('inertia', least=0.0, most=HEAVIEST, unit='kg·m²'),
         )

@@ -13,19 +13,11 @@
 # limitations under the License.
 
 
-"""
-The scene within an FMU: what PythonFMU3 calls, on the importer's machine.
-
-An exception that leaves a method of `SceneSlave` may crash the importer: PythonFMU3's wrapper
-(0.3.4) frees the instance, but keeps its pointers. So a step that cannot be done has the status
-`discard`, which leaves the instance as it was, and after a failure all steps have the status
-`error`.
-"""
+"""The scene within an FMU: what PythonFMU3 calls, on the importer's machine."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import partial
 import json
 from pathlib import Path
@@ -35,12 +27,14 @@ from xml.etree.ElementTree import Element
 from linkage_ros import __version__
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import read_regular
+from linkage_ros.fmu.border import guarded, GuardedSlave, State
 from linkage_ros.fmu.stepped_scene import (
     LARGEST_SEED,
     LinkageOutputs,
     NO_CRANK,
     STATUS_NUMBERS,
     SteppedScene,
+    Variable,
 )
 from linkage_ros.scene.load import parse_scene
 from pythonfmu3 import (
@@ -49,7 +43,6 @@ from pythonfmu3 import (
     EnumerationType,
     Float64,
     Fmi3Causality,
-    Fmi3Slave,
     Fmi3Status,
     Fmi3StepResult,
     Fmi3Variability,
@@ -72,6 +65,8 @@ _EXPONENTS: dict[str, dict[str, int]] = {
     'm/s2': {'m': 1, 's': -2},
     'N': {'kg': 1, 'm': 1, 's': -2},
     'N.m': {'kg': 1, 'm': 2, 's': -2},
+    'A': {'A': 1},
+    'V': {'kg': 1, 'm': 2, 's': -3, 'A': -1},
 }
 """The units, as products of base units."""
 
@@ -107,7 +102,11 @@ class _Enumeration(Enumeration):
     dimensions = ()
 
 
-class SceneSlave(Fmi3Slave):
+_loaded: set[str] = set()
+"""Folders of FMUs that could be instantiated."""
+
+
+class SceneSlave(GuardedSlave):
     """
     An instance of the FMU.
 
@@ -120,7 +119,17 @@ class SceneSlave(Fmi3Slave):
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
-        folder = Path(given['resources'])
+        folder = given['resources']
+        try:
+            self._load(Path(folder))
+        except Exception as error:
+            if folder not in _loaded:
+                raise
+            self.fail('fmi3Reset', error)
+        _loaded.add(folder)
+
+    def _load(self, folder: Path) -> None:
+        """Read the scene, and declare its variables."""
         content = Content(**json.loads(read_regular(folder / CONTENT_FILE, _LARGEST_FILE)))
         if content.version != __version__:
             raise LinkageError(
@@ -139,7 +148,6 @@ class SceneSlave(Fmi3Slave):
         )
         self._inputs = [0.0] * len(self._scene.inputs)
         self._begin: float | None = None
-        self._failed = False
         self._logged: set[str] = set()
         self.time = 0.0
         self._declare()
@@ -180,6 +188,8 @@ class SceneSlave(Fmi3Slave):
             )
         for outputs in self._scene.outputs:
             self._declare_outputs(outputs)
+        for motor in self._scene.motors:
+            self._declare_numbers(motor.variables, motor.values)
         if self._scene.inputs:
             self._add(
                 Int64(
@@ -193,17 +203,7 @@ class SceneSlave(Fmi3Slave):
 
     def _declare_outputs(self, outputs: LinkageOutputs) -> None:
         for field, variables in outputs.variables.items():
-            for number, (name, unit, text) in enumerate(variables):
-                self._add(
-                    Float64(
-                        name,
-                        causality=Fmi3Causality.output,
-                        variability=Fmi3Variability.discrete,
-                        unit=unit,
-                        description=text,
-                        getter=partial(outputs.values[field].__getitem__, number),
-                    )
-                )
+            self._declare_numbers(variables, outputs.values[field])
         for field in outputs.variables:
             of_reading = field == 'position'
             self._add(
@@ -229,6 +229,19 @@ class SceneSlave(Fmi3Slave):
         )
         self.type_definitions['Status'] = _status_type()
 
+    def _declare_numbers(self, variables: Sequence[Variable], values: Sequence[float]) -> None:
+        for number, (name, unit, text) in enumerate(variables):
+            self._add(
+                Float64(
+                    name,
+                    causality=Fmi3Causality.output,
+                    variability=Fmi3Variability.discrete,
+                    unit=unit,
+                    description=text,
+                    getter=partial(values.__getitem__, number),
+                )
+            )
+
     def _add(self, variable: Any) -> None:
         # nested: a dot in a name would be taken for an attribute of an attribute.
         self.register_variable(variable, nested=False)
@@ -252,39 +265,33 @@ class SceneSlave(Fmi3Slave):
             simulation.set('canHandleVariableCommunicationStepSize', 'true')
         return root
 
+    @guarded('fmi3EnterInitializationMode', (State.INSTANTIATED,), lambda: None)
+    def enter_initialization_mode(self) -> None:
+        """Await values for the first tick."""
+        self.state = State.INITIALIZING
+
+    @guarded('fmi3ExitInitializationMode', (State.INITIALIZING,), lambda: None)
     def exit_initialization_mode(self) -> None:
         """Do the first tick, at the start time."""
-        with self._failures_logged():
-            self._scene.start(self._seed, self._inputs)
-            self._log_rejections()
+        self._scene.start(self._seed, self._inputs)
+        self.state = State.INITIALIZED
+        self._log_rejections()
 
+    @guarded('fmi3DoStep', (State.INITIALIZED,), lambda *_: Fmi3StepResult(Fmi3Status.error))
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
         """Do the ticks of a step; discard a step that is no whole number of them."""
-        if self._failed:
-            return Fmi3StepResult(status=Fmi3Status.error)
         # PythonFMU3 keeps the start time to itself: the first step begins there.
         begin = current_time if self._begin is None else self._begin
         try:
             ticks = self._scene.whole_ticks(current_time - begin, step_size)
         except LinkageError as error:
             self.log(str(error), Fmi3Status.discard)
-            return Fmi3StepResult(status=Fmi3Status.discard)
+            return Fmi3StepResult(Fmi3Status.discard)
         self._begin = begin
-        with self._failures_logged():
-            self._scene.step(ticks, self._inputs)
-            self.time = current_time + step_size
-            self._log_rejections()
-        return Fmi3StepResult(status=Fmi3Status.error if self._failed else Fmi3Status.ok)
-
-    @contextmanager
-    def _failures_logged(self) -> Iterator[None]:
-        """Log an exception, and let all further steps fail."""
-        try:
-            yield
-        except Exception as error:  # noqa: BLE001 (the wrapper cannot take any)
-            self._failed = True
-            text = str(error) if isinstance(error, LinkageError) else repr(error)
-            self.log(text, Fmi3Status.error)
+        self._scene.step(ticks, self._inputs)
+        self.time = current_time + step_size
+        self._log_rejections()
+        return Fmi3StepResult(Fmi3Status.ok)
 
     def _log_rejections(self) -> None:
         """Log each reason for which samples are rejected, once."""

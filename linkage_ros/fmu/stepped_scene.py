@@ -34,6 +34,7 @@ from linkage_ros.effects.stage import PUBLISHED_WITH
 from linkage_ros.errors import LinkageError, listed
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
+from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageTick, Pipeline
 from linkage_ros.scene.scene import Scene, SceneLinkage
@@ -57,8 +58,10 @@ _UNITS = {
     'velocity': ('rad/s', 'm/s'),
     'acceleration': ('rad/s2', 'm/s2'),
     'effort': ('N.m', 'N'),
+    'current': ('A', 'A'),
+    'voltage': ('V', 'V'),
 }
-"""Units of each field, of a joint that turns and of one that slides."""
+"""Units of each quantity, of a joint that turns and of one that slides."""
 
 _MOST_TICKS = 10_000_000
 """Most ticks of one step: hours of computing."""
@@ -88,17 +91,22 @@ class _Sender:
 
     def __init__(self, line: LinkagePipeline) -> None:
         member = line.member
-        drive, _ = member.drive
+        drive, parameters = member.drive
         self._fields = _INPUT_FIELDS[drive]
+        # A motor may be commanded by another quantity, which the message calls an effort too.
+        command = getattr(getattr(parameters, 'motor', None), 'command', 'effort')
+        quantities = {field: command if field == 'effort' else field for field in self._fields}
         self._count = len(member.inputs)
         self._write = JointStateWriter(member.inputs).write
         self.variables = [
             Variable(
-                f'{line.topic}.{joint}.{field}',
-                _UNITS[field][bool(given.slider)],
-                f'{field} of the input {joint}',
+                f'{line.topic}.{joint}.{quantity}',
+                _UNITS[quantity][bool(given.slider)],
+                f'{quantity} of the input {joint}'
+                if quantity == field
+                else f'{quantity} that is commanded to the motor of {joint}',
             )
-            for field in self._fields
+            for field, quantity in quantities.items()
             for joint, given in zip(member.inputs, member.linkage.inputs, strict=True)
         ]
 
@@ -168,7 +176,46 @@ def _published(member: SceneLinkage) -> list[str]:
     """Return the fields that a linkage publishes."""
     named = {also for effect in member.effects for also in PUBLISHED_WITH.get(effect, ())}
     named |= {'position', *member.effects}
-    return [field for field in _UNITS if field in named]
+    return [field for field in _READ_AS if field in named]
+
+
+class MotorOutputs:
+    """
+    What the encoder of a motor reads: the newest message on ``~/motor``.
+
+    Parameters
+    ----------
+    line
+        The pipeline of its linkage.
+    writer
+        Number of its topic among the auxiliary topics.
+
+    """
+
+    def __init__(self, line: LinkagePipeline, writer: int) -> None:
+        member = line.member
+        (joint,), (given,) = member.inputs, member.linkage.inputs
+        _, parameters = member.drive
+        # Without a motor at the input, the reading is of what is commanded: the input itself.
+        slides = bool(given.slider) and parameters.motor is None
+        fields = ('position', 'velocity', 'effort')[: 2 if parameters.motor is None else 3]
+        self.variables = [
+            Variable(
+                f'motor.{joint}_motor.{field}',
+                _UNITS[field][slides],
+                f'{field} of the motor of {joint}, as its encoder reads it',
+            )
+            for field in fields
+        ]
+        self.values = [0.0] * len(fields)
+        """The newest values, in the order of the variables; 0 before the first."""
+        self._writer, self._read = writer, MessageValues(JOINT_STATE).read
+
+    def take(self, messages: Sequence[bytes]) -> None:
+        """Take the auxiliary messages of a tick."""
+        values = self._read(messages[self._writer]) if messages else ''
+        if not isinstance(values, str):
+            self.values[:] = values.numbers
 
 
 class SteppedScene:
@@ -198,6 +245,13 @@ class SteppedScene:
         """What goes in, in order."""
         self.outputs = [LinkageOutputs(line) for line in self._pipeline.lines]
         """What comes out of each linkage."""
+        extras = [(line, extra) for line in self._pipeline.lines for extra in line.extras]
+        self.motors = [
+            MotorOutputs(line, number)
+            for number, (line, extra) in enumerate(extras)
+            if extra.effect in DRIVES
+        ]
+        """What comes out of each motor that has an encoder."""
         self.rejections: dict[Rejection, int] = {}
         """How many samples were rejected, by reason."""
 
@@ -285,6 +339,8 @@ class SteppedScene:
         tick = self._pipeline.tick(self._now())
         for outputs, look in zip(self.outputs, tick.looks, strict=True):
             outputs.take(look)
+        for motor in self.motors:
+            motor.take(tick.extras)
 
 
 def _refuse(scene: Scene) -> None:

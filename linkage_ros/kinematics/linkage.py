@@ -174,7 +174,7 @@ class Mass:
     Attributes
     ----------
     mass
-        In [kg], more than 0.
+        In [kg]; 0 for a massless link.
     center
         Centre of mass in the link's frame, in [m].
     inertia

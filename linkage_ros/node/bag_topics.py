@@ -19,13 +19,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from contextlib import suppress
-import re
 from typing import Any
 
 from linkage_ros.bag.topic import INFINITE, QosProfile, Topic
 from linkage_ros.errors import LinkageError, quoted
 from linkage_ros.replay.topic_description import described, message_type
-from linkage_ros.resources import share_folders
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -51,7 +49,6 @@ def _qos(profile: QoSProfile) -> QosProfile:
     )
 
 
-_TYPE = re.compile(r'([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)')
 _MOST_DEPTH = 2**31 - 1  # as DDS counts it
 
 
@@ -124,19 +121,6 @@ def _publisher(node: Node, topic: Topic) -> Publisher:
 
 def _class_of(topic: Topic) -> Any:
     """Return the class of a topic's messages, if it is installed and as it was recorded."""
-    matched = _TYPE.fullmatch(topic.type)
-    if matched is None:
-        raise LinkageError(
-            topic.name,
-            f'its type {quoted(topic.type)} is none of a ROS 2 message',
-            'convert the bag',
-        )
-    package, kind = matched.groups()
-    # A bag is untrusted: a name in it must not import anything but a message package.
-    if not any((folder / 'msg' / f'{kind}.idl').is_file() for folder in share_folders(package)):
-        raise LinkageError(
-            topic.name, f'{topic.type} is not installed', f'install the ROS package {package}'
-        )
     message_class = message_type(topic.type, topic.name)
     installed = ''
     with suppress(LinkageError):
@@ -145,6 +129,6 @@ def _class_of(topic: Topic) -> Any:
         raise LinkageError(
             topic.name,
             f'{topic.type} was another when it was recorded',
-            f'install the ROS package {package} of that time',
+            'install its ROS package of that time',
         )
     return message_class

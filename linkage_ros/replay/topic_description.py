@@ -23,8 +23,10 @@ import re
 from typing import Any
 
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.errors import LinkageError, RecordingError
+from linkage_ros.errors import LinkageError, quoted, RecordingError
 from linkage_ros.resources import share_folders
+
+_MESSAGE = re.compile(r'([a-z][a-z0-9_]{0,99})/msg/([A-Z][A-Za-z0-9]{0,99})', re.ASCII)
 
 _NESTED = re.compile(r'([a-z]\w*)/([A-Z]\w*)')
 """A message type within the type of a field, as in sequence<geometry_msgs/Point>."""
@@ -34,30 +36,41 @@ _SEPARATOR = f'\n{"=" * 80}\n'
 
 def message_type(name: str, key: str) -> Any:
     """
-    Return the class of a message type; imports it only here, when the scene asks for it.
+    Return the class of a message type.
+
+    Names come from bags and from the graph, so nothing is imported but the package of a message
+    whose definition is installed.
 
     Parameters
     ----------
     name
         package/msg/Type.
     key
-        Key of the scene that asks for it.
+        Topic, or key of the scene, that has this type.
 
     Raises
     ------
     LinkageError
-        The package of the type is not installed.
+        It does not name a message, or its package is not installed.
 
     """
-    package, _, kind = name.split('/')
-    try:
-        return getattr(import_module(f'{package}.msg'), kind)
-    except ImportError:
+    matched = _MESSAGE.fullmatch(name)
+    if matched is None:
         raise LinkageError(
             key,
-            f'the ROS package {package} is not installed',
-            'install it, or leave it out',
-        ) from None
+            f'its type {quoted(name)} is not a ROS 2 message',
+            'messages are named package/msg/Type',
+        )
+    package, kind = matched.groups()
+    defined = any((folder / 'msg' / f'{kind}.idl').is_file() for folder in share_folders(package))
+    try:
+        if defined:
+            return getattr(import_module(f'{package}.msg'), kind)
+    except (ImportError, AttributeError):
+        pass
+    raise LinkageError(
+        key, f'{quoted(name)} is not installed', f'install the ROS package {package}'
+    )
 
 
 def described(name: str, message_class: Any, qos: QosProfile) -> Topic:
@@ -89,15 +102,16 @@ def described(name: str, message_class: Any, qos: QosProfile) -> Topic:
     return Topic(name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), qos)
 
 
-def _collect(message_type: Any, package: str, kind: str, texts: dict[str, str]) -> None:
+def _collect(message_class: Any, package: str, kind: str, texts: dict[str, str]) -> None:
     """Collect the text of a type and, after it, those of all types that it contains."""
     if f'{package}/{kind}' in texts:
         return
     texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
-    nested = _NESTED.findall(' '.join(message_type.get_fields_and_field_types().values()))
+    nested = _NESTED.findall(' '.join(message_class.get_fields_and_field_types().values()))
     # Sorted by full name, as rosbag2 does.
     for other, other_kind in sorted(nested):
-        _collect(getattr(import_module(f'{other}.msg'), other_kind), other, other_kind, texts)
+        other_class = message_type(f'{other}/msg/{other_kind}', f'{package}/msg/{kind}')
+        _collect(other_class, other, other_kind, texts)
 
 
 def _type_hash(package: str, kind: str) -> str:

@@ -398,8 +398,10 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
     """
     Return a model of linkages for MuJoCo.
 
-    A PartError says that one has another gravity than the first, or names that are taken.
+    A PartError says that one has another gravity than the first, a massless link, or names that
+    are taken.
     """
+    _refuse_massless(parts)
     model = ET.Element('mujoco', model=name)
     model.append(comment(_HEAD.splitlines()))
     ET.SubElement(model, 'compiler', angle='radian', autolimits='true')
@@ -432,6 +434,18 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
         if not len(section) and key != 'worldbody':
             model.remove(section)
     return document(model)
+
+
+def _refuse_massless(parts: Sequence[Part]) -> None:
+    for count, part in enumerate(parts):
+        for link, mass in part.closure.linkage.masses.items():
+            if not mass.mass:
+                raise PartError(
+                    count,
+                    f'masses.{link}.mass',
+                    'is 0, and MuJoCo moves no massless body',
+                    'write a small mass, or omit it for that of its shape',
+                )
 
 
 def _gravity(parts: Sequence[Part]) -> tuple[float, float]:

@@ -280,8 +280,9 @@ def _write(robot: ET.Element, model: _Model) -> None:
     for link in linkage.links:
         element = ET.SubElement(robot, 'link', name=names.own(link))
         origin = model.tree.origins[link]
-        if link in linkage.masses and link != GROUND:
-            _inertial(element, linkage.masses[link], origin)
+        mass = linkage.masses.get(link)
+        if mass and mass.mass:  # without an inertial a link is massless
+            _inertial(element, mass, origin)
         _visuals(element, names.own(link), model.bodies[link], origin)
     links = {names.own(link) for link in linkage.links}
     for joint in model.tree.joints:

@@ -582,7 +582,7 @@ def _mass() -> Schema:
     return mapping(
         'What a link weighs.',
         {
-            'mass': _number('mass', 'kg', above=0.0, most=HEAVIEST),
+            'mass': _number('mass; 0: the link is massless', 'kg', least=0.0, most=HEAVIEST),
             'center': _point("centre of mass in the link's frame: [x, y]", 'm', FARTHEST),
             'inertia': _number(
                 'moment of inertia about the centre of mass', 'kg·m²', least=0.0, most=HEAVIEST

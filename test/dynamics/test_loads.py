@@ -113,13 +113,14 @@ def test_friction_in_every_pin_and_slider(joint):
 
 def test_every_link_that_moves_has_a_mass():
     linkage = shipped('four_bar')
-    check_masses(linkage)
+    check_masses(linkage, Loads())
     masses = {link: mass for link, mass in linkage.masses.items() if link != 'rocker'}
     with pytest.raises(DefinitionError) as caught:
-        check_masses(replace(linkage, masses=masses))
+        check_masses(replace(linkage, masses=masses), Loads(drive_inertia=1.0))
     assert str(caught.value) == (
         "masses: link 'rocker' has no mass, and forces are asked for; add masses: {rocker: "
-        '{mass: 0.1, center: [0, 0], inertia: 1.0e-5}} in [kg], [m] and [kg·m²]'
+        '{mass: 0.1, center: [0, 0], inertia: 1.0e-5}} in [kg], [m] and [kg·m²]; '
+        'mass: 0 for a massless link'
     )
 
 

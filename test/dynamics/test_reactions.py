@@ -43,8 +43,8 @@ from .loaded import (
     STATES,
 )
 
-WEIGHTLESS = 1e-300
-"""In [kg]: a mass there must be."""
+WEIGHTLESS = 0.0
+"""In [kg]."""
 
 
 def at_rest(mechanics, *inputs):

@@ -45,7 +45,7 @@ import pytest
 
 from .importer import Bench
 from ..support.messages import joint_state, read_joint_state
-from ..support.scenes import FIVE_BAR, four_bar_text, scene_of
+from ..support.scenes import FIVE_BAR, four_bar_text, LINKAGES, scene_of
 
 Open = Callable[[Scene], Bench]
 SECOND = 10**9
@@ -107,6 +107,39 @@ def test_the_interface_is_that_of_the_scene(bench):
     assert others == {'seed', 'valid', 'velocity_valid', 'effort_valid', 'status', 'rejected'}
 
 
+@pytest.mark.parametrize(
+    ('command', 'unit', 'text'),
+    [
+        ('effort', 'N.m', 'effort of the input crank_joint'),
+        ('current', 'A', 'current that is commanded to the motor of crank_joint'),
+        ('voltage', 'V', 'voltage that is commanded to the motor of crank_joint'),
+    ],
+)
+def test_a_motor_is_commanded_in_its_own_unit(command, unit, text, bench):
+    scene = load_scene('torque_crank', [VOLTAGE, f'drive.torque.motor.command={command}'])
+    variables = bench(scene).variables.values()
+    (given,) = [v for v in variables if v.causality == 'input']
+    shown = (given.name, given.unit, given.description)
+    assert shown == (f'crank_commands.crank_joint.{command}', unit, text)
+
+
+@pytest.mark.parametrize(
+    ('keys', 'units'),
+    [
+        ('', []),
+        ('motor: {torque_constant: 1}', []),
+        ('motor_encoder: {}', ['m', 'm/s']),
+        ('motor_encoder: {}, motor: {torque_constant: 1, ratio: 100}', ['rad', 'rad/s', 'N.m']),
+    ],
+)
+def test_a_motor_turns_though_its_input_slides(keys, units, bench):
+    cylinder = (LINKAGES / 'excavator_bucket.yaml').read_text('utf-8')
+    scene = scene_of(f'drive: {{torque: {{start: 0.9, {keys}}}}}', cylinder)
+    motor = [v for v in bench(scene).variables.values() if v.name.startswith('motor.')]
+    assert [v.unit for v in motor] == units
+    assert all(v.causality == 'output' for v in motor)
+
+
 def test_a_slide_is_in_metres_and_has_accelerations_where_the_scene_has(bench):
     scene = load_scene('slider_crank', ['effects.acceleration={}'])
     variables = bench(scene).variables.values()
@@ -117,6 +150,12 @@ def test_a_slide_is_in_metres_and_has_accelerations_where_the_scene_has(bench):
 
 TWO = ', '.join(
     f'{{name: {name}, linkage: ../linkages/{name}.yaml}}' for name in ('four_bar', 'slider_crank')
+)
+
+
+VOLTAGE = (
+    'drive.torque.motor={torque_constant: 0.02, resistance: 1.5, ratio: 10, command: voltage, '
+    'voltage: 12}'
 )
 
 
@@ -138,6 +177,8 @@ TWO = ', '.join(
         ('two_fingers', (f'linkages=[{TWO}]',)),
         ('excavator_delay', ('drive={topic: {}}', 'effects={}')),
         ('torque_crank', ()),
+        ('torque_crank', (VOLTAGE, 'drive.torque.motor_encoder={counts: 500}')),
+        ('torque_crank', ('drive.torque.motor_encoder={}',)),
     ],
 )
 def test_every_output_has_the_bits_of_the_message(name, settings, bench):
@@ -163,7 +204,8 @@ def test_every_output_has_the_bits_of_the_message(name, settings, bench):
             assert pipeline.offer(_message(inputs, begin), begin) is None
         if pipeline.injection is not None:
             pipeline.injection.advance(now)
-        message = pipeline.tick(now).message
+        tick = pipeline.tick(now)
+        message = tick.message
         valid = [value for key, value in outputs.items() if key.split('.')[-1] == 'valid']
         assert any(valid) == bool(message)
         published += bool(message)
@@ -173,6 +215,12 @@ def test_every_output_has_the_bits_of_the_message(name, settings, bench):
             for field, values in arrays.items():
                 for joint, value in zip(read.name, values, strict=len(values) > 0):
                     newest[f'joint_states.{joint}.{field}'] = float(value)
+        if message and any(name.startswith('motor.') for name in outputs):
+            of_motor = read_joint_state(tick.extras[0])
+            values = (*of_motor.position, *of_motor.velocity, *of_motor.effort)
+            shown = {name: v for name, v in outputs.items() if name.startswith('motor.')}
+            assert tuple(shown.values()) == tuple(map(float, values))
+            assert all(name.startswith('motor.crank_joint_motor.') for name in shown)
         assert newest.items() <= outputs.items()
     assert published
     assert newest
@@ -181,16 +229,17 @@ def test_every_output_has_the_bits_of_the_message(name, settings, bench):
 def _input(name: str, number: int) -> float:
     """Return the value of an input at a step: to and fro, by another angle for each joint."""
     to_and_fro = 1.0 + 0.1 * sin(0.1 * number + len(name))
-    return {'position': to_and_fro, 'velocity': 3.0 - 0.1 * number, 'effort': 0.01 * to_and_fro}[
-        name.rpartition('.')[2]
-    ]
+    quantity = name.rpartition('.')[2]
+    by_quantity = {'position': to_and_fro, 'velocity': 3.0 - 0.1 * number, 'voltage': to_and_fro}
+    return by_quantity.get(quantity, 0.01 * to_and_fro)
 
 
 def _message(inputs: dict[str, float], now: int) -> bytes:
     """Return one message with the inputs of all linkages, as a sender in ROS writes it."""
     arrays: dict[str, list[float]] = {'position': [], 'velocity': [], 'effort': []}
     for name, value in inputs.items():
-        arrays[name.rpartition('.')[2]].append(value)
+        quantity = name.rpartition('.')[2]
+        arrays[quantity if quantity in arrays else 'effort'].append(value)
     joints = dict.fromkeys(name.split('.')[1] for name in inputs)
     return joint_state(joints, *arrays.values(), stamp=divmod(now, SECOND))
 

@@ -303,4 +303,4 @@ def test_where_its_message_is_not_installed_one_line_says_so(domain, write_scene
     )
     assert done.returncode == 2
     (line,) = [line for line in done.stderr.splitlines() if 'ERROR' in line]
-    assert 'effects.acceleration: the ROS package trajectory_msgs is not installed' in line
+    assert 'install the ROS package trajectory_msgs' in line

@@ -396,12 +396,12 @@ def foreign(file, channels):
 
 LEFT_OUT = [
     # topic and type, and why it is left out
-    ('/x', 'no_such_msgs/msg/Thing', 'no_such_msgs/msg/Thing is not installed; install the ROS'),
-    ('/x', 'sensor_msgs/msg/NoSuchThing', 'sensor_msgs/msg/NoSuchThing is not installed'),
-    ('/x', 'sensor_msgs/JointState', "its type 'sensor_msgs/JointState' is none of a ROS 2"),
-    ('/x', '', "its type '' is none of a ROS 2 message"),
-    ('/x', 'antigravity/msg/Thing', 'antigravity/msg/Thing is not installed'),
-    ('/x', '../../etc/msg/Thing', 'is none of a ROS 2 message'),
+    ('/x', 'no_such_msgs/msg/Thing', "'no_such_msgs/msg/Thing' is not installed; install the ROS"),
+    ('/x', 'sensor_msgs/msg/NoSuchThing', "'sensor_msgs/msg/NoSuchThing' is not installed"),
+    ('/x', 'sensor_msgs/JointState', "its type 'sensor_msgs/JointState' is not a ROS 2"),
+    ('/x', '', "its type '' is not a ROS 2 message"),
+    ('/x', 'antigravity/msg/Thing', "'antigravity/msg/Thing' is not installed"),
+    ('/x', '../../etc/msg/Thing', 'is not a ROS 2 message'),
     ('two words', 'std_msgs/msg/Empty', 'two words: is no name of a ROS 2 topic'),
     ('/a//b', 'std_msgs/msg/Empty', '/a//b: is no name of a ROS 2 topic'),
     ('', 'std_msgs/msg/Empty', "'': is no name of a ROS 2 topic"),

@@ -79,9 +79,9 @@ BAD = {
         '{crank: {center: [0, 0], inertia: 0}}',
         "masses.crank: the key 'mass' is missing; add mass: a number in [kg]",
     ),
-    'a mass of zero': (
-        '{crank: {mass: 0, center: [0, 0], inertia: 0}}',
-        'masses.crank.mass: 0 is out of bounds; write a finite number, more than 0 and at most 1e',
+    'a mass below zero': (
+        '{crank: {mass: -1e-9, center: [0, 0], inertia: 0}}',
+        'masses.crank.mass: -1e-09 is out of bounds; write a finite number, at least 0 and at',
     ),
     'a mass that is none': (
         '{crank: {mass: .nan, center: [0, 0], inertia: 0}}',

@@ -281,7 +281,7 @@ BAD_LINKAGES = {
     'joints missing': WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')],
     'paths of no names': WRITTEN_OUT.replace(b'traced: [P]', b'traced: [1]'),
     'pose without inputs': WRITTEN_OUT + b'pose: {points: {A: [0, 0]}}',
-    'weightless': WRITTEN_OUT + b'masses: {crank: {mass: 0, center: [0, 0], inertia: 0}}',
+    'mass below 0': WRITTEN_OUT + b'masses: {crank: {mass: -1, center: [0, 0], inertia: 0}}',
     'mass without a place': WRITTEN_OUT + b'masses: {crank: {mass: 1, inertia: 0}}',
     'angle of no block': slider(
         b'{point: Y, angle: 0, along: ground, through: O2, direction: [1, 0]}'
