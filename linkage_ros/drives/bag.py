@@ -17,8 +17,9 @@
 A recorded crank: the samples of a bag, at their times or one per tick.
 
 Samples that the `topic` drive would reject are skipped and counted: messages without the input
-joints, non-finite numbers, stamps that go back. The lead of a stamp over the clock does not
-matter, since the first sample counts as taken at the first tick.
+joints, numbers beyond its bounds, stamps that go back. Absent rates are differenced as there. The
+lead of a stamp over the clock does not matter, since the first sample counts as taken at the first
+tick.
 
 The drive reads the bag when it is built, and again at every reset. A sample takes 8 bytes for its
 time and 16 for each input: 86 MB for an hour at 1 kHz.
@@ -49,27 +50,27 @@ class Samples:
 
     Parameters
     ----------
-    inputs
-        Names of the driven joints.
     use
         How samples are used, which decides whether they need rates.
-    needs_rate
-        As for `TopicDrive`.
+    context
+        Context of the drive.
 
     """
 
-    __slots__ = ('_inputs', '_read', '_sieve', '_values', 'offsets', 'rejected')
+    __slots__ = ('_first', '_inputs', '_read', '_sieve', '_values', 'offsets', 'rejected')
 
     offsets: array[int]
     """Times since the first sample, in [ns]."""
     rejected: Counter[Rejection]
     """Number of skipped messages, by reason."""
 
-    def __init__(self, inputs: tuple[str, ...], use: TopicParameters, needs_rate: bool) -> None:
+    def __init__(self, use: TopicParameters, context: Context) -> None:
+        inputs = context.closure.linkage.inputs
         self._inputs = len(inputs)
-        self._read = JointStateReader(inputs).read
-        self._sieve = TopicDrive(use, needs_rate)
+        self._read = JointStateReader(context.inputs_in_messages).read
+        self._sieve = TopicDrive(use, context.needs_rate, inputs)
         self._values = array('d')
+        self._first = 0
         self.offsets = array('q')
         self.rejected = Counter()
 
@@ -79,14 +80,14 @@ class Samples:
         if isinstance(sample, Rejection):
             self.rejected[sample] += 1
             return
-        last = self._sieve.stamp
         rejection = self._sieve.offer(sample, sample.stamp)
         if rejection is not None:
             self.rejected[rejection] += 1
-            return
-        self.offsets.append(self.offsets[-1] + sample.stamp - last if self.offsets else 0)
-        self._values.extend(sample.angles)
-        self._values.extend(sample.rates or (0.0,) * self._inputs)
+        elif (good := self._sieve.sample) is not None:
+            stamp, angles, rates, _ = good
+            self._first = self._first if self.offsets else stamp
+            self.offsets.append(stamp - self._first)
+            self._values.extend(angles + rates)
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -100,9 +101,7 @@ class Samples:
         return tuple(self._values[first:middle]), tuple(self._values[middle:end])
 
 
-def read_samples(
-    bag: Bag, topic: str, inputs: tuple[str, ...], use: TopicParameters, needs_rate: bool
-) -> Samples:
+def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -> Samples:
     """
     Return the samples of a bag's crank topic.
 
@@ -113,7 +112,7 @@ def read_samples(
     topic
         The topic; '' for the topic that the run's account in the bag names or, without an account,
         for the only topic with good samples.
-    inputs, use, needs_rate
+    use, context
         As for `Samples`.
 
     Raises
@@ -128,7 +127,7 @@ def read_samples(
         raise BagError(bag.path, f'holds no topic {topic!r} of {_TYPE}', f'it holds {known}')
     crank_topic = topic or _crank_topic_of_run(bag)
     samples_of = {
-        name: Samples(inputs, use, needs_rate)
+        name: Samples(use, context)
         for name in ([crank_topic] if crank_topic in of_type else of_type)
     }
     for name, _, _, data in bag.messages():
@@ -146,7 +145,7 @@ def read_samples(
         )
     raise BagError(
         bag.path,
-        f'holds no crank sample of {listed(inputs)}{_why(samples_of)}',
+        f'holds no crank sample of {listed(context.inputs_in_messages)}{_why(samples_of)}',
         'name another bag, or its topic as drive.bag.topic',
     )
 
@@ -214,9 +213,7 @@ def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPac
         carry_forward=parameters.carry_forward and recorded, max_age=parameters.max_age
     )
     bag = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
-    samples = read_samples(
-        bag, parameters.topic, context.inputs_in_messages, use, context.needs_rate
-    )
+    samples = read_samples(bag, parameters.topic, use, context)
     if recorded:
         return RecordedPace(samples, use, repeat=parameters.repeat)
     return FastPace(samples, repeat=parameters.repeat)

@@ -58,7 +58,6 @@ class Rejection(Enum):
     UNEQUAL = 'arrays of unequal length'
     MISSING = 'crank joint missing'
     TWICE = 'crank joint named twice'
-    NO_RATE = 'no velocities'
     NOT_FINITE = 'position or rate not finite'
     TOO_LARGE = 'position or rate beyond 1e10'
     NO_EFFORT = 'no efforts'
@@ -77,7 +76,7 @@ class CrankSample(NamedTuple):
 
     stamp: int  # Time of the measurement, in [ns]
     angles: tuple[float, ...]  # Value of each input, in [rad]; of a sliding input in [m]
-    # Rates, in [rad/s] or [m/s]; None if the message has no velocities.
+    # Rates, in [rad/s] or [m/s]; None if the message has no velocities, NaN where one is absent.
     rates: tuple[float, ...] | None
 
 

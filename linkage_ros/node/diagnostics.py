@@ -452,14 +452,13 @@ def _of(line: LinkagePipeline) -> str:
 
 _REMEDIES = {
     Rejection.MALFORMED: 'the publisher must send sensor_msgs/JointState as plain CDR',
-    Rejection.EMPTY: 'fill name, position and velocity',
+    Rejection.EMPTY: 'fill name and position',
     Rejection.UNEQUAL: 'give each joint that is named a number in every array that is filled',
     Rejection.TWICE: 'name the joint once',
-    Rejection.NO_RATE: 'fill velocity, or set carry_forward: false and leave out velocity',
     Rejection.NOT_FINITE: 'look at the sensor',
     Rejection.TOO_LARGE: 'the units are rad and m',
     Rejection.NO_EFFORT: 'fill name and effort',
-    Rejection.EFFORT_NOT_FINITE: 'look at the controller',
+    Rejection.EFFORT_NOT_FINITE: 'activate the controller: ros2_control sends NaN before',
     Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
     Rejection.STAMP_ZERO: 'stamp the messages',
     Rejection.STAMP_INVALID: 'stamp the messages with the time',

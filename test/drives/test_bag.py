@@ -210,7 +210,6 @@ def test_what_the_topic_would_refuse_is_skipped_and_counted(tmp_path):
         (sample(2, 0.0, inf), Rejection.NOT_FINITE),
         (sample(3, 2e10), Rejection.TOO_LARGE),
         (NO_CRANK.write(RECORDED, (1.0,), ()), Rejection.MISSING),
-        (sample(4, 0.5, None), Rejection.NO_RATE),
         (sample(5, 0.5)[:-30], Rejection.MALFORMED),
         (b'', Rejection.MALFORMED),
         (CRANK.write(0, (0.0, 0.5), (0.0, 0.0)), Rejection.STAMP_ZERO),
@@ -229,27 +228,30 @@ def test_what_the_topic_would_refuse_is_skipped_and_counted(tmp_path):
     ]
 
 
+@pytest.mark.parametrize('rate', [None, nan])
 @pytest.mark.parametrize(
-    ('pace', 'carry_forward', 'needs_rate', 'good'),
+    ('pace', 'carry_forward', 'needs_rate', 'differenced'),
     [
-        ('recorded', True, False, False),
-        ('recorded', False, True, False),
-        ('recorded', False, False, True),
-        ('fast', True, True, False),
-        ('fast', True, False, True),
+        ('recorded', True, False, True),
+        ('recorded', False, True, True),
+        ('recorded', False, False, False),
+        ('fast', True, True, True),
+        ('fast', True, False, False),
     ],
 )
-def test_samples_without_rates_are_taken_where_no_rate_is_needed(
-    tmp_path, pace, carry_forward, needs_rate, good
+def test_absent_rates_are_those_that_the_topic_would_have(
+    tmp_path, pace, carry_forward, needs_rate, differenced, rate
 ):
-    file = write(tmp_path / 'bag', crank(sample(0, 0.5, None), sample(1, 0.6, None)))
+    samples = [sample(0, 0.5, rate), sample(10, 0.6, rate), sample(20, 0.65, rate)]
+    file = write(tmp_path / 'bag', crank(*samples))
     parameters = BagParameters(file, pace=pace, carry_forward=carry_forward)
-    if good:
-        drive = build(parameters, one_input(needs_rate=needs_rate))
-        assert drive.state(BEGIN) == CrankState((0.5,), (0.0,), (0.0,), 0)
-    else:
-        with pytest.raises(BagError, match=r'no crank sample of crank_joint, /crank: no vel'):
-            build(parameters, one_input(needs_rate=needs_rate))
+    drive = build(parameters, one_input(needs_rate=needs_rate))
+    expected = (
+        [(0.6, 10.0), (0.65, 5.0)] if differenced else [(0.5, 0.0), (0.6, 0.0), (0.65, 0.0)]
+    )
+    for number, (angle, speed) in enumerate(expected):
+        state = drive.state(BEGIN + 10 * number * MS)
+        assert (*state.angles, *state.rates) == pytest.approx((angle, speed), rel=1e-9)
 
 
 TWO_TOPICS = [
