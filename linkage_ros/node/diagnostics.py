@@ -78,6 +78,8 @@ class Snapshot:
     unclosed: int = 0
     indeterminate: int = 0
     wrenches_rejected: int = 0
+    interleaved: int = 0
+    own_interleaved: int = 0
 
     @classmethod
     def of(cls, counts: Counts, time: int) -> Snapshot:
@@ -92,6 +94,8 @@ class Snapshot:
             counts.unclosed[Status.OPEN] + counts.unclosed[Status.INDETERMINATE],
             counts.unclosed[Status.INDETERMINATE],
             sum(sum(each.rejected.values()) for each in counts.wrenches),
+            counts.interleaved,
+            counts.own_interleaved,
         )
 
 
@@ -116,8 +120,9 @@ class DiagnosticsSummary:
     # Time since the last ``/clock`` message, in [s]; 0 where the node does not use it.
     clock_silence: float = 0.0
     clock_refused: int = 0  # Number of ``/clock`` messages without a valid time
-    # Whether other joints share the crank's topic: it may then have several publishers.
-    crank_shared: bool = False
+    # What several publishers, or several nodes of one name, spoil; '' for nothing.
+    cranks_doubled: str = ''
+    node_doubled: str = ''
     # Settings of middleware and operating system that affect the ticks.
     system: Mapping[str, str] = field(default_factory=dict)
 
@@ -143,6 +148,8 @@ class DiagnosticsSummary:
             level, message = WARN, f'{actual:.1f} ticks a second, {self.rate:g} wanted'
         elif lost:
             level, message = WARN, f'{lost} ticks lost'
+        elif self.node_doubled:
+            level, message = WARN, self.node_doubled
         # The keys of diagnostic_updater's FrequencyStatus come first.
         values: dict[str, object] = {
             'Events in window': ticks,
@@ -201,8 +208,8 @@ class DiagnosticsSummary:
         elif max_age and age * NANOSECONDS > max_age:
             level = STALE
             message = f'No crank for {age:.1f} s, by its stamps' if stamp else 'No crank yet'
-        elif len(self.publishers) > 1 and not self.crank_shared:
-            level, message = WARN, f'Several publishers: {", ".join(self.publishers)}'
+        elif self.cranks_doubled:
+            level, message = WARN, self.cranks_doubled
         elif rejected:
             level, message = WARN, f'{rejected} samples rejected'
         missed = self.loop.missed
@@ -393,6 +400,15 @@ class DiagnosticsSummary:
             hardware_id=self.scene,
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
+
+
+def is_interleaved(before: int, now: int) -> bool:
+    """
+    Return whether messages came from several publishers, by counts of numbers that went back.
+
+    A publisher that starts again begins its numbers again, once.
+    """
+    return now - before > 1
 
 
 def no_clock(silence: float) -> str:

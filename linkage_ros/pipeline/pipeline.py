@@ -628,6 +628,8 @@ class Pipeline:
         )
         """Whether ticks without a message may matter to a replay."""
         self._routes = SampleRouter({line: line.member.inputs for line in self.lines})
+        self.addressed: tuple[LinkagePipeline, ...] = ()
+        """Of several linkages, those whose inputs the last message named."""
         self._offered = 0
         self._newest: dict[LinkagePipeline, int] = {}
         self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
@@ -651,7 +653,8 @@ class Pipeline:
         # A message may concern one linkage or several: it is good if one of them accepts it.
         self._offered += 1
         rejections = []
-        for line in self._routes.find(message):
+        self.addressed = self._routes.find(message)
+        for line in self.addressed:
             rejections.append(line.offer(message, now))
             if rejections[-1] is None:
                 self._newest[line] = self._offered

@@ -164,6 +164,10 @@ class Counts:
     last_ignored: bytes = b''
     missed: int = 0
     """Gaps in the sequence numbers of a single publisher."""
+    interleaved: int = 0
+    """Crank messages whose number is not above that before: publishers number theirs by one."""
+    own_interleaved: int = 0
+    """Likewise of messages with the published joints, where they come back on that topic."""
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
     lateness: DurationHistogram = field(default_factory=DurationHistogram)
     last: Tick | None = None
@@ -227,7 +231,9 @@ class TickLoop:
         self._own = own
         self._depth = depth
         self._take_wrenches = take_wrenches
-        self._sequence = 0
+        self._sequence = self._own_sequence = 0
+        self._crank_sequences: dict[object, int] = {}
+        """Number of the last message with the crank of the same linkages."""
         self._last_time = 0
         self._pipeline = build()
         self.injection = self._pipeline.injection
@@ -317,9 +323,10 @@ class TickLoop:
                 self._move_on(clock())
             now = self._last_time
             message, info = taken
+            number = info.get('publication_sequence_number')
             if self._own is None or not self._own(message):
                 counts.received += 1
-                if number := info.get('publication_sequence_number'):
+                if number:
                     # Neither the first message, nor a restarted publisher.
                     if 0 < self._sequence < number:
                         counts.missed += number - self._sequence - 1
@@ -338,6 +345,13 @@ class TickLoop:
                     counts.last_ignored = message
                 else:
                     counts.rejected[rejection] += 1
+                if number and rejection is not Rejection.MISSING:
+                    cranks = pipeline.addressed
+                    counts.interleaved += number <= self._crank_sequences.get(cranks, 0)
+                    self._crank_sequences[cranks] = number
+            elif number:
+                counts.own_interleaved += number <= self._own_sequence
+                self._own_sequence = number
             if not end:
                 end = monotonic_ns() + _LONGEST_DRAIN
             elif monotonic_ns() > end:

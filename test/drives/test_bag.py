@@ -246,9 +246,7 @@ def test_absent_rates_are_those_that_the_topic_would_have(
     file = write(tmp_path / 'bag', crank(*samples))
     parameters = BagParameters(file, pace=pace, carry_forward=carry_forward)
     drive = build(parameters, one_input(needs_rate=needs_rate))
-    expected = (
-        [(0.6, 10.0), (0.65, 5.0)] if differenced else [(0.5, 0.0), (0.6, 0.0), (0.65, 0.0)]
-    )
+    expected = [(0.6, 10.0), (0.65, 5.0)] if differenced else [(0.5, 0.0), (0.6, 0.0), (0.65, 0.0)]
     for number, (angle, speed) in enumerate(expected):
         state = drive.state(BEGIN + 10 * number * MS)
         assert (*state.angles, *state.rates) == pytest.approx((angle, speed), rel=1e-9)

@@ -194,3 +194,46 @@ def test_what_the_middleware_lost_is_told_by_the_numbers_that_are_missing(kind):
     assert ('lost before' in rig.loop.samples) == bool(missed)
     rig.loop.several_publishers = True
     assert rig.loop.missed is None, 'their numbers go apart'
+
+
+CRANK, LEFT, RIGHT = ('crank_joint',), ('left_crank_joint',), ('right_crank_joint',)
+ELBOW, BOTH = ('elbow',), LEFT + RIGHT
+# (scene, [(joints, number that the publisher gave the message)], how often they went back).
+PUBLISHERS = {
+    'one': (ONE, [(CRANK, 1), (CRANK, 2), (CRANK, 5)], 0),
+    'one that begins anew': (ONE, [(CRANK, 8), (CRANK, 1), (CRANK, 2), (CRANK, 9)], 1),
+    'two in step': (ONE, [(CRANK, 1), (CRANK, 1), (CRANK, 2), (CRANK, 2)], 2),
+    'two, one of them long there': (ONE, [(CRANK, 70), (CRANK, 1), (CRANK, 71), (CRANK, 2)], 2),
+    'two, and one names other joints too': (
+        ONE, [(ELBOW, 1), (CRANK, 2), (CRANK, 1), (CRANK, 3), (CRANK, 2)], 2,
+    ),
+    'two, one of other joints': (ONE, [(CRANK, 7), (ELBOW, 1), (CRANK, 8), (ELBOW, 2)], 0),
+    'two, one of which is rejected': (ONE, [(CRANK, 7), (CRANK * 2, 1), (CRANK, 8), (CRANK * 2, 2)], 2),
+    'none that is numbered': (ONE, [(CRANK, 0), (CRANK, 0)], 0),
+    'one for each of two linkages': (TWO, [(LEFT, 7), (RIGHT, 1), (LEFT, 8), (RIGHT, 2)], 0),
+    'one for both': (TWO, [(BOTH, 1), (BOTH, 2)], 0),
+    'two for one of two linkages': (TWO, [(LEFT, 7), (RIGHT, 1), (LEFT, 1), (LEFT, 8)], 1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('kind', PUBLISHERS)
+def test_two_publishers_of_one_crank_are_told_by_the_numbers_of_their_messages(kind):
+    text, messages, expected = PUBLISHERS[kind]
+    rig = Rig(text)
+    for names, number in messages:
+        rig.send(names=names, number=number)
+    rig.tick(BEGIN)
+    assert rig.loop.counts.interleaved == expected
+    rig.counts()
+
+
+@pytest.mark.parametrize(('numbers', 'expected'), [([1, 2, 3], 0), ([9, 1, 10, 2, 11], 2)])
+def test_another_publisher_of_the_published_joints_is_told_likewise(numbers, expected):
+    rig = Rig(own=lambda message: b'rocker' in message)
+    for number in numbers:
+        rig.send(names=('coupler_joint', 'rocker_joint'), number=number)
+        rig.send()
+    rig.tick(BEGIN)
+    assert rig.loop.counts.own_interleaved == expected
+    assert rig.loop.counts.interleaved == 0
+    assert rig.counts()[0] == len(numbers)
