@@ -172,7 +172,7 @@ class LinkageNode(LifecycleNode):
         self._before = self._before_last = Snapshot()
         self._real_time = RealTime(
             self.get_parameter('thread_priority').value,
-            self.get_parameter_or('cpu_affinity').value or (),
+            [each for each in self.get_parameter('cpu_affinity').value if each != -1],
             self.get_parameter('lock_memory').value,
         )
         why = standstill()
@@ -194,7 +194,7 @@ class LinkageNode(LifecycleNode):
                 raise LinkageError(
                     'parameter scene', "'' names no file", 'start with --ros-args -p scene:=FILE'
                 )
-            scene = load_scene(file, self.get_parameter_or('set').value or ())
+            scene = load_scene(file, [each for each in self.get_parameter('set').value if each])
             pipeline = Pipeline(scene)  # fails here if it cannot be built, not at the first tick
             self._scene_topics.connect(pipeline)
             for closure in pipeline.closures:
