@@ -31,7 +31,7 @@ from array import array
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from linkage_ros.bag.reader import Bag, read_bag
 from linkage_ros.bag.run_events import raw_account
@@ -57,7 +57,16 @@ class Samples:
 
     """
 
-    __slots__ = ('_first', '_inputs', '_read', '_sieve', '_values', 'offsets', 'rejected')
+    __slots__ = (
+        '_at_arrival',
+        '_first',
+        '_inputs',
+        '_read',
+        '_sieve',
+        '_values',
+        'offsets',
+        'rejected',
+    )
 
     offsets: array[int]
     """Times since the first sample, in [ns]."""
@@ -69,18 +78,19 @@ class Samples:
         self._inputs = len(inputs)
         self._read = JointStateReader(context.inputs_in_messages).read
         self._sieve = TopicDrive(use, context.needs_rate, inputs)
+        self._at_arrival = use.stamp == 'arrival'
         self._values = array('d')
         self._first = 0
         self.offsets = array('q')
         self.rejected = Counter()
 
-    def add(self, message: bytes) -> None:
-        """Add a serialized message, or count the reason for its rejection."""
+    def add(self, message: bytes, log_time: int) -> None:
+        """Add a message, recorded at a time in [ns], or count the reason for its rejection."""
         sample = self._read(message)
         if isinstance(sample, Rejection):
             self.rejected[sample] += 1
             return
-        rejection = self._sieve.offer(sample, sample.stamp)
+        rejection = self._sieve.offer(sample, log_time if self._at_arrival else sample.stamp)
         if rejection is not None:
             self.rejected[rejection] += 1
         elif (good := self._sieve.sample) is not None:
@@ -130,9 +140,9 @@ def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -
         name: Samples(use, context)
         for name in ([crank_topic] if crank_topic in of_type else of_type)
     }
-    for name, _, _, data in bag.messages():
+    for name, log_time, _, data in bag.messages():
         if name in samples_of:
-            samples_of[name].add(data)
+            samples_of[name].add(data, log_time)
     good = {name: samples for name, samples in samples_of.items() if len(samples)}
     if len(good) == 1:
         (samples,) = good.values()
@@ -187,6 +197,9 @@ class BagParameters:
         least=1e-6,
         most=3600.0,
     )
+    stamp: str = choice(
+        'time of a sample: its stamp, or when it was recorded', ('measured', 'arrival'), 'measured'
+    )
     repeat: bool = flag(
         'after the last sample begin again, a mean interval later; else there is no crank', False
     )
@@ -210,7 +223,9 @@ def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPac
     """
     recorded = parameters.pace == 'recorded'
     use = TopicParameters(
-        carry_forward=parameters.carry_forward and recorded, max_age=parameters.max_age
+        carry_forward=parameters.carry_forward and recorded,
+        max_age=parameters.max_age,
+        stamp=parameters.stamp,
     )
     bag = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
     samples = read_samples(bag, parameters.topic, use, context)
@@ -248,7 +263,7 @@ class RecordedPace(Drive):
 
     def __init__(self, samples: Samples, use: TopicParameters, *, repeat: bool) -> None:
         self.samples = samples
-        self._topic = TopicDrive(use, needs_rate=False)
+        self._topic = TopicDrive(replace(use, stamp='measured'), needs_rate=False)
         self.max_age = self._topic.max_age
         self._start: int | None = None
         self._newest = (-1, -1)

@@ -72,6 +72,11 @@ class TopicParameters:
         least=0.0,
         most=3600.0,
     )
+    stamp: str = choice(
+        'time of a sample: its stamp, or its arrival whatever the stamp',
+        ('measured', 'arrival'),
+        'measured',
+    )
     acceleration: str = choice(
         "the crank's acceleration: zero, or the differences of the samples' rates",
         ('zero', 'differenced'),
@@ -130,6 +135,7 @@ class TopicDrive(Drive):
     """
 
     __slots__ = (
+        '_at_arrival',
         '_bend',
         '_carry_forward',
         '_estimate',
@@ -152,6 +158,7 @@ class TopicDrive(Drive):
         self._carry_forward = use.carry_forward
         self.max_age = round(use.max_age * NANOSECONDS)
         self._max_lead = round(use.max_lead * NANOSECONDS)
+        self._at_arrival = use.stamp == 'arrival'
         self._estimate = use.acceleration == 'differenced'
         self._bend = -tau * use.cutoff
         self._needs_rate = needs_rate or use.carry_forward or self._estimate
@@ -187,6 +194,8 @@ class TopicDrive(Drive):
                 complete = False
         if not complete and (why := _refusal(angles, rates)) is not None:
             return why
+        if self._at_arrival:
+            stamp = now
         if stamp == 0:
             return Rejection.STAMP_ZERO
         if stamp > now + self._max_lead:

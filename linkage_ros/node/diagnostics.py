@@ -80,6 +80,7 @@ class Snapshot:
     wrenches_rejected: int = 0
     interleaved: int = 0
     own_interleaved: int = 0
+    stale: int = 0
 
     @classmethod
     def of(cls, counts: Counts, time: int) -> Snapshot:
@@ -96,6 +97,7 @@ class Snapshot:
             sum(sum(each.rejected.values()) for each in counts.wrenches),
             counts.interleaved,
             counts.own_interleaved,
+            counts.stale,
         )
 
 
@@ -205,6 +207,8 @@ class DiagnosticsSummary:
             message = 'Driven by the scene'
         elif counts.ignored and counts.ignored == counts.received:
             level, message = STALE if max_age else WARN, 'No crank yet, but messages without it'
+        elif self.now.stale > self.before.stale and age * NANOSECONDS > max_age:
+            level, message = STALE, f'Samples arrive, but are {age:.1f} s old by their stamps'
         elif max_age and age * NANOSECONDS > max_age:
             level = STALE
             message = f'No crank for {age:.1f} s, by its stamps' if stamp else 'No crank yet'
@@ -219,6 +223,7 @@ class DiagnosticsSummary:
             'Samples received': counts.received,
             'Samples used': counts.used,
             'Samples superseded': counts.superseded,
+            'Samples stale': counts.stale,
             'Samples rejected': self.now.rejected,
             'Messages without the crank': counts.ignored,
             'Messages lost before': 'unknown' if missed is None else missed,
@@ -476,7 +481,7 @@ _REMEDIES = {
     Rejection.NO_EFFORT: 'fill name and effort',
     Rejection.EFFORT_NOT_FINITE: 'activate the controller: ros2_control sends NaN before',
     Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
-    Rejection.STAMP_ZERO: 'stamp the messages',
+    Rejection.STAMP_ZERO: 'stamp the messages, or write drive: {topic: {stamp: arrival}}',
     Rejection.STAMP_INVALID: 'stamp the messages with the time',
     Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
     Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
@@ -488,6 +493,9 @@ _WRENCH_REMEDIES = {
     Rejection.WRENCH_TOO_LARGE: 'the units are N and N·m',
 }
 
+
+_STALE_PERIOD = 30.0
+"""Least time between two warnings about stamps that are too old, in [s]: a clock stays wrong."""
 
 _PATIENCE = 2.0
 """Time without a warning about a missing crank, in [s]."""
@@ -510,8 +518,35 @@ class Warnings:
         self._rejected = dict.fromkeys(Rejection, 0)
         self._wrenches_rejected: dict[str, dict[Rejection, int]] = {}
         self._unclosed = dict.fromkeys(Status, 0)
-        self._lost = self._stalls = self._ticks = 0
+        self._lost = self._stalls = self._ticks = self._stale = 0
         self._heard = (0, 0, monotonic())
+
+    def check_age(self, counts: Counts, crank_topic: str, max_age: int, period: float) -> None:
+        """
+        Warn of samples that are too old when they arrive, as where two clocks differ.
+
+        Parameters
+        ----------
+        counts
+            Counts of the tick.
+        crank_topic
+            Topic of the crank samples.
+        max_age
+            Age above which a sample gives no crank, in [ns].
+        period
+            Least time between two warnings of this kind, in [s], if it is above 30 s.
+
+        """
+        if (new := counts.stale - self._stale) <= 0:
+            return
+        line = (
+            f'{crank_topic}: {new} samples too old to use, the newest {counts.stale_age * 1e-9:.1f} '
+            f's by its stamp, and max_age is {max_age * 1e-9:g} s: synchronise the clocks, set '
+            'use_sim_time where time is played or simulated, or write drive: {topic: {stamp: '
+            'arrival}}'
+        )
+        if self.warn('stale', line, max(period, _STALE_PERIOD)):
+            self._stale = counts.stale
 
     def check_silence(
         self,

@@ -155,8 +155,12 @@ class Counts:
     clock_jumps: int = 0
     resets: int = 0
     received: int = 0
-    """Messages on the drives' topic: used + superseded + ignored + rejected."""
+    """Messages on the drives' topic: used + stale + superseded + ignored + rejected."""
     used: int = 0
+    stale: int = 0
+    """Good messages, the newest of a tick, whose stamps are too old to give a crank."""
+    stale_age: int = 0
+    """Age of the last of them by its stamp, in [ns]."""
     superseded: int = 0
     """Good messages followed by a newer one in the same tick."""
     ignored: int = 0
@@ -279,6 +283,7 @@ class TickLoop:
         return (
             f'{counts.received} received, {counts.used} used, {counts.superseded} superseded, '
             f'{sum(counts.rejected.values())} rejected'
+            + (f', {counts.stale} stale' if counts.stale else '')
             + (f', {counts.ignored} without the crank' if counts.ignored else '')
             + (f'; {self.missed} lost before' if self.missed else '')
         )
@@ -356,10 +361,15 @@ class TickLoop:
                 end = monotonic_ns() + _LONGEST_DRAIN
             elif monotonic_ns() > end:
                 break
-        if good:
-            used = good if tick_for_each else pipeline.newly_used()
+        if good and tick_for_each:
+            counts.used += good
+        elif good:
+            used, stale = pipeline.newly_used(self._last_time)
             counts.used += used
-            counts.superseded += good - used
+            counts.superseded += good - used - stale
+            if stale:
+                counts.stale += stale
+                counts.stale_age = self._last_time - pipeline.newest_stamp
 
     def _take_wrench(self, number: int, take: Take, clock: Callable[[], int] | None) -> None:
         """Take the waiting messages of a topic with a wrench: record, offer and count them."""

@@ -190,6 +190,16 @@ def test_it_is_as_if_the_samples_came_by_topic(tmp_path_factory, taken, ticks, c
         assert drive.state(now) == topic.state(now)
 
 
+def test_by_arrival_samples_are_as_far_apart_as_they_were_recorded(tmp_path):
+    angles = (0.1, 0.2, 0.4)
+    samples = [CRANK.write(0, (7.0, angle), (9.0, 0.0)) for angle in angles]
+    file = write(tmp_path / 'bag', crank(*samples))
+    with pytest.raises(BagError, match='stamp zero'):
+        build(BagParameters(file), one_input())
+    drive = build(BagParameters(file, stamp='arrival'), one_input())
+    assert [drive.state(BEGIN + n * MS).angles[0] for n in range(3)] == [*angles]
+
+
 def test_several_inputs_are_read_from_one_message(tmp_path):
     both = JointStateWriter(['right_crank', 'other', 'left_crank'])
     messages = crank(

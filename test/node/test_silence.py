@@ -134,11 +134,26 @@ def test_samples_that_come_too_late_are_silence(
     graph, write_scene, start, publisher, joint_states
 ):
     # As from a machine whose clock lags.
-    start(write_scene('late', TICKING))
-    with publishing(publisher, lambda: crank(0.5, stamp=time.time_ns() - NS)):
+    node = start(write_scene('late', TICKING), '-p', 'warning_period:=0.2')
+    with publishing(publisher, lambda: crank(0.5, stamp=time.time_ns() - 100 * NS)):
         wait_until_taken(graph)
-        assert graph.next_status('crank').level == STALE
+        status = graph.next_status('crank')
+        node.wait_for_log('too old to use')
+        time.sleep(1.0)
+    assert status.level == STALE
+    assert re.fullmatch(r'Samples arrive, but are 100\.\d s old by their stamps', status.message)
+    (line,) = [line for line in node.log.splitlines() if 'too old' in line]
+    assert 'WARN' in line
+    assert re.search(
+        r'/crank_states: \d+ samples too old to use, the newest 100\.\d s by its stamp, and max_age '
+        r'is 0\.3 s: synchronise the clocks, set use_sim_time .*, or write drive: \{topic: \{stamp: '
+        r'arrival\}\}$',
+        line,
+    )
     assert joint_states == []
+    assert int(graph.value('crank', 'Samples stale')) > 0
+    assert node.end() == 0
+    assert re.search(r'received, 0 used, \d+ superseded, 0 rejected, \d+ stale', node.log)
 
 
 def test_at_rate_0_a_repeat_keeps_its_stamp_and_is_silence_too(

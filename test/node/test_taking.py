@@ -41,8 +41,8 @@ TWO_FILES = {'scene.yaml': TWO.encode(), 'linkage_1.yaml': FOUR_BAR, 'linkage_2.
 class Rig:
     """A tick loop behind a queue of the test's; a clock that goes on by 1 ms with every look."""
 
-    def __init__(self, text=ONE, rate=50, **options):
-        text += f'rate: {rate}\ndrive: {{topic: {{max_lead: 0.0}}}}\n'
+    def __init__(self, text=ONE, rate=50, drive='{max_lead: 0.0}', **options):
+        text += f'rate: {rate}\ndrive: {{topic: {drive}}}\n'
         of = ['linkage.yaml'] if 'linkages' not in text else ['linkage_1.yaml', 'linkage_2.yaml']
         files = {'scene.yaml': text.encode(), **dict.fromkeys(of, FOUR_BAR)}
         scene = parse_scene('t', 't', files)
@@ -71,7 +71,7 @@ class Rig:
         """Return received, used, superseded, ignored and rejected, which must close."""
         c = self.loop.counts
         rejected = sum(c.rejected.values())
-        assert c.received == c.used + c.superseded + c.ignored + rejected
+        assert c.received == c.used + c.stale + c.superseded + c.ignored + rejected
         return c.received, c.used, c.superseded, c.ignored, rejected
 
 
@@ -150,6 +150,56 @@ def test_its_own_messages_are_told_also_where_a_linkage_is_not_in_them():
         rig.queue.append((message, {'source_timestamp': BEGIN}))
     rig.tick(BEGIN + 2 * MS)
     assert rig.counts() == counts == (2, 2, 0, 0, 0)
+
+
+# (scene, [(joints, age of the stamp in ms)] of a tick), then used, stale and superseded; max_age is 200 ms.
+AGES = {
+    'young': (ONE, [(('crank_joint',), 5)], (1, 0, 0)),
+    'at the limit': (ONE, [(('crank_joint',), 200)], (1, 0, 0)),
+    'beyond it': (ONE, [(('crank_joint',), 201)], (0, 1, 0)),
+    'a clock that differs': (ONE, [(('crank_joint',), 100_000)], (0, 1, 0)),
+    'several, after a stall': (ONE, [(('crank_joint',), age) for age in (400, 300, 9)], (1, 0, 2)),
+    'several, all too old': (ONE, [(('crank_joint',), age) for age in (402, 401)], (0, 1, 1)),
+    'of two linkages one': (
+        TWO, [(('left_crank_joint',), 9), (('right_crank_joint',), 300)], (1, 1, 0),
+    ),
+    'of two linkages both': (TWO, [(('left_crank_joint', 'right_crank_joint'), 300)], (0, 1, 0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('kind', AGES)
+def test_what_is_too_old_when_it_arrives_is_counted_as_stale(kind):
+    text, messages, expected = AGES[kind]
+    rig = Rig(text)
+    for names, age in messages:
+        rig.send(BEGIN - age * MS, names=names)
+    rig.tick(BEGIN)
+    c = rig.loop.counts
+    assert (c.used, c.stale, c.superseded) == expected
+    assert rig.counts()[0] == len(messages)
+    assert bool(rig.published) == bool(c.used)
+    assert ('stale' in rig.loop.samples) == bool(c.stale)
+    if 'differs' in kind:
+        assert c.stale_age == 100_000 * MS
+
+
+def test_at_rate_0_a_sample_is_solved_for_its_own_stamp_and_never_stale():
+    rig = Rig(rate=0)
+    rig.send(BEGIN - 100_000 * MS)
+    rig.tick(BEGIN)
+    assert (rig.loop.counts.used, rig.loop.counts.stale, len(rig.published)) == (1, 0, 1)
+
+
+@pytest.mark.parametrize('stamp', [0, 1, BEGIN - 100_000 * MS, BEGIN + 100_000 * MS])
+def test_by_arrival_no_stamp_matters(stamp):
+    rig = Rig(drive='{stamp: arrival}')
+    rig.send(stamp)
+    rig.tick(BEGIN)
+    rig.send(stamp, 2.0)
+    rig.tick(BEGIN + 10 * MS)
+    assert rig.counts() == (2, 2, 0, 0, 0)
+    assert rig.loop.newest_stamp == BEGIN + 10 * MS
+    assert len(rig.published) == 2
 
 
 def test_a_tick_takes_no_more_than_the_queue_holds():
