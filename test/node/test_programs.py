@@ -25,9 +25,11 @@ from linkage_ros.scene.load import SCENE_FILE
 import pytest
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
+from sensor_msgs.msg import JointState
 import yaml
 
 from ..support.commands import environment
+from .graph import NodeProcess, wait_for
 
 PROGRAMS = {
     'linkage_node': LINKAGE_NODE,
@@ -121,6 +123,16 @@ def test_one_request_for_all_parameters_gets_their_values(graph, start, write_sc
     node = start(scene, '--params-file', str(again))
     assert node.end() == 0
     assert 'WARN' not in node.log
+
+
+def test_the_crank_source_publishes_reliably(graph, domain, folder):
+    """A subscriber that asks for it gets nothing else, as joint_state_publisher for source_list."""
+    heard = graph.listen(JointState, '/crank_states')
+    source = NodeProcess(domain, folder, program=('-m', 'linkage_ros.node.crank_source'))
+    try:
+        wait_for(lambda: heard, 'a crank')
+    finally:
+        source.kill()
 
 
 def test_a_bag_holds_the_scene_with_the_keys_that_were_set(start, write_scene, folder):
