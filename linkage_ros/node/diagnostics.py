@@ -214,7 +214,7 @@ class DiagnosticsSummary:
             message = f'No crank for {age:.1f} s, by its stamps' if stamp else 'No crank yet'
         elif self.cranks_doubled:
             level, message = WARN, self.cranks_doubled
-        elif rejected:
+        elif rejected > 0:
             level, message = WARN, f'{rejected} samples rejected'
         missed = self.loop.missed
         values: dict[str, object] = {

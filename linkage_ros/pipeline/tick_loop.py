@@ -26,7 +26,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import itertools
 from threading import Event, Thread
-from time import monotonic_ns
+from time import monotonic_ns, time_ns
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.bag.recorder import Recorder
@@ -162,7 +162,7 @@ class Counts:
     stale_age: int = 0
     """Age of the last of them by its stamp, in [ns]."""
     superseded: int = 0
-    """Good messages followed by a newer one in the same tick."""
+    """Good messages followed by a newer one in the same tick, or by a clock that jumped back."""
     ignored: int = 0
     """Messages without the crank's joints: other publishers may share the topic."""
     last_ignored: bytes = b''
@@ -239,6 +239,10 @@ class TickLoop:
         self._crank_sequences: dict[object, int] = {}
         """Number of the last message with the crank of the same linkages."""
         self._last_time = 0
+        self._jumped = 0
+        """System's time at which the clock was seen to be back, in [ns]."""
+        self._old = 0
+        """Samples that the last tick rejected as older than the last one."""
         self._pipeline = build()
         self.injection = self._pipeline.injection
         self._publish_change = publish_change
@@ -321,6 +325,7 @@ class TickLoop:
             self._take_wrench(which, take, clock)
         counts, pipeline = self.counts, self._pipeline
         good, end = 0, 0
+        self._old = 0
         for _ in range(self._depth):
             if (taken := self._take()) is None:
                 break
@@ -348,8 +353,14 @@ class TickLoop:
                 elif rejection is Rejection.MISSING:
                     counts.ignored += 1
                     counts.last_ignored = message
+                elif (
+                    rejection is Rejection.STAMP_FUTURE
+                    and info.get('received_timestamp', self._jumped) < self._jumped
+                ):
+                    counts.superseded += 1
                 else:
                     counts.rejected[rejection] += 1
+                    self._old += rejection is Rejection.STAMP_OLD
                 if number and rejection is not Rejection.MISSING:
                     cranks = pipeline.addressed
                     counts.interleaved += number <= self._crank_sequences.get(cranks, 0)
@@ -434,7 +445,12 @@ class TickLoop:
     def _rebuild(self, now: int) -> None:
         """Build the pipeline again, after a reset request or a backward jump of time."""
         if now < self._last_time:
+            # As where a bag is played in a loop: what waits is of the time before, and what came a
+            # little before the clock did was not too old.
+            self._jumped = time_ns()
             self.counts.clock_jumps += 1
+            self.counts.rejected[Rejection.STAMP_OLD] -= self._old
+            self.counts.superseded += self._old
         if self.reset_requested:
             self.reset_requested = False
             self.counts.resets += 1

@@ -21,6 +21,7 @@ The queue is the test's, and its clock goes on by a step with every look at it.
 
 from functools import partial
 from itertools import count
+from time import time_ns
 
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
@@ -61,10 +62,12 @@ class Rig:
         self.now += MS
         return self.now
 
-    def send(self, stamp=BEGIN, angle=1.0, names=('crank_joint',), number=None):
+    def send(self, stamp=BEGIN, angle=1.0, names=('crank_joint',), number=None, received=None):
         message = JointStateWriter(names).write(stamp, [angle] * len(names), [0.0] * len(names))
         number = next(self._numbers) if number is None else number
         info = {'source_timestamp': stamp, 'publication_sequence_number': number}
+        if received is not None:
+            info['received_timestamp'] = received
         self.queue.append((message, info))
 
     def counts(self):
@@ -150,6 +153,26 @@ def test_its_own_messages_are_told_also_where_a_linkage_is_not_in_them():
         rig.queue.append((message, {'source_timestamp': BEGIN}))
     rig.tick(BEGIN + 2 * MS)
     assert rig.counts() == counts == (2, 2, 0, 0, 0)
+
+
+def test_where_played_time_begins_again_no_sample_is_refused():
+    """As `ros2 bag play --loop --clock`: samples and /clock come a little before one another."""
+    rig = Rig()
+    rig.send(BEGIN + 900 * MS)
+    rig.tick(BEGIN + 900 * MS)
+    rig.send(BEGIN)  # of the second pass, before its /clock
+    rig.tick(BEGIN + 910 * MS)
+    rig.send(BEGIN + 915 * MS, received=time_ns())  # of the first pass, after it
+    rig.send(BEGIN + 5 * MS)
+    rig.tick(BEGIN + 10 * MS)
+    assert rig.loop.counts.clock_jumps == 1
+    assert rig.counts() == (4, 2, 2, 0, 0)
+    assert rig.loop.newest_stamp == BEGIN + 5 * MS
+    rig.send(BEGIN + 915 * MS, received=time_ns())  # of the future indeed
+    rig.send(BEGIN)
+    rig.tick(BEGIN + 20 * MS)
+    assert rig.loop.counts.rejected[Rejection.STAMP_FUTURE] == 1
+    assert rig.counts() == (6, 2, 2, 0, 2)
 
 
 # (scene, [(joints, age of the stamp in ms)] of a tick), then used, stale and superseded; max_age is 200 ms.
