@@ -51,7 +51,16 @@ ARGUMENTS = {
         'false',
         'Start it without a file too, with the model of the scene; Jazzy reads no topic.',
     ),
+    'publish_frequency': (
+        '',
+        'Most transforms a second of a joint, up to 1000; below the rate of its messages crank and '
+        "dependent joints come apart; '': the value of params_file, else 1000.",
+    ),
+    'frame_prefix': ('', "Before all frames, as left/; '': the value of params_file."),
 }
+
+FASTEST = 1000.0
+"""Most that robot_state_publisher takes [Hz]; by default it takes 20, each topic by itself."""
 
 
 FLAGS = {'true': True, '1': True, 'false': False, '0': False}
@@ -87,9 +96,25 @@ def nodes(context):
             name='robot_state_publisher',
             namespace=value['namespace'],
             # The file sets its clock, which has to be that of the node.
-            parameters=[value['params_file'], {**clock, 'robot_description': urdf}],
+            parameters=[
+                {'publish_frequency': FASTEST},
+                value['params_file'],
+                {**clock, **frames(value), 'robot_description': urdf},
+            ],
             output='screen',
         )
+
+
+def frames(value):
+    """Return the parameters of the transforms that are given."""
+    given = {'frame_prefix': value['frame_prefix']} if value['frame_prefix'] else {}
+    if text := value['publish_frequency']:
+        try:
+            given['publish_frequency'] = float(text)
+        except ValueError:
+            where = f'publish_frequency {quoted(text)}'
+            raise LinkageError(where, 'is no number', f'write 1 to {FASTEST:g}') from None
+    return given
 
 
 def flag(value, name):

@@ -23,7 +23,7 @@ import pytest
 
 from .support.messages import read_joint_state as read
 from .support.messages import STORE
-from .support.scenes import pipeline_of
+from .support.scenes import four_bar_text, pipeline_of
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
@@ -307,3 +307,67 @@ effects: {{delay: {{seconds: 0.002, spread: 0.01, stamp: measured}}}}
         assert stamp == pytest.approx(1e9 * max(measured), abs=2.0)
         together += len(set(measured)) == 2
     assert together >= 20
+
+
+UNPREFIXED = """
+linkages:
+  - {name: left, linkage: left.yaml, prefix: ''}
+  - {name: right, linkage: right.yaml}
+drive: {topic: {}}
+effects: {velocity: {}, pin_forces: {}, markers: {}}
+"""
+
+
+@pytest.mark.parametrize('where', ['entry', 'scene'])
+def test_without_a_prefix_names_are_those_of_the_files(load, tmp_path, where):
+    # As a URDF has them; the crank is one motor for both.
+    for side in ('left', 'right'):
+        masses = ((0.2, 0.02, 1e-4), (0.3, 0.06, 1e-3), (0.2, 0.04, 1e-3))
+        text = four_bar_text(0.04, 0.12, 0.08, 0.1, masses)
+        text = text.replace('rocker_joint', f'{side}_knee')
+        (tmp_path / f'{side}.yaml').write_text(text)
+    text = UNPREFIXED.replace(', linkage: right.yaml', ", linkage: right.yaml, prefix: ''")
+    if where == 'scene':
+        text = text.replace(", prefix: ''", '') + "prefix: ''\n"
+    scene = load(text)
+    assert scene.joints == ('left_knee', 'right_knee')
+    pipeline = Pipeline(scene)
+    assert pipeline.offer(crank(BEGIN, crank_joint=0.5), BEGIN) is None
+    state = read(pipeline.tick(BEGIN).message)
+    assert state.name == ['left_knee', 'right_knee']
+    assert state.position[0] == state.position[1]
+    assert [extra.topic for extra in pipeline.extras] == [
+        '~/left/pin_forces', '~/left/markers', '~/right/pin_forces', '~/right/markers',
+    ]  # fmt: skip
+
+
+PREFIXES = {
+    'one of its own': ("prefix: 'arm/l-'", 'arm/l-coupler_joint'),
+    'none for the only one': ("prefix: ''", 'coupler_joint'),
+    'one for the only one': ('prefix: finger_', 'finger_coupler_joint'),
+}
+
+
+@pytest.mark.parametrize('kind', PREFIXES)
+def test_a_prefix_is_as_it_is_written(load, kind):
+    text, joint = PREFIXES[kind]
+    scene = load(f'linkage: four_bar.yaml\n{text}\n')
+    assert scene.joints[0] == joint
+    assert scene.members[0].inputs == (joint.replace('coupler', 'crank'),)
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        (
+            TWO.replace('half_open.yaml}', "half_open.yaml, prefix: 'left_'}"),
+            'prefix: a second linkage publishes left_coupler_joint, left_rocker_joint; give each',
+        ),
+        (TWO + "prefix: ''\n", 'a second linkage publishes coupler_joint, rocker_joint; give'),
+        (TWO + "prefix: 'a b'\n", "prefix: 'a b' begins no name of a joint; use letters"),
+    ],
+)
+def test_a_prefix_that_does_not_tell_joints_apart_is_refused(load, text, said):
+    with pytest.raises(FileError) as caught:
+        load(text)
+    assert said in str(caught.value)

@@ -231,11 +231,6 @@ def test_at_a_toggle_a_trajectory_has_positions_only():
     assert len(point.velocities) == len(point.accelerations) == 0
 
 
-def test_acceleration_needs_the_cranks_rate():
-    held = pipeline(b'effects: {acceleration: {}}\ndrive: {topic: {carry_forward: false}}')
-    assert held.offer(CRANK.write(BEGIN, [1.0], []), BEGIN) is Rejection.NO_RATE
-
-
 TWO_CRANKS = FIVE_BAR.encode()
 
 
@@ -279,7 +274,7 @@ def test_a_rejected_message_leaves_the_next_ticks_as_they_were():
         (CRANK.write(BEGIN, [float('nan')], [0.0]), Rejection.NOT_FINITE),
         (CRANK.write(0, [1.0], [0.0]), Rejection.STAMP_ZERO),
         (CRANK.write(BEGIN - 1, [1.0], [0.0]), Rejection.STAMP_OLD),
-        (CRANK.write(BEGIN, [1.0], []), Rejection.NO_RATE),
+        (CRANK.write(BEGIN, [1.0], [float('inf')]), Rejection.NOT_FINITE),
         (JointStateWriter(['x']).write(BEGIN, [1.0], [0.0]), Rejection.MISSING),
     ]
     clean, disturbed = pipeline(), pipeline()

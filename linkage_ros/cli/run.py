@@ -303,7 +303,7 @@ def run_scene(
                 {
                     'scene': scene,
                     'runs_directory': arguments.runs,
-                    **({'set': arguments.set} if arguments.set else {}),  # rclpy: no empty list
+                    'set': arguments.set or [''],
                 },
                 seconds=arguments.seconds,
                 patience=patience,

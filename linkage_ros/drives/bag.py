@@ -17,8 +17,9 @@
 A recorded crank: the samples of a bag, at their times or one per tick.
 
 Samples that the `topic` drive would reject are skipped and counted: messages without the input
-joints, non-finite numbers, stamps that go back. The lead of a stamp over the clock does not
-matter, since the first sample counts as taken at the first tick.
+joints, numbers beyond its bounds, stamps that go back. Absent rates are differenced as there. The
+lead of a stamp over the clock does not matter, since the first sample counts as taken at the first
+tick.
 
 The order of the messages is that of their log times, whatever that in the file: other writers do
 not keep it. The drive reads the bag when it is built, and again at every reset. A sample takes 8
@@ -32,8 +33,9 @@ from array import array
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import nan
 
 from linkage_ros.bag.reader import Bag, read_bag
 from linkage_ros.bag.run_events import raw_account
@@ -52,17 +54,15 @@ class Samples:
 
     Parameters
     ----------
-    inputs
-        Names of the driven joints.
     use
         How samples are used, which decides whether they need rates.
-    needs_rate
-        As for `TopicDrive`.
+    context
+        Context of the drive.
 
     """
 
     __slots__ = (
-        '_has_rates',
+        '_at_arrival',
         '_inputs',
         '_log_times',
         '_read',
@@ -78,12 +78,13 @@ class Samples:
     rejected: Counter[Rejection]
     """Number of skipped messages, by reason."""
 
-    def __init__(self, inputs: tuple[str, ...], use: TopicParameters, needs_rate: bool) -> None:
+    def __init__(self, use: TopicParameters, context: Context) -> None:
+        inputs = context.closure.linkage.inputs
         self._inputs = len(inputs)
-        self._read = JointStateReader(inputs).read
-        self._sieve = TopicDrive(use, needs_rate)
+        self._read = JointStateReader(context.inputs_in_messages).read
+        self._sieve = TopicDrive(use, context.needs_rate, inputs)
+        self._at_arrival = use.stamp == 'arrival'
         self._log_times, self._stamps = array('Q'), array('Q')
-        self._has_rates = array('b')
         self._values = array('d')
         self.offsets = array('q')
         self.rejected = Counter()
@@ -96,9 +97,8 @@ class Samples:
             return
         self._log_times.append(log_time)
         self._stamps.append(sample.stamp)
-        self._has_rates.append(sample.rates is not None)
         self._values.extend(sample.angles)
-        self._values.extend(sample.rates or (0.0,) * self._inputs)
+        self._values.extend(sample.rates or (nan,) * self._inputs)
 
     def settle(self) -> None:
         """Put the added samples in the order of their log times, and reject what is not good."""
@@ -106,23 +106,20 @@ class Samples:
         order: Sequence[int] = range(len(times))
         if any(later < time for time, later in pairwise(times)):
             order = sorted(order, key=times.__getitem__)
-        good = array('q')
+        values, first = array('d'), 0
         for place in order:
-            angles, rates = self[place]
-            stamp, last = self._stamps[place], self._sieve.stamp
-            sample = CrankSample(stamp, angles, rates if self._has_rates[place] else None)
-            rejection = self._sieve.offer(sample, stamp)
+            stamp = self._stamps[place]
+            sample = CrankSample(stamp, *self[place])
+            rejection = self._sieve.offer(sample, times[place] if self._at_arrival else stamp)
             if rejection is not None:
                 self.rejected[rejection] += 1
-                continue
-            self.offsets.append(self.offsets[-1] + stamp - last if self.offsets else 0)
-            good.append(place)
-        values = array('d')
-        for place in good:
-            for numbers in self[place]:
-                values.extend(numbers)
+            elif (good := self._sieve.sample) is not None:
+                stamp, angles, rates, _ = good
+                first = first if self.offsets else stamp
+                self.offsets.append(stamp - first)
+                values.extend(angles + rates)
         self._values = values
-        del self._log_times[:], self._stamps[:], self._has_rates[:]
+        del self._log_times[:], self._stamps[:]
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -136,9 +133,7 @@ class Samples:
         return tuple(self._values[first:middle]), tuple(self._values[middle:end])
 
 
-def read_samples(
-    bag: Bag, topic: str, inputs: tuple[str, ...], use: TopicParameters, needs_rate: bool
-) -> Samples:
+def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -> Samples:
     """
     Return the samples of a bag's crank topic.
 
@@ -149,7 +144,7 @@ def read_samples(
     topic
         The topic; '' for the topic that the run's account in the bag names or, without an account,
         for the only topic with good samples.
-    inputs, use, needs_rate
+    use, context
         As for `Samples`.
 
     Raises
@@ -164,7 +159,7 @@ def read_samples(
         raise BagError(bag.path, f'holds no topic {topic!r} of {_TYPE}', f'it holds {known}')
     crank_topic = topic or _crank_topic_of_run(bag)
     samples_of = {
-        name: Samples(inputs, use, needs_rate)
+        name: Samples(use, context)
         for name in ([crank_topic] if crank_topic in of_type else of_type)
     }
     for name, log_time, _, data in bag.messages():
@@ -184,7 +179,7 @@ def read_samples(
         )
     raise BagError(
         bag.path,
-        f'holds no crank sample of {listed(inputs)}{_why(samples_of)}',
+        f'holds no crank sample of {listed(context.inputs_in_messages)}{_why(samples_of)}',
         'name another bag, or its topic as drive.bag.topic',
     )
 
@@ -226,6 +221,9 @@ class BagParameters:
         least=1e-6,
         most=3600.0,
     )
+    stamp: str = choice(
+        'time of a sample: its stamp, or when it was recorded', ('measured', 'arrival'), 'measured'
+    )
     repeat: bool = flag(
         'after the last sample begin again, a mean interval later; else there is no crank', False
     )
@@ -249,12 +247,12 @@ def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPac
     """
     recorded = parameters.pace == 'recorded'
     use = TopicParameters(
-        carry_forward=parameters.carry_forward and recorded, max_age=parameters.max_age
+        carry_forward=parameters.carry_forward and recorded,
+        max_age=parameters.max_age,
+        stamp=parameters.stamp,
     )
     bag = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
-    samples = read_samples(
-        bag, parameters.topic, context.inputs_in_messages, use, context.needs_rate
-    )
+    samples = read_samples(bag, parameters.topic, use, context)
     if recorded:
         return RecordedPace(samples, use, repeat=parameters.repeat)
     return FastPace(samples, repeat=parameters.repeat)
@@ -289,7 +287,7 @@ class RecordedPace(Drive):
 
     def __init__(self, samples: Samples, use: TopicParameters, *, repeat: bool) -> None:
         self.samples = samples
-        self._topic = TopicDrive(use, needs_rate=False)
+        self._topic = TopicDrive(replace(use, stamp='measured'), needs_rate=False)
         self.max_age = self._topic.max_age
         self._start: int | None = None
         self._newest = (-1, -1)

@@ -16,6 +16,10 @@
 """
 Drive from a topic: the newest measured sample, extrapolated by its rate.
 
+A rate that is absent, or NaN as joint_state_broadcaster fills it in for an interface that is not
+there, is the backward difference of the angles, where one is needed: ω = (q − q₋₁)/Δt, for a
+revolute input by the shorter way around. Before a second sample there is none, and no crank state.
+
 A JointState has no accelerations. With ``acceleration: differenced`` they come from the rates of
 the samples: their backward difference d = (ω − ω₋₁)/Δt, and behind it a low-pass of order one,
 
@@ -28,13 +32,15 @@ Signal Processing, 3rd ed., 2010, ch. 7).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import expm1, isfinite, tau
+from math import expm1, isfinite, isnan, nan, remainder, tau
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import choice, flag, number
 from linkage_ros.generated_code import Lines
+from linkage_ros.kinematics.linkage import Input
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
 
@@ -65,6 +71,11 @@ class TopicParameters:
         unit='s',
         least=0.0,
         most=3600.0,
+    )
+    stamp: str = choice(
+        'time of a sample: its stamp, or its arrival whatever the stamp',
+        ('measured', 'arrival'),
+        'measured',
     )
     acceleration: str = choice(
         "the crank's acceleration: zero, or the differences of the samples' rates",
@@ -98,7 +109,7 @@ def build(parameters: TopicParameters, context: Context) -> TopicDrive:
         raise DefinitionError(
             'drive.topic.cutoff', 'filters nothing', 'add acceleration: differenced'
         )
-    return TopicDrive(parameters, context.needs_rate)
+    return TopicDrive(parameters, context.needs_rate, context.closure.linkage.inputs)
 
 
 _Values = tuple[float, ...]
@@ -117,16 +128,21 @@ class TopicDrive(Drive):
         How samples are used.
     needs_rate
         Whether anything besides the extrapolation needs the crank's rate. If nothing does,
-        messages without velocities are accepted.
+        a rate that is absent counts as 0.
+    inputs
+        Inputs of the linkage; () for inputs that are all revolute.
 
     """
 
     __slots__ = (
+        '_at_arrival',
         '_bend',
         '_carry_forward',
         '_estimate',
+        '_last',
         '_max_lead',
         '_needs_rate',
+        '_sliding',
         'max_age',
         'sample',
     )
@@ -134,21 +150,27 @@ class TopicDrive(Drive):
     max_age: int
     """Age of the newest sample above which there is no crank state, in [ns]."""
     sample: tuple[int, _Values, _Values, _Values] | None
-    """The newest good sample: its stamp, in [ns], angles, rates, and accelerations."""
+    """The newest good sample with rates: its stamp, in [ns], angles, rates, accelerations."""
 
-    def __init__(self, use: TopicParameters, needs_rate: bool) -> None:
+    def __init__(
+        self, use: TopicParameters, needs_rate: bool, inputs: Sequence[Input] = ()
+    ) -> None:
         self._carry_forward = use.carry_forward
         self.max_age = round(use.max_age * NANOSECONDS)
         self._max_lead = round(use.max_lead * NANOSECONDS)
+        self._at_arrival = use.stamp == 'arrival'
         self._estimate = use.acceleration == 'differenced'
         self._bend = -tau * use.cutoff
         self._needs_rate = needs_rate or use.carry_forward or self._estimate
+        self._sliding = {number for number, given in enumerate(inputs) if given.slider}
+        self._last: tuple[int, _Values] | None = None
+        """Stamp and angles of the newest good sample."""
         self.sample = None
 
     @property
     def stamp(self) -> int:
         """Stamp of the newest good sample, in [ns]; 0 before the first."""
-        return self.sample[0] if self.sample else 0
+        return self._last[0] if self._last else 0
 
     def offer(self, sample: CrankSample, now: int) -> Rejection | None:
         """
@@ -165,21 +187,46 @@ class TopicDrive(Drive):
         stamp, angles, rates = sample
         zeros = (0.0,) * len(angles)
         if rates is None:
-            if self._needs_rate:
-                return Rejection.NO_RATE
-            rates = zeros
+            rates = (nan,) * len(angles)
+        complete = True
         for value in angles + rates:
             if not -LARGEST <= value <= LARGEST:
-                finite = all(map(isfinite, angles + rates))
-                return Rejection.TOO_LARGE if finite else Rejection.NOT_FINITE
+                complete = False
+        if not complete and (why := _refusal(angles, rates)) is not None:
+            return why
+        if self._at_arrival:
+            stamp = now
         if stamp == 0:
             return Rejection.STAMP_ZERO
         if stamp > now + self._max_lead:
             return Rejection.STAMP_FUTURE
-        if self.sample is not None and stamp < self.sample[0]:
+        if self._last is not None and stamp < self._last[0]:
             return Rejection.STAMP_OLD
+        if not complete:
+            known = self._differences(stamp, angles) if self._needs_rate else zeros
+            if known is None:
+                self._last = stamp, angles
+                return None
+            rates = tuple(
+                [old if isnan(rate) else rate for rate, old in zip(rates, known, strict=True)]
+            )
         self.sample = (stamp, angles, rates, self._bent(stamp, rates) if self._estimate else zeros)
+        self._last = stamp, angles
         return None
+
+    def _differences(self, stamp: int, angles: _Values) -> _Values | None:
+        """Return the mean rates since the last sample; None without one of another stamp."""
+        if self._last is None or stamp == self._last[0]:
+            return self.sample and self.sample[2]
+        before, earlier = self._last
+        ways = [q - old for q, old in zip(angles, earlier, strict=True)]
+        seconds = (stamp - before) * 1e-9
+        return tuple(
+            [
+                (way if number in self._sliding else remainder(way, tau)) / seconds
+                for number, way in enumerate(ways)
+            ]
+        )
 
     def _bent(self, stamp: int, rates: _Values) -> _Values:
         """Return the accelerations at a new sample; 0 at the first one, and after a gap."""
@@ -247,3 +294,12 @@ class TopicDrive(Drive):
             carried = [f'angles[{i}] + rates[{i}] * seconds,' for i in range(inputs)]
             lines += ['seconds = age * 1e-9', f'angles = ({" ".join(carried)})']
         return Lines(lines, {'drive': self})
+
+
+def _refusal(angles: _Values, rates: _Values) -> Rejection | None:
+    """Return why a sample is rejected for its numbers; a rate that is NaN is absent."""
+    bad = [value for value in angles if not -LARGEST <= value <= LARGEST]
+    bad += [rate for rate in rates if abs(rate) > LARGEST]
+    if not bad:
+        return None
+    return Rejection.TOO_LARGE if all(map(isfinite, bad)) else Rejection.NOT_FINITE

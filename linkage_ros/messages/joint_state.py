@@ -58,7 +58,6 @@ class Rejection(Enum):
     UNEQUAL = 'arrays of unequal length'
     MISSING = 'crank joint missing'
     TWICE = 'crank joint named twice'
-    NO_RATE = 'no velocities'
     NOT_FINITE = 'position or rate not finite'
     TOO_LARGE = 'position or rate beyond 1e10'
     NO_EFFORT = 'no efforts'
@@ -77,7 +76,7 @@ class CrankSample(NamedTuple):
 
     stamp: int  # Time of the measurement, in [ns]
     angles: tuple[float, ...]  # Value of each input, in [rad]; of a sliding input in [m]
-    # Rates, in [rad/s] or [m/s]; None if the message has no velocities.
+    # Rates, in [rad/s] or [m/s]; None if the message has no velocities, NaN where one is absent.
     rates: tuple[float, ...] | None
 
 
@@ -135,13 +134,15 @@ def _pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection:
         return arrays_or_reason
     _, names, arrays = arrays_or_reason
     positions, rates, efforts = arrays
+    # First, whether it is for this reader at all: others may share the topic.
+    if names and not {*joints} <= {*names}:
+        return Rejection.MISSING
     if not names or not positions.length:
         return Rejection.EMPTY
     if positions.length != len(names) or not {rates.length, efforts.length} <= {0, len(names)}:
         return Rejection.UNEQUAL
-    for joint in joints:
-        if names.count(joint) != 1:
-            return Rejection.TWICE if joint in names else Rejection.MISSING
+    if any(names.count(joint) > 1 for joint in joints):
+        return Rejection.TWICE
     places = [8 * names.index(joint) for joint in joints]
     groups = [
         [array.first + place for place in places] if array.length else []
@@ -314,12 +315,16 @@ def _effort_pattern(
         return arrays_or_reason
     _, names, arrays = arrays_or_reason
     efforts = arrays[-1]
+    if names and joint not in names:
+        return Rejection.MISSING
     if not efforts.length:
         return Rejection.NO_EFFORT
     able = [name for name in names if name not in dependent]
     if not {array.length for array in arrays} <= {0, len(able), len(names)}:
         return Rejection.UNEQUAL
-    if names.count(joint) != 1:
-        return Rejection.TWICE if joint in names else Rejection.MISSING
+    if not names:
+        return Rejection.MISSING
+    if names.count(joint) > 1:
+        return Rejection.TWICE
     commanded = names if efforts.length == len(names) else able
     return pattern(data, arrays, [[efforts.first + 8 * commanded.index(joint)]])

@@ -46,7 +46,6 @@ from linkage_ros.signals import bounded_end
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
@@ -205,9 +204,8 @@ class CrankSource(DemoNode):
         self._start = self.value('start')
         self._seconds = self.value('seconds')
         self._writer = JointStateWriter([self.value('joint')])
-        self._publisher = self.create_publisher(
-            JointState, 'crank_states', qos_profile_sensor_data
-        )
+        # Reliable, as a broadcaster is: some subscribers refuse less, as joint_state_publisher.
+        self._publisher = self.create_publisher(JointState, 'crank_states', 10)
 
     def run(self, stop: Event) -> None:
         """Publish until the event is set, or for the configured time."""

@@ -78,6 +78,9 @@ class Snapshot:
     unclosed: int = 0
     indeterminate: int = 0
     wrenches_rejected: int = 0
+    interleaved: int = 0
+    own_interleaved: int = 0
+    stale: int = 0
     chattered: int = 0
 
     @classmethod
@@ -93,6 +96,9 @@ class Snapshot:
             counts.unclosed[Status.OPEN] + counts.unclosed[Status.INDETERMINATE],
             counts.unclosed[Status.INDETERMINATE],
             sum(sum(each.rejected.values()) for each in counts.wrenches),
+            counts.interleaved,
+            counts.own_interleaved,
+            counts.stale,
             chattered,
         )
 
@@ -118,8 +124,9 @@ class DiagnosticsSummary:
     # Time since the last ``/clock`` message, in [s]; 0 where the node does not use it.
     clock_silence: float = 0.0
     clock_refused: int = 0  # Number of ``/clock`` messages without a valid time
-    # Whether other joints share the crank's topic: it may then have several publishers.
-    crank_shared: bool = False
+    # What several publishers, or several nodes of one name, spoil; '' for nothing.
+    cranks_doubled: str = ''
+    node_doubled: str = ''
     # Settings of middleware and operating system that affect the ticks.
     system: Mapping[str, str] = field(default_factory=dict)
 
@@ -147,6 +154,8 @@ class DiagnosticsSummary:
             level, message = WARN, f'{lost} ticks lost'
         elif self.now.chattered > self.before.chattered:
             level, message = WARN, 'Motor and crank meet and part too often for the step'
+        elif self.node_doubled:
+            level, message = WARN, self.node_doubled
         # The keys of diagnostic_updater's FrequencyStatus come first.
         values: dict[str, object] = {
             'Events in window': ticks,
@@ -204,12 +213,14 @@ class DiagnosticsSummary:
             message = 'Driven by the scene'
         elif counts.ignored and counts.ignored == counts.received:
             level, message = STALE if max_age else WARN, 'No crank yet, but messages without it'
+        elif self.now.stale > self.before.stale and age * NANOSECONDS > max_age:
+            level, message = STALE, f'Samples arrive, but are {age:.1f} s old by their stamps'
         elif max_age and age * NANOSECONDS > max_age:
             level = STALE
             message = f'No crank for {age:.1f} s, by its stamps' if stamp else 'No crank yet'
-        elif len(self.publishers) > 1 and not self.crank_shared:
-            level, message = WARN, f'Several publishers: {", ".join(self.publishers)}'
-        elif rejected:
+        elif self.cranks_doubled:
+            level, message = WARN, self.cranks_doubled
+        elif rejected > 0:
             level, message = WARN, f'{rejected} samples rejected'
         missed = self.loop.missed
         values: dict[str, object] = {
@@ -218,6 +229,7 @@ class DiagnosticsSummary:
             'Samples received': counts.received,
             'Samples used': counts.used,
             'Samples superseded': counts.superseded,
+            'Samples stale': counts.stale,
             'Samples rejected': self.now.rejected,
             'Messages without the crank': counts.ignored,
             'Messages lost before': 'unknown' if missed is None else missed,
@@ -406,6 +418,15 @@ def chattered(lines: Sequence[LinkagePipeline]) -> int:
     return sum(getattr(line.drive, 'chattered', 0) for line in lines)
 
 
+def is_interleaved(before: int, now: int) -> bool:
+    """
+    Return whether messages came from several publishers, by counts of numbers that went back.
+
+    A publisher that starts again begins its numbers again, once.
+    """
+    return now - before > 1
+
+
 def no_clock(silence: float) -> str:
     """Return the text for a ``/clock`` that has been silent for a time, in [s]."""
     return 'No /clock yet' if silence == inf else f'No /clock for {silence:.1f} s'
@@ -463,16 +484,15 @@ def _of(line: LinkagePipeline) -> str:
 
 _REMEDIES = {
     Rejection.MALFORMED: 'the publisher must send sensor_msgs/JointState as plain CDR',
-    Rejection.EMPTY: 'fill name, position and velocity',
+    Rejection.EMPTY: 'fill name and position',
     Rejection.UNEQUAL: 'give each joint that is named a number in every array that is filled',
     Rejection.TWICE: 'name the joint once',
-    Rejection.NO_RATE: 'fill velocity, or set carry_forward: false and leave out velocity',
     Rejection.NOT_FINITE: 'look at the sensor',
     Rejection.TOO_LARGE: 'the units are rad and m',
     Rejection.NO_EFFORT: 'fill name and effort',
-    Rejection.EFFORT_NOT_FINITE: 'look at the controller',
+    Rejection.EFFORT_NOT_FINITE: 'activate the controller: ros2_control sends NaN before',
     Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
-    Rejection.STAMP_ZERO: 'stamp the messages',
+    Rejection.STAMP_ZERO: 'stamp the messages, or write drive: {topic: {stamp: arrival}}',
     Rejection.STAMP_INVALID: 'stamp the messages with the time',
     Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
     Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
@@ -484,6 +504,9 @@ _WRENCH_REMEDIES = {
     Rejection.WRENCH_TOO_LARGE: 'the units are N and N·m',
 }
 
+
+_STALE_PERIOD = 30.0
+"""Least time between two warnings about stamps that are too old, in [s]: a clock stays wrong."""
 
 _PATIENCE = 2.0
 """Time without a warning about a missing crank, in [s]."""
@@ -506,10 +529,37 @@ class Warnings:
         self._rejected = dict.fromkeys(Rejection, 0)
         self._wrenches_rejected: dict[str, dict[Rejection, int]] = {}
         self._unclosed = dict.fromkeys(Status, 0)
-        self._lost = self._stalls = self._ticks = 0
+        self._lost = self._stalls = self._ticks = self._stale = 0
         self._chattered = 0
         self._heard = (0, 0, monotonic())
         self._looked = (0, monotonic())
+
+    def check_age(self, counts: Counts, crank_topic: str, max_age: int, period: float) -> None:
+        """
+        Warn of samples that are too old when they arrive, as where two clocks differ.
+
+        Parameters
+        ----------
+        counts
+            Counts of the tick.
+        crank_topic
+            Topic of the crank samples.
+        max_age
+            Age above which a sample gives no crank, in [ns].
+        period
+            Least time between two warnings of this kind, in [s], if it is above 30 s.
+
+        """
+        if (new := counts.stale - self._stale) <= 0:
+            return
+        line = (
+            f'{crank_topic}: {new} samples too old to use, the newest {counts.stale_age * 1e-9:.1f} '
+            f's by its stamp, and max_age is {max_age * 1e-9:g} s: synchronise the clocks, set '
+            'use_sim_time where time is played or simulated, or write drive: {topic: {stamp: '
+            'arrival}}'
+        )
+        if self.warn('stale', line, max(period, _STALE_PERIOD)):
+            self._stale = counts.stale
 
     def check_silence(
         self,

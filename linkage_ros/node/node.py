@@ -21,7 +21,7 @@ executor: transitions, services, parameters, diagnostics, and all logging.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial, wraps
 from math import inf
@@ -40,6 +40,7 @@ from linkage_ros.node.diagnostics import (
     chattered,
     CLOCK_PATIENCE,
     DiagnosticsSummary,
+    is_interleaved,
     no_clock,
     Snapshot,
     Warnings,
@@ -169,10 +170,10 @@ class LinkageNode(LifecycleNode):
         self._activated = 0
         self.add_on_set_parameters_callback(self._on_parameters)
         self._warnings = Warnings(self.get_logger())
-        self._before = Snapshot()
+        self._before = self._before_last = Snapshot()
         self._real_time = RealTime(
             self.get_parameter('thread_priority').value,
-            self.get_parameter_or('cpu_affinity').value or (),
+            [each for each in self.get_parameter('cpu_affinity').value if each != -1],
             self.get_parameter('lock_memory').value,
         )
         why = standstill()
@@ -194,7 +195,7 @@ class LinkageNode(LifecycleNode):
                 raise LinkageError(
                     'parameter scene', "'' names no file", 'start with --ros-args -p scene:=FILE'
                 )
-            scene = load_scene(file, self.get_parameter_or('set').value or ())
+            scene = load_scene(file, [each for each in self.get_parameter('set').value if each])
             pipeline = Pipeline(scene)  # fails here if it cannot be built, not at the first tick
             self._scene_topics.connect(pipeline)
             for closure in pipeline.closures:
@@ -230,7 +231,7 @@ class LinkageNode(LifecycleNode):
             while take() is not None:
                 pass  # discard messages from before this run
         self._activated = time.monotonic_ns()
-        self._before = Snapshot.of(self.loop.counts, self._activated)
+        self._before = self._before_last = Snapshot.of(self.loop.counts, self._activated)
         if self.scene.record is not None:
             self._start_recording()
         self._real_time.lock_memory()
@@ -278,7 +279,6 @@ class LinkageNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def _build_loop(self, scene: Scene) -> TickLoop:
-        shared = self.crank_topic == self._joint_states.topic_name
         pipeline = Pipeline(scene, self._closures)
         closures, injection = pipeline.closures, pipeline.injection
         crank = self._scene_topics.crank
@@ -286,7 +286,7 @@ class LinkageNode(LifecycleNode):
             partial(Pipeline, scene, closures, injection),
             self._scene_topics.take,
             self._joint_states.handle.publish_raw,
-            own_joint_states(scene) if shared else None,
+            own_joint_states(scene) if self._shares_topic else None,
             [extra.handle.publish_raw for extra in self._scene_topics.extras],
             self._scene_topics.publish_change,
             # An unbounded queue: only the time of a tick limits how many messages it takes.
@@ -421,6 +421,7 @@ class LinkageNode(LifecycleNode):
             return
         period = self.get_parameter('warning_period').value
         self._warnings.check(loop.counts, loop.pipeline.closures, self.crank_topic, period)
+        self._warnings.check_age(loop.counts, self.crank_topic, loop.pipeline.max_age, period)
         wrenches = [each.topic_name for each in self._scene_topics.wrenches]
         self._warnings.check_chatter(loop.pipeline.lines, period)
         self._warnings.check_wrenches([*zip(wrenches, loop.counts.wrenches, strict=True)], period)
@@ -460,23 +461,19 @@ class LinkageNode(LifecycleNode):
         assert self.scene is not None
         assert self.loop is not None
         publishers = self._crank_publishers()
-        several = len(publishers) > 1
-        self.loop.several_publishers |= several
-        # If messages come without the crank's joints, other publishers share the topic, and it is
-        # unknown which publisher sends the crank.
-        shared = self.crank_topic == self._joint_states.topic_name or self.loop.counts.ignored
-        if several and not shared:
-            self._warnings.warn(
-                'publishers',
-                f'{self.crank_topic}: several publishers, {" and ".join(publishers)}; '
-                'stop all but one',
-                self.get_parameter('warning_period').value,
-            )
-        simulated = self.get_parameter('use_sim_time').value
-        clock = self.get_clock().now()
+        self.loop.several_publishers |= len(publishers) > 1
         now = Snapshot.of(
             self.loop.counts, time.monotonic_ns(), chattered(self.loop.pipeline.lines)
         )
+        cranks_doubled = self._doubled_cranks(publishers, now)
+        node_doubled = self._doubled_node(now)
+        self._before_last = self._before
+        period = self.get_parameter('warning_period').value
+        for kind, line in (('publishers', cranks_doubled), ('twin', node_doubled)):
+            if line:
+                self._warnings.warn(kind, line, period)
+        simulated = self.get_parameter('use_sim_time').value
+        clock = self.get_clock().now()
         health = DiagnosticsSummary(
             node=self.get_fully_qualified_name(),
             scene=self.scene.name,
@@ -486,7 +483,8 @@ class LinkageNode(LifecycleNode):
             clock_refused=self._clock_guard.refused,
             crank_topic=self.crank_topic,
             publishers=publishers,
-            crank_shared=bool(shared),
+            cranks_doubled=cranks_doubled,
+            node_doubled=node_doubled,
             loop=self.loop,
             before=self._before,
             now=now,
@@ -505,14 +503,48 @@ class LinkageNode(LifecycleNode):
                 self.loop.topics.diagnostics, clock.nanoseconds, clock.nanoseconds, data
             )
 
+    def _doubled_cranks(self, publishers: Sequence[str], now: Snapshot) -> str:
+        """Return that several publishers send the same crank, and the remedy; '' if none do."""
+        assert self.loop is not None
+        topic, shared = self.crank_topic, self._shares_topic or self.loop.counts.ignored
+        among = ' and '.join(publishers) or 'nodes without a name yet'
+        # Where others share the topic, or each linkage has a publisher, only the numbers tell.
+        if is_interleaved(self._before_last.interleaved, now.interleaved):
+            return f'{topic}: several publishers send the crank, among {among}; stop all but one'
+        if len(publishers) > 1 and not shared and len(self.loop.pipeline.lines) == 1:
+            return f'{topic}: several publishers, {among}; stop all but one'
+        return ''
+
+    def _doubled_node(self, now: Snapshot) -> str:
+        """Return that there is another node of this name, or of these joints; '' if not."""
+        name = self.get_fully_qualified_name()
+        nodes = self.get_node_names_and_namespaces()
+        if [f'{space.rstrip("/")}/{each}' for each, space in nodes].count(name) > 1:
+            return (
+                f'another node is named {name}: services and diagnostics of both mix; rename one, '
+                'as by -r __ns:=/left'
+            )
+        if is_interleaved(self._before_last.own_interleaved, now.own_interleaved):
+            topic = self._joint_states.topic_name
+            return f'{topic}: another publisher sends the same joints as {name}; stop one of them'
+        return ''
+
+    @property
+    def _shares_topic(self) -> bool:
+        """Whether the node publishes on the topic of the crank."""
+        return self.crank_topic == self._joint_states.topic_name
+
     def _crank_publishers(self) -> list[str]:
-        """Return the other publishers on the drives' topic."""
+        """Return the other publishers on the drives' topic, each by its node's name."""
         names = [
             f'{info.node_namespace.rstrip("/")}/{info.node_name}'
             for info in self._scene_topics.crank_publishers
             if info.node_name != _NOT_YET_KNOWN
         ]
-        return [name for name in names if name != self.get_fully_qualified_name()]
+        # One publisher of this name is the node itself; another may have the same name.
+        if self._shares_topic and (own := self.get_fully_qualified_name()) in names:
+            names.remove(own)
+        return names
 
     def _clock_silence(self) -> float:
         """Return the time since the last ``/clock`` message, in [s]; 0 if unused."""

@@ -35,7 +35,7 @@ class NodeParameter(NamedTuple):
     """A parameter of a node."""
 
     name: str  # Name
-    default: Any  # Default; the type of the parameter if it has none
+    default: Any  # Default
     meaning: str  # Meaning with its unit, for the descriptor and ``--help``
     bounds: tuple[float, float] | None = None  # Least and greatest value; None for no bounds
     changeable: bool = False  # Whether it may be changed while the node runs
@@ -60,16 +60,16 @@ LINKAGE_NODE = (
     NodeParameter('scene', '', 'Scene file or linkage file, or the name of a shipped one'),
     NodeParameter(
         'set',
-        Parameter.Type.STRING_ARRAY,  # rclpy cannot infer the type of an empty list
-        'Keys of the scene to set, as rate=500',
+        # Not empty: rclpy cannot tell the type of an empty list, nor read one from a file. And one
+        # parameter without a value makes it answer a request for all with none.
+        [''],
+        "Keys of the scene to set, as rate=500; '': none",
     ),
     NodeParameter('runs_directory', '', "Folder of the bags; '' for the scene's own"),
     NodeParameter('autostart', True, 'Whether the node configures and activates itself'),
     NodeParameter('thread_priority', 0, 'Priority of the tick under SCHED_FIFO; 0: none', (0, 99)),
     NodeParameter(
-        'cpu_affinity',
-        Parameter.Type.INTEGER_ARRAY,
-        'Numbers of the processors that may run the tick; not set: all',
+        'cpu_affinity', [-1], 'Numbers of the processors that may run the tick; -1: all'
     ),
     NodeParameter(
         'lock_memory', False, 'Whether the memory of the process stays in that of the machine'
@@ -91,7 +91,10 @@ LINKAGE_NODE = (
 
 def declare_parameters(node: Node, parameters: Sequence[NodeParameter]) -> None:
     """Declare parameters; rclpy refuses values out of bounds. Warn of unknown ones."""
+    given = node._parameter_overrides  # noqa: SLF001 (rclpy has no other way)
     for name, default, meaning, bounds, changeable in parameters:
+        if name in given and given[name].type_ is Parameter.Type.NOT_SET:
+            del given[name]  # an empty list in a file
         descriptor = ParameterDescriptor(description=meaning, read_only=not changeable)
         if changeable:
             descriptor.additional_constraints = 'may be changed at any time'
@@ -105,7 +108,7 @@ def declare_parameters(node: Node, parameters: Sequence[NodeParameter]) -> None:
                 descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
         node.declare_parameter(name, default, descriptor)
     names = [parameter.name for parameter in parameters]
-    for name in node._parameter_overrides:  # noqa: SLF001 (rclpy has no other way)
+    for name in given:
         # Qualities of service are declared with their publisher.
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
             remedy = did_you_mean(name, names, f'known: {listed(names)}')
@@ -158,9 +161,7 @@ def _help(
     yield f'\n{purpose}\n\nparameters:'
     width = max(len(parameter.name) for parameter in declared) + 4
     for name, default, meaning, bounds, changeable in declared:
-        facts = [meaning]
-        if not isinstance(default, Parameter.Type):
-            facts.append(f'default {default!r}')
+        facts = [meaning, f'default {default!r}']
         if bounds is not None:
             facts.append(f'{bounds[0]:g} to {bounds[1]:g}')
         if changeable:

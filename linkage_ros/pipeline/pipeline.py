@@ -446,6 +446,10 @@ class LinkagePipeline:
         choice: Choice | None = getattr(self.closure, 'choice', None)
         return choice
 
+    def is_stale(self, now: int) -> bool:
+        """Return whether the newest sample is too old at a time, in [ns], to give a crank."""
+        return now - self.drive.stamp > self.drive.max_age > 0
+
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """Take a serialized message of the drive's topic at a time, in [ns]; or return why not."""
         if self._read_message is None:
@@ -628,6 +632,8 @@ class Pipeline:
         )
         """Whether ticks without a message may matter to a replay."""
         self._routes = SampleRouter({line: line.member.inputs for line in self.lines})
+        self.addressed: tuple[LinkagePipeline, ...] = ()
+        """Of several linkages, those whose inputs the last message named."""
         self._offered = 0
         self._newest: dict[LinkagePipeline, int] = {}
         self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
@@ -651,19 +657,25 @@ class Pipeline:
         # A message may concern one linkage or several: it is good if one of them accepts it.
         self._offered += 1
         rejections = []
-        for line in self._routes.find(message):
+        self.addressed = self._routes.find(message)
+        for line in self.addressed:
             rejections.append(line.offer(message, now))
             if rejections[-1] is None:
                 self._newest[line] = self._offered
         return None if None in rejections else next(iter(rejections), Rejection.MISSING)
 
-    def newly_used(self) -> int:
-        """Return how many good messages since the last call are still the newest for a linkage."""
+    def newly_used(self, now: int) -> tuple[int, int]:
+        """
+        Tell the good messages since the last call that are still the newest for a linkage.
+
+        Return how many of them give a crank at a time, in [ns], and how many are too old.
+        """
         if len(self.lines) == 1:
-            return 1
-        numbers = set(self._newest.values())
+            return (0, 1) if self.lines[0].is_stale(now) else (1, 0)
+        fresh = {number for line, number in self._newest.items() if not line.is_stale(now)}
+        stale = {*self._newest.values()} - fresh
         self._newest.clear()
-        return len(numbers)
+        return len(fresh), len(stale)
 
     def _made(self, now: int, seen: Sequence[LinkageTick | Seen]) -> Tick:
         """Return the result of a tick; joints without a reading are left out."""

@@ -26,7 +26,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import itertools
 from threading import Event, Thread
-from time import monotonic_ns
+from time import monotonic_ns, time_ns
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.bag.recorder import Recorder
@@ -156,15 +156,23 @@ class Counts:
     clock_jumps: int = 0
     resets: int = 0
     received: int = 0
-    """Messages on the drives' topic: used + superseded + ignored + rejected."""
+    """Messages on the drives' topic: used + stale + superseded + ignored + rejected."""
     used: int = 0
+    stale: int = 0
+    """Good messages, the newest of a tick, whose stamps are too old to give a crank."""
+    stale_age: int = 0
+    """Age of the last of them by its stamp, in [ns]."""
     superseded: int = 0
-    """Good messages followed by a newer one in the same tick."""
+    """Good messages followed by a newer one in the same tick, or by a clock that jumped back."""
     ignored: int = 0
     """Messages without the crank's joints: other publishers may share the topic."""
     last_ignored: bytes = b''
     missed: int = 0
     """Gaps in the sequence numbers of a single publisher."""
+    interleaved: int = 0
+    """Crank messages whose number is not above that before: publishers number theirs by one."""
+    own_interleaved: int = 0
+    """Likewise of messages with the published joints, where they come back on that topic."""
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
     lateness: DurationHistogram = field(default_factory=DurationHistogram)
     last: Tick | None = None
@@ -228,8 +236,14 @@ class TickLoop:
         self._own = own
         self._depth = depth
         self._take_wrenches = take_wrenches
-        self._sequence = 0
+        self._sequence = self._own_sequence = 0
+        self._crank_sequences: dict[object, int] = {}
+        """Number of the last message with the crank of the same linkages."""
         self._last_time = 0
+        self._jumped = 0
+        """System's time at which the clock was seen to be back, in [ns]."""
+        self._old = 0
+        """Samples that the last tick rejected as older than the last one."""
         self._pipeline = build()
         self.injection = self._pipeline.injection
         self._publish_change = publish_change
@@ -274,6 +288,7 @@ class TickLoop:
         return (
             f'{counts.received} received, {counts.used} used, {counts.superseded} superseded, '
             f'{sum(counts.rejected.values())} rejected'
+            + (f', {counts.stale} stale' if counts.stale else '')
             + (f', {counts.ignored} without the crank' if counts.ignored else '')
             + (f'; {self.missed} lost before' if self.missed else '')
         )
@@ -311,6 +326,7 @@ class TickLoop:
             self._take_wrench(which, take, clock)
         counts, pipeline = self.counts, self._pipeline
         good, end = 0, 0
+        self._old = 0
         for _ in range(self._depth):
             if (taken := self._take()) is None:
                 break
@@ -318,9 +334,10 @@ class TickLoop:
                 self._move_on(clock())
             now = self._last_time
             message, info = taken
+            number = info.get('publication_sequence_number')
             if self._own is None or not self._own(message):
                 counts.received += 1
-                if number := info.get('publication_sequence_number'):
+                if number:
                     # Neither the first message, nor a restarted publisher.
                     if 0 < self._sequence < number:
                         counts.missed += number - self._sequence - 1
@@ -337,16 +354,34 @@ class TickLoop:
                 elif rejection is Rejection.MISSING:
                     counts.ignored += 1
                     counts.last_ignored = message
+                elif (
+                    rejection is Rejection.STAMP_FUTURE
+                    and info.get('received_timestamp', self._jumped) < self._jumped
+                ):
+                    counts.superseded += 1
                 else:
                     counts.rejected[rejection] += 1
+                    self._old += rejection is Rejection.STAMP_OLD
+                if number and rejection is not Rejection.MISSING:
+                    cranks = pipeline.addressed
+                    counts.interleaved += number <= self._crank_sequences.get(cranks, 0)
+                    self._crank_sequences[cranks] = number
+            elif number:
+                counts.own_interleaved += number <= self._own_sequence
+                self._own_sequence = number
             if not end:
                 end = monotonic_ns() + _LONGEST_DRAIN
             elif monotonic_ns() > end:
                 break
-        if good:
-            used = good if tick_for_each else pipeline.newly_used()
+        if good and tick_for_each:
+            counts.used += good
+        elif good:
+            used, stale = pipeline.newly_used(self._last_time)
             counts.used += used
-            counts.superseded += good - used
+            counts.superseded += good - used - stale
+            if stale:
+                counts.stale += stale
+                counts.stale_age = self._last_time - pipeline.newest_stamp
 
     def _take_wrench(self, number: int, take: Take, clock: Callable[[], int] | None) -> None:
         """Take the waiting messages of a topic with a wrench: record, offer and count them."""
@@ -411,7 +446,12 @@ class TickLoop:
     def _rebuild(self, now: int) -> None:
         """Build the pipeline again, after a reset request or a backward jump of time."""
         if now < self._last_time:
+            # As where a bag is played in a loop: what waits is of the time before, and what came a
+            # little before the clock did was not too old.
+            self._jumped = time_ns()
             self.counts.clock_jumps += 1
+            self.counts.rejected[Rejection.STAMP_OLD] -= self._old
+            self.counts.superseded += self._old
         if self.reset_requested:
             self.reset_requested = False
             self.counts.resets += 1

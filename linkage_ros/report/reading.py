@@ -308,6 +308,8 @@ class SceneRun:
         left_out |= {('pin forces', reason): n for reason, n in self._forces.left_out.items()}
         for what, reader in (('joint states', self._states), ('samples', self._samples)):
             left_out |= {(what, reason): n for reason, n in reader.left_out.items() if n}
+        if self._judge.ignored:
+            left_out['samples', 'of other joints'] = self._judge.ignored
         if len(self._linkages) > MOST_LINKAGES:
             left_out['the scene', _NOT_MOVING] = len(self._linkages) - MOST_LINKAGES
         kinds = {*self._known_kinds()}

@@ -103,6 +103,7 @@ class SampleJudge:
         self._last = 0
         self.listens = bool(self._pipeline.topic)
         self.rejected: Counter[str] = Counter()
+        self.ignored = 0
         self._faults: dict[str, int] = {}
 
     @property
@@ -134,7 +135,7 @@ class SampleJudge:
             else:
                 rejection = self._offer(message, int(samples.logged[place]))
                 good[place] = rejection is None
-                if rejection is not None:
+                if rejection not in (None, Rejection.MISSING):
                     lanes['rejected'].add(time, time, rejection.value)
         return good
 
@@ -158,7 +159,9 @@ class SampleJudge:
             self._reset()
         self._last = logged
         rejection = self._pipeline.offer(message, logged)
-        if rejection is not None:
+        if rejection is Rejection.MISSING:
+            self.ignored += 1
+        elif rejection is not None:
             self.rejected[rejection.value] += 1
         return rejection
 

@@ -23,6 +23,7 @@ from importlib import import_module
 from os import PathLike
 from os.path import isfile
 from pathlib import Path
+from re import fullmatch
 from typing import Any, Literal
 from zlib import crc32
 
@@ -284,9 +285,16 @@ def _scene(
             member_name = entry.ros_name(entry.text('name'))
             if member_name in [member.name for member in members]:
                 raise entry.error('name', f'{quoted(member_name)} is taken', 'give each its own')
+            taken = {joint for member in members for joint in member.joints}
             members.append(
                 _member(member_name, linkage_content, entry, content, folder, trust_effects)
             )
+            if twice := taken.intersection(members[-1].joints):
+                raise entry.error(
+                    'prefix' if 'prefix' in entry else '',
+                    f'a second linkage publishes {listed(sorted(twice))}',
+                    'give each linkage its own prefix, or its joints names of their own',
+                )
             entry.finish(_OF_A_MEMBER)
     else:
         linkage_content, files[LINKAGE_FILE] = open_linkage(content)
@@ -321,6 +329,7 @@ def _scene(
 
 
 _OF_A_MEMBER = (
+    'prefix',
     'publish_input',
     'drive',
     'effects',
@@ -397,6 +406,7 @@ def _member(
         ),
         effects={e: read_parameters(effects.section(e), of, parts) for e, of in types.items()},
         loads=_read_loads(loads, parts) if loads is not None else None,
+        prefix=_prefix(where('prefix'), f'{name}_' if name else ''),
         content=own,
         linkage_content=linkage_content,
         silent_beyond_limits=_silent(where('beyond_limits'), linkage),
@@ -405,6 +415,16 @@ def _member(
     )
     effects.finish(tuple(EFFECTS))
     return member
+
+
+def _prefix(content: Section, default: str) -> str:
+    """Return the prefix of the names of a linkage; '' is one too."""
+    prefix = content.text('prefix', '') if 'prefix' in content else default
+    if not fullmatch('[A-Za-z0-9_/.-]*', prefix):
+        raise content.error(
+            'prefix', f'{quoted(prefix)} begins no name of a joint', 'use letters, digits and _/.-'
+        )
+    return prefix
 
 
 def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:

@@ -121,9 +121,7 @@ class RecordParameters:
 class SceneLinkage:
     """A linkage of a scene, with its drive and its effects."""
 
-    # Name of the linkage, which with an underscore prefixes its joint names; '' if it is the only
-    # linkage of the scene.
-    name: str
+    name: str  # Name of the linkage; '' if it is the only one of the scene
     # The linkage, and its closure. Published input joints come first among its joints.
     linkage: Linkage
     closure: Closure = field(compare=False, repr=False)
@@ -131,6 +129,7 @@ class SceneLinkage:
     # Parameters of each effect in the scene, by name, in physical order.
     effects: Mapping[str, Any]
     loads: Loads | None  # Loads on it; None if the scene has none
+    prefix: str  # Before the names of its joints and links, as messages have them
     # Sections for error messages: in the scene, and in the linkage file.
     content: Section = field(compare=False, repr=False)
     linkage_content: Section = field(compare=False, repr=False)
@@ -143,11 +142,6 @@ class SceneLinkage:
     # User-defined effects that the scene names but that were not imported, so that the linkage
     # cannot run.
     not_imported: tuple[str, ...] = ()
-
-    @property
-    def prefix(self) -> str:
-        """Return the prefix of its joint names."""
-        return f'{self.name}_' if self.name else ''
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -217,6 +217,12 @@ def _of_a_linkage() -> dict[str, Schema]:
         for registry in (DRIVES, EFFECTS)
     )
     return {
+        'prefix': {
+            'description': 'Put before the names of joints and links in messages and models; '
+            "without it NAME_ where there are several linkages, else ''.",
+            'type': 'string',
+            'pattern': '^[A-Za-z0-9_/.-]*$',
+        },
         'publish_input': {
             'description': 'Whether the input joints are published too, before the others; '
             'without it, they are where the drive is no topic, or effort is named.',

@@ -192,6 +192,16 @@ def test_it_is_as_if_the_samples_came_by_topic(tmp_path_factory, taken, ticks, c
         assert drive.state(now) == topic.state(now)
 
 
+def test_by_arrival_samples_are_as_far_apart_as_they_were_recorded(tmp_path):
+    angles = (0.1, 0.2, 0.4)
+    samples = [CRANK.write(0, (7.0, angle), (9.0, 0.0)) for angle in angles]
+    file = write(tmp_path / 'bag', crank(*samples))
+    with pytest.raises(BagError, match='stamp zero'):
+        build(BagParameters(file), one_input())
+    drive = build(BagParameters(file, stamp='arrival'), one_input())
+    assert [drive.state(BEGIN + n * MS).angles[0] for n in range(3)] == [*angles]
+
+
 def test_several_inputs_are_read_from_one_message(tmp_path):
     both = JointStateWriter(['right_crank', 'other', 'left_crank'])
     messages = crank(
@@ -212,7 +222,6 @@ def test_what_the_topic_would_refuse_is_skipped_and_counted(tmp_path):
         (sample(2, 0.0, inf), Rejection.NOT_FINITE),
         (sample(3, 2e10), Rejection.TOO_LARGE),
         (NO_CRANK.write(RECORDED, (1.0,), ()), Rejection.MISSING),
-        (sample(4, 0.5, None), Rejection.NO_RATE),
         (sample(5, 0.5)[:-30], Rejection.MALFORMED),
         (b'', Rejection.MALFORMED),
         (CRANK.write(0, (0.0, 0.5), (0.0, 0.0)), Rejection.STAMP_ZERO),
@@ -231,27 +240,28 @@ def test_what_the_topic_would_refuse_is_skipped_and_counted(tmp_path):
     ]
 
 
+@pytest.mark.parametrize('rate', [None, nan])
 @pytest.mark.parametrize(
-    ('pace', 'carry_forward', 'needs_rate', 'good'),
+    ('pace', 'carry_forward', 'needs_rate', 'differenced'),
     [
-        ('recorded', True, False, False),
-        ('recorded', False, True, False),
-        ('recorded', False, False, True),
-        ('fast', True, True, False),
-        ('fast', True, False, True),
+        ('recorded', True, False, True),
+        ('recorded', False, True, True),
+        ('recorded', False, False, False),
+        ('fast', True, True, True),
+        ('fast', True, False, False),
     ],
 )
-def test_samples_without_rates_are_taken_where_no_rate_is_needed(
-    tmp_path, pace, carry_forward, needs_rate, good
+def test_absent_rates_are_those_that_the_topic_would_have(
+    tmp_path, pace, carry_forward, needs_rate, differenced, rate
 ):
-    file = write(tmp_path / 'bag', crank(sample(0, 0.5, None), sample(1, 0.6, None)))
+    samples = [sample(0, 0.5, rate), sample(10, 0.6, rate), sample(20, 0.65, rate)]
+    file = write(tmp_path / 'bag', crank(*samples))
     parameters = BagParameters(file, pace=pace, carry_forward=carry_forward)
-    if good:
-        drive = build(parameters, one_input(needs_rate=needs_rate))
-        assert drive.state(BEGIN) == CrankState((0.5,), (0.0,), (0.0,), 0)
-    else:
-        with pytest.raises(BagError, match=r'no crank sample of crank_joint, /crank: no vel'):
-            build(parameters, one_input(needs_rate=needs_rate))
+    drive = build(parameters, one_input(needs_rate=needs_rate))
+    expected = [(0.6, 10.0), (0.65, 5.0)] if differenced else [(0.5, 0.0), (0.6, 0.0), (0.65, 0.0)]
+    for number, (angle, speed) in enumerate(expected):
+        state = drive.state(BEGIN + 10 * number * MS)
+        assert (*state.angles, *state.rates) == pytest.approx((angle, speed), rel=1e-9)
 
 
 TWO_TOPICS = [

@@ -101,11 +101,10 @@ def test_what_samples_say_of_the_acceleration(name):
     assert acceleration(fed(DIFFERENCED, samples), samples[-1][0]) == pytest.approx(expected)
 
 
-def test_an_older_stamp_and_a_missing_rate_change_nothing():
+def test_an_older_stamp_changes_nothing():
     drive = fed(DIFFERENCED, [(1000, 5.0), (1010, 5.2)])
     older = CrankSample(1005 * MS, (0.0,), (50.0,))
     assert drive.offer(older, 1010 * MS) is Rejection.STAMP_OLD
-    assert drive.offer(CrankSample(1015 * MS, (0.0,), None), 1015 * MS) is Rejection.NO_RATE
     assert acceleration(drive, 1010) == pytest.approx(20.0)
 
 

@@ -14,7 +14,7 @@
 
 """The crank from a topic, also as ros2_control sends it."""
 
-from math import inf, nan
+from math import inf, isnan, nan, tau
 from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
@@ -23,6 +23,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.kinematics.linkage import Input
 from linkage_ros.messages.joint_state import CrankSample, Rejection
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
@@ -30,6 +31,7 @@ import pytest
 
 from ..support.messages import joint_state as serialized
 from ..support.messages import read_joint_state
+from ..support.scenes import FOUR_BAR, pipeline_of
 
 # The crank from a topic, as timelines.
 #
@@ -120,7 +122,6 @@ def test_samples_turn_the_crank_as_the_timeline_says(name):
     [
         (CrankSample(NOW, (nan,), (0.0,)), Rejection.NOT_FINITE),
         (CrankSample(NOW, (inf,), (0.0,)), Rejection.NOT_FINITE),
-        (CrankSample(NOW, (0.0,), (nan,)), Rejection.NOT_FINITE),
         (CrankSample(NOW, (0.0,), (-inf,)), Rejection.NOT_FINITE),
         (CrankSample(NOW, (1.0000001e10,), (0.0,)), Rejection.TOO_LARGE),
         (CrankSample(NOW, (-1e300,), (0.0,)), Rejection.TOO_LARGE),
@@ -150,26 +151,91 @@ def test_the_largest_numbers_are_good(angle):
     assert drive.state(NOW) == CrankState((angle,), (angle,), (0.0,), 0)
 
 
-@pytest.mark.parametrize(
-    ('parameters', 'needs_rate', 'good'),
-    [(CARRIED, False, False), (CARRIED, True, False), (HELD, True, False), (HELD, False, True)],
-)
-def test_a_sample_without_a_rate_is_taken_where_no_rate_is_needed(parameters, needs_rate, good):
-    drive = TopicDrive(parameters, needs_rate)
-    rejection = drive.offer(CrankSample(NOW, (0.5,), None), NOW)
-    if good:
-        assert rejection is GOOD
-        assert drive.state(NOW) == CrankState((0.5,), (0.0,), (0.0,), 0)
+# joint_state_broadcaster fills in NaN for an interface that is not there; others send no array.
+ABSENT = {'no velocities': None, 'a velocity that is NaN': (nan,)}
+
+
+@pytest.mark.parametrize('rates', ABSENT.values(), ids=ABSENT)
+@pytest.mark.parametrize('needs_rate', [True, False])
+def test_where_nobody_needs_a_rate_an_absent_one_is_0(rates, needs_rate):
+    drive = TopicDrive(CARRIED if needs_rate else HELD, needs_rate=False)
+    assert drive.offer(CrankSample(NOW, (0.5,), rates), NOW) is GOOD
+    expected = None if needs_rate else CrankState((0.5,), (0.0,), (0.0,), 0)
+    assert drive.state(NOW) == expected
+    assert drive.stamp == NOW
+
+
+# (time in ms, angle, rate or None), and the expected rate at the last of them.
+ABSENT_RATES = {
+    'two samples': ([(0, 0.5, None), (10, 0.52, None)], 2.0),
+    'three': ([(0, 0.5, None), (10, 0.52, None), (30, 0.46, None)], -3.0),
+    'over a gap the mean': ([(0, 0.5, None), (1000, 1.5, None)], 1.0),
+    'a known rate counts': ([(0, 0.5, None), (10, 0.52, 7.0)], 7.0),
+    'behind a known one': ([(0, 0.5, 7.0), (10, 0.52, None)], 2.0),
+    'a repeat keeps it': ([(0, 0.5, None), (10, 0.52, None), (10, 0.9, None)], 2.0),
+    'from π to -π': ([(0, 3.14, None), (10, 3.16 - tau, None)], 2.0),
+    'from -π to π': ([(0, -3.14, None), (10, tau - 3.16, None)], -2.0),
+    'many turns on': ([(0, 100 * tau, None), (10, 100 * tau + 0.02, None)], 2.0),
+    'one sample has none': ([(0, 0.5, None)], None),
+    'a repeat of the first has none': ([(0, 0.5, None), (0, 0.6, None)], None),
+}
+
+
+@pytest.mark.parametrize('as_nan', [False, True])
+@pytest.mark.parametrize('name', ABSENT_RATES)
+def test_where_a_rate_is_needed_an_absent_one_is_the_difference_of_the_angles(name, as_nan):
+    steps, expected = ABSENT_RATES[name]
+    drive = TopicDrive(CARRIED, needs_rate=True)
+    for time, angle, rate in steps:
+        rates = ((nan,) if as_nan else None) if rate is None else (rate,)
+        now = NOW + time * MS
+        assert drive.offer(CrankSample(now, (angle,), rates), now) is GOOD
+    if expected is None:
+        assert drive.state(now) is None
     else:
-        assert rejection is Rejection.NO_RATE
-        assert drive.state(NOW) is None
+        assert drive.state(now).rates == (pytest.approx(expected, rel=1e-12),)
+        (carried,) = drive.state(now + 5 * MS).angles
+        assert carried == pytest.approx(angle + expected * 0.005, abs=1e-12)
+
+
+def test_of_several_inputs_only_the_absent_rate_is_differenced_and_a_slide_has_no_turns():
+    slide = (Input('crank', 'ground', 'crank'), Input('slide', slider='s'), Input('c', 'a', 'b'))
+    drive = TopicDrive(CARRIED, needs_rate=True, inputs=slide)
+    assert drive.offer(CrankSample(NOW, (3.1, 0.0, 1.0), (nan, nan, 9.0)), NOW) is GOOD
+    now = NOW + 10 * MS
+    assert drive.offer(CrankSample(now, (-3.1, 5.0, 2.0), (nan, nan, 8.0)), now) is GOOD
+    expected = ((tau - 6.2) * 100.0, 500.0, 8.0)
+    assert drive.state(now).rates == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize('carry', ['true', 'false'])
+@pytest.mark.parametrize('effects', ['{velocity: {}}', '{}'])
+@pytest.mark.parametrize('velocities', [[], [nan, nan], [9.0, nan]])
+@pytest.mark.parametrize('efforts', [[], [nan, nan]])
+def test_a_scene_takes_the_messages_of_a_broadcaster_without_velocities(
+    carry, effects, velocities, efforts
+):
+    scene = pipeline_of(
+        f'drive: {{topic: {{carry_forward: {carry}}}}}\neffects: {effects}', FOUR_BAR
+    )
+    for n in range(3):
+        stamp = 10 * SECOND + 10 * n * MS
+        message = serialized(
+            ['x', 'crank_joint'], [nan, 1.0 + 0.02 * n], velocities, efforts,
+            stamp=divmod(stamp, SECOND),
+        )  # fmt: skip
+        assert scene.offer(message, stamp) is GOOD
+    crank = scene.tick(stamp + 5 * MS).looks[0].crank
+    assert crank.angles[0] == pytest.approx(1.05 if carry == 'true' else 1.04, abs=1e-12)
+    if carry == 'true' or 'velocity' in effects:
+        assert crank.rates[0] == pytest.approx(2.0, rel=1e-9)
 
 
 samples = st.builds(
     CrankSample,
     st.integers(0, 2 * NOW) | st.sampled_from([0, NOW, NOW + 100 * MS]),
     st.tuples(st.floats() | st.floats(-10, 10)),
-    st.none() | st.tuples(st.floats() | st.floats(-10, 10)),
+    st.tuples(st.floats(allow_nan=False) | st.floats(-10, 10)),
 )
 
 
@@ -204,6 +270,8 @@ def test_of_several_inputs_each_is_carried_by_its_own_rate():
 )
 @pytest.mark.parametrize('place', range(4))
 def test_of_several_inputs_one_that_is_bad_spoils_the_sample(bad, reason, place):
+    if isnan(bad) and place > 1:
+        bad = inf  # a rate that is NaN is absent
     drive = TopicDrive(CARRIED, needs_rate=True)
     values = [0.1, 0.2, 0.3, 0.4]
     values[place] = bad

@@ -23,7 +23,12 @@ from linkage_ros.node.demo_nodes import CrankSource, PDController
 from linkage_ros.node.parameters import LINKAGE_NODE
 from linkage_ros.scene.load import SCENE_FILE
 import pytest
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
+from rclpy.parameter import parameter_value_to_python
+from sensor_msgs.msg import JointState
+import yaml
 
+from .graph import NodeProcess, wait_for
 from ..support.commands import environment
 
 PROGRAMS = {
@@ -86,6 +91,48 @@ def test_the_node_warns_once_of_each_unknown_parameter_and_runs(start, write_sce
         ('scnee', "'scene'"),
         ('warn.condtioning', "'warn.conditioning'"),
     ]
+
+
+def test_one_request_for_all_parameters_gets_their_values(graph, start, write_scene, folder):
+    """As `ros2 param dump` and rqt_reconfigure ask; a file of the answer starts a node."""
+    own = [parameter.name for parameter in LINKAGE_NODE]
+    scene = write_scene('dumped', 'rate: 100')
+    # An empty list in a file is no value to rclpy.
+    given = folder / 'given.yaml'
+    given.write_text('/**: {ros__parameters: {set: [], cpu_affinity: []}}\n')
+    node = start(scene, '--params-file', str(given))
+    names = graph.call(ListParameters, '/linkage_node/list_parameters').result.names
+    assert {*own} < {*names}
+    request = GetParameters.Request(names=names)
+    answer = graph.call(GetParameters, '/linkage_node/get_parameters', request)
+    dumped = {
+        name: parameter_value_to_python(value)
+        for name, value in zip(names, answer.values, strict=True)
+    }
+    assert None not in dumped.values()
+    assert (dumped['set'], dumped['cpu_affinity']) == ([''], [-1])
+    descriptors = graph.call(
+        DescribeParameters,
+        '/linkage_node/describe_parameters',
+        DescribeParameters.Request(names=own),
+    ).descriptors
+    assert all(each.description and each.type for each in descriptors)
+    assert node.end() == 0
+    again = folder / 'parameters.yaml'
+    again.write_text(yaml.safe_dump({'/linkage_node': {'ros__parameters': dumped}}))
+    node = start(scene, '--params-file', str(again))
+    assert node.end() == 0
+    assert 'WARN' not in node.log
+
+
+def test_the_crank_source_publishes_reliably(graph, domain, folder):
+    """A subscriber that asks for it gets nothing else, as joint_state_publisher for source_list."""
+    heard = graph.listen(JointState, '/crank_states')
+    source = NodeProcess(domain, folder, program=('-m', 'linkage_ros.node.crank_source'))
+    try:
+        wait_for(lambda: heard, 'a crank')
+    finally:
+        source.kill()
 
 
 def test_a_bag_holds_the_scene_with_the_keys_that_were_set(start, write_scene, folder):

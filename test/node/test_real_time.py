@@ -119,7 +119,7 @@ def test_without_the_rights_a_line_for_each_says_what_helps_and_the_run_goes_on(
     assert node.end() == 0
 
 
-@pytest.mark.parametrize('asked', ['[1000]', '[-1]', f'[{LAST}, 1000]', f'[{2**40}]'])
+@pytest.mark.parametrize('asked', ['[1000]', '[-2]', f'[{LAST}, 1000]', f'[{2**40}]'])
 def test_a_processor_that_there_is_not_is_told(graph, start, write_scene, asked):
     node = start(write_scene('processors', TURNING), '-p', f'cpu_affinity:={asked}')
     node.wait_for_log(f'cpu_affinity {asked}: ticks run on [')

@@ -25,7 +25,7 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from .conftest import LINKAGES
-from .graph import crank, NS, stamp_of, wait_for
+from .graph import crank, NodeProcess, NS, stamp_of, wait_for
 
 OK, WARN, STALE = b'\0', b'\1', b'\3'
 TICKING = 'rate: 100\ndrive: {topic: {max_age: 0.3}}'
@@ -134,11 +134,26 @@ def test_samples_that_come_too_late_are_silence(
     graph, write_scene, start, publisher, joint_states
 ):
     # As from a machine whose clock lags.
-    start(write_scene('late', TICKING))
-    with publishing(publisher, lambda: crank(0.5, stamp=time.time_ns() - NS)):
+    node = start(write_scene('late', TICKING), '-p', 'warning_period:=0.2')
+    with publishing(publisher, lambda: crank(0.5, stamp=time.time_ns() - 100 * NS)):
         wait_until_taken(graph)
-        assert graph.next_status('crank').level == STALE
+        status = graph.next_status('crank')
+        node.wait_for_log('too old to use')
+        time.sleep(1.0)
+    assert status.level == STALE
+    assert re.fullmatch(r'Samples arrive, but are 100\.\d s old by their stamps', status.message)
+    (line,) = [line for line in node.log.splitlines() if 'too old' in line]
+    assert 'WARN' in line
+    assert re.search(
+        r'/crank_states: \d+ samples too old to use, the newest 100\.\d s by its stamp, and max_age '
+        r'is 0\.3 s: synchronise the clocks, set use_sim_time .*, or write drive: \{topic: \{stamp: '
+        r'arrival\}\}$',
+        line,
+    )
     assert joint_states == []
+    assert int(graph.value('crank', 'Samples stale')) > 0
+    assert node.end() == 0
+    assert re.search(r'received, 0 used, \d+ superseded, 0 rejected, \d+ stale', node.log)
 
 
 def test_at_rate_0_a_repeat_keeps_its_stamp_and_is_silence_too(
@@ -169,3 +184,40 @@ def test_two_publishers_are_named(graph, write_scene, start, publisher):
     assert '/tester' in line
     assert '/impostor' in line
     assert 'stop all but one' in line
+
+
+def test_where_others_share_the_topic_two_that_send_the_crank_are_told(
+    graph, domain, folder, write_scene, start
+):
+    scene = write_scene('shared', TICKING)
+    node = start(scene, '-r', 'crank_states:=joint_states', '-p', 'warning_period:=0.5')
+    first, arm = (graph.publisher(JointState, '/joint_states', node=name) for name in ('a', 'arm'))
+    with publishing(first), publishing(arm, lambda: crank(1.0, name='elbow')):
+        wait_for(lambda: graph.value('crank', 'Messages without the crank') > '0', 'the arm')
+        graph.wait_for_level('crank', OK)
+        graph.next_status('crank')
+        assert graph.next_status('crank').level == OK
+        assert 'WARN' not in node.log
+        second = graph.publisher(JointState, '/joint_states', node='b')
+        with publishing(second, lambda: crank(-1.0)):
+            status = graph.wait_for_level('crank', WARN)
+            node.wait_for_log('several publishers')
+        assert 'several publishers send the crank, among ' in status.message
+        assert {'/a', '/b', '/arm'} <= {*re.findall(r'/\w+', status.message)}
+        graph.wait_for_level('crank', OK)
+        # Another node of the same name, and of the same joints.
+        twin = NodeProcess(domain, folder, '-p', f'scene:={scene}')
+        try:
+            named = 'another node is named /linkage_node: services and diagnostics of both mix'
+            node.wait_for_log(named)
+            twin.wait_for_log(named)
+            assert graph.wait_for_level('tick', WARN).message.startswith(named)
+            twin.end()
+        finally:
+            twin.kill()
+        renamed = '-r', '__node:=other', '-r', 'crank_states:=joint_states'
+        elsewhere = NodeProcess(domain, folder, '-p', f'scene:={scene}', *renamed)
+        try:
+            node.wait_for_log('another publisher sends the same joints as /linkage_node; stop one')
+        finally:
+            elsewhere.kill()

@@ -21,6 +21,7 @@ The queue is the test's, and its clock goes on by a step with every look at it.
 
 from functools import partial
 from itertools import count
+from time import time_ns
 
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
@@ -41,8 +42,8 @@ TWO_FILES = {'scene.yaml': TWO.encode(), 'linkage_1.yaml': FOUR_BAR, 'linkage_2.
 class Rig:
     """A tick loop behind a queue of the test's; a clock that goes on by 1 ms with every look."""
 
-    def __init__(self, text=ONE, rate=50, **options):
-        text += f'rate: {rate}\ndrive: {{topic: {{max_lead: 0.0}}}}\n'
+    def __init__(self, text=ONE, rate=50, drive='{max_lead: 0.0}', **options):
+        text += f'rate: {rate}\ndrive: {{topic: {drive}}}\n'
         of = ['linkage.yaml'] if 'linkages' not in text else ['linkage_1.yaml', 'linkage_2.yaml']
         files = {'scene.yaml': text.encode(), **dict.fromkeys(of, FOUR_BAR)}
         scene = parse_scene('t', 't', files)
@@ -61,17 +62,19 @@ class Rig:
         self.now += MS
         return self.now
 
-    def send(self, stamp=BEGIN, angle=1.0, names=('crank_joint',), number=None):
+    def send(self, stamp=BEGIN, angle=1.0, names=('crank_joint',), number=None, received=None):
         message = JointStateWriter(names).write(stamp, [angle] * len(names), [0.0] * len(names))
         number = next(self._numbers) if number is None else number
         info = {'source_timestamp': stamp, 'publication_sequence_number': number}
+        if received is not None:
+            info['received_timestamp'] = received
         self.queue.append((message, info))
 
     def counts(self):
         """Return received, used, superseded, ignored and rejected, which must close."""
         c = self.loop.counts
         rejected = sum(c.rejected.values())
-        assert c.received == c.used + c.superseded + c.ignored + rejected
+        assert c.received == c.used + c.stale + c.superseded + c.ignored + rejected
         return c.received, c.used, c.superseded, c.ignored, rejected
 
 
@@ -152,6 +155,76 @@ def test_its_own_messages_are_told_also_where_a_linkage_is_not_in_them():
     assert rig.counts() == counts == (2, 2, 0, 0, 0)
 
 
+def test_where_played_time_begins_again_no_sample_is_refused():
+    """As `ros2 bag play --loop --clock`: samples and /clock come a little before one another."""
+    rig = Rig()
+    rig.send(BEGIN + 900 * MS)
+    rig.tick(BEGIN + 900 * MS)
+    rig.send(BEGIN)  # of the second pass, before its /clock
+    rig.tick(BEGIN + 910 * MS)
+    rig.send(BEGIN + 915 * MS, received=time_ns())  # of the first pass, after it
+    rig.send(BEGIN + 5 * MS)
+    rig.tick(BEGIN + 10 * MS)
+    assert rig.loop.counts.clock_jumps == 1
+    assert rig.counts() == (4, 2, 2, 0, 0)
+    assert rig.loop.newest_stamp == BEGIN + 5 * MS
+    rig.send(BEGIN + 915 * MS, received=time_ns())  # of the future indeed
+    rig.send(BEGIN)
+    rig.tick(BEGIN + 20 * MS)
+    assert rig.loop.counts.rejected[Rejection.STAMP_FUTURE] == 1
+    assert rig.counts() == (6, 2, 2, 0, 2)
+
+
+# (scene, [(joints, age of the stamp in ms)] of a tick), then used, stale and superseded; max_age is 200 ms.
+AGES = {
+    'young': (ONE, [(('crank_joint',), 5)], (1, 0, 0)),
+    'at the limit': (ONE, [(('crank_joint',), 200)], (1, 0, 0)),
+    'beyond it': (ONE, [(('crank_joint',), 201)], (0, 1, 0)),
+    'a clock that differs': (ONE, [(('crank_joint',), 100_000)], (0, 1, 0)),
+    'several, after a stall': (ONE, [(('crank_joint',), age) for age in (400, 300, 9)], (1, 0, 2)),
+    'several, all too old': (ONE, [(('crank_joint',), age) for age in (402, 401)], (0, 1, 1)),
+    'of two linkages one': (
+        TWO, [(('left_crank_joint',), 9), (('right_crank_joint',), 300)], (1, 1, 0),
+    ),
+    'of two linkages both': (TWO, [(('left_crank_joint', 'right_crank_joint'), 300)], (0, 1, 0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('kind', AGES)
+def test_what_is_too_old_when_it_arrives_is_counted_as_stale(kind):
+    text, messages, expected = AGES[kind]
+    rig = Rig(text)
+    for names, age in messages:
+        rig.send(BEGIN - age * MS, names=names)
+    rig.tick(BEGIN)
+    c = rig.loop.counts
+    assert (c.used, c.stale, c.superseded) == expected
+    assert rig.counts()[0] == len(messages)
+    assert bool(rig.published) == bool(c.used)
+    assert ('stale' in rig.loop.samples) == bool(c.stale)
+    if 'differs' in kind:
+        assert c.stale_age == 100_000 * MS
+
+
+def test_at_rate_0_a_sample_is_solved_for_its_own_stamp_and_never_stale():
+    rig = Rig(rate=0)
+    rig.send(BEGIN - 100_000 * MS)
+    rig.tick(BEGIN)
+    assert (rig.loop.counts.used, rig.loop.counts.stale, len(rig.published)) == (1, 0, 1)
+
+
+@pytest.mark.parametrize('stamp', [0, 1, BEGIN - 100_000 * MS, BEGIN + 100_000 * MS])
+def test_by_arrival_no_stamp_matters(stamp):
+    rig = Rig(drive='{stamp: arrival}')
+    rig.send(stamp)
+    rig.tick(BEGIN)
+    rig.send(stamp, 2.0)
+    rig.tick(BEGIN + 10 * MS)
+    assert rig.counts() == (2, 2, 0, 0, 0)
+    assert rig.loop.newest_stamp == BEGIN + 10 * MS
+    assert len(rig.published) == 2
+
+
 def test_a_tick_takes_no_more_than_the_queue_holds():
     # One that sends faster than messages are read would hold up the tick for ever.
     rig = Rig(depth=10)
@@ -194,3 +267,46 @@ def test_what_the_middleware_lost_is_told_by_the_numbers_that_are_missing(kind):
     assert ('lost before' in rig.loop.samples) == bool(missed)
     rig.loop.several_publishers = True
     assert rig.loop.missed is None, 'their numbers go apart'
+
+
+CRANK, LEFT, RIGHT = ('crank_joint',), ('left_crank_joint',), ('right_crank_joint',)
+ELBOW, BOTH = ('elbow',), LEFT + RIGHT
+# (scene, [(joints, number that the publisher gave the message)], how often they went back).
+PUBLISHERS = {
+    'one': (ONE, [(CRANK, 1), (CRANK, 2), (CRANK, 5)], 0),
+    'one that begins anew': (ONE, [(CRANK, 8), (CRANK, 1), (CRANK, 2), (CRANK, 9)], 1),
+    'two in step': (ONE, [(CRANK, 1), (CRANK, 1), (CRANK, 2), (CRANK, 2)], 2),
+    'two, one of them long there': (ONE, [(CRANK, 70), (CRANK, 1), (CRANK, 71), (CRANK, 2)], 2),
+    'two, and one names other joints too': (
+        ONE, [(ELBOW, 1), (CRANK, 2), (CRANK, 1), (CRANK, 3), (CRANK, 2)], 2,
+    ),
+    'two, one of other joints': (ONE, [(CRANK, 7), (ELBOW, 1), (CRANK, 8), (ELBOW, 2)], 0),
+    'two, one of which is rejected': (ONE, [(CRANK, 7), (CRANK * 2, 1), (CRANK, 8), (CRANK * 2, 2)], 2),
+    'none that is numbered': (ONE, [(CRANK, 0), (CRANK, 0)], 0),
+    'one for each of two linkages': (TWO, [(LEFT, 7), (RIGHT, 1), (LEFT, 8), (RIGHT, 2)], 0),
+    'one for both': (TWO, [(BOTH, 1), (BOTH, 2)], 0),
+    'two for one of two linkages': (TWO, [(LEFT, 7), (RIGHT, 1), (LEFT, 1), (LEFT, 8)], 1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('kind', PUBLISHERS)
+def test_two_publishers_of_one_crank_are_told_by_the_numbers_of_their_messages(kind):
+    text, messages, expected = PUBLISHERS[kind]
+    rig = Rig(text)
+    for names, number in messages:
+        rig.send(names=names, number=number)
+    rig.tick(BEGIN)
+    assert rig.loop.counts.interleaved == expected
+    rig.counts()
+
+
+@pytest.mark.parametrize(('numbers', 'expected'), [([1, 2, 3], 0), ([9, 1, 10, 2, 11], 2)])
+def test_another_publisher_of_the_published_joints_is_told_likewise(numbers, expected):
+    rig = Rig(own=lambda message: b'rocker' in message)
+    for number in numbers:
+        rig.send(names=('coupler_joint', 'rocker_joint'), number=number)
+        rig.send()
+    rig.tick(BEGIN)
+    assert rig.loop.counts.own_interleaved == expected
+    assert rig.loop.counts.interleaved == 0
+    assert rig.counts()[0] == len(numbers)

@@ -16,6 +16,7 @@
 """linkage.launch.py, run against stubs: no launch that pip could install exists."""
 
 import asyncio
+from cmath import exp
 from dataclasses import dataclass, field
 import importlib.util
 import sys
@@ -23,6 +24,9 @@ from types import ModuleType, SimpleNamespace
 
 from linkage_ros.errors import LinkageError, quoted
 import pytest
+
+from ..support.messages import joint_state, read_joint_state
+from ..support.scenes import FOUR_BAR, pipeline_of
 
 
 @dataclass
@@ -166,8 +170,8 @@ def test_launch_ends_with_1_where_the_node_does_not_end_well(start, code):
 def test_both_nodes_have_one_clock(start, root):
     scene = root / 'config' / 'scenes' / 'bare.yaml'
     own, publisher = start(scene=str(scene), params_file='/mine.yaml', robot_state_publisher='1')
-    assert own['parameters'][0] == publisher['parameters'][0] == '/mine.yaml'
-    assert 'use_sim_time' not in publisher['parameters'][1]
+    assert own['parameters'][0] == publisher['parameters'][1] == '/mine.yaml'
+    assert 'use_sim_time' not in publisher['parameters'][-1]
 
 
 def test_a_urdf_starts_robot_state_publisher(start, tmp_path):
@@ -190,3 +194,81 @@ def test_robot_state_publisher_takes_the_model_that_the_scene_makes(start, root)
 def test_without_a_scene_there_is_no_model(start):
     with pytest.raises(LinkageError, match='has no scene; name scene:=FILE too'):
         start(robot_state_publisher='true')
+
+
+def test_the_frequency_and_the_prefix_of_frames_reach_robot_state_publisher(start, root):
+    given = {'scene': str(root / 'config' / 'scenes' / 'bare.yaml'), 'robot_state_publisher': '1'}
+    _, publisher = start(**given)
+    first, _, last = publisher['parameters']
+    assert first == {'publish_frequency': 1000.0}, 'the file may change it'
+    assert set(last) == {'robot_description'}
+    _, publisher = start(**given, publish_frequency='250', frame_prefix='left/')
+    last = publisher['parameters'][-1]
+    assert (last['publish_frequency'], last['frame_prefix']) == (250.0, 'left/')
+    with pytest.raises(LinkageError) as caught:
+        start(**given, publish_frequency='fast')
+    assert str(caught.value) == "publish_frequency 'fast': is no number; write 1 to 1000"
+
+
+class RobotStatePublisher:
+    """What robot_state_publisher 3.3 does with joint states: it throttles by their stamps."""
+
+    def __init__(self, frequency):
+        self._interval = int(1000.0 / frequency) * 1_000_000
+        self._stamps, self.angles = {}, {}
+
+    def take(self, names, positions, stamp):
+        """Take a message; the transforms of all of its joints are published, or none."""
+        if stamp >= min(self._stamps.get(name, 0) for name in names) + self._interval:
+            self.angles |= zip(names, positions, strict=True)
+            self._stamps |= dict.fromkeys(names, stamp)
+
+
+A, B, C, D = 0.04, 0.12, 0.08, 0.1
+
+
+def gap_of_pin(angles):
+    """Return how far both ends of the four-bar's cut pin are apart in tf, in [m]."""
+    crank, coupler, rocker = (angles[f'{name}_joint'] for name in ('crank', 'coupler', 'rocker'))
+    over_coupler = A * exp(1j * crank) + B * exp(1j * (crank + coupler))
+    return abs(over_coupler - D - C * exp(1j * rocker))
+
+
+# (rate of the scene, whether it publishes the input, least and greatest gap in [m]).
+STREAMS = {
+    'at its default of 20 Hz the streams come apart': (100, False, 20.0, 2e-3, 1e-2),
+    'at that of the launch file by less than a period of the crank': (100, False, None, 0, 8e-4),
+    'once for every sample not at all': (0, False, None, 0, 1e-12),
+    'in one message not at all': (100, True, None, 0, 1e-12),
+    'in one message not at all, whatever the frequency': (100, True, 20.0, 0, 1e-12),
+}
+
+
+@pytest.mark.parametrize('name', STREAMS)
+def test_two_streams_of_joint_states_meet_in_tf(start, root, name):
+    """A broadcaster at 100 Hz, the crank at 1 rad/s; the node ticks 3 ms after it."""
+    rate, publish_input, frequency, least, most = STREAMS[name]
+    if frequency is None:
+        scene = str(root / 'config' / 'scenes' / 'bare.yaml')
+        _, publisher = start(scene=scene, robot_state_publisher='true')
+        frequency = publisher['parameters'][0]['publish_frequency']
+    pipeline = pipeline_of(
+        f'rate: {rate}\npublish_input: {str(publish_input).lower()}\neffects: {{velocity: {{}}}}',
+        FOUR_BAR,
+    )
+    tf = RobotStatePublisher(frequency)
+    gaps = []
+    for number in range(500):
+        stamp = 10**12 + number * 10_000_000
+        angle = 0.01 * number
+        message = joint_state(['crank_joint'], [angle], [1.0], stamp=divmod(stamp, 10**9))
+        assert pipeline.offer(message, stamp) is None
+        if not publish_input:
+            tf.take(['arm', 'crank_joint'], [0.0, angle], stamp)
+        at = stamp if rate == 0 else stamp + 3_000_000
+        # It starts a little after the broadcaster, so that each stream has a phase of its own.
+        if number >= 2:
+            state = read_joint_state(pipeline.tick(at).message)
+            tf.take(state.name, state.position, at)
+            gaps.append(gap_of_pin(tf.angles))
+    assert least <= max(gaps) <= most
