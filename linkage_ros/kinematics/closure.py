@@ -22,14 +22,15 @@ Position first; what a scene calls for beyond it starts from the position and re
 from __future__ import annotations
 
 from cmath import rect
-from collections.abc import Iterable, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from numbers import Real
 from operator import mul
 from typing import Any, ClassVar, TYPE_CHECKING
 
 from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
+from linkage_ros.kinematics.built_once import BuiltProperty, keep_results
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.limits import Bounds, limited, without_mirrored, zero_length
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
@@ -134,7 +135,10 @@ class Closure:
         self.bounds = Bounds(linkage)
         """The limits between which its joints stay."""
         self._keep_limits()
-        self._compiled: list[Compiled] = []
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle the definition: the copy builds the rest anew, to the same bits."""
+        return type(self), (self.linkage, self.name)
 
     def __repr__(self) -> str:
         counts = ((len(self.input_names), 'input'), (len(self.joint_names), 'joint'))
@@ -290,17 +294,15 @@ class Closure:
             Which numbers of these; all published joints if not given.
 
         """
-        from linkage_ros.kinematics.compiling import (
-            linkage,  # local import: they trace
-            trace,  # local import: they trace
-        )
+        from linkage_ros.kinematics.compiling.trace import joints  # local import: it traces
 
-        wanted = wanted or trace.joints
-        for compiled in self._compiled:
-            if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
-                return compiled
-        self._compiled.append(linkage.Compiled(self, derivatives, wanted))
-        return self._compiled[-1]
+        return self._compiled(derivatives, wanted or joints)
+
+    @BuiltProperty
+    def _compiled(self) -> Callable[[int, Wanted], Compiled]:
+        from linkage_ros.kinematics.compiling.linkage import Compiled  # local import: it traces
+
+        return keep_results(partial(Compiled, self))
 
     def solve(
         self,
@@ -343,7 +345,7 @@ class Closure:
         """
         return self._solver.solve(inputs, rates, accelerations, derivatives, out)
 
-    @cached_property
+    @BuiltProperty
     def _solver(self) -> Solver:
         from linkage_ros.kinematics.compiling.solve import Solver  # local import: needs numpy
 
@@ -400,7 +402,7 @@ class Closure:
 
         return PointTracker(self._known, points)
 
-    @cached_property
+    @BuiltProperty
     def link_frames(self) -> LinkFrames:
         """Return the frames of the links and blocks that move."""
         from linkage_ros.kinematics.link_frames import (
@@ -464,7 +466,7 @@ class Closure:
             worst = max(worst, abs(error))
         return worst
 
-    @cached_property
+    @BuiltProperty
     def input_ranges(self) -> tuple[InputRange, ...]:
         """
         Ranges of a single input, in [rad] or [m]; empty for several inputs.
@@ -473,12 +475,12 @@ class Closure:
         """
         return input_ranges(self)
 
-    @cached_property
+    @BuiltProperty
     def singular_inputs(self) -> tuple[SingularInput, ...]:
         """Toggles and change points of a single input; empty for several inputs."""
         return singular_inputs(self)
 
-    @cached_property
+    @BuiltProperty
     def closing_ranges(self) -> tuple[InputRange, ...]:
         """
         Ranges in which a single input closes every loop, without limits; empty for several.
@@ -489,7 +491,7 @@ class Closure:
         found = closing_ranges(self)
         return without_mirrored(self.linkage, self.structure, 0, found) if found else ()
 
-    @cached_property
+    @BuiltProperty
     def zero_length(self) -> float | None:
         """Slide at which the two pins of a cylinder meet, in [m]; None if there is none."""
         return zero_length(self.linkage, self.structure, 0)
@@ -528,7 +530,8 @@ class Closure:
     def _check_own(self, what: str, found: Position | Velocity) -> None:
         """Refuse a result of another linkage: the steps would read its numbers."""
         closure = getattr(found, 'closure', None)
-        if getattr(closure, 'linkage', None) is not self.linkage:
+        linkage = getattr(closure, 'linkage', None)
+        if linkage is not self.linkage and linkage != self.linkage:
             message = f'{what}: {quoted(found)} is not of {self!r}; give what that returned'
             raise TypeError(message)
 

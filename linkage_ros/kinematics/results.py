@@ -22,7 +22,7 @@ The modules that compute them, and `Closure`, import this one.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import tau
 from typing import Any, NamedTuple, Protocol
 
@@ -208,6 +208,11 @@ class _JointValues(Mapping[str, float]):
         if not self.joints:
             raise ValueError(f'{joint}: {self!r} has no joint values; check its status first')
         return self.joints[names.index(joint)]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Also for the pickle protocols that know no slots.
+        names = [each.name for each in fields(self)]  # type: ignore[arg-type]
+        return type(self), tuple(getattr(self, name) for name in names)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.closure.joint_names)

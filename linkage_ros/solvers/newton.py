@@ -45,6 +45,7 @@ from typing import Any, NamedTuple
 
 from linkage_ros.files.parameters import number
 from linkage_ros.kinematics.arithmetic import cross, UNIT_ROUNDOFF
+from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
@@ -128,11 +129,12 @@ class Knots:
             return self._new(key), offsets
 
     def _new(self, key: tuple[int, ...]) -> Knot | None:
-        if len(self._knots) >= _MOST:
-            self._knots.clear()
-            self._signs.clear()
-        self._knots[key] = knot = self._knot(key)
-        return knot
+        with BUILD_LOCK:
+            if len(self._knots) >= _MOST:
+                self._knots.clear()
+                self._signs.clear()
+            self._knots[key] = knot = self._knot(key)
+            return knot
 
     def _knot(self, key: tuple[int, ...]) -> Knot | None:
         signs = self._signs_at(key)
@@ -424,6 +426,7 @@ class NewtonClosure(Solver):
         super().__init__(Closure(linkage))
         self.tolerance = tolerance
         self.exact_states = 0  # Number of states that the closed form has solved so far
+        self._given_warm = warm
         self._warm = warm is True
         self._last: list[float] | None = None
         self._plan, self._iterates = self._planned(tolerance)
@@ -433,6 +436,9 @@ class NewtonClosure(Solver):
         if warm is False:
             pose = self.closed.position(*usual_inputs(self.closed))
             self._pose = pose.state.coordinates
+
+    def _definition(self) -> tuple[Any, ...]:
+        return self.linkage, self.tolerance, self._given_warm
 
     def position(self, *inputs: float) -> Position:
         x = self._coordinates('inputs', inputs)

@@ -33,6 +33,7 @@ ends, the states are those of the closed form.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import fmod, inf, tau
 from struct import Struct
 from time import perf_counter
@@ -154,6 +155,7 @@ class TableClosure(Solver):
     ) -> None:
         begun = perf_counter()
         super().__init__(Closure(linkage))
+        self._request = (linkage, tolerance, knots, order, span)
         if len(linkage.inputs) > 1:
             raise DefinitionError(
                 'solver.table',
@@ -196,6 +198,11 @@ class TableClosure(Solver):
         self.memory = len(self._data)
         self.build_time = perf_counter() - begun
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        linkage, tolerance, knots, order, span = self._request
+        build = partial(type(self), linkage, tolerance, knots=knots, order=order, span=span)
+        return build, (), super().__reduce__()[2]
+
     def position(self, *inputs: float) -> Position:
         (x,) = inputs
         low, high, first, density = self._first
@@ -236,7 +243,7 @@ class TableClosure(Solver):
         return off + self.closed.residual(exact)
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
-        if position.state.pins is not self._no_pins:
+        if not isinstance(cast('Any', position.poses), _Place):
             return self.closed.velocity(position, *rates)
         c, t, density = cast('_Place', position.poses)
         (rate,) = rates
@@ -254,7 +261,7 @@ class TableClosure(Solver):
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
     ) -> Acceleration:
-        if position.state.pins is not self._no_pins:
+        if not isinstance(cast('Any', position.poses), _Place):
             return self.closed.acceleration(position, velocity, *accelerations)
         c, t, density = cast('_Place', position.poses)
         (factor,), (change,) = velocity.rates, accelerations

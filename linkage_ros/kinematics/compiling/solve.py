@@ -24,12 +24,12 @@ they are called for these.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from math import isfinite
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.batch import Array, Batch, CODES, Codes, Mask
+from linkage_ros.kinematics.built_once import keep_results
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction, Number
 from linkage_ros.kinematics.compiling.real_program import Lowered, lowered
@@ -91,8 +91,8 @@ class Solver:
         self._driven = len(closure.linkage.inputs)
         self._width = width
         self._wanted = wanted
-        self._compiled = cache(self._compile)
-        self._programs = cache(self._program)
+        self._compiled = keep_results(self._compile)
+        self._programs = keep_results(self._program)
 
     def solve(
         self,
