@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 import copy
 from functools import partial
 import multiprocessing
@@ -93,7 +94,7 @@ CASES = [*((name, False) for name in CLOSURES), *((name, True) for name in USED)
 
 
 @pytest.mark.parametrize('way', COPIES)
-@pytest.mark.parametrize('name, used', CASES)
+@pytest.mark.parametrize(('name', 'used'), CASES)
 def test_a_copy_gives_the_same_bits(name, used, way):
     """It takes the positions of its original, and the original takes those of the copy."""
     closure = CLOSURES[name]()
@@ -129,25 +130,15 @@ def test_positions_of_another_linkage_are_refused_by_a_copy():
 
 def many(calls, repeat):
     """Call functions at once, each ``repeat`` times; return their results, or raise."""
-    barrier, results = Barrier(repeat * len(calls)), []
-
-    def work(call):
-        barrier.wait()
-        try:
-            results.append(call())
-        except BaseException as error:
-            results.append(error)
-
-    threads = [Thread(target=work, args=(call,)) for call in calls for _ in range(repeat)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(60.0)
-        assert not thread.is_alive(), 'two threads wait for each other'
-    for result in results:
-        if isinstance(result, BaseException):
-            raise result
-    return results
+    count = repeat * len(calls)
+    barrier = Barrier(count)
+    with ThreadPoolExecutor(count) as pool:
+        futures = [
+            pool.submit(lambda c=call: barrier.wait() is not None and c())
+            for call in calls
+            for _ in range(repeat)
+        ]
+        return [future.result(120.0) for future in futures]
 
 
 @pytest.fixture
