@@ -300,7 +300,8 @@ class Velocity(_JointValues):
     joints
         Rates of the published joints, in [rad/s] or [m/s].
     state, rates
-        Rates of coordinates and pins, and what each step needs for its accelerations.
+        Rates of coordinates and pins, and what each step needs for its accelerations; None for
+        rates so huge that a square of them would overflow.
     closure
         The closure that found them.
 
@@ -308,7 +309,7 @@ class Velocity(_JointValues):
 
     joints: tuple[float, ...]
     state: State
-    rates: list[Any]
+    rates: Any
     closure: LoopClosure = field(compare=False)
 
 

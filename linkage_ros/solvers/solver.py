@@ -26,6 +26,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.doubles import to_doubles
 from linkage_ros.kinematics.results import (
     Acceleration,
     InputRange,
@@ -159,4 +160,4 @@ def _rows(values: Any, driven: int, count: int) -> list[list[float]]:
 
     if driven == 1 and not isinstance(values, list | tuple) and np.ndim(values) < 2:
         values = [values]
-    return [np.broadcast_to(np.asarray(value, np.float64), count).tolist() for value in values]
+    return [np.broadcast_to(to_doubles('inputs', value), count).tolist() for value in values]

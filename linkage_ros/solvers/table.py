@@ -42,6 +42,7 @@ from typing import Any, cast, Literal, NamedTuple, TYPE_CHECKING
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import number, point
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.doubles import to_double
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.ranges import link_lengths
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
@@ -205,6 +206,8 @@ class TableClosure(Solver):
 
     def position(self, *inputs: float) -> Position:
         (x,) = inputs
+        if type(x) is not float:
+            x = to_double('inputs', x, '; solve() takes arrays')
         low, high, first, density = self._first
         if not low <= x < high:
             part, at = self._elsewhere(x)
@@ -247,6 +250,8 @@ class TableClosure(Solver):
             return self.closed.velocity(position, *rates)
         c, t, density = cast('_Place', position.poses)
         (rate,) = rates
+        if type(rate) is not float:
+            rate = to_double('rates', rate, '; solve() takes arrays')
         factor = rate * density
         joints: tuple[float, ...] = ()
         if self._degree == 3:
@@ -265,6 +270,8 @@ class TableClosure(Solver):
             return self.closed.acceleration(position, velocity, *accelerations)
         c, t, density = cast('_Place', position.poses)
         (factor,), (change,) = velocity.rates, accelerations
+        if type(change) is not float:
+            change = to_double('accelerations', change, '; solve() takes arrays')
         square, pull = factor * factor, change * density
         joints: tuple[float, ...] = ()
         if self._degree == 3:
