@@ -43,6 +43,7 @@ from math import floor, inf, nextafter, remainder, sqrt, tau
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
+from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.equations import Array, Constraint, derivative, equations, spread
 from linkage_ros.kinematics.step import State
 import numpy as np
@@ -470,13 +471,17 @@ class Branch:
         elif self._turning and not low <= x <= high and self.interval.period:
             x -= tau * round((x - 0.5 * (low + high)) / tau)
         side = self._sides[int(x >= self._x)]
-        while side.end is None and side.sign * x > self._reached(side) and self._lap(side):
-            pass
+        if side.sign * x > self._reached(side):
+            with BUILD_LOCK:
+                while side.end is None and side.sign * x > self._reached(side):
+                    if not self._lap(side):
+                        break
         if side.sign * x > self._reached(side):
             return None
         gained = turned * self._gained
-        number = bisect_left(side.inputs, side.sign * x)
-        if number == len(side.cells):
+        inputs = side.inputs
+        number = bisect_left(inputs, side.sign * x)
+        if number == len(inputs):
             # Next to a toggle of the links before, the cells become too small to continue.
             return Start(side.node.place[:-1], _NEXT_TO_END, gained, False)
         cell = side.cells[number]
@@ -521,19 +526,22 @@ class Branch:
             last = self._x + side.sign * side.laps * tau
         else:
             last = side.sign * max(self._far, side.sign * self._x) * 2.0 ** (side.laps - 1)
-        for cell in self._continuation.cells(side.node, side.sign, last):
-            side.cells.append(cell)
-            side.inputs.append(side.sign * float(cell.end.place[-1]))
-            side.node = cell.end
-        at = float(side.node.place[-1])
-        if side.cells and side.cells[-1].folds:
-            side.end = at
+        found = list(self._continuation.cells(side.node, side.sign, last))
+        cells, node = side.cells + found, found[-1].end if found else side.node
+        at = float(node.place[-1])
+        end = None
+        if cells and cells[-1].folds:
+            end = at
         elif side.sign * (last - at) > 0.0:
-            side.end = self._last_known(at, side.sign)
-            if side.end == at and side.cells:
+            end = self._last_known(at, side.sign)
+            if end == at and cells:
                 # Where branches cross the group is singular too: no way to choose between them.
-                side.cells[-1] = side.cells[-1]._replace(folds=True)
-        return side.end is None
+                cells[-1] = cells[-1]._replace(folds=True)
+        # Other threads read a side while it grows: whoever sees an input sees its cell.
+        side.node, side.cells = node, cells
+        side.inputs = side.inputs + [side.sign * float(one.end.place[-1]) for one in found]
+        side.end = end
+        return end is None
 
     def _last_known(self, x: float, sign: float) -> float:
         """Return the last float at which the links before close, next to the end of the cells."""

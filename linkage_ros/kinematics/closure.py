@@ -22,15 +22,17 @@ Position first; what a scene calls for beyond it starts from the position and re
 from __future__ import annotations
 
 from cmath import rect
-from collections.abc import Iterable, Sequence
-from functools import cached_property
-from numbers import Real
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from math import inf
 from operator import mul
 from typing import Any, ClassVar, TYPE_CHECKING
 
 from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
+from linkage_ros.kinematics.built_once import BuiltProperty, keep_results
 from linkage_ros.kinematics.checks import check
+from linkage_ros.kinematics.doubles import HUGE, scale_of, to_double
 from linkage_ros.kinematics.limits import Bounds, limited, without_mirrored, zero_length
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.plan import SolutionPlan
@@ -64,6 +66,18 @@ def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueErro
     if not status.has_rates:
         return ValueError(f'{what}: a linkage that is {status.value} has none; ask its status')
     return ValueError(f'{what}: {list(given)} is not finite')
+
+
+def _multiplied(found: Velocity | Acceleration, factor: float) -> tuple[tuple[float, ...], State]:
+    """Return joints and state of a velocity or an acceleration times a factor."""
+    coordinates, pins = found.state
+    return (
+        tuple(value * factor for value in found.joints),
+        State(
+            [value * factor for value in coordinates],
+            [complex(pin.real * factor, pin.imag * factor) for pin in pins],
+        ),
+    )
 
 
 class Closure:
@@ -131,10 +145,14 @@ class Closure:
         self._more_steps = tuple(planner.steps[needed:])
         factors = [1.0 / self.scale if given.slider else 1.0 for given in linkage.inputs]
         self._factors = None if set(factors) == {1.0} else factors
+        self._single = factors == [1.0]
         self.bounds = Bounds(linkage)
         """The limits between which its joints stay."""
         self._keep_limits()
-        self._compiled: list[Compiled] = []
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle the definition: the copy builds the rest anew, to the same bits."""
+        return type(self), (self.linkage, self.name)
 
     def __repr__(self) -> str:
         counts = ((len(self.input_names), 'input'), (len(self.joint_names), 'joint'))
@@ -189,9 +207,10 @@ class Closure:
             If an input is not a number.
 
         """
-        x = self._coordinates('inputs', inputs)
+        x = self._coordinates('inputs', inputs, 0.0, inf)
         if x is None:
-            state = State([0.0, *self._scaled(inputs)], [])
+            numbers = self._doubles('inputs', inputs)
+            state = State([0.0, *self._scaled(numbers)], [])
             return Position(Status.INDETERMINATE, 0.0, (), state, [], self)
         state = State(x, [])
         poses: list[Pose] = []
@@ -212,7 +231,7 @@ class Closure:
 
     def known(self, *inputs: float) -> State:
         """Return the state before the first step: the coordinates of the ground and the inputs."""
-        return State(self._coordinates('inputs', inputs) or [], [])
+        return State(self._coordinates('inputs', inputs, 0.0, inf) or [], [])
 
     def posed(self, *inputs: float) -> Position:
         """Close the loops as `position` does, without limits."""
@@ -242,7 +261,7 @@ class Closure:
             self._check_own('position', position)
         v = self._coordinates('rates', rates)
         if v is None or not position.status.has_rates:
-            raise _no_motion('rates', rates, position.status)
+            return self._huge_velocity(position, self._doubles('rates', rates))
         speeds = State(v, [])
         found = []
         for step, pose in zip(self.steps, position.poses, strict=True):
@@ -270,13 +289,36 @@ class Closure:
         """
         if getattr(velocity, 'closure', None) is not self:
             self._check_own('velocity', velocity)
-        a = self._coordinates('accelerations', accelerations)
-        if a is None:
-            raise _no_motion('accelerations', accelerations, position.status)
+        a = self._coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
+        if a is None or velocity.rates is None:
+            numbers = self._doubles('accelerations', accelerations)
+            return self._huge_acceleration(position, velocity, numbers)
         changes = State(a, [])
         for step, pose, rate in zip(self.steps, position.poses, velocity.rates, strict=True):
             step.accelerations(pose, rate, position.state, velocity.state, changes)
         return Acceleration(self._joints(a), changes, self)
+
+    def _huge_velocity(self, position: Position, rates: tuple[float, ...]) -> Velocity:
+        """Return the velocity at rates of which one is huge: infinite where it overflows."""
+        if not (position.status.has_rates and all_finite(rates)):
+            raise _no_motion('rates', rates, position.status)
+        scale = float(scale_of(rates, ()))
+        found = self.velocity(position, *(rate * scale for rate in rates))
+        joints, state = _multiplied(found, 1.0 / scale)
+        return Velocity(joints, state, None, self)
+
+    def _huge_acceleration(
+        self, position: Position, velocity: Velocity, accelerations: tuple[float, ...]
+    ) -> Acceleration:
+        if not all_finite(accelerations):
+            raise _no_motion('accelerations', accelerations, position.status)
+        rates = self.inputs_of(velocity.state)
+        scale = float(scale_of(rates, accelerations))
+        scaled = self.velocity(position, *(rate * scale for rate in rates))
+        changes = (change * scale * scale for change in accelerations)
+        found = self.acceleration(position, scaled, *changes)
+        once = Acceleration(*_multiplied(found, 1.0 / scale), self)
+        return Acceleration(*_multiplied(once, 1.0 / scale), self)
 
     def compiled(self, derivatives: int, wanted: Wanted | None = None) -> Compiled:
         """
@@ -290,17 +332,15 @@ class Closure:
             Which numbers of these; all published joints if not given.
 
         """
-        from linkage_ros.kinematics.compiling import (
-            linkage,  # local import: they trace
-            trace,  # local import: they trace
-        )
+        from linkage_ros.kinematics.compiling.trace import joints  # local import: it traces
 
-        wanted = wanted or trace.joints
-        for compiled in self._compiled:
-            if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
-                return compiled
-        self._compiled.append(linkage.Compiled(self, derivatives, wanted))
-        return self._compiled[-1]
+        return self._compiled(derivatives, wanted or joints)
+
+    @BuiltProperty
+    def _compiled(self) -> Callable[[int, Wanted], Compiled]:
+        from linkage_ros.kinematics.compiling.linkage import Compiled  # local import: it traces
+
+        return keep_results(partial(Compiled, self))
 
     def solve(
         self,
@@ -343,7 +383,7 @@ class Closure:
         """
         return self._solver.solve(inputs, rates, accelerations, derivatives, out)
 
-    @cached_property
+    @BuiltProperty
     def _solver(self) -> Solver:
         from linkage_ros.kinematics.compiling.solve import Solver  # local import: needs numpy
 
@@ -400,7 +440,7 @@ class Closure:
 
         return PointTracker(self._known, points)
 
-    @cached_property
+    @BuiltProperty
     def link_frames(self) -> LinkFrames:
         """Return the frames of the links and blocks that move."""
         from linkage_ros.kinematics.link_frames import (
@@ -464,7 +504,7 @@ class Closure:
             worst = max(worst, abs(error))
         return worst
 
-    @cached_property
+    @BuiltProperty
     def input_ranges(self) -> tuple[InputRange, ...]:
         """
         Ranges of a single input, in [rad] or [m]; empty for several inputs.
@@ -473,12 +513,12 @@ class Closure:
         """
         return input_ranges(self)
 
-    @cached_property
+    @BuiltProperty
     def singular_inputs(self) -> tuple[SingularInput, ...]:
         """Toggles and change points of a single input; empty for several inputs."""
         return singular_inputs(self)
 
-    @cached_property
+    @BuiltProperty
     def closing_ranges(self) -> tuple[InputRange, ...]:
         """
         Ranges in which a single input closes every loop, without limits; empty for several.
@@ -489,7 +529,7 @@ class Closure:
         found = closing_ranges(self)
         return without_mirrored(self.linkage, self.structure, 0, found) if found else ()
 
-    @cached_property
+    @BuiltProperty
     def zero_length(self) -> float | None:
         """Slide at which the two pins of a cylinder meet, in [m]; None if there is none."""
         return zero_length(self.linkage, self.structure, 0)
@@ -505,22 +545,38 @@ class Closure:
             step.close(state)
         return state
 
-    def _coordinates(self, what: str, values: tuple[float, ...]) -> list[float] | None:
-        """Return the coordinates of the ground and the inputs; None if one is not finite."""
+    def _coordinates(
+        self, what: str, values: tuple[float, ...], zero: float = -0.0, most: float = HUGE
+    ) -> list[float] | None:
+        """
+        Return the coordinates of the ground and the inputs, as doubles.
+
+        Each is a value plus ``zero``: 0.0 makes 0.0 of −0.0, which is the same input, and −0.0
+        changes nothing. None if a value is not between ``-most`` and ``most``.
+        """
+        if self._single and len(values) == 1:
+            (value,) = values
+            if type(value) is float and -most < value < most:
+                return [0.0, value + zero]
         if len(values) != len(self.input_names):
             names = listed(self.input_names)
             raise ValueError(f'{what}: {len(values)} given; give {len(self.input_names)}: {names}')
-        try:
-            if not all_finite(values):
-                return None
-        except (TypeError, ValueError):
-            numbers = [isinstance(value, Real) for value in values]
-            wrong = values[numbers.index(False)]
-            message = f'{what}: {quoted(wrong)} is not a number; solve() takes arrays'
-            raise TypeError(message) from None
-        return [0.0, *self._scaled(values)]
+        numbers = self._doubles(what, values)
+        x = [0.0, *self._scaled([number + zero for number in numbers])]
+        if any(hasattr(number, 'apply') for number in numbers):
+            return x if all_finite(numbers) else None
+        return x if all(-most < number < most for number in (*numbers, *x)) else None
 
-    def _scaled(self, values: tuple[float, ...]) -> Iterable[float]:
+    def _doubles(self, what: str, values: tuple[float, ...]) -> tuple[float, ...]:
+        """Return values of any type as doubles; symbols as they are."""
+        return tuple(
+            value
+            if type(value) is float or hasattr(value, 'apply')
+            else to_double(what, value, '; solve() takes arrays')
+            for value in values
+        )
+
+    def _scaled(self, values: Sequence[float]) -> Iterable[float]:
         """Return values of the inputs, or their rates, in the unit of the steps."""
         factors = self._factors
         return values if factors is None else map(mul, values, factors)
@@ -528,7 +584,8 @@ class Closure:
     def _check_own(self, what: str, found: Position | Velocity) -> None:
         """Refuse a result of another linkage: the steps would read its numbers."""
         closure = getattr(found, 'closure', None)
-        if getattr(closure, 'linkage', None) is not self.linkage:
+        linkage = getattr(closure, 'linkage', None)
+        if linkage is not self.linkage and linkage != self.linkage:
             message = f'{what}: {quoted(found)} is not of {self!r}; give what that returned'
             raise TypeError(message)
 

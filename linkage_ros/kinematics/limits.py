@@ -132,7 +132,7 @@ def limited(position: Callable[..., Position], bounds: Bounds) -> Callable[..., 
     @wraps(position)
     def close(*inputs: float) -> Position:
         found = position(*inputs)
-        if found.status in _UNDISTURBED and exceeded(inputs, found.joints) is not None:
+        if found.status in _UNDISTURBED and exceeded(found.inputs, found.joints) is not None:
             return replace(found, status=Status.LIMITED)
         return found
 

@@ -39,6 +39,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.arithmetic import called, is_found, UNIT_ROUNDOFF
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
+from linkage_ros.kinematics.built_once import keep_results
 from linkage_ros.kinematics.compiling.python import straight
 from linkage_ros.kinematics.equations import (
     along,
@@ -108,8 +109,8 @@ class Iteration:
 
     """
 
-    __slots__ = ('_before', '_branch', '_constraints', '_far', '_slides', '_sliding', '_solution',
-                 '_start', '_straight', 'inputs', 'tolerance')  # fmt: skip
+    __slots__ = ('_before', '_constraints', '_far', '_slides', '_sliding', '_start', '_straight',
+                 'branch', 'inputs', 'solution', 'tolerance')  # fmt: skip
 
     def __init__(
         self,
@@ -128,9 +129,11 @@ class Iteration:
         self._sliding = sliding
         self._far = far
         self._start = np.array(start)
-        self._branch: Branch | None = None
-        self._solution: Array | None = None
         self._straight: _StraightSystem | None = None
+        # Returns the branch of a single input; None if the pose leads to no solution.
+        self.branch = keep_results(self._followed_branch)
+        # Returns the unknowns at the pose's inputs; None if the pose leads to no solution.
+        self.solution = keep_results(self._solution_of_pose)
         # Bound of the last correction, in [rad] and in the unit of the lengths; 0 for full
         # accuracy.
         self.tolerance = 0.0
@@ -231,36 +234,26 @@ class Iteration:
         end = 1 + len(self.inputs)
         return known.coordinates[1:end]
 
-    def branch(self) -> Branch | None:
-        """
-        Return the branch of a single input, followed on the first call.
+    def _followed_branch(self) -> Branch | None:
+        solution = self.solution()
+        if solution is None:
+            return None
+        return Branch(
+            Continuation(
+                self._constraints,
+                lambda x: self._known_at((x,)),
+                lambda x: self._moving_at((x,)),
+            ),
+            solution,
+            self.inputs[0],
+            turning=not self._sliding[0],
+            far=self._far,
+        )
 
-        Return None if the pose leads to no solution.
-        """
-        if self._branch is None:
-            solution = self.solution()
-            if solution is None:
-                return None
-            self._branch = Branch(
-                Continuation(
-                    self._constraints,
-                    lambda x: self._known_at((x,)),
-                    lambda x: self._moving_at((x,)),
-                ),
-                solution,
-                self.inputs[0],
-                turning=not self._sliding[0],
-                far=self._far,
-            )
-        return self._branch
-
-    def solution(self) -> Array | None:
-        """Return the unknowns at the pose's inputs; None if the pose leads to no solution."""
-        if self._solution is None:
-            known = self._known_at(self.inputs)
-            corrected = self._correct(known, self._start, inf) if known is not None else None
-            self._solution = corrected[0] if corrected is not None else None
-        return self._solution
+    def _solution_of_pose(self) -> Array | None:
+        known = self._known_at(self.inputs)
+        corrected = self._correct(known, self._start, inf) if known is not None else None
+        return corrected[0] if corrected is not None else None
 
     def rates(self, pose: IteratedPose, known: State, speeds: State) -> list[float]:
         """Append the rates of the coordinates and pins that `close` appended."""
@@ -427,7 +420,8 @@ class Iteration:
         If they would close, but in another assembly or after another number of turns, the closure
         error is the one at that end.
         """
-        end = self._branch.nearest_end(inputs[0]) if self._branch is not None else None
+        branch = self.branch() if len(inputs) == 1 else None
+        end = None if branch is None else branch.nearest_end(inputs[0])
         unknowns = self._start if end is None else end
         errors, jacobian = self._system(known, unknowns)
         first = float(np.abs(errors).max())

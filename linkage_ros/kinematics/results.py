@@ -22,7 +22,7 @@ The modules that compute them, and `Closure`, import this one.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import tau
 from typing import Any, NamedTuple, Protocol
 
@@ -209,6 +209,11 @@ class _JointValues(Mapping[str, float]):
             raise ValueError(f'{joint}: {self!r} has no joint values; check its status first')
         return self.joints[names.index(joint)]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Also for the pickle protocols that know no slots.
+        names = [each.name for each in fields(self)]  # type: ignore[arg-type]
+        return type(self), tuple(getattr(self, name) for name in names)
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.closure.joint_names)
 
@@ -295,7 +300,8 @@ class Velocity(_JointValues):
     joints
         Rates of the published joints, in [rad/s] or [m/s].
     state, rates
-        Rates of coordinates and pins, and what each step needs for its accelerations.
+        Rates of coordinates and pins, and what each step needs for its accelerations; None for
+        rates so huge that a square of them would overflow.
     closure
         The closure that found them.
 
@@ -303,7 +309,7 @@ class Velocity(_JointValues):
 
     joints: tuple[float, ...]
     state: State
-    rates: list[Any]
+    rates: Any
     closure: LoopClosure = field(compare=False)
 
 

@@ -17,12 +17,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cached_property
 from itertools import product
 from math import cos, inf, isfinite, nan, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.limits import Bound, without_mirrored
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.kinematics.ranges import (
@@ -197,7 +197,7 @@ class InputSweep:
         bounds = self.closure.bounds
         return bool(position.joints) and not (bounds and bounds.exceeded(inputs, position.joints))
 
-    @cached_property
+    @BuiltProperty
     def ranges(self) -> tuple[InputRange, ...]:
         """
         Ranges in which every loop closes, with angles as a user expects them.

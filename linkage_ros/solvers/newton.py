@@ -40,12 +40,14 @@ from __future__ import annotations
 from cmath import rect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import copysign, tau
+from math import copysign, inf, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.files.parameters import number
 from linkage_ros.kinematics.arithmetic import cross, UNIT_ROUNDOFF
+from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.doubles import HUGE
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.status import Status
@@ -128,11 +130,12 @@ class Knots:
             return self._new(key), offsets
 
     def _new(self, key: tuple[int, ...]) -> Knot | None:
-        if len(self._knots) >= _MOST:
-            self._knots.clear()
-            self._signs.clear()
-        self._knots[key] = knot = self._knot(key)
-        return knot
+        with BUILD_LOCK:
+            if len(self._knots) >= _MOST:
+                self._knots.clear()
+                self._signs.clear()
+            self._knots[key] = knot = self._knot(key)
+            return knot
 
     def _knot(self, key: tuple[int, ...]) -> Knot | None:
         signs = self._signs_at(key)
@@ -424,6 +427,7 @@ class NewtonClosure(Solver):
         super().__init__(Closure(linkage))
         self.tolerance = tolerance
         self.exact_states = 0  # Number of states that the closed form has solved so far
+        self._given_warm = warm
         self._warm = warm is True
         self._last: list[float] | None = None
         self._plan, self._iterates = self._planned(tolerance)
@@ -434,8 +438,11 @@ class NewtonClosure(Solver):
             pose = self.closed.position(*usual_inputs(self.closed))
             self._pose = pose.state.coordinates
 
+    def _definition(self) -> tuple[Any, ...]:
+        return self.linkage, self.tolerance, self._given_warm
+
     def position(self, *inputs: float) -> Position:
-        x = self._coordinates('inputs', inputs)
+        x = self._coordinates('inputs', inputs, 0.0, inf)
         if x is None:
             return self._exact(inputs)
         knot, offsets = self._knots.near(x[1:])
@@ -476,7 +483,7 @@ class NewtonClosure(Solver):
             return self.closed.velocity(position, *rates)
         v = self._coordinates('rates', rates)
         if v is None:
-            return self.closed.velocity(position, *rates)
+            return super().velocity(position, *rates)
         x, pins = state
         speeds = State(v, [])
         others = iter(poses)
@@ -494,9 +501,9 @@ class NewtonClosure(Solver):
         state, poses = position.state, position.poses
         if not isinstance(poses, _Found):
             return self.closed.acceleration(position, velocity, *accelerations)
-        a = self._coordinates('accelerations', accelerations)
-        if a is None:
-            return self.closed.acceleration(position, velocity, *accelerations)
+        a = self._coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
+        if a is None or velocity.rates is None:
+            return super().acceleration(position, velocity, *accelerations)
         speeds, rates = velocity.state, velocity.rates
         changes = State(a, [])
         others, moving = iter(poses), iter(rates)

@@ -22,10 +22,11 @@ gives ranges, singularity margins, points and drawings at the same inputs.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.doubles import to_doubles
 from linkage_ros.kinematics.results import (
     Acceleration,
     InputRange,
@@ -64,6 +65,13 @@ class Solver(Closure):
         self._keep_limits()
         self.closed = closed
         self.choice: Choice | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), self._definition(), {'name': self.name, 'choice': self.choice}
+
+    def _definition(self) -> tuple[Any, ...]:
+        """Return the arguments that build the same closure."""
+        return (self.closed,)
 
     def solve(
         self,
@@ -130,15 +138,15 @@ class Solver(Closure):
         accelerations = self.closed.acceleration(exact, rates, *changes)
         return self.closed.point_motion(exact, rates, accelerations)
 
-    @cached_property
+    @BuiltProperty
     def input_ranges(self) -> tuple[InputRange, ...]:
         return self.closed.input_ranges
 
-    @cached_property
+    @BuiltProperty
     def singular_inputs(self) -> tuple[SingularInput, ...]:
         return self.closed.singular_inputs
 
-    @cached_property
+    @BuiltProperty
     def closing_ranges(self) -> tuple[InputRange, ...]:
         return self.closed.closing_ranges
 
@@ -152,4 +160,4 @@ def _rows(values: Any, driven: int, count: int) -> list[list[float]]:
 
     if driven == 1 and not isinstance(values, list | tuple) and np.ndim(values) < 2:
         values = [values]
-    return [np.broadcast_to(np.asarray(value, np.float64), count).tolist() for value in values]
+    return [np.broadcast_to(to_doubles('inputs', value), count).tolist() for value in values]

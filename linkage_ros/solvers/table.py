@@ -33,6 +33,7 @@ ends, the states are those of the closed form.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import fmod, inf, tau
 from struct import Struct
 from time import perf_counter
@@ -41,6 +42,7 @@ from typing import Any, cast, Literal, NamedTuple, TYPE_CHECKING
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import number, point
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.doubles import to_double
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.ranges import link_lengths
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
@@ -154,6 +156,7 @@ class TableClosure(Solver):
     ) -> None:
         begun = perf_counter()
         super().__init__(Closure(linkage))
+        self._request = (linkage, tolerance, knots, order, span)
         if len(linkage.inputs) > 1:
             raise DefinitionError(
                 'solver.table',
@@ -196,8 +199,15 @@ class TableClosure(Solver):
         self.memory = len(self._data)
         self.build_time = perf_counter() - begun
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        linkage, tolerance, knots, order, span = self._request
+        build = partial(type(self), linkage, tolerance, knots=knots, order=order, span=span)
+        return build, (), super().__reduce__()[2]
+
     def position(self, *inputs: float) -> Position:
         (x,) = inputs
+        if type(x) is not float:
+            x = to_double('inputs', x, '; solve() takes arrays')
         low, high, first, density = self._first
         if not low <= x < high:
             part, at = self._elsewhere(x)
@@ -236,10 +246,12 @@ class TableClosure(Solver):
         return off + self.closed.residual(exact)
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
-        if position.state.pins is not self._no_pins:
+        if not isinstance(cast('Any', position.poses), _Place):
             return self.closed.velocity(position, *rates)
         c, t, density = cast('_Place', position.poses)
         (rate,) = rates
+        if type(rate) is not float:
+            rate = to_double('rates', rate, '; solve() takes arrays')
         factor = rate * density
         joints: tuple[float, ...] = ()
         if self._degree == 3:
@@ -254,10 +266,12 @@ class TableClosure(Solver):
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
     ) -> Acceleration:
-        if position.state.pins is not self._no_pins:
+        if not isinstance(cast('Any', position.poses), _Place):
             return self.closed.acceleration(position, velocity, *accelerations)
         c, t, density = cast('_Place', position.poses)
         (factor,), (change,) = velocity.rates, accelerations
+        if type(change) is not float:
+            change = to_double('accelerations', change, '; solve() takes arrays')
         square, pull = factor * factor, change * density
         joints: tuple[float, ...] = ()
         if self._degree == 3:

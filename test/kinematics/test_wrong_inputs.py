@@ -65,8 +65,8 @@ def test_an_input_that_is_not_finite_has_no_pose(value):
     ),
     (ONE.solve, ValueError, 'inputs: 0 given; give 1, one for each driven joint'),
     (
-        lambda: ONE.solve(['a']), ValueError,
-        "inputs: not an array of numbers: could not convert string to float: 'a'",
+        lambda: ONE.solve(['a']), TypeError,
+        "inputs: 'a' is not a number",
     ),
 ])  # fmt: skip
 def test_what_is_no_input(call, kind, text):

@@ -25,6 +25,7 @@ from linkage_ros.generated_code import written
 from linkage_ros.kinematics.compiling.tape import Operation, Tape
 from linkage_ros.kinematics.compiling.trace import number_of, Path
 from linkage_ros.kinematics.compiling.writer import Writer
+from linkage_ros.kinematics.doubles import HUGE
 
 Values = tuple[tuple[float, ...], ...]
 
@@ -112,8 +113,11 @@ def python_body(path: Path, leave: str) -> Body:
     for given in path.inputs:
         writer.name(given, given.name)
     if any(map(_of_inputs, conditions)):
-        # 0 for finite numbers, otherwise NaN; a sum that overflows leaves the path, too.
-        total = ' + '.join(given.name for given in path.inputs)
+        # 0 for finite numbers, otherwise NaN; a sum that overflows leaves the path, too, and so
+        # do huge rates, whose squares might.
+        large = f'{2.0**512 / HUGE * 2.0**512!r} * '
+        names = [given.name for given in path.inputs]
+        total = ' + '.join(name if name[0] == 'q' else large + name for name in names)
         writer.lines += [f'total = {total}', 'if total - total != 0.0:', f'    {leave}']
     for condition, held in path.decisions:
         if not _of_inputs(condition):

@@ -24,16 +24,17 @@ they are called for these.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.batch import Array, Batch, CODES, Codes, Mask
+from linkage_ros.kinematics.built_once import keep_results
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction, Number
 from linkage_ros.kinematics.compiling.real_program import Lowered, lowered
 from linkage_ros.kinematics.compiling.trace import Branch, fates, joints, Tree, Wanted
+from linkage_ros.kinematics.doubles import HUGE, scale_of, to_doubles
 from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -91,8 +92,8 @@ class Solver:
         self._driven = len(closure.linkage.inputs)
         self._width = width
         self._wanted = wanted
-        self._compiled = cache(self._compile)
-        self._programs = cache(self._program)
+        self._compiled = keep_results(self._compile)
+        self._programs = keep_results(self._program)
 
     def solve(
         self,
@@ -116,11 +117,13 @@ class Solver:
         count = len(given[0])
         for name, values in (('rates', rates), ('accelerations', accelerations))[:derivatives]:
             # The values of a single driven joint need no list.
-            alone = np.ndim(values) < 2 if driven == 1 else not np.iterable(values)
-            each = [values] if alone else list(values)
-            given += _numbers(name, each, driven, count)
-        batch = _room(self._width, count, derivatives, out)
+            each: Any = to_doubles(name, values) if driven == 1 else values
+            alone = each.ndim < 2 if driven == 1 else not np.iterable(each)
+            given += _numbers(name, [each] if alone else list(each), driven, count)
         numbers: list[Any] = [value if value.ndim else float(value) for value in given]
+        if _has_huge(numbers[driven:], driven):
+            return self._solve_huge(given, derivatives, out)
+        batch = _room(self._width, count, derivatives, out)
         # A constant 0 or 1 is folded into the program.
         kinds = [int(n) if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
         programs = self._programs(derivatives, tuple(kinds))
@@ -133,13 +136,35 @@ class Solver:
             for start in range(0, count, BLOCK):
                 part = slice(start, start + BLOCK)
                 block = _Block(
-                    [n[part] if isinstance(n, np.ndarray) else n for n in numbers],
+                    # Adding 0.0 makes 0.0 of −0.0, which is the same input.
+                    [
+                        *(n[part] + 0.0 for n in numbers[:driven]),
+                        *(n[part] if isinstance(n, np.ndarray) else n for n in numbers[driven:]),
+                    ],
                     batch.status[part],
                     [array[:, part] for array in batch[1:] if array is not None],
                     rows,
                     masks,
                 )
                 self._solve(block, programs, self._compiled(derivatives))
+        return batch
+
+    def _solve_huge(self, given: list[Array], derivatives: int, out: Batch | None) -> Batch:
+        """Solve with scaled rates and accelerations: what overflows is infinite."""
+        driven = self._driven
+        inputs, rates, changes = given[:driven], given[driven:][:driven], given[2 * driven :]
+        with np.errstate(over='ignore', under='ignore'):
+            scale = scale_of(rates, changes)
+            batch = self.solve(
+                inputs,
+                [rate * scale for rate in rates],
+                [change * scale * scale for change in changes] or None,
+                derivatives,
+                out,
+            )
+            for values in (batch.velocities, batch.accelerations, batch.accelerations):
+                if values is not None:
+                    np.divide(values, scale, out=values)
         return batch
 
     def _solve(self, block: _Block, programs: Sequence[_Program], one: Compiled) -> None:
@@ -276,14 +301,23 @@ def _comes_to(form: ArrayForm, fate: Tree, status: Status) -> Number:
     )
 
 
+def _has_huge(numbers: Sequence[Any], driven: int) -> bool:
+    """Return whether a finite rate, or an acceleration after the rates, is huge."""
+    for k, number in enumerate(numbers):
+        if isinstance(number, float):
+            size = abs(number)
+        else:  # not abs(), which would take memory
+            size = max(number.max(), -number.min()) if number.size else 0.0
+        if (HUGE if k < driven else HUGE * HUGE) <= size < inf:
+            return True
+    return False
+
+
 def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> list[Array]:
     """Return an array for each driven joint; a scalar stays one if the count is known."""
     if len(values) != driven:
         raise ValueError(f'{name}: {len(values)} given; give {driven}, one for each driven joint')
-    try:
-        arrays = [np.asarray(value, np.float64) for value in values]
-    except (TypeError, ValueError) as error:
-        raise ValueError(f'{name}: not an array of numbers: {error}') from None
+    arrays = [to_doubles(name, value) for value in values]
     shapes = [array.shape for array in arrays]
     try:
         shape = np.broadcast_shapes(*shapes, () if count is None else (count,))

@@ -291,6 +291,8 @@ def _simplified(name: str, given: tuple[Any, ...]) -> Any:
             return one
         if name == '*' and _is(one, 1.0):
             return other
+        if name == '+' and _is(other, -0.0):
+            return one
         if name == '+' and _is(one, 0.0) and never_minus_zero(other):
             return other
         if name == '+' and _is(other, 0.0) and never_minus_zero(one):
