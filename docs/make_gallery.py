@@ -45,13 +45,14 @@ from linkage_ros.drawing.painting import corners, outline, paint, save, set_plan
 from linkage_ros.drawing.shapes import shapes
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.plan import sides_at
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,
     InputSweep,
     transmission_angles,
     usual_inputs,
 )
-from linkage_ros.kinematics.topology import Driven
+from linkage_ros.kinematics.topology import Driven, links_of
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -186,8 +187,9 @@ def _head(file: Path) -> str:
 
 def _sequence(closure: Closure) -> str:
     steps = []
+    sides = sides_at(closure, closure.position(*usual_inputs(closure)))
     for number, group in enumerate(closure.structure.groups):
-        kind, links, how, assembly = describe_group(closure, number)
+        kind, links, how, assembly = describe_group(closure, number, sides)
         if isinstance(group, Driven):
             steps.append(f'input {closure.linkage.inputs[group.index].joint}')
         else:
@@ -225,7 +227,7 @@ def _worst(closure: Closure) -> str:
     else:
         group, extremes = min(conditionings(sweep).items(), key=lambda item: item[1].lowest.value)
         text = f'Worst conditioning: {extremes.lowest.value:.3f}'
-    links = describe_group(closure, group)[1]
+    links = ', '.join(links_of(closure.structure.groups[group]))
     at = extremes.lowest.at
     if not at:
         return f'{text}, everywhere'

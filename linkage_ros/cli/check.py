@@ -20,7 +20,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 import json
-from math import tau
+from math import ceil, tau
 import sys
 from threading import Event
 from typing import Any
@@ -30,6 +30,8 @@ from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
+from linkage_ros.kinematics.plan import closes_in_two_ways, closing_name, sides_at
+from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,
@@ -37,9 +39,10 @@ from linkage_ros.kinematics.sweep_analysis import (
     InputSweep,
     MinMaxCurve,
     transmission_angles,
+    usual_inputs,
     worst_residual,
 )
-from linkage_ros.kinematics.topology import Driven, Dyad, Group, Iterated
+from linkage_ros.kinematics.topology import Driven, Dyad, Group, Iterated, links_of
 from linkage_ros.scene.notes import linkage_notes
 
 _SINGULAR = {
@@ -51,6 +54,9 @@ _SINGULAR = {
 
 _PLACES = 4
 """Maximum number of places shown for one extreme value."""
+
+_SAME = 1e-9
+"""Largest difference of inputs that is rounding, in [rad] or [m]."""
 
 EXAMPLE = 'linkage check jansen_leg'
 
@@ -93,6 +99,7 @@ def account_of(
     way = InputSweep(closure) if len(linkage.inputs) == 1 else None
     # Most of the time goes by here.
     parts = (_reach, _residual, _other_assemblies, _transmission, _conditioning)
+    sides = sides_at(closure, closure.posed(*usual_inputs(closure)))
     examined: dict[str, Any] = {}
     for number, part in enumerate(parts):
         advance(number, len(parts))
@@ -126,7 +133,8 @@ def account_of(
             }
             for name, limits in linkage.limits.items()
         ],
-        'groups': [_group(closure, number) for number in range(len(structure.groups))],
+        'unwrapped': _counts_turns(closure),
+        'groups': [_group(closure, number, sides) for number in range(len(structure.groups))],
         'four_bars': [
             {
                 'group': bar.group + 1,
@@ -142,8 +150,17 @@ def account_of(
     }
 
 
-def _group(closure: Closure, number: int) -> dict[str, Any]:
-    kind, links, method, assembly = describe_group(closure, number)
+def _counts_turns(closure: Closure) -> bool:
+    """Return whether whole turns of several inputs against each other lead to another pose."""
+    if len(closure.linkage.inputs) == 1:
+        return False
+    parts = (getattr(step, 'diagonal', getattr(step, 'rail', None)) for step in closure.steps)
+    crossed = (sum(getattr(part, 'crosses', ())) for part in parts)
+    return iterated(closure) or any(number == 1 for number in crossed)
+
+
+def _group(closure: Closure, number: int, sides: Mapping[str, str]) -> dict[str, Any]:
+    kind, links, method, assembly = describe_group(closure, number, sides)
     return {'kind': kind, 'links': links.split(', '), 'method': method, 'assembly': assembly}
 
 
@@ -241,7 +258,7 @@ def _curves(closure: Closure, found: Mapping[int, MinMaxCurve], key: str) -> lis
     return [
         {
             'group': number + 1,
-            'links': _group(closure, number)['links'],
+            'links': list(links_of(closure.structure.groups[number])),
             'least': extreme(curve.lowest),
             'greatest': extreme(curve.highest),
         }
@@ -249,21 +266,30 @@ def _curves(closure: Closure, found: Mapping[int, MinMaxCurve], key: str) -> lis
     ]
 
 
-def describe_group(closure: Closure, number: int) -> tuple[str, str, str, str]:
-    """Return kind, links, solution method and assembly of a group."""
+def describe_group(
+    closure: Closure, number: int, sides: Mapping[str, str]
+) -> tuple[str, str, str, str]:
+    """Return kind, links, solution method and assembly of a group; sides as `sides_at`."""
     group: Group = closure.structure.groups[number]
     if isinstance(group, Driven):
         given = closure.linkage.inputs[group.index]
         place = f'{"pin" if group.joint.kind == "R" else "slider"} {group.joint.name}'
         return 'input', group.joint.link, f'{given.joint}, {place} on {group.joint.to}', ''
+    steps = [
+        step
+        for step, owner in zip(closure.steps, closure.step_groups, strict=True)
+        if owner == number
+    ]
     if isinstance(group, Dyad):
         links = ', '.join(' + '.join(body) for body in group.bodies)
-        return f'{group.kind} dyad', links, 'closed form', _assembly(closure, group)
-    (equations,) = (
-        step.equation_count
-        for step, owner in zip(closure.steps, closure.step_groups, strict=True)
-        if owner == number and hasattr(step, 'equation_count')
-    )
+        assembly = 'the only one'
+        if closes_in_two_ways(group):
+            assembly = _assembly(group, sides.get(closing_name(group), 'in line with'))
+            parts = (getattr(one, 'diagonal', getattr(one, 'rail', None)) for one in steps)
+            if any(any(getattr(part, 'crosses', ())) for part in parts):
+                assembly += ', as drawn (it changes at change points)'
+        return f'{group.kind} dyad', links, 'closed form', assembly
+    (equations,) = (step.equation_count for step in steps if hasattr(step, 'equation_count'))
     return (
         f'{len(group.links)} links',
         ', '.join(group.links),
@@ -272,19 +298,12 @@ def describe_group(closure: Closure, number: int) -> tuple[str, str, str, str]:
     )
 
 
-def _assembly(closure: Closure, dyad: Dyad) -> str:
+def _assembly(dyad: Dyad, side: str) -> str:
     first, second = dyad.outer
-    closing = dyad.inner.name
     if dyad.kind == 'RRR':
-        side = closure.linkage.assembly[closing]
-        return f'pin {closing} {side} of {first.name}→{second.name}'
-    if dyad.kind == 'RPR':
-        side = closure.linkage.assembly[closing]
-        return f'slider {closing}: pin {second.name} {side} of {first.name}'
-    if dyad.kind == 'RRP':
-        side = closure.linkage.assembly[second.name]
-        return f'slider {second.name}: pin {closing} {side} of {first.name}'
-    return 'the only one'
+        return f'pin {dyad.inner.name} {side} of {first.name}→{second.name}'
+    pin = dyad.inner.name if dyad.kind == 'RRP' else second.name
+    return f'slider {closing_name(dyad)}: pin {pin} {side} of {first.name}'
 
 
 # The same as tables.
@@ -394,6 +413,8 @@ def _facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str,
 def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str, str]]:
     if account['ranges'] is None:
         yield 'range', 'no single one: it depends on every input'
+        if account['unwrapped']:
+            yield 'turns', 'they count: send unwrapped angles, a turn leads to another assembly'
         return
     turning = account['inputs'][0]['unit'] == 'rad'
     for interval in account['ranges']:
@@ -410,13 +431,22 @@ def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tupl
             yield 'range', 'every angle'
     for status, name in _SINGULAR.items():
         places = [
-            angles.value_text(one['input'], turning)
+            angles.value_text(_brought_within(one['input'], account['ranges'], turning), turning)
             + ('' if one['within_limits'] else ' beyond the limits')
             for one in account['singular_inputs']
             if one['status'] == status.value
         ]
         if places or status is not Status.INDETERMINATE:
             yield name, ', '.join(places) or 'none'
+
+
+def _brought_within(value: float, ranges: Sequence[Mapping[str, Any]], turning: bool) -> float:
+    """Return an input, an angle in the turn in which it lies within a range, if it does."""
+    for interval in ranges if turning else ():
+        turn = tau * ceil((interval['low'] - value) / tau - _SAME)
+        if value + turn <= interval['high'] + _SAME:
+            return float(value + turn)
+    return 0.0 if abs(value) < _SAME else value
 
 
 def _limits_text(limits: Mapping[str, Any], angles: AngleUnit) -> str:

@@ -38,9 +38,13 @@ from linkage_ros.drawing.dxf import links_dxf
 from linkage_ros.drawing.figure import assemblies_picture, picture, view
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import atomic_write
-from linkage_ros.files.linkage_file import assemblies, load
+from linkage_ros.files.linkage_file import assemblies, load, written_linkage
+from linkage_ros.files.linkage_text import pose_text
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.drawn_pose import drawn_pose
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.resources import named_file
 
 EXAMPLE = 'linkage draw jansen_leg -o jansen_leg.svg --names'
 
@@ -57,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--assemblies',
         action='store_true',
-        help='draw each choice of assembly sides that closes, with the line for the file',
+        help='draw each assembly that closes, with the pose for the file, which is printed too',
     )
 
     parts = parser.add_argument_group('parts, in a DXF')
@@ -100,20 +104,28 @@ def _write_parts(closure: Closure, arguments: argparse.Namespace) -> int:
 
 def _draw_assemblies(arguments: argparse.Namespace) -> int:
     """Draw all assemblies at the same inputs; one that is open there, at inputs of its own."""
-    found = assemblies(arguments.file)
-    first = next(iter(found.values()))
+    found = list(assemblies(arguments.file).values())
+    first = found[0]
     if arguments.at:
         pose = inputs(first.linkage, arguments.at[0], '--at')
-        closed = {text: each for text, each in found.items() if each.position(*pose).joints}
+        closed = [each for each in found if each.position(*pose).joints]
         # If it closes in no assembly there, `view` says so.
-        views = {text: view(each, pose) for text, each in (closed or {'': first}).items()}
+        views = [view(each, pose) for each in closed or [first]]
     else:
         pose = usual_inputs(first)
-        views = {
-            text: view(each, pose if each.position(*pose).joints else usual_inputs(each))
-            for text, each in found.items()
-        }
+        views = [
+            view(each, pose if each.position(*pose).joints else usual_inputs(each))
+            for each in found
+        ]
     file = output_or(arguments, Path(f'{Path(arguments.file).stem}.png'))
-    assemblies_picture(views, file)
+    content, _ = read_yaml(named_file(arguments.file, 'linkages'))
+    written_linkage(content)  # it sets the units
+    texts = [
+        pose_text(one.closure.linkage, drawn_pose(one.closure, one.position), content.units)
+        for one in views
+    ]
+    assemblies_picture(dict(zip(texts, views, strict=True)), file)
+    for text in texts:
+        print(text)
     print(file)
     return 0

@@ -35,6 +35,9 @@ All coordinates are drawn, link by link and point by point in the order of the l
 before y, and then scaled. So neither the deviation nor the choice of links changes the draws of
 the others, and a doubled deviation gives the same mechanism with doubled errors. The direction of
 a slider does not deviate.
+
+The altered linkage stays on the branch of the one in the file: where that passes a change point,
+it changes its side too, although its own lengths make none.
 """
 
 from __future__ import annotations
@@ -103,7 +106,7 @@ def alter(parameters: ToleranceParameters, linkage: Linkage, random: Random) -> 
             dx, dy = parameters.given.get(f'{link}.{point}', drawn)
             made[point] = (x + dx, y + dy)
         links[link] = made
-    altered = replace(linkage, links=links)
+    altered = replace(linkage, links=links, nominal=linkage.nominal or linkage)
     _check(altered)
     return altered
 

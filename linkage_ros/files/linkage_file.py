@@ -40,7 +40,7 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
-from linkage_ros.kinematics.plan import assembly_sides
+from linkage_ros.kinematics.plan import assembly_sides, undrawn
 from linkage_ros.kinematics.sweep_analysis import check_limits
 from linkage_ros.kinematics.topology import assur_groups
 from linkage_ros.resources import named_file
@@ -140,7 +140,7 @@ def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[
     for shorthand, expand in _SHORTHANDS.items():
         if shorthand in content:
             short = content.section(shorthand)
-            written_out = Section(content.file, '', _limited(expand(short), short))
+            written_out = Section(content.file, '', _posed(_limited(expand(short), short), short))
             short.finish()
             content.finish()
             return _linkage(written_out, publish_inputs), shorthand
@@ -257,7 +257,12 @@ def _pose(content: Section, driven: Sequence[Input]) -> Pose:
     units = chain((given.unit for given in driven), repeat(''))
     inputs = tuple(map(content.units.read, values, units))
     points = content.section('points', required=False)
-    pose = Pose(inputs, {name: points.point(name, most=FARTHEST, unit='m') for name in points})
+    angles = content.section('angles', required=False)
+    pose = Pose(
+        inputs,
+        {name: points.point(name, most=FARTHEST, unit='m') for name in points},
+        {name: angles.number(name, least=-FARTHEST, most=FARTHEST, unit='rad') for name in angles},
+    )
     content.finish()
     return pose
 
@@ -320,8 +325,9 @@ def closable(content: Section, linkage: Linkage, name: str, shorthand: str = '')
     except DefinitionError as error:
         where = error.where
         if shorthand:
-            # Of the expanded file, the author of a shorthand wrote only the limits.
-            where = f'{shorthand}.{where}' if where.endswith('.limits') else shorthand
+            # Of the expanded file, the author of a shorthand wrote only limits, side and pose.
+            own = where.endswith('.limits') or where.partition('.')[0] in ('assembly', 'pose')
+            where = f'{shorthand}.{where}' if own else shorthand
         remedy = error.remedy
         if where == 'assembly':
             remedy += f'; linkage draw {content.file} --assemblies draws the choices'
@@ -350,6 +356,24 @@ def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
         }
         joint.update({key: value for key, value in in_si.items() if key in of})
     return written_out
+
+
+def _posed(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
+    """Return an expanded shorthand with the pose that it gives; a drawn one tells the side."""
+    if 'pose' in content:
+        pose = _pose(content.section('pose'), [_DRIVEN_CRANK])
+        if pose.drawn and 'assembly' not in content:
+            del written_out['assembly']
+        written_out['pose'] = {
+            'inputs': [*pose.inputs],
+            'points': {name: [*place] for name, place in pose.points.items()},
+            'angles': dict(pose.angles),
+        }
+    return written_out
+
+
+_DRIVEN_CRANK = Input('crank_joint', GROUND, 'crank')
+"""The input of every shorthand."""
 
 
 def _four_bar(content: Section) -> dict[str, Any]:
@@ -431,7 +455,8 @@ def closures(content: Section, name: str) -> dict[str, Closure]:
     """Return the closures of a linkage file by name, as `assemblies` does."""
     written, shorthand = written_linkage(content)
     try:
-        sides = assembly_sides(assur_groups(written))
+        structure = assur_groups(written)
+        sides = assembly_sides(structure)
     except DefinitionError as error:
         raise content.error(shorthand or error.where, error.reason, error.remedy) from None
     free = [name for name in sides if name not in written.assembly] or list(sides)
@@ -443,6 +468,7 @@ def closures(content: Section, name: str) -> dict[str, Closure]:
         raise content.error('assembly', reason, f'leave out only {_MOST_SIDES} of them')
     found = {}
     errors = []
+    written = undrawn(written, structure)
     for chosen in product(*(sides[name] for name in free)):
         assembly = dict(written.assembly) | dict(zip(free, chosen, strict=True))
         one = replace(written, assembly=assembly)  # type: ignore[arg-type]  # sides, as above

@@ -160,6 +160,8 @@ def _shorthand(node: Any, kind: str, before: Linkage, after: Linkage, units: Uni
             node[key] = _made(value, units, 'm')
     if after.assembly != before.assembly:
         node['assembly'] = next(iter(after.assembly.values()))
+    if before.pose is not None and before.pose != after.pose:
+        return False
     return _is_written(node, kind, after, units)
 
 

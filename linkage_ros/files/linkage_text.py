@@ -37,19 +37,21 @@ from textwrap import wrap
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.units import Units
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     Input,
     Limits,
     Linkage,
+    Pose,
     RevoluteJoint,
     SlideJoint,
     Slider,
 )
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
+from linkage_ros.kinematics.sweep_analysis import InputSweep, starts_at_pose, usual_inputs
 
 _WIDTH = 99
 _WHOLE = 1e15
@@ -119,7 +121,7 @@ def content_of(linkage: Linkage) -> dict[str, Content]:
         'sliders': {name: _slider(slider) for name, slider in linkage.sliders.items()},
         'input': inputs[0] if len(inputs) == 1 else inputs,
         'assembly': dict(linkage.assembly),
-        'pose': _pose(linkage),
+        'pose': _pose(linkage.pose),
         'joints': {name: _joint(joint) for name, joint in linkage.joints.items()},
         'traced': [*linkage.traced],
         'masses': {
@@ -166,13 +168,30 @@ def _limits(limits: Limits) -> dict[str, Content]:
     return bounds
 
 
-def _pose(linkage: Linkage) -> dict[str, Content]:
-    if linkage.pose is None:
+def _pose(pose: Pose | None) -> dict[str, Content]:
+    if pose is None:
         return {}
-    pose: dict[str, Content] = {'inputs': [*linkage.pose.inputs]}
-    if linkage.pose.points:
-        pose['points'] = {name: [*point] for name, point in linkage.pose.points.items()}
-    return pose
+    content: dict[str, Content] = {'inputs': [*pose.inputs]}
+    if pose.points:
+        content['points'] = {name: [*point] for name, point in pose.points.items()}
+    if pose.angles:
+        content['angles'] = dict(pose.angles)
+    return content
+
+
+def pose_text(linkage: Linkage, pose: Pose, units: Units) -> str:
+    """Return the line of a pose for a linkage file in some units, with seven digits."""
+
+    def shown(value: float, unit: str) -> float:
+        return float(f'{units.shown(value, unit):.7g}') + 0.0
+
+    driven = zip(pose.inputs, linkage.inputs, strict=True)
+    rounded = Pose(
+        tuple(shown(value, given.unit) for value, given in driven),
+        {name: (shown(x, 'm'), shown(y, 'm')) for name, (x, y) in pose.points.items()},
+        {link: shown(angle, 'rad') for link, angle in pose.angles.items()},
+    )
+    return f'pose: {_flow(_pose(rounded))}'
 
 
 def _comment(paragraphs: Sequence[str]) -> Iterator[str]:
@@ -266,7 +285,7 @@ def _drive(closure: Closure) -> str:
 def _start(closure: Closure) -> tuple[float, InputRange]:
     """Return the start of the single input, and the range that contains it."""
     way, pose = InputSweep(closure), closure.linkage.pose
-    if pose is None or pose.points:
+    if pose is None or not starts_at_pose(closure):
         (start,) = usual_inputs(closure)
         # The usual input may lie beside a range that is as narrow as its rounding.
         interval = way.range_about(start) or way.widest_range

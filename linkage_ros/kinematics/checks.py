@@ -72,6 +72,8 @@ def check(linkage: Linkage) -> None:
             raise DefinitionError(
                 key, f'{quoted(point)} is not a point of a link', _one_of(points)
             )
+    for link in linkage.pose.angles if linkage.pose else ():
+        _check_link(linkage, 'pose.angles', link)
     if linkage.pose and len(linkage.pose.inputs) != len(linkage.inputs):
         raise DefinitionError(
             'pose.inputs',
@@ -84,7 +86,8 @@ def _check_points(linkage: Linkage) -> None:
     # A slider joins links without a shared point, so such a link may have a single point.
     sliding = {name for s in linkage.sliders.values() for name in (s.block, s.along)}
     for name, points in linkage.links.items():
-        if len(points) < 2 and not (points and name in sliding):
+        # A single pivot is enough for the ground: its frame does not turn.
+        if len(points) < 2 and not (points and (name in sliding or name == GROUND)):
             raise DefinitionError(
                 f'links.{name}', f'{len(points)} point(s)', 'a link needs two points or more'
             )

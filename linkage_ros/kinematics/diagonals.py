@@ -30,6 +30,7 @@ from typing import NamedTuple, Protocol
 
 from linkage_ros.kinematics.arithmetic import (
     atan2,
+    copysign,
     cos,
     passes_zero,
     phase,
@@ -324,6 +325,11 @@ class CrankDiagonal:
         return 0.25 * bend / diagonal.square
 
     @property
+    def crosses(self) -> tuple[bool, bool]:
+        """Whether the dyad changes its side where it folds, and where it stretches."""
+        return self.fold_margin == 0.0, self.stretch_margin == 0.0
+
+    @property
     def singular_angles(self) -> tuple[float, ...]:
         """Differences of the two coordinates at which all links are collinear, in [rad]."""
         margins = ((self.fold_margin, 0.0), (self.stretch_margin, pi))
@@ -353,12 +359,95 @@ class UnsignedDiagonal(CrankDiagonal):
 
     _at_change_point = Status.TOGGLE
 
+    @property
+    def crosses(self) -> tuple[bool, bool]:
+        return False, False
+
     def at(self, known: State) -> Diagonal:
         signed = super().at(known)
         return signed._replace(fold=abs(signed.fold), stretch=abs(signed.stretch))
 
     def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
         return diagonal.near / diagonal.fold, diagonal.far / diagonal.stretch
+
+
+class NearlyCrossingDiagonal(CrankDiagonal):
+    """
+    The diagonal of a dyad whose lengths nearly make a change point.
+
+    Its roots have the sign of the half angle, as those at the change point have. So the dyad stays
+    next to the one without deviations, where a side alone would leave it.
+
+    Parameters
+    ----------
+    a, d, fold, stretch, limits, arms, offset
+        As in `CrankDiagonal`.
+    crosses
+        Whether the dyad without deviations changes its side where it folds and where it stretches.
+
+    """
+
+    __slots__ = ('_crosses',)
+
+    def __init__(
+        self,
+        a: float,
+        d: float,
+        fold: float,
+        stretch: float,
+        limits: tuple[float, float, float],
+        arms: tuple[int, int],
+        offset: float,
+        crosses: tuple[bool, bool],
+    ) -> None:
+        super().__init__(a, d, fold, stretch, limits, arms, offset)
+        self._crosses = crosses
+
+    @property
+    def crosses(self) -> tuple[bool, bool]:
+        return self._crosses
+
+    def at(self, known: State) -> Diagonal:
+        found = super().at(known)
+        folds, stretches = self._crosses
+        return found._replace(
+            fold=copysign(found.fold, found.near) if folds else found.fold,
+            stretch=copysign(found.stretch, found.far) if stretches else found.stretch,
+        )
+
+
+def crank_diagonal_of(
+    a: float,
+    d: float,
+    margins: tuple[float, float],
+    limits: tuple[float, float, float],
+    hinge: tuple[tuple[int, int], float],
+    turns_matter: bool,
+    crosses: tuple[bool, bool] | None,
+) -> CrankDiagonal:
+    """
+    Return the diagonal between two pinned links, by the change points that it passes.
+
+    Parameters
+    ----------
+    a, d, limits
+        As in `CrankDiagonal`.
+    margins
+        Its margins fold and stretch.
+    hinge
+        Its arms and its offset.
+    turns_matter
+        Whether a whole turn may lead to another pose, and the whole turns are unknown.
+    crosses
+        The change points of the linkage without deviations; None for those of these lengths.
+
+    """
+    fold, stretch = margins
+    if turns_matter:
+        return UnsignedDiagonal(a, d, fold, stretch, limits, *hinge)
+    if crosses is None or crosses == (fold == 0.0, stretch == 0.0):
+        return CrankDiagonal(a, d, fold, stretch, limits, *hinge)
+    return NearlyCrossingDiagonal(a, d, fold, stretch, limits, *hinge, crosses)
 
 
 class FreeDiagonal:

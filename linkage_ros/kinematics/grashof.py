@@ -25,6 +25,17 @@ from linkage_ros.kinematics.arithmetic import margin
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.topology import Dyad, links_of, Structure
 
+NEARLY = 2e-3
+"""Largest relative difference of two lengths that were meant to be equal: a rounded digit."""
+
+
+class Paired(NamedTuple):
+    """A four-bar whose lengths are equal in pairs, or nearly."""
+
+    name: str  # parallelogram, kite or rhombus
+    deviation: float  # Largest difference within a pair, in the unit of the lengths
+    crosses: tuple[bool, bool]  # Whether its dyad changes its side where it folds and stretches
+
 
 class FourBarType(NamedTuple):
     """The type of a four-bar, after Grashof and Barker."""
@@ -88,10 +99,15 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     excess = margin(p, q, -shortest, -longest)
     if fsum((shortest, p, q, -longest)) < 0.0 and margin(shortest, p, q, -longest):
         return FourBarType('', 'no loop (one link is longer than the others together)', excess)
-    if excess > 0.0:
-        return FourBarType(*GRASHOF[sides.index(shortest)], excess)
-    if excess < 0.0:
-        return FourBarType(*TRIPLE_ROCKERS[sides.index(longest)], excess)
+    nearly = nearly_paired(*sides)
+    almost = f'{nearly.name} to within {nearly.deviation:.2g} m; else a ' if nearly else ''
+    if excess:
+        code, name = (
+            GRASHOF[sides.index(shortest)]
+            if excess > 0.0
+            else TRIPLE_ROCKERS[sides.index(longest)]
+        )
+        return FourBarType(code, almost + name, excess)
     opposite = margin(a, -c) == margin(b, -d) == 0.0
     beside = margin(a, -b) == margin(c, -d) == 0.0 or margin(a, -d) == margin(b, -c) == 0.0
     if opposite and beside:
@@ -101,6 +117,31 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     if beside:
         return FourBarType('S2X', 'kite (change point)', 0.0)
     return FourBarType(*CHANGE_POINTS[sides.index(shortest)], 0.0)
+
+
+def nearly_equal(one: float, other: float) -> bool:
+    """Return whether two lengths were meant to be equal, as far as a rounded digit tells."""
+    return abs(one - other) <= NEARLY * max(one, other)
+
+
+def nearly_paired(a: float, b: float, c: float, d: float) -> Paired | None:
+    """
+    Return the parallelogram, kite or rhombus that a four-bar nearly is, or None.
+
+    None too if the lengths make a change point exactly: then these lengths were meant.
+    """
+    exact = (margin(b, c, -a, -d), margin(max(a, d), -min(a, d), -max(b, c), min(b, c)))
+    if 0.0 in exact:
+        return None
+    opposite, beside, across = ((a, c), (b, d)), ((a, b), (c, d)), ((a, d), (b, c))
+    found = [one for one in (opposite, beside, across) if all(nearly_equal(p, q) for p, q in one)]
+    if not found:
+        return None
+    name = 'parallelogram' if found[0] is opposite else 'kite'
+    deviation = max(abs(p - q) for p, q in found[0])
+    if len(found) > 1:
+        name, deviation = 'rhombus', max(a, b, c, d) - min(a, b, c, d)
+    return Paired(name, deviation, (True, found[0] is not across))
 
 
 class FourBar(NamedTuple):

@@ -150,20 +150,28 @@ class SlideJoint:
 @dataclass(frozen=True, slots=True)
 class Pose:
     """
-    The start of the linkage; its points are the initial guess of an iteration.
+    The linkage as drawn, at some inputs; what it names tells the assembly.
 
     Attributes
     ----------
     inputs
-        One value for each input, in [rad] or [m].
+        One value for each input, in [rad] or [m]; the linkage starts there.
     points
-        Approximate points, in the frame of the ground, in [m], of the links that no dyad covers;
-        empty if there are no such links.
+        Approximate places of points, in the frame of the ground, in [m]. Those of links that no
+        dyad covers are the initial guess of their iteration.
+    angles
+        Approximate angles of links to the ground, in [rad].
 
     """
 
     inputs: tuple[float, ...]
     points: Mapping[str, Point]
+    angles: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def drawn(self) -> bool:
+        """Whether it says where links lie."""
+        return bool(self.points or self.angles)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,9 +215,12 @@ class Linkage:
     traced
         Names of points whose curves are recorded or drawn.
     pose
-        The start; for links that no dyad covers, the initial guess of the iteration.
+        The linkage as drawn at its start; it tells the assembly, if `assembly` does not.
     masses
         Masses by link name; given only for forces, and then for every link that moves.
+    nominal
+        The linkage without deviations, if this one has some: the assembly, and the change points
+        that it passes, are those of the nominal one.
 
     """
 
@@ -221,6 +232,7 @@ class Linkage:
     traced: tuple[str, ...] = ()
     pose: Pose | None = None
     masses: Mapping[str, Mass] = field(default_factory=dict)
+    nominal: Linkage | None = None
 
     @property
     def limits(self) -> dict[str, Limits]:

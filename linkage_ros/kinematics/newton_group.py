@@ -543,6 +543,7 @@ def iteration(
     places = {name: complex(*place) / scale for name, place in pose.points.items()}
     places |= {name: pins[i] for name, i in constraints.known_pins.items()}
     angles = {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()}
+    angles |= {link: angle for link, angle in pose.angles.items() if link in links}
     start = _initial_guess(linkage, links, planner, places, angles)
     far = sum(
         max(abs(one - other) for one in points.values() for other in points.values())

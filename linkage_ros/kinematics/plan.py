@@ -17,19 +17,14 @@
 from __future__ import annotations
 
 from cmath import phase, rect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING, TypeGuard
 
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.arithmetic import cross, resolved, ROUNDING, UNIT_ROUNDOFF
-from linkage_ros.kinematics.diagonals import (
-    AnyDiagonal,
-    CrankDiagonal,
-    FreeDiagonal,
-    UnsignedDiagonal,
-)
+from linkage_ros.kinematics.diagonals import AnyDiagonal, CrankDiagonal, FreeDiagonal
 from linkage_ros.kinematics.dyads.prp import CrankPRPDyad, PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad, swivel_diagonal
@@ -42,17 +37,80 @@ from linkage_ros.kinematics.dyads.rrr import (
     RRRDyad,
     Side,
 )
+from linkage_ros.kinematics.dyads.two_sided import TwoSided
+from linkage_ros.kinematics.grashof import nearly_equal, nearly_paired
 from linkage_ros.kinematics.known_links import Angle, Held, KnownLinks, Line, Slide
-from linkage_ros.kinematics.linkage import Input, Linkage
-from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
+from linkage_ros.kinematics.linkage import carriers, Input, Linkage, Pose
+from linkage_ros.kinematics.rail import (
+    CrankRail,
+    FreeRail,
+    NearlyCrossingRail,
+    Rail,
+    UnsignedRail,
+)
 from linkage_ros.kinematics.step import RelativeAngle
-from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Structure
+from linkage_ros.kinematics.topology import (
+    assur_groups,
+    Driven,
+    Dyad,
+    Group,
+    Iterated,
+    Structure,
+)
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.results import LoopClosure, Position
 
 _SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
 _SIDES['RPR'] = _SIDES['RRP']
 
 _LEVEL = Angle(0, 0.0, 1 + 0j)
 """The zero direction of angles in the frame of the ground."""
+
+
+class TwoWays(NamedTuple):
+    """A dyad that closes in two ways, and what the file says of it."""
+
+    dyad: Dyad
+    step: int  # Number of its step
+    # Its side in `assembly`, +1 for 'left' and 'ahead'; 0 if it is left out.
+    written: int
+    # Whether it changes its side at a change point; and the sign of its step for the side +1 while
+    # the crank points to the left of the ground line, or ahead along the slider.
+    crosses: bool
+    upright: int
+
+    @property
+    def name(self) -> str:
+        """Return its key in `assembly`."""
+        return closing_name(self.dyad)
+
+    def word(self, side: float) -> str:
+        """Return the word of a side by its sign."""
+        return next(word for word, sign in _SIDES[self.dyad.kind].items() if sign * side > 0)
+
+
+def closes_in_two_ways(group: Group) -> TypeGuard[Dyad]:
+    """Return whether a group is a dyad that closes in two ways."""
+    return isinstance(group, Dyad) and group.kind in _SIDES
+
+
+def closing_name(dyad: Dyad) -> str:
+    """Return the pin or slider by which `assembly` names a dyad that closes in two ways."""
+    return dyad.outer[1].name if dyad.kind == 'RRP' else dyad.inner.name
+
+
+def telling_part(links: Mapping[str, Mapping[str, Any]], dyad: Dyad) -> tuple[str, str]:
+    """
+    Return the link and the point of it that tell the side of a dyad.
+
+    Of a rail without another point than its pin the angle tells it: the point is ''.
+    """
+    if dyad.kind != 'RPR':
+        return dyad.inner.link, dyad.inner.name
+    rail, pin = dyad.outer[0].link, dyad.outer[0].name
+    at = links[rail][pin]
+    return rail, next((name for name, place in links[rail].items() if place != at), '')
 
 
 class _Hinge(NamedTuple):
@@ -68,15 +126,14 @@ class _Hinge(NamedTuple):
     # Whether the link of A is the crank, that is the one of the two that is known later.
     crank_first: bool
 
-    def side_at_change_point(self, diagonal: CrankDiagonal, sign: int) -> int:
+    def upright(self, diagonal: CrankDiagonal) -> int:
         """
-        Return the sign of a dyad whose side is given for a crank between 0 and π from the ground.
+        Return the sign of a dyad on the side +1 for a crank between 0 and π from the ground.
 
         A dyad that folds has the sign of the half angle from OD to OA. If OD is the crank and OA
         the ground, that sign is negative there.
         """
-        folds = diagonal.fold_margin == 0.0 and not isinstance(diagonal, UnsignedDiagonal)
-        return -sign if folds and not self.crank_first else sign
+        return -1 if diagonal.crosses[0] and not self.crank_first else 1
 
 
 class SolutionPlan(KnownLinks):
@@ -86,7 +143,13 @@ class SolutionPlan(KnownLinks):
         super().__init__(linkage, structure)
         self._structure = structure
         self._assembly = dict(linkage.assembly)
-        self._keys: list[str] = []
+        # The dyads that close in two ways; those of the nominal linkage by name, with its steps.
+        self.two_ways: list[TwoWays] = []
+        self._settled = 0
+        self._nominal: dict[str, TwoSided] = {}
+        if linkage.nominal is not None:
+            nominal = SolutionPlan(linkage.nominal, assur_groups(linkage.nominal))
+            self._nominal = {one.name: nominal.two_sided(one) for one in nominal.two_ways}
         self._missing: dict[str, str] = {}
         for self.group, group in enumerate(structure.groups):
             if isinstance(group, Driven):
@@ -94,24 +157,50 @@ class SolutionPlan(KnownLinks):
             elif isinstance(group, Dyad):
                 self._close(group)
             else:
-                self._check_sides()  # the iteration starts from the links before it
+                self._choose_sides()  # the iteration starts from the links before it
                 self._iterate(group)
-        self._check_sides()
+        self._choose_sides()
         for name in self._assembly:
+            keys = listed(repr(one.name) for one in self.two_ways)
             raise DefinitionError(
                 f'assembly.{name}',
                 f'{quoted(name)} does not close a dyad that has two assemblies',
-                f'name {listed(map(repr, self._keys))}' if self._keys else 'leave it out',
+                f'name {keys}' if keys else 'leave it out',
             )
 
-    def _check_sides(self) -> None:
-        """Refuse a linkage without the sides of all dyads so far."""
+    def two_sided(self, one: TwoWays) -> Any:
+        """Return the step of a dyad that closes in two ways, a `TwoSided`."""
+        return self.steps[one.step]
+
+    def _choose_sides(self) -> None:
+        """Bring the new dyads into the assembly that the file tells, or refuse it."""
+        new = self.two_ways[self._settled :]
+        self._settled = len(self.two_ways)
+        if self._nominal:
+            return
+        pose = self._linkage.pose
+        crosses = any(one.crosses and one.written for one in new)
+        if pose is not None and new and (pose.drawn or crosses):
+            from linkage_ros.kinematics.drawn_pose import (
+                drawn_signs,  # local import: few linkages need it
+            )
+
+            for one, sign in drawn_signs(self._linkage, self, new):
+                self.steps[one.step] = self.two_sided(one).with_sign(sign)
+                self._missing.pop(one.name, None)
         if self._missing:
             verb = 'is' if len(self._missing) == 1 else 'are'
+            remedy = f'write {listed(self._missing.values())}'
+            drawn = [one for one in self.two_ways if one.crosses and one.name in self._missing]
+            if drawn:
+                parts = (telling_part(self.points, one.dyad) for one in drawn)
+                points = listed(f'{point}: [x, y]' for _, point in parts if point)
+                remedy = (
+                    f'draw it, since its side changes at change points: '
+                    f'pose: {{inputs: [...], points: {{{points}}}}}'
+                )
             raise DefinitionError(
-                'assembly',
-                f'{listed(map(repr, self._missing))} {verb} missing',
-                f'write {listed(self._missing.values())}',
+                'assembly', f'{listed(map(repr, self._missing))} {verb} missing', remedy
             )
 
     def _drive(self, driven: Driven) -> None:
@@ -153,18 +242,19 @@ class SolutionPlan(KnownLinks):
         (one,), (other,) = dyad.bodies
         first, second = dyad.outer
         closing = dyad.inner.name
-        sign = self._sign(dyad.kind, closing, f'the side of {first.name}→{second.name}')
         one_arm = self.arm(one, first.name, closing)
         other_arm = self.arm(other, second.name, closing)
         b, c = abs(one_arm), abs(other_arm)
-        diagonal, base, sign = self._diagonal(
-            dyad,
-            (abs(b - c), b + c, 4.0 * b * c),
-            lambda a, d, *hinge: crank_diagonal(a, b, c, d, *hinge),
-            sign,
-        )
+
+        def crank(
+            a: float, d: float, arms: tuple[int, int], angle: float, turns_known: bool
+        ) -> CrankDiagonal:
+            crosses = self._crosses(dyad, (a, b, c, d))
+            return crank_diagonal(a, b, c, d, arms, angle, turns_known, crosses)
+
+        diagonal, base, upright = self._diagonal(dyad, (abs(b - c), b + c, 4.0 * b * c), crank)
         kind: type[RRRDyad] = FoldingRRRDyad if FoldingRRRDyad.fits(diagonal) else RRRDyad
-        self.add(kind(diagonal, b, c, sign))
+        self._add_two_sided(dyad, kind(diagonal, b, c, 1), diagonal, upright)
         k = self.new_coordinates(2)
         self.angles[one] = _facing(k, base, one_arm)
         self.angles[other] = _facing(k + 1, base, other_arm)
@@ -175,20 +265,21 @@ class SolutionPlan(KnownLinks):
         (rail,), (block,) = dyad.bodies
         first, second = dyad.outer
         name = dyad.inner.name
-        sign = self._sign(dyad.kind, name, f'where {second.name} lies from {first.name}')
         start = self.points[rail][first.name]
         line = self.line(name, rail, self.points[block][second.name])
         foot = (line.start - start) * line.direction.conjugate()
         offset = foot.imag
         if abs(offset) <= 4.0 * UNIT_ROUNDOFF * (abs(line.start) + abs(start)):
             offset = 0.0
-        diagonal, base, sign = self._diagonal(
-            dyad,
-            (abs(offset), inf, inf),
-            lambda a, d, *hinge: swivel_diagonal(a, d, offset, *hinge),
-            sign,
-        )
-        self.add(RPRDyad(diagonal, offset, sign))
+
+        def crank(
+            a: float, d: float, arms: tuple[int, int], angle: float, turns_known: bool
+        ) -> CrankDiagonal:
+            crosses = self._crosses(dyad)
+            return swivel_diagonal(a, d, offset, arms, angle, turns_known, crosses)
+
+        diagonal, base, upright = self._diagonal(dyad, (abs(offset), inf, inf), crank)
+        self._add_two_sided(dyad, RPRDyad(diagonal, offset, 1), diagonal, upright)
         k = self.new_coordinates(2)
         self.angles[rail] = _facing(k, base, line.direction)
         self.angles[block] = self.angles[rail].plus(line.angle)
@@ -200,12 +291,12 @@ class SolutionPlan(KnownLinks):
         (link,), (block,) = dyad.bodies
         first, second = dyad.outer
         closing, name = dyad.inner.name, second.name
-        sign = self._sign(dyad.kind, name, f'where {closing} lies from {first.name}')
         arm = self.arm(link, first.name, closing)
         point = self.points[block][closing]
         line = self.line(name, second.to, point)
         base = self.angles[second.to].along(line.direction)
-        self.add(RRPDyad(self._rail(first.name, second.to, line, abs(arm)), sign))
+        rail = self._rail(dyad, first.name, second.to, line, abs(arm))
+        self._add_two_sided(dyad, RRPDyad(rail, 1), rail)
         k = self.new_coordinates(2)
         self.angles[link] = _facing(k, base, arm)
         self.pin_to(link, first)
@@ -266,7 +357,7 @@ class SolutionPlan(KnownLinks):
             )
         constant = (inner.start - point) * turn
         level = Line(outer.start, 1 + 0j, 0.0, 1.0)
-        rail = self._rail(first.name, second.to, level, inf)
+        rail = self._rail(dyad, first.name, second.to, level, inf)
         offsets = cross(constant, outer.direction), cross(inner.start - point, inner.direction)
         self.add(RPPDyad(rail, direction, outer.direction, offsets))
         k = self.new_coordinates(2)
@@ -279,7 +370,6 @@ class SolutionPlan(KnownLinks):
     def _driven_rrr(self, dyad: Dyad) -> None:
         closing = dyad.inner.name
         first, second = dyad.outer
-        sign = self._sign(dyad.kind, closing, f'the side of {first.name}→{second.name}')
         sides = [
             Side(
                 self.points[outer.link][outer.name],
@@ -289,7 +379,7 @@ class SolutionPlan(KnownLinks):
             for outer, end in zip(dyad.outer, (dyad.inner.link, dyad.inner.to), strict=True)
         ]
         ends = self.place_pin(first.name), self.place_pin(second.name)
-        self.add(DrivenRRRDyad(ends, (sides[0], sides[1]), sign))
+        self._add_two_sided(dyad, DrivenRRRDyad(ends, (sides[0], sides[1]), 1))
         k = self.new_coordinates(2)
         for i, outer in enumerate(dyad.outer):
             self.angles[outer.link] = Angle(k + i, 0.0, 1 + 0j)
@@ -349,17 +439,31 @@ class SolutionPlan(KnownLinks):
         dyad: Dyad,
         limits: tuple[float, float, float],
         crank: Callable[..., CrankDiagonal],
-        sign: int,
     ) -> tuple[AnyDiagonal, Angle, int]:
-        """Return the diagonal of a dyad, the zero of its directions, and the dyad's sign."""
+        """Return the diagonal of a dyad, the zero of its directions, and its upright sign."""
         first, second = (outer.name for outer in dyad.outer)
         hinge = self._hinge(first, second)
         if hinge is None:
             ends = self.place_pin(first), self.place_pin(second)
-            return FreeDiagonal(ends, limits), _LEVEL, sign
+            return FreeDiagonal(ends, limits), _LEVEL, 1
         turns_known = self._driven_only(hinge.arms)
         diagonal = crank(hinge.a, hinge.d, hinge.arms, hinge.offset, turns_known)
-        return diagonal, hinge.base, hinge.side_at_change_point(diagonal, sign)
+        return diagonal, hinge.base, hinge.upright(diagonal)
+
+    def _crosses(
+        self, dyad: Dyad, lengths: tuple[float, float, float, float] | None = None
+    ) -> tuple[bool, bool] | None:
+        """
+        Return the change points of a dyad on a crank; None for those of its own lengths.
+
+        They are those of the nominal linkage; or those of the parallelogram, kite or rhombus that
+        a four-bar of such lengths nearly is.
+        """
+        if self._nominal:
+            nominal: Any = self._nominal[closing_name(dyad)]
+            return getattr(getattr(nominal, 'diagonal', None) or nominal.rail, 'crosses', None)
+        nearly = nearly_paired(*lengths) if lengths else None
+        return nearly.crosses if nearly else None
 
     def _hinge(self, first: str, second: str) -> _Hinge | None:
         """Return the links with a common pin O that carry two pins, or None."""
@@ -376,7 +480,7 @@ class SolutionPlan(KnownLinks):
                     return _Hinge(abs(a), abs(d), arms, offset, base, later)
         return None
 
-    def _rail(self, pin: str, on: str, line: Line, length: float) -> Rail:
+    def _rail(self, dyad: Dyad, pin: str, on: str, line: Line, length: float) -> Rail:
         """Return a line on a known link as the rail of a known pin."""
         base = self.angles[on].along(line.direction)
         for link in self.carriers(pin):
@@ -389,6 +493,15 @@ class SolutionPlan(KnownLinks):
                 rail = CrankRail(arm, place, length, arms)
                 # As for a parallelogram: both roots change their sign with a whole turn.
                 turns_matter = len(rail.singular_angles) < 2
+                crosses = self._crosses(dyad) if dyad.kind == 'RRP' else None
+                if crosses is None and dyad.kind == 'RRP' and not any(rail.crosses):
+                    # Crank and rod of one length, on a line through the crank's pivot?
+                    sums = length + abs(place.imag), length
+                    nearly = all(nearly_equal(abs(arm), one) for one in sums)
+                    crosses = (nearly, nearly)
+                if crosses is not None and crosses != rail.crosses:
+                    turns_matter = not all(crosses)
+                    rail = NearlyCrossingRail(arm, place, length, arms, crosses)
                 if turns_matter and not self._driven_only(arms):
                     return UnsignedRail(arm, place, length, arms)
                 return rail
@@ -399,32 +512,82 @@ class SolutionPlan(KnownLinks):
         """Return whether two coordinates are sums of inputs, so that their turns are known."""
         return set(arms) <= set(self.turns_with)
 
-    def _sign(self, kind: str, closing: str, meaning: str) -> int:
-        """Return the sign of the assembly of the pin or slider that closes a dyad."""
-        self._keys.append(closing)
-        sides = _SIDES[kind]
+    def _add_two_sided(
+        self, dyad: Dyad, step: Any, part: AnyDiagonal | Rail | None = None, upright: int = 1
+    ) -> None:
+        """
+        Add the step of a dyad that closes in two ways, on the side that the file writes.
+
+        ``part`` is its diagonal or rail, ``upright`` its sign there on the side +1.
+        """
+        name, sides = closing_name(dyad), _SIDES[dyad.kind]
+        crosses = any(getattr(part, 'crosses', ()))
+        first, second = (outer.name for outer in dyad.outer)
+        meaning = {
+            'RRR': f'the side of {first}→{second}',
+            'RPR': f'where {second} lies from {first}',
+            'RRP': f'where {dyad.inner.name} lies from {first}',
+        }[dyad.kind]
         choices = ' or '.join(sides)
-        side = self._assembly.pop(closing, None)
+        side = self._assembly.pop(name, None)
         if side is None:
-            self._missing[closing] = f'{closing}: {choices} ({meaning})'
-            return 1
-        if side not in sides:
+            self._missing[name] = f'{name}: {choices} ({meaning})'
+        elif side not in sides:
             raise DefinitionError(
-                f'assembly.{closing}',
-                f'{quoted(side)} is no side',
-                f'write {choices} ({meaning})',
+                f'assembly.{name}', f'{quoted(side)} is no side', f'write {choices} ({meaning})'
             )
-        return sides[side]
+        written = sides[side] if side else 0
+        sign = self._nominal[name].sign if self._nominal else (written or 1) * upright
+        self.two_ways.append(TwoWays(dyad, len(self.steps), written, crosses, upright))
+        self.add(step.with_sign(sign))
 
 
 def assembly_sides(structure: Structure) -> dict[str, tuple[str, ...]]:
     """Return the pins and sliders whose side is to be written, with the sides they may have."""
     sides = {}
     for group in structure.groups:
-        if isinstance(group, Dyad) and group.kind in _SIDES:
-            closing = group.outer[1] if group.kind == 'RRP' else group.inner
-            sides[closing.name] = tuple(_SIDES[group.kind])
+        if closes_in_two_ways(group):
+            sides[closing_name(group)] = tuple(_SIDES[group.kind])
     return sides
+
+
+def written_sides(closure: LoopClosure) -> dict[str, str]:
+    """Return the side of each dyad as the file writes it, or as its pose draws it."""
+    pose = closure.linkage.pose
+    drawn = sides_at(closure, closure.posed(*pose.inputs)) if pose and pose.drawn else {}
+    return {**drawn, **closure.linkage.assembly}
+
+
+def undrawn(linkage: Linkage, structure: Structure) -> Linkage:
+    """Return a linkage whose pose says nothing of the links of dyads, so that sides tell all."""
+    pose = linkage.pose
+    if pose is None or not pose.drawn:
+        return linkage
+    groups = (group for group in structure.groups if isinstance(group, Iterated))
+    iterated = {link for group in groups for link in group.links}
+    on = carriers(structure.links)
+    points = {name: place for name, place in pose.points.items() if {*on[name]} <= iterated}
+    angles = {link: angle for link, angle in pose.angles.items() if link in iterated}
+    return replace(linkage, pose=Pose(pose.inputs, points, angles))
+
+
+def sides_at(closure: LoopClosure, position: Position) -> dict[str, str]:
+    """
+    Return the side of each dyad that closes in two ways, as it lies at a position.
+
+    A dyad in line has none.
+    """
+    found: dict[str, str] = {}
+    groups: tuple[Group, ...] = closure.structure.groups
+    for step, number, pose in zip(
+        closure.steps, closure.step_groups, position.poses, strict=False
+    ):
+        group = groups[number]
+        if isinstance(step, TwoSided) and isinstance(group, Dyad):
+            side = step.side_of(pose)  # type: ignore[attr-defined]  # each such dyad has one
+            words = _SIDES[group.kind].items()
+            found |= {closing_name(group): word for word, sign in words if sign * side > 0.0}
+    return found
 
 
 def _facing(coordinate: int, base: Angle, vector: complex) -> Angle:

@@ -31,6 +31,7 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros.kinematics.arithmetic import facing, vector
 from linkage_ros.kinematics.known_links import KnownLinks
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.step import State
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import Acceleration, Position, Velocity
@@ -78,8 +79,12 @@ class PointTracker:
 
     def places(self, position: Position) -> list[complex]:
         """Return the places of the points in the frame of the ground, in [m]."""
-        x = position.state.coordinates
-        places = self._started(self._fixed, position.state.pins)
+        return self.places_in(position.state)
+
+    def places_in(self, state: State) -> list[complex]:
+        """Return the places of the points as `places` does, for a state."""
+        x = state.coordinates
+        places = self._started(self._fixed, state.pins)
         for base, arm, way, slide in self._nodes:
             turned = facing(x[arm]) * way
             places.append(places[base] + (turned if slide < 0 else x[slide] * turned))

@@ -30,6 +30,7 @@ from math import fsum, inf, pi
 from typing import NamedTuple, Protocol
 
 from linkage_ros.kinematics.arithmetic import (
+    copysign,
     facing,
     margin,
     passes_zero,
@@ -145,6 +146,11 @@ class CrankRail:
         self._half_turn = rect(1.0, 0.25 * pi - 0.5 * phase(arm))
         self._link = link
         self.arms = arms
+
+    @property
+    def crosses(self) -> tuple[bool, bool]:
+        """Whether the link changes its side where it stands across the line, on either side."""
+        return self._below == 0.0, self._above == 0.0
 
     @property
     def singular_angles(self) -> tuple[float, ...]:
@@ -270,10 +276,59 @@ class UnsignedRail(CrankRail):
 
     _at_change_point = Status.TOGGLE
 
+    @property
+    def crosses(self) -> tuple[bool, bool]:
+        return False, False
+
     def at(self, known: State) -> PinOnRail:
         signed = super().at(known)
         lean = where((signed.below < 0.0) != (signed.above < 0.0), -signed.lean, signed.lean)
         return signed._replace(below=abs(signed.below), above=abs(signed.above), lean=lean)
+
+
+class NearlyCrossingRail(CrankRail):
+    """
+    A `CrankRail` whose lengths nearly make a change point; see `NearlyCrossingDiagonal`.
+
+    Parameters
+    ----------
+    arm, pivot, link, arms
+        As in `CrankRail`.
+    crosses
+        Whether the link without deviations changes its side across the line, on either side.
+
+    """
+
+    __slots__ = ('_crosses',)
+
+    def __init__(
+        self,
+        arm: complex,
+        pivot: complex,
+        link: float,
+        arms: tuple[int, int],
+        crosses: tuple[bool, bool],
+    ) -> None:
+        super().__init__(arm, pivot, link, arms)
+        self._crosses = crosses
+
+    @property
+    def crosses(self) -> tuple[bool, bool]:
+        return self._crosses
+
+    def at(self, known: State) -> PinOnRail:
+        found = super().at(known)
+        first, second = self.arms
+        swing = known.coordinates[first] - known.coordinates[second]
+        eta = facing(-0.5 * swing) * self._half_turn
+        below, above, lean = found.below, found.above, found.lean
+        if self._crosses[0]:
+            below = copysign(below, eta.imag)
+        if self._crosses[1]:
+            above = copysign(above, eta.real)
+        if all(self._crosses):
+            lean = abs(lean)
+        return found._replace(below=below, above=above, lean=lean)
 
 
 class FreeRail:

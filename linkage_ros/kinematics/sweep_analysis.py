@@ -28,6 +28,7 @@ from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.kinematics.ranges import (
     describe,
     golden,
+    iterated,
     reach,
     repeats,
     search,
@@ -288,12 +289,21 @@ class InputSweep:
         return InputRange(low, high, self.turning, by=(by[0], by[1]))
 
 
+def starts_at_pose(closure: LoopClosure) -> bool:
+    """Return whether the file's pose is the start: not only that of the links iterated."""
+    linkage = closure.linkage
+    several = len(linkage.inputs) > 1
+    return linkage.pose is not None and not (
+        linkage.pose.drawn and not several and iterated(closure)
+    )
+
+
 def usual_inputs(closure: LoopClosure) -> tuple[float, ...]:
     """
     Return inputs at which a linkage is shown, or from which it starts.
 
     These are the inputs of the file's pose, if the linkage closes there; with a single input only
-    if the pose has no points, since one with points is the start of an iteration. Otherwise a
+    if no links are iterated, for which the pose is the start. Otherwise a
     single input is at 60 degrees if it turns fully, or at two thirds of its widest range: in the
     middle the links of a symmetric linkage often lie on each other. Several inputs are at 60
     degrees each if that is far from a toggle, or else at the point of a coarse grid that is
@@ -302,7 +312,7 @@ def usual_inputs(closure: LoopClosure) -> tuple[float, ...]:
     linkage, pose = closure.linkage, closure.linkage.pose
     several = len(linkage.inputs) > 1
     # Without joints a loop is open.
-    if pose and (several or not pose.points) and closure.position(*pose.inputs).joints:
+    if pose and starts_at_pose(closure) and closure.position(*pose.inputs).joints:
         return pose.inputs
     if several:
         usual = (pi / 3.0,) * len(linkage.inputs)

@@ -414,7 +414,8 @@ def _keys() -> dict[str, Schema]:
         ),
         'input': _input(),
         'assembly': named(
-            'Of each pin or slider that closes a dyad, the side on which it lies.',
+            'Of each pin or slider that closes a dyad, the side on which it lies, unless `pose` '
+            'tells it.',
             _choice('the side', ('left', 'right', 'ahead', 'behind')),
         ),
         'sliders': named('Points that stay on lines of other links, by name.', _slider()),
@@ -444,6 +445,7 @@ def _shorthands() -> dict[str, Schema]:
             {
                 **lengths,
                 'assembly': _choice('side of A→O4 on which B lies', left, left[0]),
+                'pose': _pose(),
                 **_limits_of('coupler_joint', 'rocker_joint'),
             },
             required=tuple(lengths),
@@ -454,6 +456,7 @@ def _shorthands() -> dict[str, Schema]:
                 'a': _number('crank', 'm', above=0.0, most=FARTHEST),
                 'swivel': _point("the swivel from the crank's pivot: [x, y]", 'm', FARTHEST),
                 'assembly': _choice('side of B on which the swivel lies', ahead, ahead[0]),
+                'pose': _pose(),
                 **_limits_of('rod_joint', 'rod_slide'),
             },
             required=('a', 'swivel'),
@@ -567,8 +570,8 @@ def _slider() -> Schema:
 
 def _pose() -> Schema:
     return mapping(
-        'Where the linkage starts; with points, where the iteration of links does that no dyad '
-        'covers.',
+        'The linkage as drawn, where it starts. Points and angles tell the assembly, as few as '
+        'tell it; of links that no dyad covers they start the iteration.',
         {
             'inputs': {
                 'description': 'a value for each input [rad or m]',
@@ -576,8 +579,12 @@ def _pose() -> Schema:
                 'items': _number('a value', 'rad or m', least=-FARTHEST, most=FARTHEST),
             },
             'points': named(
-                'points of iterated links in the frame of the ground, roughly',
+                'points in the frame of the ground, roughly',
                 _point('[x, y]', 'm', FARTHEST),
+            ),
+            'angles': named(
+                'angles of links to the ground, roughly',
+                _number('the angle', 'rad', least=-FARTHEST, most=FARTHEST),
             ),
         },
         required=('inputs',),

@@ -43,7 +43,7 @@ from linkage_ros.files.linkage_rewriting import rewritten
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage, RevoluteJoint
-from linkage_ros.kinematics.plan import assembly_sides
+from linkage_ros.kinematics.plan import assembly_sides, undrawn, written_sides
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import assur_groups
 
@@ -366,7 +366,8 @@ def _side(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
         if side not in possible[key]:
             remedy = f'choose {" or ".join(possible[key])}'
             raise LinkageError(f'assembly.{key}', f'{quoted(side)} is no side of it', remedy)
-    return _Change(replace(linkage, assembly={**linkage.assembly, **given}))
+    sides: Any = {**written_sides(shown.closure), **given}
+    return _Change(replace(undrawn(linkage, shown.closure.structure), assembly=sides))
 
 
 _KINDS: dict[str, Callable[[_Shown, Mapping[str, Any]], _Change]] = {
@@ -385,9 +386,11 @@ def _in_pose(
 ) -> Linkage:
     """Return a linkage in the assembly in which its pins are where they are shown."""
     try:
-        sides = assembly_sides(assur_groups(linkage))
+        structure = assur_groups(linkage)
     except DefinitionError:  # the check of the text tells it with its place
         return linkage
+    sides = assembly_sides(structure)
+    linkage = undrawn(linkage, structure)
     written = {name: side for name, side in linkage.assembly.items() if name in sides}
     # First the assembly that is written.
     own = [

@@ -37,7 +37,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.javascript import JavaScript
 from linkage_ros.kinematics.compiling.source import source, STATUSES, Subject
 from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage
-from linkage_ros.kinematics.plan import assembly_sides
+from linkage_ros.kinematics.plan import assembly_sides, written_sides
 from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
@@ -141,7 +141,7 @@ def _model(
     linkage = closure.linkage
     program = program_of(closure)
     carried = carriers(linkage.links)
-    sides = assembly_sides(closure.structure)
+    sides, now = assembly_sides(closure.structure), written_sides(closure)
     return {
         'name': name,
         'text': text,
@@ -186,9 +186,7 @@ def _model(
         ],
         'lengths': list(_lengths(closure)),
         'unit': {'length': units.length, 'factor': units.read(1.0, 'm')},
-        'choices': {
-            key: {'now': linkage.assembly.get(key), 'sides': list(of)} for key, of in sides.items()
-        },
+        'choices': {key: {'now': now.get(key), 'sides': list(of)} for key, of in sides.items()},
         'inputs_possible': [
             link
             for link, points in linkage.links.items()
@@ -239,7 +237,7 @@ def _others(closure: Closure, content: Section) -> list[dict[str, Any]]:
         found = closures(content, closure.name)
     except FileError:  # it has none, or too many to choose from
         return []
-    own = closure.linkage.assembly
+    own = written_sides(closure)
     others = [(text, other) for text, other in found.items() if other.linkage.assembly != own]
     return [{'text': text, 'program': program_of(other)} for text, other in others[:_MOST_GHOSTS]]
 

@@ -44,8 +44,10 @@ from math import atan2, cos, sin, sqrt
 from typing import Any, NamedTuple
 
 from linkage_ros.accuracy.methods import ACCELERATION, Joints, Method, Motion, RATE
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
+from linkage_ros.kinematics.plan import written_sides
 from linkage_ros.kinematics.topology import assur_groups, Driven
 import numpy as np
 
@@ -125,7 +127,7 @@ def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     constants = {link: level - arm for link, arm in arms.items()}
     return PlainFourBar(
         *found[0].lengths,
-        side=1.0 if linkage.assembly[closing] == 'left' else -1.0,
+        side=1.0 if written_sides(Closure(linkage))[closing] == 'left' else -1.0,
         turn=turn,
         offset=arms[crank] - level,
         terms=tuple(

@@ -43,11 +43,12 @@ from typing import NamedTuple
 from linkage_ros.kinematics.arithmetic import atan2, margin
 from linkage_ros.kinematics.diagonals import (
     AnyDiagonal,
+    crank_diagonal_of,
     CrankDiagonal,
     Diagonal,
     DiagonalRate,
-    UnsignedDiagonal,
 )
+from linkage_ros.kinematics.dyads.two_sided import TwoSided
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
@@ -62,7 +63,7 @@ class RPRPose(NamedTuple):
     diagonal: Diagonal  # From A to D
 
 
-class RPRDyad:
+class RPRDyad(TwoSided):
     """
     A rail pinned at A, a block on it pinned at D.
 
@@ -78,12 +79,12 @@ class RPRDyad:
 
     """
 
-    __slots__ = ('_sign', 'diagonal', 'offset')
+    __slots__ = ('diagonal', 'offset')
 
     def __init__(self, diagonal: AnyDiagonal, offset: float, sign: int) -> None:
         self.diagonal = diagonal
         self.offset = offset
-        self._sign = float(sign)
+        super().__init__(sign)
 
     def close(self, known: State) -> RPRPose:
         """Append the direction of the rail, and the slide."""
@@ -139,8 +140,9 @@ def swivel_diagonal(
     arms: tuple[int, int] = (1, 0),
     angle: float = 0.0,
     turns_known: bool = True,
+    crosses: tuple[bool, bool] | None = None,
 ) -> CrankDiagonal:
     """Return the diagonal of the inverted slider-crank with crank a on ground d."""
     fold = margin(max(a, d), -min(a, d), -abs(offset))
-    kind = CrankDiagonal if turns_known else UnsignedDiagonal
-    return kind(a, d, fold, inf, (abs(offset), inf, inf), arms, angle)
+    limits = (abs(offset), inf, inf)
+    return crank_diagonal_of(a, d, (fold, inf), limits, (arms, angle), not turns_known, crosses)

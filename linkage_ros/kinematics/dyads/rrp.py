@@ -34,6 +34,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import atan2, SMALLEST
+from linkage_ros.kinematics.dyads.two_sided import TwoSided
 from linkage_ros.kinematics.rail import PinOnRail, Rail
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
@@ -57,7 +58,7 @@ class RRPRates(NamedTuple):
     link: float
 
 
-class RRPDyad:
+class RRPDyad(TwoSided):
     """
     A link pinned at A, and a pin of it on a line.
 
@@ -71,11 +72,11 @@ class RRPDyad:
 
     """
 
-    __slots__ = ('_sign', 'rail')
+    __slots__ = ('rail',)
 
     def __init__(self, rail: Rail, sign: int) -> None:
         self.rail = rail
-        self._sign = float(sign)
+        super().__init__(sign)
 
     def close(self, known: State) -> RRPPose:
         """Append the direction of the link, in the rail's coordinates, and the slide."""

@@ -61,6 +61,7 @@ from linkage_ros.kinematics.arithmetic import (
 )
 from linkage_ros.kinematics.diagonals import (
     AnyDiagonal,
+    crank_diagonal_of,
     CrankDiagonal,
     Diagonal,
     DiagonalAcceleration,
@@ -68,8 +69,9 @@ from linkage_ros.kinematics.diagonals import (
     free_diagonal,
     free_diagonal_acceleration,
     free_diagonal_rate,
-    UnsignedDiagonal,
+    NearlyCrossingDiagonal,
 )
+from linkage_ros.kinematics.dyads.two_sided import TwoSided
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
@@ -89,7 +91,7 @@ class RRRPose(NamedTuple):
     less: float
 
 
-class RRRDyad:
+class RRRDyad(TwoSided):
     """
     Two links pinned together.
 
@@ -105,12 +107,12 @@ class RRRDyad:
 
     """
 
-    __slots__ = ('_difference', '_sign', '_sums', 'diagonal')
+    __slots__ = ('_difference', '_sums', 'diagonal')
 
     def __init__(self, diagonal: AnyDiagonal, b: float, c: float, sign: int) -> None:
         self.diagonal = diagonal
         self._sums = sums(b, c, diagonal.least)
-        self._sign = float(sign)
+        super().__init__(sign)
         self._difference = (b - c) * (b + c)
 
     def close(self, known: State) -> RRRPose:
@@ -150,6 +152,7 @@ def crank_diagonal(
     arms: tuple[int, int] = (1, 0),
     offset: float = 0.0,
     turns_known: bool = True,
+    crosses: tuple[bool, bool] | None = None,
 ) -> CrankDiagonal:
     """
     Return the diagonal of the four-bar with crank a, coupler b, rocker c and ground d.
@@ -158,8 +161,10 @@ def crank_diagonal(
     """
     fold = margin(max(a, d), -min(a, d), -max(b, c), min(b, c))
     stretch = margin(b, c, -a, -d)
-    kind = CrankDiagonal if turns_known or fold == stretch == 0.0 else UnsignedDiagonal
-    return kind(a, d, fold, stretch, (abs(b - c), b + c, 4.0 * b * c), arms, offset)
+    both = fold == stretch == 0.0 if crosses is None else all(crosses)
+    limits = (abs(b - c), b + c, 4.0 * b * c)
+    turns_matter = not (turns_known or both)
+    return crank_diagonal_of(a, d, (fold, stretch), limits, (arms, offset), turns_matter, crosses)
 
 
 def sums(b: float, c: float, least: Fraction) -> tuple[float, float]:
@@ -278,7 +283,11 @@ class FoldingRRRDyad(RRRDyad):
     @staticmethod
     def fits(diagonal: AnyDiagonal) -> bool:
         """Return whether a diagonal passes a change point where the links fold."""
-        return isinstance(diagonal, CrankDiagonal) and not diagonal.brackets[0]
+        return (
+            isinstance(diagonal, CrankDiagonal)
+            and not isinstance(diagonal, NearlyCrossingDiagonal)
+            and not diagonal.brackets[0]
+        )
 
     def rates(  # type: ignore[override]  # other ones
         self, pose: RRRPose, _known: State, speeds: State
@@ -421,7 +430,7 @@ class DrivenRRRRates(NamedTuple):
     sides: tuple[complex, complex]
 
 
-class DrivenRRRDyad:
+class DrivenRRRDyad(TwoSided):
     """
     RRR whose sides change their length: cylinders, and links with a motor in them.
 
@@ -442,12 +451,12 @@ class DrivenRRRDyad:
 
     """
 
-    __slots__ = ('_ends', '_sides', '_sign')
+    __slots__ = ('_ends', '_sides')
 
     def __init__(self, ends: tuple[int, int], sides: tuple[Side, Side], sign: int) -> None:
         self._ends = ends
         self._sides = sides
-        self._sign = float(sign)
+        super().__init__(sign)
 
     def close(self, known: State) -> DrivenRRRPose:
         """Append the angles of the first link of each group."""

@@ -1,0 +1,51 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A dyad that closes in two ways, one on each side."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any
+
+
+class TwoSided:
+    """
+    A dyad that closes in two ways.
+
+    Parameters
+    ----------
+    sign
+        The assembly, +1 or −1, as its dyad defines it.
+
+    """
+
+    __slots__ = ('_sign',)
+
+    def __init__(self, sign: int) -> None:
+        self._sign = float(sign)
+
+    @property
+    def sign(self) -> int:
+        """The assembly, +1 or −1."""
+        return int(self._sign)
+
+    def with_sign(self, sign: int) -> Any:
+        """Return the same dyad in the assembly of a sign."""
+        if sign == self._sign:
+            return self
+        mirrored = copy(self)
+        TwoSided.__init__(mirrored, sign)
+        return mirrored
