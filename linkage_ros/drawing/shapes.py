@@ -44,6 +44,9 @@ _FLAT = 1e-6
 
 _ARC = pi / 8.0
 
+_MOST_STROKES = 200
+"""Strokes of a hatched line: a rail may be a thousand times as long as the links."""
+
 
 class Polygon(NamedTuple):
     """A filled area."""
@@ -261,7 +264,7 @@ def _support(pivot: complex, size: float) -> list[Shape]:
 def _hatch(start: complex, end: complex, size: float) -> list[Shape]:
     """Draw the surface of the ground, which lies to the right of start→end."""
     along = (end - start) / abs(end - start)
-    count = max(3, round(abs(end - start) / (0.9 * size)))
+    count = min(max(3, round(abs(end - start) / (0.9 * size))), _MOST_STROKES)
     stroke = along * complex(-0.7, -0.9) * size
     ticks = [start + (end - start) * (i + 0.8) / count for i in range(count)]
     return [

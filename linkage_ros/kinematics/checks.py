@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import combinations
-from math import inf, isfinite, isnan
+from math import hypot, inf, isfinite, isnan
 
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.linkage import (
@@ -29,6 +29,12 @@ from linkage_ros.kinematics.linkage import (
     RevoluteJoint,
     Slider,
 )
+
+_SHORTEST = 2.0**-511
+"""Least distance of two pins, in [m]: the square of a shorter one would underflow."""
+
+_LEAST_RATIO = 1e-30
+"""Least distance of two pins relative to the linkage; in a shorter one no digit would be left."""
 
 
 def check(linkage: Linkage) -> None:
@@ -107,15 +113,21 @@ def _check_points(linkage: Linkage) -> None:
     ends = [point for points in linkage.links.values() for point in points]
     ends += [slider.point for slider in linkage.sliders.values()]
     joined = {point for point, count in Counter(ends).items() if count > 1}
+    sizes = (hypot(*place) for points in linkage.links.values() for place in points.values())
+    nearest = max(_SHORTEST, _LEAST_RATIO * max(sizes, default=0.0))
     for name, points in linkage.links.items():
         pins = [point for point in points if point in joined]
         for one, other in combinations(pins, 2):
-            if points[one] == points[other]:
-                raise DefinitionError(
-                    f'links.{name}.{other}',
-                    f'lies on {one!r}',
-                    'give the two points different places',
-                )
+            distance = hypot(*(p - q for p, q in zip(points[one], points[other], strict=True)))
+            if not distance:
+                fault, places = f'lies on {one!r}', 'different places'
+            elif distance < nearest:
+                fault = f'{other!r} lies {distance:.3g} m from {one!r}'
+                places = f'places that are at least {nearest:.3g} m apart'
+            else:
+                continue
+            key = f'links.{name}.{other}'
+            raise DefinitionError(key, fault, f'give the two points {places}')
 
 
 def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
@@ -141,7 +153,7 @@ def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
             f'{quoted(slider.block)} does not carry {slider.point!r}',
             _one_of(carriers),
         )
-    if slider.direction == (0.0, 0.0) or not all(map(isfinite, slider.direction)):
+    if hypot(*slider.direction) < _SHORTEST or not all(map(isfinite, slider.direction)):
         raise DefinitionError(
             f'{key}.direction',
             f'[{slider.direction[0]:g}, {slider.direction[1]:g}] has no direction',

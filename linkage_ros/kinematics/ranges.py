@@ -377,7 +377,9 @@ def repeats(
 ) -> bool:
     """Return whether all joints are the same after a shift, apart from whole turns."""
     here, there = position(value).joints, position(value + shift).joints
-    return len(here) == len(there) and all(
+    if not (here and there):
+        return len(here) == len(there)
+    return all(
         abs(remainder(p - q, tau) if turning else p - q)
         < _SAME * (1.0 if turning else closure.scale)
         for p, q, turning in zip(here, there, closure.turning, strict=True)

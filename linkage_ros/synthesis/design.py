@@ -37,6 +37,9 @@ from linkage_ros.kinematics.linkage import (
 
 CRANK, COUPLER, ROCKER = 'crank', 'coupler', 'rocker'
 
+SHORTEST, FARTHEST = 1e-12, 1e9
+"""Least and greatest length or coordinate of a task, in [m]."""
+
 Assembly = Literal['left', 'right']
 
 

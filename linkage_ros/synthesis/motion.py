@@ -45,7 +45,7 @@ from typing import Any, NamedTuple, TypeAlias
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.batch import Array, Complex
-from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.design import Design, FARTHEST, FourBar, Wanted
 from linkage_ros.synthesis.double_double import minus, over, plus, sine_cosine, times, Twofold
 from linkage_ros.synthesis.proof import assembled
 import numpy as np
@@ -75,14 +75,14 @@ def check_task(poses: Sequence[Pose], pivots: Mapping[str, complex]) -> None:
     if len(poses) != 3:
         raise SynthesisError('poses', f'{len(poses)} were given', 'give three')
     for number, (place, angle) in enumerate(poses, 1):
-        if not (finite(place) and isfinite(angle)):
+        if not (abs(place) <= FARTHEST and isfinite(angle)):
             raise SynthesisError(
                 f'pose {number}',
                 f'({place.real}, {place.imag}), {angle} is not a pose',
                 'write numbers',
             )
     for name, place in pivots.items():
-        if not finite(place):
+        if not abs(place) <= FARTHEST:
             raise SynthesisError(name, f'({place.real}, {place.imag}) is no place', 'give numbers')
     spread = max(abs(one.place - other.place) for one, other in combinations(poses, 2))
     for (i, one), (j, other) in combinations(enumerate(poses, 1), 2):
@@ -110,11 +110,6 @@ def columns(poses: Sequence[Pose]) -> tuple[Complex, Array]:
         np.array([pose.place for pose in poses], np.complex128),
         np.array([pose.angle for pose in poses], np.float64),
     )
-
-
-def finite(place: complex) -> bool:
-    """Return whether both coordinates are finite."""
-    return isfinite(place.real) and isfinite(place.imag)
 
 
 def said(place: complex) -> str:

@@ -26,7 +26,7 @@ from linkage_ros.drawing.curves import continuous, drawn_once, sweep
 from linkage_ros.drawing.painting import Label, place_labels
 from linkage_ros.drawing.shapes import Circle, hull, Polygon, rounded, Segment, shapes, skeleton
 from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
@@ -60,6 +60,18 @@ def contains(polygon: Polygon, point: complex) -> bool:
     corners = polygon.corners
     edges = zip(corners, (*corners[1:], corners[0]), strict=True)
     return all(left_of(point, start, end) >= -1e-12 for start, end in edges)
+
+
+SLIDER_CRANK = """
+links:
+  ground: {O2: [0, 0], G: [0, 0]}
+  crank: {O2: [0, 0], A: [0.05, 0]}
+  rod: {A: [0, 0], B: [0.15, 0]}
+sliders: {guide: {point: B, along: ground, through: G, direction: [1, 0]}}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {guide: ahead}
+joints: {slide: {slider: guide}}
+"""
 
 
 @given(st.lists(places, min_size=1, max_size=12))
@@ -203,3 +215,17 @@ def test_a_whole_turn_of_an_outline_is_one_turn():
     assert len(outline) == 16
     assert all(abs(place) == pytest.approx(1.0) for place in outline)
     assert tau / len(outline) == pytest.approx(pi / 8.0)
+
+
+@pytest.mark.parametrize('ratio', [1.0, 1e3, 1e6, 1e9])
+def test_a_rail_of_any_length_is_drawn_in_few_strokes(ratio):
+    closure = Closure(read_linkage(parse_yaml(SLIDER_CRANK.encode(), 'slider_crank.yaml')))
+    position = closure.position(0.3)
+    drawn = shapes(closure, position, 0.01, {'guide': (0.1, 0.1 + ratio)})
+    hatched = [shape for shape in drawn if shape.role == 'hatch']
+    assert 3 <= len(hatched) <= 300
+    # They reach from end to end.
+    rail = max((s for s in drawn if s.role == 'rail'), key=lambda s: abs(s.end - s.start))
+    apart = [abs(stroke.start - end) for end in (rail.start, rail.end) for stroke in hatched]
+    assert min(apart[: len(hatched)]) < 0.02 * abs(rail.end - rail.start) + 0.02
+    assert min(apart[len(hatched) :]) < 0.02 * abs(rail.end - rail.start) + 0.02

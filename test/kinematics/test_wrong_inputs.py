@@ -219,6 +219,14 @@ MALFORMED = {
     'a link of no length': Fault(
         FOUR_BAR, put('links', 'coupler', 'B', (0.0, 0.0)), 'links.coupler.B', 'different places'
     ),
+    'a link of nearly no length': Fault(
+        FOUR_BAR, put('links', 'coupler', 'B', (1e-40, 0.0)), 'links.coupler.B',
+        'places that are at least'
+    ),
+    'a link whose square underflows': Fault(
+        FOUR_BAR, put('links', 'coupler', 'B', (5e-324, 0.0)), 'links.coupler.B',
+        'places that are at least'
+    ),
     'a ground pivot on the other': Fault(
         FOUR_BAR, put('links', 'ground', 'D', (0.0, 0.0)), 'links.ground.D', 'different places'
     ),
@@ -287,6 +295,10 @@ MALFORMED = {
     ),
     'a slider in no direction': Fault(
         SLIDER_CRANK, swivel(direction=(0.0, 0.0)), 'sliders.swivel.direction',
+        'for example [1, 0]'
+    ),
+    'a slider in a direction that is nearly none': Fault(
+        SLIDER_CRANK, swivel(direction=(1e-320, 0.0)), 'sliders.swivel.direction',
         'for example [1, 0]'
     ),
     'a swivel on the crank pivot': Fault(

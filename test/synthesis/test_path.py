@@ -356,7 +356,11 @@ NEITHER = (
     ),
     (
         {'points': (-1e308 - 1e308j, 0j, 1e308 + 1e308j)},
-        'path: its size is beyond a double; use another unit',
+        'path: its size is inf m; make it 1e-12 to 1e+09 m',
+    ),
+    (
+        {'points': (0j, 1e-200 + 0j, 1e-200j)},
+        'path: its size is 1.41421e-200 m; make it 1e-12 to 1e+09 m',
     ),
 ])  # fmt: skip
 def test_what_is_no_path_is_said_in_one_line(arguments, line):

@@ -46,12 +46,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from math import degrees, inf, remainder, tau
+from math import degrees, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
-from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.design import Design, FARTHEST, FourBar, SHORTEST, Wanted
 from linkage_ros.synthesis.double_double import (
     Array,
     minus,
@@ -269,8 +269,9 @@ def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) 
         With the numbers of the pairs, counted from 1.
 
     """
-    if not 0.0 < ground < inf:
-        raise SynthesisError('ground', f'{ground!r} m is no length', 'give it one above 0')
+    if not SHORTEST <= ground <= FARTHEST:
+        remedy = f'give it one from {SHORTEST:g} to {FARTHEST:g}'
+        raise SynthesisError('ground', f'{ground!r} m is no length', remedy)
     pairs = [*enumerate(zip(crank, rocker, strict=True), 1)]
     for number, pair in pairs:
         if not all(abs(angle) <= _FARTHEST for angle in pair):

@@ -40,6 +40,7 @@ from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.batch import Array, Complex, Mask
+from linkage_ros.synthesis.design import FARTHEST, SHORTEST
 import numpy as np
 from numpy.typing import NDArray
 
@@ -118,8 +119,9 @@ def _check_points(points: tuple[complex, ...], closed: bool) -> None:
             'is the first one again',
             'leave it out: a closed path returns by itself',
         )
-    if not isfinite(_size(points)):
-        raise SynthesisError('path', 'its size is beyond a double', 'use another unit')
+    if not SHORTEST <= _size(points) <= FARTHEST:
+        reason = f'its size is {_size(points):g} m'
+        raise SynthesisError('path', reason, f'make it {SHORTEST:g} to {FARTHEST:g} m')
 
 
 def _check_timing(timing: tuple[float, ...], points: int, closed: bool) -> None:
