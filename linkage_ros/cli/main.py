@@ -50,6 +50,7 @@ COMMANDS = {
     'export': 'write the joints of a bag, or one of its topics, to a CSV or Parquet file',
     'recover': 'make a whole bag of what a damaged or unfinished one still holds',
     'replay': 'run the scene of a bag once more and compare, or another scene over its samples',
+    'compare': 'say how far the joints of two runs lie apart over the time, and draw it',
     'scene': 'say what a scene consists of; list all effects; print the schemas of the files',
     'cost': 'say what each effect of a scene costs on this machine',
     'accuracy': 'show what accuracy costs in time, on a scene: tables, and a page with pictures',
