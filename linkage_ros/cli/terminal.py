@@ -255,9 +255,9 @@ def clean_output() -> None:
         if getattr(sys, name) is None:
             # A file that is opened later must not get the number of a standard stream.
             os.open(os.devnull, os.O_RDWR)
-            stream = open(number, 'w' if number else 'r', closefd=False)  # noqa: SIM115
-            setattr(sys, name, stream)
-            setattr(sys, f'__{name}__', stream)
+            opened = open(number, 'w' if number else 'r', closefd=False)  # noqa: SIM115
+            setattr(sys, name, opened)
+            setattr(sys, f'__{name}__', opened)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
