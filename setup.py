@@ -187,7 +187,7 @@ setup(
             'linkage_node = linkage_ros.node.linkage_node:main',
             'crank_source = linkage_ros.node.crank_source:main',
             'pd_controller = linkage_ros.node.pd_controller:main',
-            'linkage = linkage_ros.cli.main:main',
+            'linkage = linkage_ros.__main__:main',
         ],
     },
 )

@@ -14,7 +14,16 @@
 
 """``python -m linkage_ros`` is ``linkage``, also where no script of that name is installed."""
 
-from linkage_ros.cli.main import main
+from linkage_ros.signals import end_at_signals
+
+
+def main() -> int:
+    """Run ``linkage``; a signal ends it in order from here on, also during the first imports."""
+    end_at_signals(b'linkage: stopped\n')
+    from linkage_ros.cli import main as command  # local import: see above
+
+    return command.main()
+
 
 if __name__ == '__main__':
     raise SystemExit(main())

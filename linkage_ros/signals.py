@@ -90,6 +90,17 @@ class Stop(Event):
         return self._wished
 
 
+def end_at_signals(line: bytes) -> None:
+    """Let a signal end the process at once, with a line, until `stop_on_signals` is called."""
+
+    def end(_number: int, _frame: object) -> NoReturn:
+        os.write(2, line)
+        os._exit(1)
+
+    for number in _SIGNALS:
+        signal.signal(number, end)
+
+
 class _Raising:
     """Whether a signal raises `StoppedError`; one state for the whole process."""
 

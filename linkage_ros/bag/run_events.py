@@ -98,7 +98,7 @@ Event = SampleEvent | WrenchEvent | FaultEvent | Reset | TickEvent
 class RunAccount(NamedTuple):
     """The run's account in its bag; '' for missing topics."""
 
-    # Name of the scene, and the folder for its relative paths.
+    # Name of the scene, and the folder for its paths, relative to that of the bag; '' without any.
     scene: str = ''
     scene_folder: str = ''
     # Names of the topics.

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 import os
 import sys
@@ -27,7 +28,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from linkage_ros import __version__
-from linkage_ros.cli.terminal import clean_output
+from linkage_ros.cli.terminal import clean_output, give_up_output
 from linkage_ros.errors import (
     did_you_mean,
     LinkageError,
@@ -49,6 +50,7 @@ COMMANDS = {
     'export': 'write the joints of a bag, or one of its topics, to a CSV or Parquet file',
     'recover': 'make a whole bag of what a damaged or unfinished one still holds',
     'replay': 'run the scene of a bag once more and compare, or another scene over its samples',
+    'compare': 'say how far the joints of two runs lie apart over the time, and draw it',
     'scene': 'say what a scene consists of; list all effects; print the schemas of the files',
     'cost': 'say what each effect of a scene costs on this machine',
     'accuracy': 'show what accuracy costs in time, on a scene: tables, and a page with pictures',
@@ -150,21 +152,36 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         try:
             with raising():
-                return _run(arguments, stop)
+                if stop.is_set():
+                    raise StoppedError
+                try:
+                    return _run(arguments, stop)
+                finally:
+                    sys.stdout.flush()  # here, where an error can be reported
         except (StoppedError, Exception) as error:
             # A library may make an error of its own of what the signal raised within it.
             stopped = isinstance(error, StoppedError) or has_raised()
             if isinstance(error, BrokenPipeError) or not stopped:
                 raise
             end_soon(1)
-            name = ' '.join(['linkage', *(name for name in arguments[:1] if name in COMMANDS)])
-            print(f'{name}: stopped', file=sys.stderr)
+            print(f'{_said_by(arguments)}: stopped', file=sys.stderr)
             sys.stdout.flush()  # if nobody reads the pipe, this blocks until the time limit
             return 1
     except BrokenPipeError:
         # The reader of the output has gone: there is nobody to report to.
-        sys.stderr.close()
+        give_up_output()
         return 1
+    except OSError as error:
+        # The output, or a place for temporary files; commands report all others themselves.
+        give_up_output()
+        where = error.filename or 'the output'
+        with suppress(OSError):
+            print(f'{_said_by(arguments)}: {where}: {error.strerror or error}', file=sys.stderr)
+        return 1
+
+
+def _said_by(arguments: Sequence[str]) -> str:
+    return ' '.join(['linkage', *(name for name in arguments[:1] if name in COMMANDS)])
 
 
 def _run(arguments: Sequence[str], stop: Event) -> int:

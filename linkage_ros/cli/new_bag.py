@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 import json
+import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -151,14 +152,16 @@ class NewBag:
         ]
         account = {
             'scene': scene.name,
-            'scene_folder': str(Path(scene.folder).resolve()),
             **named,
             'extra_topics': list(names.extras),
             BEGUN: WITH_THE_RUN,
             SEED: scene.seed,
             **({USER_EFFECTS: user_effects} if (user_effects := user_effects_here(scene)) else {}),
             **versions_here(),
-            'made_from': {'bag': str(bag.path.resolve()), 'run': raw_account(bag)},
+            'made_from': {
+                'bag': os.path.relpath(bag.path.resolve(), folder.resolve()),
+                'run': raw_account(bag),
+            },
         }
         files = {name: ('application/yaml', data) for name, data in scene.files.items()}
         files[RUN_FILE] = ('application/json', json.dumps(account).encode())

@@ -52,8 +52,8 @@ from linkage_ros.cli.new_bag import Names, names_for, NewBag, Source
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import BagError, clean, LinkageError, listed
 from linkage_ros.files.file_access import remove_bag
-from linkage_ros.messages.joint_values import JOINT_STATE, UNITS
-from linkage_ros.replay.compare import At, Comparison, First, TopicComparison, ulps
+from linkage_ros.messages.joint_values import JOINT_STATE, Key, UNITS
+from linkage_ros.replay.compare import At, Comparison, Deviation, First, TopicComparison, ulps
 from linkage_ros.replay.counterfactual import (
     check_drives,
     Counterfactual,
@@ -181,25 +181,31 @@ def greatest(comparison: Comparison, turning: Mapping[str, bool]) -> list[dict[s
 
 def joints_account(comparison: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
     """Return the differences of each number that both runs have, joint by joint."""
-    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    deviations: dict[Key, Deviation] = {}
     for topic in comparison.topics:
+        # ~/motion repeats the positions and velocities of the joint states.
         for key, deviation in topic.deviations.items():
-            joint, quantity = key
-            # ~/motion repeats the positions and velocities of the joint states.
-            rows.setdefault(
-                key,
-                {
-                    'joint': joint,
-                    'quantity': quantity,
-                    'unit': unit_of(joint, quantity, turning),
-                    'compared': deviation.compared,
-                    'different': deviation.differing,
-                    'rms': finite(deviation.rms),
-                    'greatest': finite(deviation.greatest),
-                    'greatest_at': at_account(deviation.at) if deviation.differing else None,
-                },
-            )
-    return list(rows.values())
+            deviations.setdefault(key, deviation)
+    return deviations_account(deviations, turning)
+
+
+def deviations_account(
+    deviations: Mapping[Key, Deviation], turning: Mapping[str, bool]
+) -> list[dict[str, Any]]:
+    """Return deviations, joint by joint."""
+    return [
+        {
+            'joint': joint,
+            'quantity': quantity,
+            'unit': unit_of(joint, quantity, turning),
+            'compared': deviation.compared,
+            'different': deviation.differing,
+            'rms': finite(deviation.rms),
+            'greatest': finite(deviation.greatest),
+            'greatest_at': at_account(deviation.at) if deviation.differing else None,
+        }
+        for (joint, quantity), deviation in deviations.items()
+    ]
 
 
 def first_text(first: Mapping[str, Any], begin: int) -> str:

@@ -17,9 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
+from io import TextIOWrapper
 from itertools import zip_longest
+import os
 from shutil import get_terminal_size
 import sys
 from textwrap import fill
@@ -244,5 +246,27 @@ class PrintableStream:
 
 
 def clean_output() -> None:
-    """Replace standard output and standard error by escaped ones; rich keeps the originals."""
+    """
+    Replace standard output and standard error by escaped ones; rich keeps the originals.
+
+    What the encoding of a terminal cannot show is escaped. A stream that is closed shows nothing.
+    """
+    for number, name in enumerate(('stdin', 'stdout', 'stderr')):
+        if getattr(sys, name) is None:
+            # A file that is opened later must not get the number of a standard stream.
+            os.open(os.devnull, os.O_RDWR)
+            opened = open(number, 'w' if number else 'r', closefd=False)  # noqa: SIM115
+            setattr(sys, name, opened)
+            setattr(sys, f'__{name}__', opened)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors='backslashreplace')
     sys.stdout, sys.stderr = PrintableStream(sys.stdout), PrintableStream(sys.stderr)
+
+
+def give_up_output() -> None:
+    """Write nothing more to standard output: what waits there could not be written."""
+    with suppress(OSError, ValueError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.__stdout__.fileno())  # type: ignore[union-attr]
+        os.close(null)

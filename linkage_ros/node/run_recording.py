@@ -104,7 +104,7 @@ class RunRecording:
         def new_bag(whole: bool) -> BagWriter:
             begun = WITH_THE_RUN if whole and with_the_run else MID_RUN
             folder = _folder(runs, record.name, scene.name)
-            files = _attachments(scene, described, begun, loop.pipeline.lines)
+            files = _attachments(scene, described, begun, loop.pipeline.lines, folder)
             opening = [
                 (number, description)
                 for number, (key, _) in enumerate(described)
@@ -233,14 +233,18 @@ class RunRecording:
 
 
 def _attachments(
-    scene: Scene, topics: Sequence[tuple[str, Topic]], begun: str, lines: Sequence[LinkagePipeline]
+    scene: Scene,
+    topics: Sequence[tuple[str, Topic]],
+    begun: str,
+    lines: Sequence[LinkagePipeline],
+    folder: Path,
 ) -> dict[str, tuple[str, bytes]]:
     several = {EXTRA, WRENCH_TOPICS}
     named: dict[str, Any] = {key: topic.name for key, topic in topics if key not in several}
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
     if wrenches := [topic.name for key, topic in topics if key == WRENCH_TOPICS]:
         named[WRENCH_TOPICS] = wrenches
-    return attachments(scene_files(scene, named, begun, lines))
+    return attachments(scene_files(scene, named, begun, lines, folder))
 
 
 def _folder(directory: Path, name: str, scene: str) -> Path:

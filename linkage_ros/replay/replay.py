@@ -27,8 +27,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import json
+from pathlib import Path
 import platform
-from typing import NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros import __version__
 from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
@@ -120,12 +121,16 @@ def recorded_scene(
         run.scene,
         str(bag.path),
         files,
-        run.scene_folder,
+        str(_folder_of(bag.path) / run.scene_folder),
         run.solvers,
         run.seed,
         trust_effects=trust_effects,
         settings=settings,
     )
+
+
+def _folder_of(path: Any) -> Path:
+    return path if isinstance(path, Path) and path.is_dir() else Path(path).parent
 
 
 class AnnouncedScene(NamedTuple):

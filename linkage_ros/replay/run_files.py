@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import json
+import os
 from pathlib import Path
 import platform
 from typing import Any
@@ -34,7 +35,11 @@ EXTRA = 'extra'
 
 
 def scene_files(
-    scene: Scene, topics: Mapping[str, Any], begun: str, lines: Sequence[LinkagePipeline]
+    scene: Scene,
+    topics: Mapping[str, Any],
+    begun: str,
+    lines: Sequence[LinkagePipeline],
+    bag: Path | None = None,
 ) -> dict[str, bytes]:
     """
     Return a scene as files: its own, and the run's account of itself.
@@ -49,11 +54,13 @@ def scene_files(
         Beginning of the bag.
     lines
         Pipelines of the linkages.
+    bag
+        Folder of the bag that gets the files; None for none.
 
     """
     run = {
         'scene': scene.name,
-        'scene_folder': str(Path(scene.folder).resolve()),
+        **_scene_folder(scene, bag),
         **topics,
         BEGUN: begun,
         SEED: scene.seed,
@@ -65,6 +72,14 @@ def scene_files(
         'machine': platform.machine(),
     }
     return {**scene.files, RUN_FILE: json.dumps(run).encode()}
+
+
+def _scene_folder(scene: Scene, bag: Path | None) -> dict[str, str]:
+    """Return the folder for the paths in a scene, relative to the bag: bags are passed on."""
+    if all(member.drive[0] != 'bag' for member in scene.members):
+        return {}
+    folder = Path(scene.folder).resolve()
+    return {'scene_folder': str(folder if bag is None else os.path.relpath(folder, bag.resolve()))}
 
 
 def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:

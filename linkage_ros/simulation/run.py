@@ -145,7 +145,7 @@ def simulate(
     topics = _topics(loop, first)
     named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
-    files = scene_files(scene, named, WITH_THE_RUN, first.lines)
+    files = scene_files(scene, named, WITH_THE_RUN, first.lines, folder)
     # A signal ends the run between two ticks: raised here, it would cut a record of the bag.
     with heeded():
         writer = BagWriter(folder, [topic for _, topic in topics], attachments(files))

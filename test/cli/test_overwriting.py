@@ -39,6 +39,7 @@ WRITES = {
     'view': (['four_bar'], 'x.html', False),
     'plot': (['bag'], 'bag.png', True),
     'report': (['bag'], 'bag.html', True),
+    'compare': (['bag', 'bag'], 'x.png', False),
     'export': (['bag'], 'x.csv', False),
     'simulate': (['worn_press', '--seconds', '0.1'], 'x.csv', False),
     'synthesize': (['--pairs', 'pairs.csv'], 'x.yaml', False),

@@ -262,7 +262,7 @@ def test_the_new_bag_says_what_it_is(tmp_path, capsys):
     assert new.attachments['scene.yaml'] == scene.read_bytes()
     assert new.attachments['linkage.yaml'] == GENERAL.encode()
     said = json.loads(new.attachments[RUN_FILE])
-    assert said['made_from']['bag'] == str(bag)
+    assert said['made_from']['bag'] == '../bag'
     assert said['made_from']['run']['linkage_ros'] == '9.8.7'
     assert said['scene'] == 'other'
     assert said['begun'] == 'with the run'

@@ -1,0 +1,122 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``linkage compare``: two runs, whose joints differ by a bias, by a rate, by nothing at all."""
+
+import json
+from math import pi, sin
+
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.cli import compare
+from linkage_ros.errors import LinkageError
+import pytest
+
+from .recorded import answer, JOINT_STATE
+from ..support.messages import joint_state
+
+SECOND = 1_000_000_000
+
+
+def bag(folder, values, *, rate=100, begin=5, seconds=2.0, topic='/joint_states'):
+    """Write a bag of joint states, made by functions of the time in [s]; without a scene."""
+    writer = BagWriter(folder, [Topic(topic, JOINT_STATE, '', '')])
+    for number in range(round(seconds * rate) + 1):
+        time = number / rate
+        stamp = begin * SECOND + round(time * SECOND)
+        data = joint_state(
+            values,
+            positions=[value(time) for value in values.values()],
+            stamp=divmod(stamp, SECOND),
+        )
+        writer.write(0, stamp, stamp, data)
+    writer.close()
+    return folder
+
+
+def told(capsys, *typed):
+    capsys.readouterr()
+    assert answer(compare, *typed, '--json') == 0
+    account = json.loads(capsys.readouterr().out)
+    return account, {row['joint']: row for row in account['joints']}
+
+
+def swing(time):
+    return 0.5 * sin(3.0 * time)
+
+
+def ramp(time):
+    return time
+
+
+def test_a_bias_is_found_whatever_the_rates_and_the_times_of_the_runs(tmp_path, capsys):
+    first = bag(tmp_path / 'a', {'p': swing, 'q': ramp})
+    second = bag(
+        tmp_path / 'b', {'q': lambda t: ramp(t) + 0.25, 'p': swing}, rate=40, begin=90, seconds=1.5
+    )
+    account, rows = told(capsys, first, second)
+    assert (account['compared'], account['seconds']) == (151, 1.5)
+    assert rows['q']['greatest'] == pytest.approx(0.25)
+    assert rows['q']['rms'] == pytest.approx(0.25)
+    # Between samples a line stands for the sine: h² · max|p″| / 8.
+    assert rows['p']['greatest'] <= (1 / 40) ** 2 * 4.5 / 8
+    assert rows['p']['greatest'] > 0.5 * (1 / 40) ** 2 * 4.5 / 8
+
+
+def test_a_run_and_itself_are_the_same(tmp_path, capsys):
+    first = bag(tmp_path / 'a', {'p': swing})
+    _, rows = told(capsys, first, first)
+    assert (rows['p']['different'], rows['p']['greatest_at']) == (0, None)
+
+
+def test_a_difference_is_placed_at_its_time(tmp_path, capsys):
+    def kicked(time):
+        return swing(time) + (0.5 if abs(time - 1.2) < 0.001 else 0.0)
+
+    _, rows = told(capsys, bag(tmp_path / 'a', {'p': swing}), bag(tmp_path / 'b', {'p': kicked}))
+    assert rows['p']['greatest_at'] == {'tick': 121, 'time_ns': 1_200_000_000}
+    assert rows['p']['different'] == 1
+
+
+def test_wrapped_angles_differ_by_the_shorter_way(tmp_path, capsys):
+    def wrapped(offset):
+        return lambda t: (3.0 * t + offset + pi) % (2.0 * pi) - pi
+
+    first = bag(tmp_path / 'a', {'p': wrapped(0.0)})
+    second = bag(tmp_path / 'b', {'p': wrapped(0.1)}, rate=70)
+    _, rows = told(capsys, first, second)
+    assert rows['p']['greatest'] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize('name', ['x.png', 'x.svg'])
+def test_a_picture_is_drawn(tmp_path, name):
+    first = bag(tmp_path / 'a', {'$p$': swing, 'q': ramp})
+    second = bag(tmp_path / 'b', {'$p$': ramp, 'q': ramp})
+    assert answer(compare, first, second, '-o', tmp_path / name) == 0
+    assert (tmp_path / name).stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ('values', 'topic', 'reason'),
+    [
+        ({'other': swing}, '/joint_states', 'has no joint in common'),
+        ({'p': swing}, '/elsewhere', 'holds no /joint_states'),
+    ],
+)
+def test_what_cannot_be_compared_is_an_error(tmp_path, values, topic, reason):
+    first = bag(tmp_path / 'a', {'p': swing})
+    second = bag(tmp_path / 'b', values, topic=topic)
+    with pytest.raises(LinkageError, match=reason):
+        answer(compare, first, second)
