@@ -284,7 +284,11 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     period = round(NANOSECONDS / context.rate) if context.rate else 0
     made_up = max(_MADE_UP, 2 * period)
     wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
-    return TorqueDrive(motion, start, parameters, made_up, min(most, LARGEST), motor, wrenches)
+    # An effect of the user's may ask for it.
+    exerts = any(name == 'effort' or '.' in name for name in context.effects)
+    return TorqueDrive(
+        motion, start, parameters, made_up, min(most, LARGEST), motor, wrenches, exerts
+    )
 
 
 def _check_curves(
@@ -413,6 +417,8 @@ class TorqueDrive(Drive):
         The motor that is mounted on the mechanism; None if there is none.
     wrenches
         The wrenches on the links, which messages change.
+    exerts_effort
+        Whether something asks for the effort.
 
     """
 
@@ -437,14 +443,15 @@ class TorqueDrive(Drive):
         '_until',
         '_waiting',
         '_wrenches',
+        'exerts_effort',
         'lost',
         'max_age',
         'saturated',
         'stamp',
     )
 
-    exerts_effort = True
-    """Whether its effort on an input at rest does not follow from the motion."""
+    exerts_effort: bool
+    """Whether its crank state says what it exerts on an input at rest."""
     stamp: int
     """Arrival of the newest good command, in [ns]; 0 before the first."""
     max_age: int
@@ -463,7 +470,9 @@ class TorqueDrive(Drive):
         most: float = LARGEST,
         motor: Motor | Winding | None = None,
         wrenches: tuple[HeldWrench, ...] = (),
+        exerts_effort: bool = False,
     ) -> None:
+        self.exerts_effort = exerts_effort
         self._mechanism = mechanism
         self._motion = self._shown = start
         self._step = round(use.step * NANOSECONDS)
@@ -557,7 +566,7 @@ class TorqueDrive(Drive):
                 f'at a rate of {motion.rate:.4g}',
                 'shorten the step, look at the controller, or write on_chatter: close',
             )
-        if motion.rate:
+        if motion.rate or not self.exerts_effort:
             return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
         standing = CrankAtRest((motion.value,), (motion.rate,), (acceleration,), 0)
         standing.bearing = self._bearing(motion, acceleration)
