@@ -165,6 +165,7 @@ def _loaded(arguments: argparse.Namespace) -> Scene:
 def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str, int]:
     """Run a scene into a bag, and return its counts; say so if a signal stopped it."""
     done = 0
+    warnings: list[str] = []
     with progress('ticks') as advance:
 
         def goes_on(number: int) -> bool:
@@ -173,7 +174,9 @@ def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str,
             advance(number, ticks)
             return not stop.is_set()
 
-        counts = simulate(scene, folder, ticks, goes_on)
+        counts = simulate(scene, folder, ticks, goes_on, warnings.append)
+    for warning in warnings:
+        print(f'linkage simulate: {warning}', file=sys.stderr)
     if stop.is_set():
         print(f'linkage simulate: stopped after {done:,} of {ticks:,} ticks', file=sys.stderr)
     return counts

@@ -60,6 +60,12 @@ EXTRA_TOPIC, EXTRA_MESSAGE = '~/motor', JOINT_STATE
 _MADE_UP = NANOSECONDS
 """Time that one tick integrates at most, in [ns]; two periods if these are longer."""
 
+_HURRIED = NANOSECONDS // 50
+"""The same while motor and crank meet and part too often: each step then costs several."""
+
+_FEW_TRIALS = 50
+"""Fewer trials than this are left of `linkage_ros.dynamics.two_masses.SAVED` then."""
+
 _NEVER = 1 << 63
 
 _SAMPLES = 90
@@ -280,14 +286,12 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             parameters.method,
             parameters.step,
         )
-    # A scene with slow ticks must not skip time between them.
     period = round(NANOSECONDS / context.rate) if context.rate else 0
-    made_up = max(_MADE_UP, 2 * period)
     wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
     # An effect of the user's may ask for it.
     exerts = any(name == 'effort' or '.' in name for name in context.effects)
     return TorqueDrive(
-        motion, start, parameters, made_up, min(most, LARGEST), motor, wrenches, exerts
+        motion, start, parameters, period, min(most, LARGEST), motor, wrenches, exerts
     )
 
 
@@ -408,8 +412,8 @@ class TorqueDrive(Drive):
         Its state at the first tick.
     use
         Step size, and the effort without a valid command.
-    made_up
-        Longest time that one tick integrates, in [ns].
+    period
+        Time from tick to tick, in [ns]; 0 if it is not known.
     most
         Greatest command in either direction, in [N·m] or [N], or of a motor in [A] or [V];
         commands are clipped to it.
@@ -428,14 +432,16 @@ class TorqueDrive(Drive):
         '_boundary',
         '_delay',
         '_due',
-        '_ends',
         '_idle',
+        '_least_made_up',
         '_loaded_until',
         '_made_up',
         '_mechanism',
         '_most',
+        '_most_made_up',
         '_motion',
         '_motor',
+        '_play',
         '_quantum',
         '_shown',
         '_step',
@@ -466,7 +472,7 @@ class TorqueDrive(Drive):
         mechanism: Any,
         start: Any,
         use: TorqueParameters,
-        made_up: int,
+        period: int,
         most: float = LARGEST,
         motor: Motor | Winding | None = None,
         wrenches: tuple[HeldWrench, ...] = (),
@@ -476,7 +482,8 @@ class TorqueDrive(Drive):
         self._mechanism = mechanism
         self._motion = self._shown = start
         self._step = round(use.step * NANOSECONDS)
-        self._made_up = made_up
+        # A scene with slow ticks must not skip time between them.
+        self._made_up = self._most_made_up = max(_MADE_UP, 2 * period)
         self._idle = self._acting = (mechanism, 0.0, use.brake)
         self._time = self._boundary = self._begun = -1
         self._until = self._due = self._loaded_until = _NEVER
@@ -485,7 +492,8 @@ class TorqueDrive(Drive):
         self._delay = round(use.motor.delay * NANOSECONDS) if use.motor else 0
         self._quantum = use.motor.quantum if use.motor else 0.0
         self._waiting: deque[tuple[int, _Acting]] = deque()
-        self._ends = use.play is not None and use.play.on_chatter == 'end'
+        self._play = use.play
+        self._least_made_up = max(_HURRIED, 2 * period)
         self.max_age = round(use.timeout * NANOSECONDS)
         self._most = most
         self.stamp = self.lost = self.saturated = 0
@@ -559,18 +567,25 @@ class TorqueDrive(Drive):
             time += seconds
         acceleration = mechanism.acceleration(motion, force, brake, time)
         self._shown = motion
-        if self._ends and self.chattered:
-            raise LinkageError(
-                'drive.torque.play',
-                f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
-                f'at a rate of {motion.rate:.4g}',
-                'shorten the step, look at the controller, or write on_chatter: close',
-            )
+        if self._play:
+            self._watch_chatter(self._play)
         if motion.rate or not self.exerts_effort:
             return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
         standing = CrankAtRest((motion.value,), (motion.rate,), (acceleration,), 0)
         standing.bearing = self._bearing(motion, acceleration)
         return standing
+
+    def _watch_chatter(self, play: PlayParameters) -> None:
+        """Let a late tick integrate less while motor and crank meet too often, or end the run."""
+        if self.chattered and play.on_chatter == 'end':
+            raise LinkageError(
+                'drive.torque.play',
+                f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
+                f'at a rate of {self._motion.rate:.4g}',
+                'shorten the step, look at the controller, or write on_chatter: close',
+            )
+        hurries = getattr(self._motion, 'moved', self._motion).trials < _FEW_TRIALS
+        self._made_up = self._least_made_up if hurries else self._most_made_up
 
     def _bearing(self, motion: Any, acceleration: float) -> tuple[float, float]:
         """Return the least and the greatest effort that acts on the input at rest."""
@@ -592,6 +607,14 @@ class TorqueDrive(Drive):
         """Number of steps in which motor and crank met and parted too often."""
         coarse: int = getattr(getattr(self._motion, 'moved', self._motion), 'coarse', 0)
         return coarse
+
+    def describe_chatter(self, before: int = 0) -> str:
+        """Return a line on the steps that `chattered` counts, but for the first ones of them."""
+        return (
+            f'drive.torque.play: motor and crank met and parted too often in '
+            f'{self.chattered - before} steps, at whose ends the play was closed; shorten the '
+            'step, or look at the controller'
+        )
 
     @property
     def motor(self) -> tuple[float, float, float | None]:
