@@ -34,7 +34,6 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankAtRest, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.longest_step import check_step, EXACT
 from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.parameters import choice, number, option, whole
@@ -45,9 +44,6 @@ from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.layout import NANOSECONDS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from linkage_ros.dynamics.mechanics import Mechanics, Rubbing, Terms
     from linkage_ros.dynamics.motor import Motor
     from linkage_ros.dynamics.winding import Winding
     from linkage_ros.dynamics.wrenches import HeldWrench
@@ -267,13 +263,11 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             'start elsewhere',
         )
     low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
-    curved = [rubbing for rubbing in mechanics.rubbing if rubbing.law]
-    if motor or curved:
+    if motor or mechanics.curved:
         places = (low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
         moved = [terms for terms in map(mechanics.equation, places) if terms]
         moved = [terms for terms in moved if terms.inertia > 0.0]
-    if curved:
-        _check_curves(mechanics, curved, moved, parameters)
+        mechanics.check_curves(moved, parameters.method, parameters.step)
     if motor:
         least = min([terms.inertia for terms in moved], default=inf)
         if parameters.play is not None:
@@ -292,33 +286,6 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     exerts = any(name == 'effort' or '.' in name for name in context.effects)
     return TorqueDrive(
         motion, start, parameters, period, min(most, LARGEST), motor, wrenches, exerts
-    )
-
-
-def _check_curves(
-    mechanics: Mechanics, curved: Sequence[Rubbing], moved: Sequence[Terms], use: TorqueParameters
-) -> None:
-    """Refuse friction that falls with the rate faster than a step follows."""
-    joints = mechanics.closure.structure.joints
-    names = [joints[rubbing.joint].name for rubbing in curved]
-    worst, blamed = 0.0, names[0]
-    for terms in moved:
-        # Their laws follow those of the loads.
-        falling = [
-            rubbing.law.steepest * at.factor**2 / terms.inertia
-            for rubbing, at in zip(curved, terms.laws[-len(curved) :], strict=True)
-            if rubbing.law
-        ]
-        if sum(falling) > worst:
-            worst, blamed = sum(falling), names[falling.index(max(falling))]
-    check_step(
-        f'effects.friction.joints.{blamed}.stribeck',
-        worst,
-        use.method,
-        use.step,
-        'the curve is too steep',
-        'write 0: breakaway then acts at rest only',
-        EXACT,
     )
 
 
