@@ -167,6 +167,7 @@ def _loaded(arguments: argparse.Namespace) -> Scene:
 def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str, int]:
     """Run a scene into a bag, and return its counts; say so if a signal stopped it."""
     stopped_at: int | None = None
+    warnings: list[str] = []
     with progress('ticks') as advance:
 
         def goes_on(number: int) -> bool:
@@ -176,7 +177,9 @@ def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str,
                 stopped_at = number
             return stopped_at is None
 
-        counts = simulate(scene, folder, ticks, goes_on)
+        counts = simulate(scene, folder, ticks, goes_on, warnings.append)
+    for warning in warnings:
+        print(f'linkage simulate: {warning}', file=sys.stderr)
     if stopped_at is not None:
         print(
             f'linkage simulate: stopped after {stopped_at:,} of {ticks:,} ticks', file=sys.stderr

@@ -34,7 +34,6 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankAtRest, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.longest_step import check_step, EXACT
 from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.parameters import choice, number, option, whole
@@ -45,9 +44,6 @@ from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.layout import NANOSECONDS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from linkage_ros.dynamics.mechanics import Mechanics, Rubbing, Terms
     from linkage_ros.dynamics.motor import Motor
     from linkage_ros.dynamics.winding import Winding
     from linkage_ros.dynamics.wrenches import HeldWrench
@@ -59,6 +55,12 @@ EXTRA_TOPIC, EXTRA_MESSAGE = '~/motor', JOINT_STATE
 
 _MADE_UP = NANOSECONDS
 """Time that one tick integrates at most, in [ns]; two periods if these are longer."""
+
+_HURRIED = NANOSECONDS // 50
+"""The same while motor and crank meet and part too often: each step then costs several."""
+
+_FEW_TRIALS = 50
+"""Fewer trials than this are left of `linkage_ros.dynamics.two_masses.SAVED` then."""
 
 _NEVER = 1 << 63
 
@@ -261,13 +263,11 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             'start elsewhere',
         )
     low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
-    curved = [rubbing for rubbing in mechanics.rubbing if rubbing.law]
-    if motor or curved:
+    if motor or mechanics.curved:
         places = (low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
         moved = [terms for terms in map(mechanics.equation, places) if terms]
         moved = [terms for terms in moved if terms.inertia > 0.0]
-    if curved:
-        _check_curves(mechanics, curved, moved, parameters)
+        mechanics.check_curves(moved, parameters.method, parameters.step)
     if motor:
         least = min([terms.inertia for terms in moved], default=inf)
         if parameters.play is not None:
@@ -280,37 +280,12 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             parameters.method,
             parameters.step,
         )
-    # A scene with slow ticks must not skip time between them.
     period = round(NANOSECONDS / context.rate) if context.rate else 0
-    made_up = max(_MADE_UP, 2 * period)
     wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
-    return TorqueDrive(motion, start, parameters, made_up, min(most, LARGEST), motor, wrenches)
-
-
-def _check_curves(
-    mechanics: Mechanics, curved: Sequence[Rubbing], moved: Sequence[Terms], use: TorqueParameters
-) -> None:
-    """Refuse friction that falls with the rate faster than a step follows."""
-    joints = mechanics.closure.structure.joints
-    names = [joints[rubbing.joint].name for rubbing in curved]
-    worst, blamed = 0.0, names[0]
-    for terms in moved:
-        # Their laws follow those of the loads.
-        falling = [
-            rubbing.law.steepest * at.factor**2 / terms.inertia
-            for rubbing, at in zip(curved, terms.laws[-len(curved) :], strict=True)
-            if rubbing.law
-        ]
-        if sum(falling) > worst:
-            worst, blamed = sum(falling), names[falling.index(max(falling))]
-    check_step(
-        f'effects.friction.joints.{blamed}.stribeck',
-        worst,
-        use.method,
-        use.step,
-        'the curve is too steep',
-        'write 0: breakaway then acts at rest only',
-        EXACT,
+    # An effect of the user's may ask for it.
+    exerts = any(name == 'effort' or '.' in name for name in context.effects)
+    return TorqueDrive(
+        motion, start, parameters, period, min(most, LARGEST), motor, wrenches, exerts
     )
 
 
@@ -404,8 +379,8 @@ class TorqueDrive(Drive):
         Its state at the first tick.
     use
         Step size, and the effort without a valid command.
-    made_up
-        Longest time that one tick integrates, in [ns].
+    period
+        Time from tick to tick, in [ns]; 0 if it is not known.
     most
         Greatest command in either direction, in [N·m] or [N], or of a motor in [A] or [V];
         commands are clipped to it.
@@ -413,6 +388,8 @@ class TorqueDrive(Drive):
         The motor that is mounted on the mechanism; None if there is none.
     wrenches
         The wrenches on the links, which messages change.
+    exerts_effort
+        Whether something asks for the effort.
 
     """
 
@@ -422,14 +399,16 @@ class TorqueDrive(Drive):
         '_boundary',
         '_delay',
         '_due',
-        '_ends',
         '_idle',
+        '_least_made_up',
         '_loaded_until',
         '_made_up',
         '_mechanism',
         '_most',
+        '_most_made_up',
         '_motion',
         '_motor',
+        '_play',
         '_quantum',
         '_shown',
         '_step',
@@ -437,14 +416,15 @@ class TorqueDrive(Drive):
         '_until',
         '_waiting',
         '_wrenches',
+        'exerts_effort',
         'lost',
         'max_age',
         'saturated',
         'stamp',
     )
 
-    exerts_effort = True
-    """Whether its effort on an input at rest does not follow from the motion."""
+    exerts_effort: bool
+    """Whether its crank state says what it exerts on an input at rest."""
     stamp: int
     """Arrival of the newest good command, in [ns]; 0 before the first."""
     max_age: int
@@ -459,15 +439,18 @@ class TorqueDrive(Drive):
         mechanism: Any,
         start: Any,
         use: TorqueParameters,
-        made_up: int,
+        period: int,
         most: float = LARGEST,
         motor: Motor | Winding | None = None,
         wrenches: tuple[HeldWrench, ...] = (),
+        exerts_effort: bool = False,
     ) -> None:
+        self.exerts_effort = exerts_effort
         self._mechanism = mechanism
         self._motion = self._shown = start
         self._step = round(use.step * NANOSECONDS)
-        self._made_up = made_up
+        # A scene with slow ticks must not skip time between them.
+        self._made_up = self._most_made_up = max(_MADE_UP, 2 * period)
         self._idle = self._acting = (mechanism, 0.0, use.brake)
         self._time = self._boundary = self._begun = -1
         self._until = self._due = self._loaded_until = _NEVER
@@ -476,7 +459,8 @@ class TorqueDrive(Drive):
         self._delay = round(use.motor.delay * NANOSECONDS) if use.motor else 0
         self._quantum = use.motor.quantum if use.motor else 0.0
         self._waiting: deque[tuple[int, _Acting]] = deque()
-        self._ends = use.play is not None and use.play.on_chatter == 'end'
+        self._play = use.play
+        self._least_made_up = max(_HURRIED, 2 * period)
         self.max_age = round(use.timeout * NANOSECONDS)
         self._most = most
         self.stamp = self.lost = self.saturated = 0
@@ -550,18 +534,25 @@ class TorqueDrive(Drive):
             time += seconds
         acceleration = mechanism.acceleration(motion, force, brake, time)
         self._shown = motion
-        if self._ends and self.chattered:
-            raise LinkageError(
-                'drive.torque.play',
-                f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
-                f'at a rate of {motion.rate:.4g}',
-                'shorten the step, look at the controller, or write on_chatter: close',
-            )
-        if motion.rate:
+        if self._play:
+            self._watch_chatter(self._play)
+        if motion.rate or not self.exerts_effort:
             return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
         standing = CrankAtRest((motion.value,), (motion.rate,), (acceleration,), 0)
         standing.bearing = self._bearing(motion, acceleration)
         return standing
+
+    def _watch_chatter(self, play: PlayParameters) -> None:
+        """Let a late tick integrate less while motor and crank meet too often, or end the run."""
+        if self.chattered and play.on_chatter == 'end':
+            raise LinkageError(
+                'drive.torque.play',
+                f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
+                f'at a rate of {self._motion.rate:.4g}',
+                'shorten the step, look at the controller, or write on_chatter: close',
+            )
+        hurries = getattr(self._motion, 'moved', self._motion).trials < _FEW_TRIALS
+        self._made_up = self._least_made_up if hurries else self._most_made_up
 
     def _bearing(self, motion: Any, acceleration: float) -> tuple[float, float]:
         """Return the least and the greatest effort that acts on the input at rest."""
@@ -583,6 +574,14 @@ class TorqueDrive(Drive):
         """Number of steps in which motor and crank met and parted too often."""
         coarse: int = getattr(getattr(self._motion, 'moved', self._motion), 'coarse', 0)
         return coarse
+
+    def describe_chatter(self, before: int = 0) -> str:
+        """Return a line on the steps that `chattered` counts, but for the first ones of them."""
+        return (
+            f'drive.torque.play: motor and crank met and parted too often in '
+            f'{self.chattered - before} steps, at whose ends the play was closed; shorten the '
+            'step, or look at the controller'
+        )
 
     @property
     def motor(self) -> tuple[float, float, float | None]:

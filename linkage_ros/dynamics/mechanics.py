@@ -48,6 +48,7 @@ from linkage_ros.dynamics.loads import (
     JointFriction,
     Loads,
 )
+from linkage_ros.dynamics.longest_step import check_step, EXACT
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.arithmetic import all_finite, called, copysign, where
 from linkage_ros.kinematics.closure import Closure
@@ -162,6 +163,8 @@ class Mechanics:
             *(rubbing.law for rubbing in self.rubbing if rubbing.law),
         )
         """Laws of the forces, in the order of ``Terms.laws``."""
+        self.curved = tuple(rubbing for rubbing in self.rubbing if rubbing.law)
+        """The joints whose friction falls with the rate; their laws are the last ones."""
         sticks = any(rubbing.friction.excess for rubbing in self.rubbing)
         self._plain = not sticks and self.applied is None
         """Whether the equation has neither laws nor an excess of friction at rest."""
@@ -383,6 +386,40 @@ class Mechanics:
                 effort = where(abs(v[1]) <= 0.0, rest, effort)
             efforts += (effort,)
         return efforts
+
+    def check_curves(self, places: Sequence[Terms], method: str, step: float) -> None:
+        """
+        Refuse friction that falls with the rate faster than a step follows.
+
+        Parameters
+        ----------
+        places
+            The equation of motion at places of the range.
+        method, step
+            The method of integration, by name, and its step, in [s].
+
+        Raises
+        ------
+        DefinitionError
+            With the key of the steepest curve; the remedy is the longest step that follows it.
+
+        """
+        worst, blamed = 0.0, None
+        for terms in places:
+            pairs = zip(self.curved, terms.laws[len(terms.laws) - len(self.curved) :], strict=True)
+            falls = {r: r.law.steepest * at.factor**2 / terms.inertia for r, at in pairs if r.law}
+            if sum(falls.values()) > worst:
+                worst, blamed = sum(falls.values()), max(falls, key=falls.__getitem__)
+        if blamed is not None:
+            check_step(
+                f'effects.friction.joints.{self.closure.structure.joints[blamed.joint].name}.stribeck',
+                worst,
+                method,
+                step,
+                'the curve is too steep',
+                'write 0: breakaway then acts at rest only',
+                EXACT,
+            )
 
     def _rubbing_joints(self) -> Iterator[Rubbing]:
         closure = self.closure

@@ -530,7 +530,7 @@ class Warnings:
         self._wrenches_rejected: dict[str, dict[Rejection, int]] = {}
         self._unclosed = dict.fromkeys(Status, 0)
         self._lost = self._stalls = self._ticks = self._stale = 0
-        self._chattered = 0
+        self._chattered: dict[str, int] = {}
         self._heard = (0, 0, monotonic())
         self._looked = (0, monotonic())
 
@@ -679,16 +679,14 @@ class Warnings:
                     self._unclosed[status] = counts.unclosed[status]
 
     def check_chatter(self, lines: Sequence[LinkagePipeline], period: float) -> None:
-        """Warn of steps in which motor and crank met and parted too often; in [s] at most once."""
-        count = chattered(lines)
-        self._chattered = min(self._chattered, count)  # a reset counts anew
-        line = (
-            f'drive.torque.play: motor and crank met and parted too often in '
-            f'{count - self._chattered} steps, at whose ends the play was closed; '
-            'shorten the step, or look at the controller'
-        )
-        if count > self._chattered and self.warn('chatter', line, period):
-            self._chattered = count
+        """Warn of steps in which motor and crank met and parted too often, once a period [s]."""
+        for line in lines:
+            kind, count = f'chatter {line.member.name}', getattr(line.drive, 'chattered', 0)
+            before = min(self._chattered.get(kind, 0), count)  # a reset counts anew
+            if count > before:
+                told: str = line.drive.describe_chatter(before)  # type: ignore[attr-defined]
+                before = count if self.warn(kind, f'{told}{_of(line)}', period) else before
+            self._chattered[kind] = before
 
     def check_wrenches(self, topics: Sequence[tuple[str, WrenchCounts]], period: float) -> None:
         """

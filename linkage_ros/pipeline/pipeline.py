@@ -411,7 +411,7 @@ class LinkagePipeline:
         if isinstance(seen, LinkageTick):
             return seen
         crank_numbers, numbers, _ = seen
-        crank = CrankState(*crank_numbers)
+        crank = _crank_state(crank_numbers)
         position = self._close(*crank.angles)
         reading = None if numbers is None else SensorReading(*numbers)
         return LinkageTick(crank, position, self._moved(crank, position), reading)
@@ -802,4 +802,8 @@ def _named(seen: LinkageTick | Numbers) -> LinkageTick | Seen:
     if isinstance(seen, LinkageTick):
         return seen
     crank, reading, reactions = seen
-    return Seen(CrankState(*crank), SensorReading(*reading), reactions)
+    return Seen(_crank_state(crank), SensorReading(*reading), reactions)
+
+
+def _crank_state(crank: tuple[Any, ...]) -> CrankState:
+    return crank if isinstance(crank, CrankState) else CrankState(*crank)

@@ -80,6 +80,7 @@ class Straight(NamedTuple):
     # `CrankState` by name, or return through ``plain``.
     lines: list[str]
     bound: dict[str, Any]
+    crank: str  # The crank state, as an expression
     # Values of the reading, as expressions; empty where the scene does not ask for them.
     joints: list[str]
     rates: list[str]
@@ -112,8 +113,9 @@ def straight(
     """
     crank = drive.straight(compiled.driven, 'return plain(now, None)')
     lines, bound = [*crank.lines], {**crank.bound}
-    # A drive that is not written out names its state, which may hold more than its fields.
-    state = 'crank' if 'crank = state(now)' in lines else f'CrankState({_CRANK})'
+    # The state of a drive that exerts an effort holds more than its fields.
+    exerts = getattr(drive, 'exerts_effort', False)
+    state = 'crank' if exerts else f'CrankState({_CRANK})'
     for number, stage in enumerate(drive_stages):
         bound[f'stage{number}'] = stage
         lines.append(f'crank = {_CRANK}, = stage{number}({state})')
@@ -150,9 +152,11 @@ def straight(
     if efforts and drive_stages:
         # Within its play, the motor moves alone and carries only itself.
         leave_unless("{*getattr(crank, 'free_motors', ())} <= {None}")
-    if efforts and getattr(drive, 'exerts_effort', False):
-        # On an input at rest the drive exerts what it is told, which no motion shows.
-        leave_unless("not getattr(crank, 'bearing', ())")
+    if efforts and exerts:
+        # As `linkage_ros.effects.effort` for an input at rest.
+        effort = efforts[0]
+        lines.append("bearing = getattr(crank, 'bearing', ())")
+        lines.append(f'if bearing: {effort} = min(max({effort}, bearing[0]), bearing[1])')
     if angles is not None:
         bound['running'] = angles
         lines.append('last = running.raw')
@@ -166,7 +170,8 @@ def straight(
         turns = [f'n{i}' for i in range(len(joints))]
         lines.append(f'{", ".join(turns)}, = running.added')
         lines += [f'{joint} += {turn}' for joint, turn in zip(joints, turns, strict=True)]
-    return Straight(lines, bound, joints, rates, accelerations, efforts, reactions)
+    crank_text = 'crank' if exerts else f'({_CRANK})'
+    return Straight(lines, bound, crank_text, joints, rates, accelerations, efforts, reactions)
 
 
 def straight_look(
@@ -187,10 +192,11 @@ def straight_look(
         Computes all other ticks.
 
     """
-    lines = [f'crank = new(CrankState, ({_CRANK}))', f'reading = new(Reading, {_reading(usual)})']
+    lines = [f'reading = new(Reading, {_reading(usual)})']
     if read is not None:
         lines.append('reading = read(now, reading)')
-    lines.append(f'return new(Seen, (crank, reading, {_reactions(usual)}))')
+    crank = usual.crank if usual.crank == 'crank' else f'new(CrankState, {usual.crank})'
+    lines.append(f'return new(Seen, ({crank}, reading, {_reactions(usual)}))')
     return _function(usual, lines, {'read': read, 'plain': plain})
 
 
@@ -217,7 +223,7 @@ def straight_share(usual: Straight, plain: Plain) -> Callable[..., Any]:
     lines = [
         f'_, own_positions, own_rates, _, own_efforts = reading = {_reading(usual)}',
         *[f'all_{name} += own_{name}' for name, group in groups.items() if group],
-        f'return (({_CRANK}), reading, {_reactions(usual)})',
+        f'return ({usual.crank}, reading, {_reactions(usual)})',
     ]
     return _function(usual, lines, {'plain': plain}, ['now', *(f'all_{name}' for name in groups)])
 
@@ -253,7 +259,7 @@ def straight_tick(
     lines = [f'reading = {_reading(usual)}', *packed.lines]
     if extras:
         lines.append('reading = new(Reading, reading)')
-    seen = f'(({_CRANK}), reading, {_reactions(usual)})'
+    seen = f'({usual.crank}, reading, {_reactions(usual)})'
     messages = _tuple(
         [
             f'write{number}(now, {"None" if extra.of_reading else "seen"}, reading)'

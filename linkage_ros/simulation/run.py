@@ -97,7 +97,11 @@ def times(scene: Scene, ticks: int) -> Sequence[int]:
 
 
 def simulate(
-    scene: Scene, folder: Path, ticks: int, goes_on: Callable[[int], bool]
+    scene: Scene,
+    folder: Path,
+    ticks: int,
+    goes_on: Callable[[int], bool],
+    warn: Callable[[str], None] = lambda _: None,
 ) -> dict[str, int]:
     """
     Run a scene, and write what its node would record.
@@ -113,6 +117,8 @@ def simulate(
     goes_on
         Called now and then with the number of ticks so far; if it returns False, the run ends and
         the bag is complete up to there. Signals only set the stop event: it has to look at that.
+    warn
+        Called at the end with a line on what a node would have warned of.
 
     Returns
     -------
@@ -159,6 +165,9 @@ def simulate(
         finally:
             counts = dict(zip((topic.name for _, topic in topics), recording.written, strict=True))
             writer.close({'linkage_ros.dropped': json.dumps(dict.fromkeys(counts, 0))})
+    for line in loop.pipeline.lines:
+        if getattr(line.drive, 'chattered', 0):
+            warn(line.drive.describe_chatter())  # type: ignore[attr-defined]
     return counts
 
 

@@ -20,6 +20,7 @@ What is counted is work, not time: how often the equation of motion is asked for
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.loads import Loads
@@ -147,6 +148,21 @@ def test_the_run_ends_where_the_scene_says_so():
     with pytest.raises(LinkageError, match=r'drive\.torque\.play: .* step of 0.001 s') as caught:
         pushed(drive, 10)
     assert '\n' not in str(caught.value)
+
+
+def test_a_late_tick_integrates_little_while_it_chatters():
+    # A tick comes each 100 ms, where 10 ms are wanted: 20 ms of these are integrated.
+    drive = drive_of(f'{LIGHT}, on_chatter: close')
+    lost = []
+    for number in range(40):
+        now = BEGIN + 100 * number * MS
+        assert drive.offer(EffortCommand(0, 5.0), now) is None
+        drive.state(now)
+        lost.append(drive.lost)
+    assert drive.chattered > 0
+    skipped = [(after - before) // MS for before, after in pairwise(lost)]
+    assert skipped[0] == 0
+    assert skipped[-1] in {79, 80, 81}
 
 
 def test_bounces_that_end_are_no_chatter():

@@ -210,7 +210,7 @@ def test_a_curve_too_narrow_for_any_step_has_its_remedy():
 GIVEN = {
     'constant_rate': 'constant_rate: {rate: 3.0, start: 2.0}',
     'sine': 'sine: {mean: 2.0, amplitude: 0.8, frequency: 0.5}',
-    'chirp': 'chirp: {mean: 2, amplitude: 0.8, start_frequency: 0.5, end_frequency: 1, seconds: 2}',
+    'chirp': 'chirp: {mean: 2, amplitude: 1, start_frequency: 0.5, end_frequency: 1, seconds: 2}',
     'profile': 'profile: {table: [[0, 2.0], [1, 3.0]]}',
 }
 

@@ -167,8 +167,8 @@ def test_the_crank_reaches_its_target_and_stays_and_is_braked_when_nobody_comman
     # The command is what weight and friction ask for, no more and no less.
     theta = held.position[0]
     assert abs(KP * (TARGET - theta) - slope_of_the_weight(theta)) <= friction(theta) + 1e-6
-    # At rest the drive bears the weight alone: friction has no direction.
-    assert held.effort[0] == pytest.approx(slope_of_the_weight(theta), rel=1e-6)
+    # At rest the drive exerts what is commanded; friction bears the difference from the weight.
+    assert held.effort[0] == pytest.approx(KP * (TARGET - theta), abs=1e-9)
     count = len(states)
     wait_for(lambda: len(states) > count + 1000, 'a second more')
     assert {tuple(state.position) for state in states[count:]} == {tuple(held.position)}
