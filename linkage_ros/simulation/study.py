@@ -30,6 +30,10 @@ from contextlib import closing
 from functools import partial
 from itertools import islice, product
 from math import inf, isfinite, sqrt
+from multiprocessing import parent_process
+import os
+import signal
+from threading import Thread
 from typing import NamedTuple
 
 from linkage_ros.effects.stage import SensorReading
@@ -299,7 +303,7 @@ def _in_processes(
     waiting: Iterator[tuple[int, Settings]],
     workers: int,
 ) -> Iterator[tuple[int, Outcome]]:
-    pool = ProcessPoolExecutor(workers)
+    pool = ProcessPoolExecutor(workers, initializer=_begin_worker)
     running: set[Future[tuple[int, Outcome]]] = set()
     ended = False
     try:
@@ -323,6 +327,21 @@ def _in_processes(
         # At an end of its own the processes end first: torn down with the interpreter, they write
         # a traceback now and then. A stop does not wait for runs.
         pool.shutdown(wait=ended, cancel_futures=True)
+
+
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the parent, which ends this process; end with it if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _numbered(study: Study, part: tuple[int, Settings]) -> tuple[int, Outcome]:

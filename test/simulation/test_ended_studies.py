@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 import os
 from pathlib import Path
 import signal
@@ -47,9 +48,10 @@ def _in_folder(tmp_path, monkeypatch):
 
 
 def command(output, *options):
-    return ['simulate', 'noisy.yaml', '--seconds', '2', '--seeds', '24', '-o', output, *options]
+    return ['simulate', 'noisy.yaml', '--seconds', '1', '--seeds', '24', '-o', output, *options]
 
 
+@cache
 def uninterrupted():
     assert main(command('whole.csv', '--workers', '1')) == 0
     return Path('whole.csv').read_bytes()
