@@ -16,13 +16,15 @@
 Run a scene as fast as it goes, without ROS: once, into a bag or a table, or many times as a study.
 
 A study runs the scene with other seeds and other values of its keys. It writes a table with a row
-for each run, and a picture of the spread over the time.
+for each run, and a picture of the spread over the time. A study that was ended goes on when it is
+called again with the same scene and options: OUTPUT.part holds its finished runs until then.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from math import nan
 from os import cpu_count
 from pathlib import Path
@@ -41,6 +43,7 @@ from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.notes import scene_notes
 from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
+from linkage_ros.simulation.finished_runs import FinishedRuns
 from linkage_ros.simulation.run import check_simulated, simulate
 from linkage_ros.simulation.study import (
     instants_of,
@@ -204,22 +207,43 @@ def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) 
     runs = runs_of(sweeps, arguments.seeds, scene.seed)
     instants = instants_of(len(runs), len(scene.joints), ticks)
     study = Study(scene.name, scene.files, scene.folder, arguments.seconds, instants)
-    found: dict[int, Outcome] = {}
-    with progress('runs') as advance:
-        workers = arguments.workers or cpu_count() or 1
-        for number, outcome in outcomes(study, runs, min(workers, len(runs)), arguments.dask):
-            found[number] = outcome
-            advance(len(found), len(runs))
-            if stop.is_set():
-                print('linkage simulate: stopped; nothing was written', file=sys.stderr)
-                return 1
+    with closing(FinishedRuns(output, study, runs)) as finished:
+        found = finished.outcomes
+        if found:
+            _say(f'goes on after {len(found)} of {len(runs)} runs, of {finished.file}')
+        waiting = [part for part in enumerate(runs) if part[0] not in found]
+        workers = max(1, min(arguments.workers or cpu_count() or 1, len(waiting)))
+        try:
+            with progress('runs') as advance:
+                for number, outcome in outcomes(study, waiting, workers, arguments.dask):
+                    finished.add(number, outcome)
+                    advance(len(found), len(runs))
+                    if stop.is_set():
+                        raise StoppedError
+        except StoppedError:
+            kept = f'{len(found)} of {len(runs)} runs are kept in {finished.file}'
+            _say(f'stopped; {kept}; the same command goes on' if found else 'stopped')
+            return 1
+        return _written(arguments, scene, runs, finished, pictures)
+
+
+def _written(
+    arguments: argparse.Namespace,
+    scene: Scene,
+    runs: Sequence[Settings],
+    finished: FinishedRuns,
+    pictures: Sequence[Path],
+) -> int:
+    """Write the results of a study; return 1 if no run succeeded."""
+    output, found = arguments.output, finished.outcomes
     failed = [(runs[number], found[number].failure) for number in sorted(found)
               if found[number].failure]  # fmt: skip
     for given, failure in failed[:_MOST_NAMED]:
-        print(f'linkage simulate: {_told(given)}: {failure}', file=sys.stderr)
+        _say(f'{_told(given)}: {failure}')
     if failed:
-        print(f'linkage simulate: {len(failed)} of {len(runs)} runs failed', file=sys.stderr)
+        _say(f'{len(failed)} of {len(runs)} runs failed')
     if len(failed) == len(runs):
+        finished.remove()
         return 1
     if output.suffix in KINDS:
         heads, rows = _table(scene, runs, found)
@@ -229,7 +253,12 @@ def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) 
     for picture in pictures:
         _draw(scene, arguments.seconds, found, picture)
         print(picture)
+    finished.remove()
     return 0
+
+
+def _say(text: str) -> None:
+    print(f'linkage simulate: {text}', file=sys.stderr)
 
 
 def _told(settings: Settings) -> str:

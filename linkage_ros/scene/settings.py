@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import re
 from typing import Any
 
 from linkage_ros.errors import did_you_mean, FileError, listed, quoted
@@ -44,7 +45,8 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
         The scene, which is changed; no key of it may have been taken.
     settings
         One ``KEY=VALUE`` each: a dotted key, and a value in YAML. Of several linkages one is
-        named: ``linkages.left.drive.sine.amplitude=0.3``.
+        named: ``linkages.left.drive.sine.amplitude=0.3``. A part with a dot that is not in the
+        scene yet stands in quotes: ``loads.forces."coupler.P".constant=5``.
 
     Raises
     ------
@@ -55,18 +57,34 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
     """
     for setting in settings:
         key, equal, text = setting.partition('=')
-        *outer, last = key.split('.')
+        parts = _PART.findall(key)
         # On one line no value can add further keys.
-        if not equal or not all((*outer, last)) or not setting.isprintable():
+        if not equal or '.'.join(parts) != key or not setting.isprintable():
             raise _error(setting, f'{quoted(setting)} is no setting', 'write KEY=VALUE: rate=500')
         within: Any = content.mapping
-        for part in outer:
-            within = _inner(setting, within, part)
-        within = _mapping(setting, outer[-1] if outer else '', within)
+        outer = ''
+        while (part := _next_part(within, parts)) and parts:
+            within, outer = _inner(setting, within, part), part
+        within, last = _mapping(setting, outer, within), part
         within.lines.setdefault(last, 0)
         within[last] = _value(setting, text)
     head = ''.join(f'# --set {setting}\n' for setting in settings)
     return (head + yaml.dump(content.mapping, Dumper=_Dumper, sort_keys=False)).encode()
+
+
+_PART = re.compile(r'"[^"]+"|[^".]+')
+"""A part of a key; in quotes it may contain dots."""
+
+
+def _next_part(within: Any, parts: list[str]) -> str:
+    """Remove the next part of a key, and return it: the longest that is there, dots included."""
+    count = 1
+    for more in range(2, len(parts) + 1):
+        if isinstance(within, LinedDict) and '.'.join(parts[:more]) in within:
+            count = more
+    part = '.'.join(parts[:count])
+    del parts[:count]
+    return part.strip('"')
 
 
 def _inner(setting: str, within: Any, part: str) -> Any:
@@ -108,7 +126,7 @@ def _value(setting: str, text: str) -> Any:
 def blamed(error: FileError, content: Section, settings: Sequence[str]) -> FileError:
     """Return an error of a scene; it names the setting that it is about instead of the file."""
     for setting in reversed(settings):
-        key, _, _ = setting.partition('=')
+        key = setting.partition('=')[0].replace('"', '')
         if error.file == content.file and _is_within(error.key, _counted(content, key)):
             return _error(setting, f'{error.key}: {error.reason}', error.remedy)
     return error

@@ -23,17 +23,21 @@ by their length.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from functools import partial
-from itertools import product
+from itertools import islice, product
 from math import inf, isfinite, sqrt
+from multiprocessing import parent_process
+import os
+import signal
+from threading import Thread
 from typing import NamedTuple
 
 from linkage_ros.effects.stage import SensorReading
-from linkage_ros.errors import LinkageError, quoted
+from linkage_ros.errors import clean, LinkageError, quoted
 from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline
 from linkage_ros.pipeline.straight_tick import Numbers, Seen
 from linkage_ros.scene.load import parse_scene
@@ -45,6 +49,7 @@ MOST_RUNS = 100_000
 _MOST_VALUES = 20_000_000
 _MOST_INSTANTS, _FEWEST_INSTANTS = 200, 20
 _BLOCK = 4096
+_AHEAD = 3  # Runs for each process that are in progress or wait for it.
 QUANTITIES = ('', ' rate', ' effort')
 """What a reading has of a joint: its position, its rate, its effort."""
 
@@ -174,10 +179,12 @@ def run_one(study: Study, settings: Settings) -> Outcome:
             trust_effects=True, settings=written,
         )  # fmt: skip
         ticks = check_simulated(scene, study.seconds)
-        pipeline = Pipeline(scene)
+        return _reduced(Pipeline(scene), times(scene, ticks), study.instants)
     except LinkageError as error:
-        return Outcome(str(error), 0, 0, {}, np.empty((0, 0)))
-    return _reduced(pipeline, times(scene, ticks), study.instants)
+        failure = str(error)
+    except Exception as error:  # noqa: BLE001 (the other runs go on)
+        failure = f'unexpected {error!r}'
+    return Outcome(clean(failure), 0, 0, {}, np.empty((0, 0)))
 
 
 def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
@@ -271,7 +278,7 @@ class _Reduction:
 
 
 def outcomes(
-    study: Study, runs: Sequence[Settings], workers: int, dask: str = ''
+    study: Study, runs: Sequence[tuple[int, Settings]], workers: int, dask: str = ''
 ) -> Iterator[tuple[int, Outcome]]:
     """
     Yield the number of each run and its outcome, in the order in which they end.
@@ -280,24 +287,61 @@ def outcomes(
     is not ''. A LinkageError says that the workers failed.
     """
     work = partial(_numbered, study)
-    parts = enumerate(runs)
     if dask:
         from linkage_ros.synthesis.study import results_of  # local import: only with Dask
 
-        with closing(results_of(work, lambda _threads: parts, dask)) as results:
+        with closing(results_of(work, lambda _threads: iter(runs), dask)) as results:
             yield from (result for _, result in results)
     elif workers == 1:
-        yield from map(work, parts)
+        yield from map(work, runs)
     else:
-        with ProcessPoolExecutor(workers) as pool:
-            try:
-                yield from pool.map(work, parts, chunksize=max(1, len(runs) // (8 * workers)))
-            except BrokenProcessPool:
-                raise LinkageError(
-                    'the study', 'a process of it was killed', 'take fewer --workers or runs'
-                ) from None
-            finally:
-                pool.shutdown(wait=False, cancel_futures=True)
+        yield from _in_processes(work, iter(runs), workers)
+
+
+def _in_processes(
+    work: Callable[[tuple[int, Settings]], tuple[int, Outcome]],
+    waiting: Iterator[tuple[int, Settings]],
+    workers: int,
+) -> Iterator[tuple[int, Outcome]]:
+    pool = ProcessPoolExecutor(workers, initializer=_begin_worker)
+    running: set[Future[tuple[int, Outcome]]] = set()
+    ended = False
+    try:
+        while not ended:
+            ahead = islice(waiting, _AHEAD * workers - len(running))
+            running |= {pool.submit(work, part) for part in ahead}
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            # Finished runs first: where a process was killed, all others fail with it.
+            for future in sorted(done, key=lambda each: each.exception() is not None):
+                yield future.result()
+            ended = not done
+    except BrokenProcessPool:
+        ended = True
+        raise LinkageError(
+            'the study',
+            'a process of it was killed',
+            'run the same command again: finished runs are kept; for less memory take fewer '
+            '--workers',
+        ) from None
+    finally:
+        # At an end of its own the processes end first: torn down with the interpreter, they write
+        # a traceback now and then. A stop does not wait for runs.
+        pool.shutdown(wait=ended, cancel_futures=True)
+
+
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the parent, which ends this process; end with it if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _numbered(study: Study, part: tuple[int, Settings]) -> tuple[int, Outcome]:
