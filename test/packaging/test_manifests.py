@@ -45,7 +45,10 @@ def test_package_xml_is_valid(root):
 
 
 def test_every_ros_import_is_declared(root, package_xml):
-    ours = r'ament_index_python|launch|builtin_interfaces|\w+_msgs|rcl_interfaces|rclpy|std_srvs|launch_ros'
+    ours = (
+        r'ament_index_python|builtin_interfaces|launch|launch_ros|\w+_msgs|rcl_interfaces|rclpy|'
+        'std_srvs'
+    )
     imported = set()
     for folder in ('linkage_ros', 'launch'):
         for path in (root / folder).rglob('*.py'):
@@ -56,9 +59,9 @@ def test_every_ros_import_is_declared(root, package_xml):
 
 ROS_PACKAGES = {
     'ament_copyright', 'ament_flake8', 'ament_index_python', 'ament_pep257', 'builtin_interfaces',
-    'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy',
-    'robot_state_publisher', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs',
-    'trajectory_msgs', 'visualization_msgs',
+    'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros', 'lifecycle_msgs',
+    'rcl_interfaces', 'rclpy', 'robot_state_publisher', 'rosgraph_msgs', 'sensor_msgs',
+    'std_msgs', 'std_srvs', 'trajectory_msgs', 'visualization_msgs',
 }  # fmt: skip
 """Released into Jazzy: rosdep takes them from ros-jazzy-…. (rosdistro, jazzy/distribution.yaml)"""
 
