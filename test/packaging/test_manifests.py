@@ -16,7 +16,10 @@
 """The manifests agree with each other, and the tools that read them can."""
 
 from configparser import ConfigParser
+from pathlib import Path
 import re
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 
 import pytest
@@ -119,6 +122,33 @@ def test_parameter_file_has_the_shape_that_rcl_reads(root):
         'thread_priority': 0,
         'lock_memory': False,
     }
+
+
+# As those that Jazzy's launch_testing and launch_testing_ros have, by their names there.
+PLUGINS = {
+    'launch_testing': 'def pytest_pycollect_makemodule(path, parent):\n    pass\n',
+    'launch_ros': 'def pytest_launch_collect_makemodule(path, parent):\n    pass\n',
+}
+
+
+def test_the_plugins_of_launch_do_not_keep_pytest_from_running(root, environment, tmp_path):
+    """On a robot they load into every pytest; a newer one than Jazzy's refuses them."""
+    for name, text in PLUGINS.items():
+        (tmp_path / f'plugin_of_{name}.py').write_text(text)
+        about = tmp_path / f'{name}-3.4.dist-info'
+        about.mkdir()
+        (about / 'METADATA').write_text(f'Metadata-Version: 2.1\nName: {name}\nVersion: 3.4\n')
+        (about / 'entry_points.txt').write_text(f'[pytest11]\n{name} = plugin_of_{name}\n')
+    here = Path(__file__).relative_to(root)
+    done = subprocess.run(
+        [sys.executable, '-m', 'pytest', '--collect-only', '-q', str(here)],
+        cwd=root,
+        env=environment | {'PYTHONPATH': str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_policy_grants_no_wildcard(root):
