@@ -294,7 +294,7 @@ def parts(kinds: list[str], seed: int, size: int, sample: int | None) -> list[Pa
             else:
                 places = sorted(Random(f'{seed} {kind} {damage}').sample(range(count), sample))
                 work += [
-                    Part(kind, seed, size, damage, places[start : start + _PART])
+                    Part(kind, seed, size, damage, places[slice(start, start + _PART)])
                     for start in range(0, sample, _PART)
                 ]
     return work
@@ -330,7 +330,7 @@ def run_part(part: Part) -> Tally:
                         tally.faults.append((part.kind, part.damage, place, name, verdict))
                 if part.damage == 'flip':
                     file.seek(at)
-                    file.write(content[at : at + 1])
+                    file.write(bytes([content[at]]))
                 else:
                     file.seek(place)
                     file.write(content[place:])

@@ -12,6 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+# The path comes before the imports.
+# flake8: noqa: E402, I100
+
 
 """
 The documentation site: Sphinx, pages in MyST's Markdown, the theme Furo.

@@ -78,7 +78,7 @@ class Section(NamedTuple):
 
     @property
     def scene(self) -> str:
-        """The scene of the section; '' for none."""
+        """Return the scene of the section; '' for none."""
         match = re.search(r'^```yaml\n(.*?)^```$', self.text, re.MULTILINE | re.DOTALL)
         return match.group(1) if match else ''
 

@@ -29,7 +29,7 @@ import tempfile
 
 from PIL import Image
 
-from test.browser.chromium import browser
+from test.browser.chromium import browser  # noqa: I100 (our own, not that of Python)
 from test.browser.opened import opened
 
 FILE = Path(__file__).resolve().parent / 'report.png'

@@ -34,7 +34,7 @@ from linkage_ros.view.page import page as page_of
 from linkage_ros.view.server import serve
 from PIL import Image
 
-from test.browser import chromium
+from test.browser import chromium  # noqa: I100 (our own, not that of Python)
 
 HERE = Path(__file__).parent
 NAME = 'hoeken'

@@ -12,6 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+# Each cell imports what it shows.
+# flake8: noqa: E402, I100
+
 
 """A tutorial in cells, which the documentation site runs and shows."""
 

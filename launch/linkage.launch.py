@@ -53,8 +53,7 @@ ARGUMENTS = {
     ),
     'publish_frequency': (
         '',
-        'Most transforms a second of a joint, up to 1000; below the rate of its messages crank and '
-        "dependent joints come apart; '': the value of params_file, else 1000.",
+        "Most transforms of a joint a second, 1 to 1000; '': those of params_file, or 1000.",
     ),
     'frame_prefix': ('', "Before all frames, as left/; '': the value of params_file."),
 }

@@ -32,7 +32,7 @@ from typing import Any
 
 from bench.report import Table
 from campaigns.accuracy.adversarial import ADVERSARIAL
-from campaigns.accuracy.judge import AT_TOGGLE, BINS, edges, FAULTS, OCTAVE, QUANTITIES, Tally
+from campaigns.accuracy.judge import AT_TOGGLE, edges, FAULTS, OCTAVE, QUANTITIES, Tally
 from campaigns.accuracy.random_families import RANDOM
 from campaigns.accuracy.run import parts, run, show_case
 from campaigns.campaign import (
@@ -164,7 +164,7 @@ def draw(tallies: Mapping[str, Tally], file: Path, limit: float) -> None:
             errors = tallies[family].quantities.get(quantity)
             if errors is None:
                 continue
-            inner = errors.histogram[1 : BINS - 1]
+            inner = errors.histogram[1:-1]
             coarse = inner[: len(inner) // step * step].reshape(-1, step).sum(axis=1)
             coarse = coarse[: rows.shape[1]].astype(float)
             coarse[np.searchsorted(borders, _SHOWN[0])] += errors.histogram[0]

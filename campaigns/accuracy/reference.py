@@ -227,7 +227,6 @@ def exact_condition_numbers(
     conditions = [0.0] * len(passed)
 
     def add(changed: Truth) -> None:
-        nonlocal kappa
         for j, (one, other) in enumerate(zip(exact, _coefficients(changed), strict=True)):
             for k in range(3):
                 kappa[j, k] += abs(float((other[k] - one[k]) / step))

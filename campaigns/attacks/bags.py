@@ -210,8 +210,9 @@ def _without_checksums(content: bytes) -> bytes:
     changed = bytearray(content)
     for kind, at, end in _records(content):
         place = end - 4 if kind == Opcode.ATTACHMENT else at + _AT_CHECKSUM.get(kind, 0)
-        if place > at and place + 4 <= end:
-            changed[place : place + 4] = bytes(4)
+        after = place + 4
+        if place > at and after <= end:
+            changed[place:after] = bytes(4)
     # Behind a broken record the footer has not been reached.
     if len(changed) > _FOOTER:
         changed[-12:-8] = bytes(4)
@@ -255,14 +256,16 @@ def _removed(content: bytes, random: Random) -> bytes:
 def _swapped_lengths(content: bytes, random: Random) -> bytes:
     (one, _), (other, _) = _some(content, random), _some(content, random)
     changed = bytearray(content)
-    lengths = content[one + 1 : one + 9], content[other + 1 : other + 9]
-    changed[other + 1 : other + 9], changed[one + 1 : one + 9] = lengths
+    first, second = slice(one + 1, one + 9), slice(other + 1, other + 9)
+    changed[second], changed[first] = content[first], content[second]
     return bytes(changed)
 
 
 def _another_kind(content: bytes, random: Random) -> bytes:
     begin, _ = _some(content, random)
-    return content[:begin] + bytes([random.randrange(256)]) + content[begin + 1 :]
+    changed = bytearray(content)
+    changed[begin] = random.randrange(256)
+    return bytes(changed)
 
 
 def _extreme(content: bytes, random: Random) -> bytes:
@@ -271,12 +274,14 @@ def _extreme(content: bytes, random: Random) -> bytes:
     size = random.choice((2, 4, 8))
     place = random.randrange(begin, max(begin + 1, min(end, begin + 120)))
     number = random.choice(_EXTREMES) % 2 ** (8 * size)
-    return content[:place] + number.to_bytes(size, 'little') + content[place + size :]
+    after = place + size
+    return content[:place] + number.to_bytes(size, 'little') + content[after:]
 
 
 def _zeros(content: bytes, random: Random) -> bytes:
     place, size = random.randrange(len(content) + 1), random.choice((8, 512, 4096))
-    return content[:place] + bytes(size) + content[place + size :]
+    after = place + size
+    return content[:place] + bytes(size) + content[after:]
 
 
 _CHANGES: tuple[Callable[[bytes, Random], bytes], ...] = (

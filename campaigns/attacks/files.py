@@ -122,7 +122,9 @@ def _bytes(data: bytes, rng: random.Random) -> bytes:
     """Flip a bit, or insert something."""
     place = rng.randrange(len(data) + 1)
     if rng.random() < 0.5 and place < len(data):
-        return data[:place] + bytes([data[place] ^ 1 << rng.randrange(8)]) + data[place + 1 :]
+        flipped = bytearray(data)
+        flipped[place] ^= 1 << rng.randrange(8)
+        return bytes(flipped)
     return data[:place] + rng.choice((*_BYTES, *_OTHERS)) + data[place:]
 
 

@@ -89,7 +89,7 @@ class Calls:
             for service, kind in kinds.items()
         }
 
-    def any(self) -> tuple[str, Any]:
+    def pick(self) -> tuple[str, Any]:
         """Call a random service; return its name and the future of its response."""
         random = self._random
         service = random.choice(sorted(self._clients))
@@ -223,12 +223,9 @@ def malformed(random: Random) -> bytes:
     if kind == 1:
         return random.randbytes(int(2.8e6 ** random.random()))
     if kind == 2:  # a count larger than the sequence
-        at = 20  # behind an empty frame_id
-        return (
-            message[:at]
-            + random.randrange(joints + 1, 2**32).to_bytes(4, 'little')
-            + (message[at + 4 :])
-        )
+        at, after = 20, 24  # behind an empty frame_id
+        count = random.randrange(joints + 1, 2**32).to_bytes(4, 'little')
+        return message[:at] + count + message[after:]
     if kind == 3:
         return (
             message[:4]
@@ -333,7 +330,7 @@ class Attacker:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             if len(waiting) < 50:
-                name, future = self._calls.any()
+                name, future = self._calls.pick()
                 self.tried[name] += 1
                 waiting.append(future)
             else:  # some get no response: rclpy raises for parameters without a type

@@ -66,12 +66,12 @@ class Recorded:
 
     @property
     def recorded(self) -> int:
-        """Number of messages that are counted as recorded."""
+        """Return the number of messages that are counted as recorded."""
         return sum(counts[1] for counts in self.counts)
 
     @property
     def let_go(self) -> int:
-        """Number of messages that are counted as removed by the ring."""
+        """Return the number of messages that are counted as removed by the ring."""
         return sum(counts[3] for counts in self.counts)
 
 

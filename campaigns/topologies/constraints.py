@@ -380,11 +380,12 @@ class Equations:
         """
         _, jacobian, _ = self.residuals(unknowns, inputs)
         drive = np.zeros_like(unknowns)
-        drive[-len(inputs) :] = rates
+        driven = slice(-len(inputs), None)
+        drive[driven] = rates
         v = solve(jacobian, drive)
         v = v + solve(jacobian, noise * _terms(jacobian, v))
         pull = np.zeros_like(unknowns)
-        pull[-len(inputs) :] = accelerations
+        pull[driven] = accelerations
         bend = self.bend(unknowns, v)
         a = solve(jacobian, pull - bend)
         a = a + solve(jacobian, noise * (_terms(jacobian, a) + np.abs(bend)))
@@ -431,7 +432,7 @@ def _terms(jacobian: Array, values: Array) -> Array:
 def _velocity(moved: _Moved, rates: Array) -> tuple[Any, Any]:
     if moved.link < 0:
         return 0.0, 0.0
-    turn, vx, vy = rates[3 * moved.link : 3 * moved.link + 3]
+    turn, vx, vy = rates[slice(3 * moved.link, 3 * moved.link + 3)]
     return vx - turn * moved.arm[1], vy + turn * moved.arm[0]
 
 

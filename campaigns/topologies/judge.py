@@ -340,7 +340,7 @@ def _compare_points(
         if link != GROUND:
             i = equations.links.index(link)
             turn = complex(np.cos(angles[i]), np.sin(angles[i]))
-            origin = complex(*(float(v) for v in motion.unknowns[3 * i + 1 : 3 * i + 3, 0]))
+            origin = complex(*(float(v) for v in motion.unknowns[slice(3 * i + 1, 3 * i + 3), 0]))
             true = origin + turn * true
         worst = max(worst, abs(place - true))
     if not worst < 1e-6 * (closure.scale + equations.size):

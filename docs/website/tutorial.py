@@ -64,7 +64,8 @@ def cells(text: str) -> Iterator[Cell]:
     marks = list(_CELL.finditer(text))
     ends = [mark.start() for mark in marks[1:]] + [len(text)]
     for mark, end in zip(marks, ends, strict=True):
-        content = text[mark.end() + 1 : end]
+        begin = mark.end() + 1
+        content = text[begin:end]
         is_text = '[markdown]' in mark[1]
         if is_text:
             content = re.sub(r'^# ?', '', content, flags=re.MULTILINE)
@@ -124,7 +125,8 @@ def _drawn(figure: Any) -> str:
     with StringIO() as file, rc_context({'svg.hashsalt': 'tutorial'}):
         figure.savefig(file, format='svg', bbox_inches='tight', metadata={'Date': None})
         svg = file.getvalue()
-    return _framed(_SCRIPT.sub('', svg[svg.index('<svg') :]))
+    _, mark, drawing = svg.partition('<svg')
+    return _framed(_SCRIPT.sub('', mark + drawing))
 
 
 def _framed(svg: str) -> str:

@@ -38,6 +38,7 @@ from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.faults.fault import Fault
+from linkage_ros.node.real_time import stay_on_this_machine
 from linkage_ros.processes import private_domain
 from linkage_ros.resources import scene_names, shipped
 from linkage_ros.scene.load import load_scene
@@ -85,7 +86,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         raise LinkageError(name, 'there is no such scene', remedy)
     file = shipped(f'scenes/{name}.yaml')
     scene = load_scene(file, arguments.set)
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    stay_on_this_machine()
     os.environ['ROS_DOMAIN_ID'] = str(private_domain())
     if arguments.seconds is None:
         ends = [max(fault.at) + fault.seconds for fault in scene.faults.values() if fault.at]

@@ -552,11 +552,11 @@ class Warnings:
         """
         if (new := counts.stale - self._stale) <= 0:
             return
+        age, most = counts.stale_age / NANOSECONDS, max_age / NANOSECONDS
         line = (
-            f'{crank_topic}: {new} samples too old to use, the newest {counts.stale_age * 1e-9:.1f} '
-            f's by its stamp, and max_age is {max_age * 1e-9:g} s: synchronise the clocks, set '
-            'use_sim_time where time is played or simulated, or write drive: {topic: {stamp: '
-            'arrival}}'
+            f'{crank_topic}: {new} samples too old to use, the newest {age:.1f} s by its stamp, '
+            f'and max_age is {most:g} s: synchronise the clocks, set use_sim_time where time is '
+            'played or simulated, or write drive: {topic: {stamp: arrival}}'
         )
         if self.warn('stale', line, max(period, _STALE_PERIOD)):
             self._stale = counts.stale

@@ -47,7 +47,7 @@ from linkage_ros.node.diagnostics import (
 )
 from linkage_ros.node.pacing import ClockGuard
 from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE, nearness_limits
-from linkage_ros.node.real_time import RealTime, standstill
+from linkage_ros.node.real_time import RealTime, STANDSTILL, standstill
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -236,8 +236,8 @@ class LinkageNode(LifecycleNode):
             self._start_recording()
         self._real_time.lock_memory()
         self.loop.start(self._real_time.paced(self._pace(self.scene.rate)))
-        for line in self._middleware.values():
-            self.get_logger().info(line)
+        if self._middleware:
+            self.get_logger().info(STANDSTILL)
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
         cranks = ', '.join(joint for member in self.scene.members for joint in member.inputs)
         drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))

@@ -37,6 +37,7 @@ import resource
 from threading import Event
 from typing import TYPE_CHECKING
 
+from linkage_ros.resources import shipped
 from rclpy.utilities import get_rmw_implementation_identifier
 
 if TYPE_CHECKING:
@@ -122,9 +123,11 @@ def _status(key: str) -> str:
 
 
 _TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
+_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+_PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 _CONFIGURED = (
     _TRANSPORTS,
-    'FASTRTPS_DEFAULT_PROFILES_FILE',
+    _PROFILE,
     'FASTDDS_DEFAULT_PROFILES_FILE',
     'RMW_FASTRTPS_PUBLICATION_MODE',
 )
@@ -142,10 +145,34 @@ def leave_out_shared_memory() -> None:
 
     Call it before `rclpy.init`; it holds for this process and its children.
     """
-    if not (
-        any(map(os.environ.get, _CONFIGURED)) or any(Path(name).is_file() for name in _PROFILES)
-    ):
+    if not _is_configured():
         os.environ[_TRANSPORTS] = 'UDPv4'
+
+
+def stay_on_this_machine() -> None:
+    """
+    Keep discovery within the machine, without shared memory where the user has said nothing of it.
+
+    Call it before `rclpy.init`; it holds for this process and its children. Clients with the
+    discovery range LOCALHOST are found all the same.
+    """
+    fast_dds = get_rmw_implementation_identifier().startswith('rmw_fastrtps')
+    if _is_configured() or not fast_dds:
+        os.environ[_RANGE] = 'LOCALHOST'
+    else:
+        os.environ |= {_RANGE: 'SYSTEM_DEFAULT', _PROFILE: str(shipped('fastdds/local.xml'))}
+
+
+def _is_configured() -> bool:
+    """Return whether the user has configured the transports."""
+    return any(map(os.environ.get, _CONFIGURED)) or any(Path(name).is_file() for name in _PROFILES)
+
+
+STANDSTILL = (
+    'when another program subscribes, ticks may pause once for 0.33 s; the page "Keep ticks on '
+    'time" of the documentation says how to avoid it'
+)
+"""The same for a reader who does not know DDS."""
 
 
 def standstill() -> str:

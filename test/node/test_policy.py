@@ -100,9 +100,11 @@ def test_a_node_has_what_the_policy_grants_and_nothing_else(graph_of, scene):
 
 # Together they have every topic of a node.
 WHOLE = (
-    'robot_description: true\npublish_input: true\nfaults: {mute: {silence: {}}}\n'
-    'effects: {acceleration: {}, pin_forces: {}, markers: {}}\n'
-    'loads: {wrenches: {coupler: {}, rocker: {}}}\n',
+    (
+        'robot_description: true\npublish_input: true\nfaults: {mute: {silence: {}}}\n'
+        'effects: {acceleration: {}, pin_forces: {}, markers: {}}\n'
+        'loads: {wrenches: {coupler: {}, rocker: {}}}\n'
+    ),
     'drive: {torque: {motor: {torque_constant: 0.1}, motor_encoder: {}}}\n',
 )
 

@@ -126,7 +126,7 @@ def test_one_request_for_all_parameters_gets_their_values(graph, start, write_sc
 
 
 def test_the_crank_source_publishes_reliably(graph, domain, folder):
-    """A subscriber that asks for it gets nothing else, as joint_state_publisher for source_list."""
+    """A subscriber may ask for it, as joint_state_publisher does for its source_list."""
     heard = graph.listen(JointState, '/crank_states')
     source = NodeProcess(domain, folder, program=('-m', 'linkage_ros.node.crank_source'))
     try:

@@ -145,9 +145,9 @@ def test_samples_that_come_too_late_are_silence(
     (line,) = [line for line in node.log.splitlines() if 'too old' in line]
     assert 'WARN' in line
     assert re.search(
-        r'/crank_states: \d+ samples too old to use, the newest 100\.\d s by its stamp, and max_age '
-        r'is 0\.3 s: synchronise the clocks, set use_sim_time .*, or write drive: \{topic: \{stamp: '
-        r'arrival\}\}$',
+        r'/crank_states: \d+ samples too old to use, the newest 100\.\d s by its stamp, and '
+        r'max_age is 0\.3 s: synchronise the clocks, set use_sim_time .*, or write drive: '
+        r'\{topic: \{stamp: arrival\}\}$',
         line,
     )
     assert joint_states == []

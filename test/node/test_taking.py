@@ -175,7 +175,7 @@ def test_where_played_time_begins_again_no_sample_is_refused():
     assert rig.counts() == (6, 2, 2, 0, 2)
 
 
-# (scene, [(joints, age of the stamp in ms)] of a tick), then used, stale and superseded; max_age is 200 ms.
+# (scene, [(joints, age of the stamp in ms)] of a tick, (used, stale, superseded)) at 200 ms.
 AGES = {
     'young': (ONE, [(('crank_joint',), 5)], (1, 0, 0)),
     'at the limit': (ONE, [(('crank_joint',), 200)], (1, 0, 0)),
@@ -281,7 +281,9 @@ PUBLISHERS = {
         ONE, [(ELBOW, 1), (CRANK, 2), (CRANK, 1), (CRANK, 3), (CRANK, 2)], 2,
     ),
     'two, one of other joints': (ONE, [(CRANK, 7), (ELBOW, 1), (CRANK, 8), (ELBOW, 2)], 0),
-    'two, one of which is rejected': (ONE, [(CRANK, 7), (CRANK * 2, 1), (CRANK, 8), (CRANK * 2, 2)], 2),
+    'two, one of which is rejected': (
+        ONE, [(CRANK, 7), (CRANK * 2, 1), (CRANK, 8), (CRANK * 2, 2)], 2,
+    ),
     'none that is numbered': (ONE, [(CRANK, 0), (CRANK, 0)], 0),
     'one for each of two linkages': (TWO, [(LEFT, 7), (RIGHT, 1), (LEFT, 8), (RIGHT, 2)], 0),
     'one for both': (TWO, [(BOTH, 1), (BOTH, 2)], 0),

@@ -26,7 +26,7 @@ import shutil
 import subprocess
 import sys
 
-from linkage_ros.node.real_time import leave_out_shared_memory
+from linkage_ros.node.real_time import leave_out_shared_memory, stay_on_this_machine
 from linkage_ros.resources import shipped
 import pytest
 from sensor_msgs.msg import JointState
@@ -39,6 +39,7 @@ SAID = (
     'FASTDDS_DEFAULT_PROFILES_FILE',
     'RMW_FASTRTPS_PUBLICATION_MODE',
 )
+RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 TURNING = 'drive: {constant_rate: {rate: 1.0}}\nrate: 1000'
 OWN_NETWORK = [shutil.which('unshare') or 'unshare', '--map-root-user', '--net']
 
@@ -145,7 +146,7 @@ def test_a_client_with_shared_memory_hears_every_message_of_a_node_without(meet)
     assert not found['node']
     assert heard_all(found['numbers'])
     assert 'Middleware' not in found['tick']
-    assert 'shared memory' not in found['log']
+    assert 'may pause' not in found['log']
 
 
 def test_a_user_can_have_shared_memory_and_is_told_what_it_costs(meet):
@@ -153,21 +154,24 @@ def test_a_user_can_have_shared_memory_and_is_told_what_it_costs(meet):
     assert found['node']
     assert heard_all(found['numbers'])
     assert 'stand still' in found['tick']['Middleware']
-    assert found['log'].count('Fast DDS uses shared memory') == 1
+    assert found['log'].count('ticks may pause once') == 1
 
 
 def test_a_node_in_the_process_of_another_tells_that_it_could_not_choose(meet):
     found = meet('-c', COMPONENT)
     assert found['node']
     assert 'FASTDDS_BUILTIN_TRANSPORTS=UDPv4' in found['tick']['Middleware']
-    assert found['log'].count('Fast DDS uses shared memory') == 1
+    assert found['log'].count('ticks may pause once') == 1
 
 
 def test_where_discovery_is_local_shared_memory_comes_all_the_same_and_is_told(
     graph, start, write_scene
 ):
     node = start(write_scene('local', TURNING))
-    assert 'Fast DDS uses shared memory' in node.log
+    (line,) = [line for line in node.log.splitlines() if 'may pause' in line]
+    assert 'INFO' in line
+    assert 'DDS' not in line
+    assert 'shared memory' not in line
     graph.next_status('tick')
     assert 'config/fastdds/local.xml' in graph.value('tick', 'Middleware')
 
@@ -180,5 +184,29 @@ def test_the_profile_that_comes_with_the_package_has_discovery_local_without_sha
     heard = graph.listen(JointState, 'joint_states')
     node = start(write_scene('profile', TURNING))
     wait_for(lambda: len(heard) > 100, 'joint states')
-    assert 'shared memory' not in node.log
+    assert 'may pause' not in node.log
     assert '/fastrtps_port' not in Path(f'/proc/{node.process.pid}/maps').read_text()
+
+
+def test_a_demo_has_discovery_local_without_shared_memory_and_says_nothing_of_it(folder, unsaid):
+    environment = {k: v for k, v in os.environ.items() if k not in (*SAID, RANGE)}
+    environment.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
+    command = [sys.executable, '-m', 'linkage_ros', 'demo', 'bare', '--seconds', '1', '--plain']
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False,
+        timeout=4 * PATIENCE,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    said = done.stdout + done.stderr
+    assert RANGE + '=LOCALHOST' in said, 'a second terminal has it simple'
+    assert 'may pause' not in said
+    assert ' 0 used' not in said, 'the crank beside it was found'
+
+
+@pytest.mark.parametrize('name', SAID)
+def test_a_demo_leaves_the_users_transports_alone(unsaid, monkeypatch, name):
+    monkeypatch.setenv(name, 'mine')
+    monkeypatch.setenv(RANGE, 'SUBNET')
+    stay_on_this_machine()
+    assert os.environ[RANGE] == 'LOCALHOST'
+    assert {said: os.environ[said] for said in SAID if said in os.environ} == {name: 'mine'}

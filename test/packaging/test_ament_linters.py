@@ -17,6 +17,7 @@
 
 import logging
 import re
+import subprocess
 
 import pytest
 
@@ -37,7 +38,16 @@ HEADER = """\
 """
 
 # Folders are named one by one: a linter on `.` would also read build/ and install/.
-NAMES = ('setup.py', 'bench', 'examples', 'launch', 'linkage_ros', 'test')
+NAMES = ('setup.py', 'bench', 'campaigns', 'docs', 'examples', 'launch', 'linkage_ros', 'test')
+
+
+def test_all_that_is_tracked_is_linted(root):
+    git = subprocess.run(
+        ['git', 'ls-files', '*.py'], cwd=root, capture_output=True, text=True, check=False
+    )
+    if git.returncode:
+        pytest.skip('no checkout of git')
+    assert {file.partition('/')[0] for file in git.stdout.split()} == {*NAMES}
 
 
 @pytest.fixture

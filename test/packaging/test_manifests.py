@@ -16,7 +16,10 @@
 """The manifests agree with each other, and the tools that read them can."""
 
 from configparser import ConfigParser
+from pathlib import Path
 import re
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 
 import pytest
@@ -45,7 +48,10 @@ def test_package_xml_is_valid(root):
 
 
 def test_every_ros_import_is_declared(root, package_xml):
-    ours = r'ament_index_python|launch|builtin_interfaces|\w+_msgs|rcl_interfaces|rclpy|std_srvs|launch_ros'
+    ours = (
+        r'ament_index_python|builtin_interfaces|launch|launch_ros|\w+_msgs|rcl_interfaces|rclpy|'
+        'std_srvs'
+    )
     imported = set()
     for folder in ('linkage_ros', 'launch'):
         for path in (root / folder).rglob('*.py'):
@@ -56,9 +62,9 @@ def test_every_ros_import_is_declared(root, package_xml):
 
 ROS_PACKAGES = {
     'ament_copyright', 'ament_flake8', 'ament_index_python', 'ament_pep257', 'builtin_interfaces',
-    'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy',
-    'robot_state_publisher', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs',
-    'trajectory_msgs', 'visualization_msgs',
+    'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros', 'lifecycle_msgs',
+    'rcl_interfaces', 'rclpy', 'robot_state_publisher', 'rosgraph_msgs', 'sensor_msgs',
+    'std_msgs', 'std_srvs', 'trajectory_msgs', 'visualization_msgs',
 }  # fmt: skip
 """Released into Jazzy: rosdep takes them from ros-jazzy-…. (rosdistro, jazzy/distribution.yaml)"""
 
@@ -116,6 +122,33 @@ def test_parameter_file_has_the_shape_that_rcl_reads(root):
         'thread_priority': 0,
         'lock_memory': False,
     }
+
+
+# As those that Jazzy's launch_testing and launch_testing_ros have, by their names there.
+PLUGINS = {
+    'launch_testing': 'def pytest_pycollect_makemodule(path, parent):\n    pass\n',
+    'launch_ros': 'def pytest_launch_collect_makemodule(path, parent):\n    pass\n',
+}
+
+
+def test_the_plugins_of_launch_do_not_keep_pytest_from_running(root, environment, tmp_path):
+    """On a robot they load into every pytest; a newer one than Jazzy's refuses them."""
+    for name, text in PLUGINS.items():
+        (tmp_path / f'plugin_of_{name}.py').write_text(text)
+        about = tmp_path / f'{name}-3.4.dist-info'
+        about.mkdir()
+        (about / 'METADATA').write_text(f'Metadata-Version: 2.1\nName: {name}\nVersion: 3.4\n')
+        (about / 'entry_points.txt').write_text(f'[pytest11]\n{name} = plugin_of_{name}\n')
+    here = Path(__file__).relative_to(root)
+    done = subprocess.run(
+        [sys.executable, '-m', 'pytest', '--collect-only', '-q', str(here)],
+        cwd=root,
+        env=environment | {'PYTHONPATH': str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_policy_grants_no_wildcard(root):
