@@ -188,7 +188,7 @@ def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
     settled: dict[int, bool] = {}
     of_steps: list[Tree] = []
     for step in closure.steps:
-        leaf = partial(_status_of, step, known, tuple(map(len, known)), tape, settled)
+        leaf = partial(_status_of, step, known, (len(known.coordinates), len(known.pins)), tape, settled)
         leaf(())
         made = tape.decisions
         held: tuple[bool, ...] = ()
@@ -209,14 +209,15 @@ def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
 def _status_of(
     step: Step,
     known: State,
-    count: tuple[int, ...],
+    count: tuple[int, int],
     tape: Tape,
     settled: dict[int, bool],
     decided: tuple[bool, ...],
 ) -> Status | None:
     """Return the status of a step with given first decisions; None if it is closed."""
-    for numbers, length in zip(known, count, strict=True):
-        del numbers[length:]  # what the step appended before
+    # What the step appended before.
+    del known.coordinates[count[0] :]
+    del known.pins[count[1] :]
     tape.begin(decided, settled)
     status = step.close(known).status
     return None if status is Status.CLOSED else status
