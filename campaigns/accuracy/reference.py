@@ -225,11 +225,16 @@ def exact_condition_numbers(
     exact = _coefficients(base)
     passed = passed_results(reference.mechanism)
     conditions = [0.0] * len(passed)
+    joints = list(reference.mechanism.joints.values())
 
     def add(changed: Truth) -> None:
         for j, (one, other) in enumerate(zip(exact, _coefficients(changed), strict=True)):
             for k in range(3):
-                kappa[j, k] += abs(float((other[k] - one[k]) / step))
+                difference = other[k] - one[k]
+                if k == 0 and isinstance(joints[j], Turn):
+                    # An angle next to π is on the other side of it as soon as anything changes.
+                    difference -= 2 * round(float(difference) / (2 * pi)) * arb.pi()
+                kappa[j, k] += abs(float(difference / step))
         for i, handed in enumerate(passed):
             conditions[i] += abs(float(_change(base.motion, changed.motion, handed) / step))
 

@@ -22,15 +22,14 @@ Position first; what a scene calls for beyond it starts from the position and re
 from __future__ import annotations
 
 from cmath import rect
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 from math import inf
 from operator import mul
 from typing import Any, ClassVar, TYPE_CHECKING
 
 from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
-from linkage_ros.kinematics.built_once import BuiltProperty, keep_results
+from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.doubles import HUGE, scale_of, to_double
 from linkage_ros.kinematics.limits import Bounds, limited, without_mirrored, zero_length
@@ -149,6 +148,7 @@ class Closure:
         self.bounds = Bounds(linkage)
         """The limits between which its joints stay."""
         self._keep_limits()
+        self._compiled: list[Compiled] = []
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle the definition: the copy builds the rest anew, to the same bits."""
@@ -332,15 +332,18 @@ class Closure:
             Which numbers of these; all published joints if not given.
 
         """
-        from linkage_ros.kinematics.compiling.trace import joints  # local import: it traces
+        from linkage_ros.kinematics.compiling import (
+            linkage,  # local import: they trace
+            trace,  # local import: they trace
+        )
 
-        return self._compiled(derivatives, wanted or joints)
-
-    @BuiltProperty
-    def _compiled(self) -> Callable[[int, Wanted], Compiled]:
-        from linkage_ros.kinematics.compiling.linkage import Compiled  # local import: it traces
-
-        return keep_results(partial(Compiled, self))
+        wanted = wanted or trace.joints
+        with BUILD_LOCK:
+            for compiled in self._compiled:
+                if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
+                    return compiled
+            self._compiled.append(linkage.Compiled(self, derivatives, wanted))
+            return self._compiled[-1]
 
     def solve(
         self,

@@ -215,7 +215,7 @@ def test_arrays_of_something_else_are_refused(name):
 
 
 def test_a_masked_number_is_refused():
-    with pytest.raises(ValueError, match='^inputs: some values are masked'):
+    with pytest.raises(ValueError, match=r'^inputs: some values are masked'):
         FOUR_BAR.position(np.ma.masked)
 
 

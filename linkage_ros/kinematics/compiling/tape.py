@@ -23,7 +23,7 @@ linkage, and the tape records it: the compiled code is valid where all decisions
 from __future__ import annotations
 
 import cmath
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 import operator
@@ -123,6 +123,7 @@ class Tape:
         # The decisions in the order in which the steps made them, each condition once.
         self.decisions: list[Decision] = []
         self._decided: dict[int, bool] = {}
+        self._settled: Mapping[int, bool] = {}
         self._ahead: Sequence[bool | None] = ()
 
     def given(self, name: str, value: complex) -> Symbol:
@@ -130,13 +131,20 @@ class Tape:
         kind: Kind = 'complex' if isinstance(value, complex) else 'real'
         return Symbol(self, self._new(name, (), kind, value))
 
-    def begin(self, ahead: Sequence[bool | None] = ()) -> None:
-        """Forget all decisions; the next ones follow ``ahead``, and then the values."""
+    def begin(
+        self, ahead: Sequence[bool | None] = (), settled: Mapping[int, bool] | None = None
+    ) -> None:
+        """
+        Forget all decisions but the settled ones, by the numbers of their conditions.
+
+        The next ones follow ``ahead``, and then the values.
+        """
         self.decisions, self._decided, self._ahead = [], {}, ahead
+        self._settled = settled or {}
 
     def decide(self, condition: Operation) -> bool:
         """Return whether a condition holds, and record the decision."""
-        held = self._decided.get(condition.number)
+        held = self._decided.get(condition.number, self._settled.get(condition.number))
         if held is None:
             number = len(self.decisions)
             ahead = self._ahead[number] if number < len(self._ahead) else None

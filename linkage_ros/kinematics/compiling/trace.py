@@ -17,10 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import chain, repeat
 from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.kinematics.compiling.tape import Decision, Operation, Symbol, Tape
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import State, Step
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import Acceleration, LoopClosure, Position, Velocity
@@ -180,26 +183,41 @@ def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
     inputs: list[Any] = [
         Symbol(tape, given) for given in path.inputs[: len(closure.linkage.inputs)]
     ]
-
-    def leaf(decided: tuple[bool, ...]) -> Tree:
-        tape.begin()
-        known = closure.known(*inputs)
-        # The inputs are finite: the first decision is that of the first step.
-        tape.begin(decided)
-        for step in closure.steps:
-            status = step.close(known).status
-            if status is not Status.CLOSED:
-                return status
-            if len(tape.decisions) >= len(decided):
-                break
-        return None
-
-    result: list[Tree] = []
-    held: tuple[bool, ...] = ()
-    for decision in path.decisions:
-        if decision.condition.name == 'finite':
-            result.append(Status.INDETERMINATE)
-        else:
-            result.append(tree_below(tape, (*held, not decision.held), leaf))
+    tape.begin()
+    known = closure.known(*inputs)
+    settled: dict[int, bool] = {}
+    of_steps: list[Tree] = []
+    for step in closure.steps:
+        leaf = partial(_status_of, step, known, (len(known.coordinates), len(known.pins)), tape, settled)
+        leaf(())
+        made = tape.decisions
+        held: tuple[bool, ...] = ()
+        for decision in made:
+            of_steps.append(tree_below(tape, (*held, not decision.held), leaf))
             held = (*held, decision.held)
-    return tuple(result)
+        # Each step starts from the ones before it, which are not run again.
+        leaf(())
+        settled |= {condition.number: holds for condition, holds in made}
+    # The rates begin where the links are closed.
+    fate = chain(of_steps, repeat(None))
+    return tuple(
+        Status.INDETERMINATE if condition.name == 'finite' else next(fate)
+        for condition, _ in path.decisions
+    )
+
+
+def _status_of(
+    step: Step,
+    known: State,
+    count: tuple[int, int],
+    tape: Tape,
+    settled: dict[int, bool],
+    decided: tuple[bool, ...],
+) -> Status | None:
+    """Return the status of a step with given first decisions; None if it is closed."""
+    # What the step appended before.
+    del known.coordinates[count[0] :]
+    del known.pins[count[1] :]
+    tape.begin(decided, settled)
+    status = step.close(known).status
+    return None if status is Status.CLOSED else status
