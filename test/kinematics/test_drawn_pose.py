@@ -40,7 +40,7 @@ from linkage_ros.kinematics.linkage import (
     RevoluteJoint,
     Slider,
 )
-from linkage_ros.kinematics.plan import sides_at
+from linkage_ros.kinematics.sides import sides_at
 import pytest
 
 from .linkages import four_bar_linkage
