@@ -38,7 +38,7 @@ from linkage_ros.kinematics.dyads.rrr import (
     Side,
 )
 from linkage_ros.kinematics.dyads.two_sided import TwoSided
-from linkage_ros.kinematics.grashof import nearly_equal, nearly_paired
+from linkage_ros.kinematics.grashof import nearly_paired
 from linkage_ros.kinematics.known_links import Angle, Held, KnownLinks, Line, Slide
 from linkage_ros.kinematics.linkage import Input, Linkage
 from linkage_ros.kinematics.rail import (
@@ -443,11 +443,6 @@ class SolutionPlan(KnownLinks):
                 # As for a parallelogram: both roots change their sign with a whole turn.
                 turns_matter = len(rail.singular_angles) < 2
                 crosses = self._crosses(dyad) if dyad.kind == 'RRP' else None
-                if crosses is None and dyad.kind == 'RRP' and not any(rail.crosses):
-                    # Crank and rod of one length, on a line through the crank's pivot?
-                    sums = length + abs(place.imag), length
-                    nearly = all(nearly_equal(abs(arm), one) for one in sums)
-                    crosses = (nearly, nearly)
                 if crosses is not None and crosses != rail.crosses:
                     turns_matter = not all(crosses)
                     rail = NearlyCrossingRail(arm, place, length, arms, crosses)

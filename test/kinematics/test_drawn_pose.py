@@ -476,10 +476,8 @@ TURNING = {
 @pytest.mark.parametrize('by', CHANGED)
 def test_sliders_next_to_change_points_follow_the_nominal_linkage(name, by):
     made, angle = TURNING[name]
-    closures = [Closure(replace(made(by), nominal=made(0.0)))]
-    if 'slider-crank' in name:
-        closures.append(Closure(made(by)))
-    for closure, degrees in product(closures, (-430, -300, -60, 50, 130, 250, 400, 670)):
+    closure = Closure(replace(made(by), nominal=made(0.0)))
+    for degrees in (-430, -300, -60, 50, 130, 250, 400, 670):
         phi = radians(degrees)
         assert off(closure.position(phi).joints[0], angle(phi)) < 6e-3
         velocity = closure.velocity(closure.position(phi), 1.0)
