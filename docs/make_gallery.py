@@ -45,7 +45,7 @@ from linkage_ros.drawing.painting import corners, outline, paint, save, set_plan
 from linkage_ros.drawing.shapes import shapes
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.plan import sides_at
+from linkage_ros.kinematics.sides import sides_at
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,
     InputSweep,

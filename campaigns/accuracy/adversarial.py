@@ -250,7 +250,9 @@ def freudenstein(rng: random.Random) -> Case:
 def pins_meet(rng: random.Random) -> Case:
     a = length(rng)
     b = a * length(rng)
-    loop = four_bar((a, b, b * (1 + tiny(rng)), a * (1 + tiny(rng))), side(rng))
+    lengths = (a, b, b * (1 + tiny(rng)), a * (1 + tiny(rng)))
+    # Lengths so near to those of a kite change the side where the kite does.
+    loop = four_bar(lengths, side(rng), fold=True)
     return loop, [tiny(rng) for _ in range(ANGLES)]
 
 

@@ -30,8 +30,8 @@ from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
-from linkage_ros.kinematics.plan import closes_in_two_ways, closing_name, sides_at
 from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.sides import closes_in_two_ways, closing_name, sides_at
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,

@@ -40,7 +40,7 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
-from linkage_ros.kinematics.plan import assembly_sides, undrawn
+from linkage_ros.kinematics.sides import assembly_sides, undrawn
 from linkage_ros.kinematics.sweep_analysis import check_limits
 from linkage_ros.kinematics.topology import assur_groups
 from linkage_ros.resources import named_file

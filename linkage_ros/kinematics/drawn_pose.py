@@ -31,14 +31,13 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.linkage import Linkage, Pose
-from linkage_ros.kinematics.plan import closes_in_two_ways, telling_part
 from linkage_ros.kinematics.point_tracker import PointTracker
+from linkage_ros.kinematics.sides import closes_in_two_ways, telling_part, TwoWays
 from linkage_ros.kinematics.step import State
 from linkage_ros.kinematics.topology import Dyad, Iterated, links_of
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.known_links import KnownLinks
-    from linkage_ros.kinematics.plan import SolutionPlan, TwoWays
     from linkage_ros.kinematics.results import LoopClosure, Position
 
 _SAME = 1e-9
@@ -117,7 +116,7 @@ class _Assembly(NamedTuple):
 
 
 def drawn_signs(
-    linkage: Linkage, plan: SolutionPlan, ways: Sequence[TwoWays]
+    linkage: Linkage, plan: KnownLinks, ways: Sequence[TwoWays]
 ) -> list[tuple[TwoWays, int]]:
     """
     Return the signs with which dyads close as drawn; none if the pose says nothing of them.
@@ -195,7 +194,7 @@ def _angle(plan: KnownLinks, link: str) -> _Sight:
 
 def _closed(
     linkage: Linkage,
-    plan: SolutionPlan,
+    plan: KnownLinks,
     ways: Sequence[TwoWays],
     groups: Sequence[Sequence[_Target]],
 ) -> list[_Assembly]:

@@ -232,7 +232,7 @@ class Linkage:
     traced: tuple[str, ...] = ()
     pose: Pose | None = None
     masses: Mapping[str, Mass] = field(default_factory=dict)
-    nominal: Linkage | None = None
+    nominal: Linkage | None = field(default=None, compare=False, repr=False)
 
     @property
     def limits(self) -> dict[str, Limits]:

@@ -17,10 +17,10 @@
 from __future__ import annotations
 
 from cmath import phase, rect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf
-from typing import Any, NamedTuple, TYPE_CHECKING, TypeGuard
+from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.arithmetic import cross, resolved, ROUNDING, UNIT_ROUNDOFF
@@ -38,9 +38,9 @@ from linkage_ros.kinematics.dyads.rrr import (
     Side,
 )
 from linkage_ros.kinematics.dyads.two_sided import TwoSided
-from linkage_ros.kinematics.grashof import nearly_equal, nearly_paired
+from linkage_ros.kinematics.grashof import nearly_paired
 from linkage_ros.kinematics.known_links import Angle, Held, KnownLinks, Line, Slide
-from linkage_ros.kinematics.linkage import carriers, Input, Linkage, Pose
+from linkage_ros.kinematics.linkage import Input, Linkage
 from linkage_ros.kinematics.rail import (
     CrankRail,
     FreeRail,
@@ -48,69 +48,18 @@ from linkage_ros.kinematics.rail import (
     Rail,
     UnsignedRail,
 )
+from linkage_ros.kinematics.sides import closing_name, SIDES, telling_part, TwoWays
 from linkage_ros.kinematics.step import RelativeAngle
 from linkage_ros.kinematics.topology import (
     assur_groups,
     Driven,
     Dyad,
-    Group,
     Iterated,
     Structure,
 )
 
-if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import LoopClosure, Position
-
-_SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
-_SIDES['RPR'] = _SIDES['RRP']
-
 _LEVEL = Angle(0, 0.0, 1 + 0j)
 """The zero direction of angles in the frame of the ground."""
-
-
-class TwoWays(NamedTuple):
-    """A dyad that closes in two ways, and what the file says of it."""
-
-    dyad: Dyad
-    step: int  # Number of its step
-    # Its side in `assembly`, +1 for 'left' and 'ahead'; 0 if it is left out.
-    written: int
-    # Whether it changes its side at a change point; and the sign of its step for the side +1 while
-    # the crank points to the left of the ground line, or ahead along the slider.
-    crosses: bool
-    upright: int
-
-    @property
-    def name(self) -> str:
-        """Return its key in `assembly`."""
-        return closing_name(self.dyad)
-
-    def word(self, side: float) -> str:
-        """Return the word of a side by its sign."""
-        return next(word for word, sign in _SIDES[self.dyad.kind].items() if sign * side > 0)
-
-
-def closes_in_two_ways(group: Group) -> TypeGuard[Dyad]:
-    """Return whether a group is a dyad that closes in two ways."""
-    return isinstance(group, Dyad) and group.kind in _SIDES
-
-
-def closing_name(dyad: Dyad) -> str:
-    """Return the pin or slider by which `assembly` names a dyad that closes in two ways."""
-    return dyad.outer[1].name if dyad.kind == 'RRP' else dyad.inner.name
-
-
-def telling_part(links: Mapping[str, Mapping[str, Any]], dyad: Dyad) -> tuple[str, str]:
-    """
-    Return the link and the point of it that tell the side of a dyad.
-
-    Of a rail without another point than its pin the angle tells it: the point is ''.
-    """
-    if dyad.kind != 'RPR':
-        return dyad.inner.link, dyad.inner.name
-    rail, pin = dyad.outer[0].link, dyad.outer[0].name
-    at = links[rail][pin]
-    return rail, next((name for name, place in links[rail].items() if place != at), '')
 
 
 class _Hinge(NamedTuple):
@@ -494,11 +443,6 @@ class SolutionPlan(KnownLinks):
                 # As for a parallelogram: both roots change their sign with a whole turn.
                 turns_matter = len(rail.singular_angles) < 2
                 crosses = self._crosses(dyad) if dyad.kind == 'RRP' else None
-                if crosses is None and dyad.kind == 'RRP' and not any(rail.crosses):
-                    # Crank and rod of one length, on a line through the crank's pivot?
-                    sums = length + abs(place.imag), length
-                    nearly = all(nearly_equal(abs(arm), one) for one in sums)
-                    crosses = (nearly, nearly)
                 if crosses is not None and crosses != rail.crosses:
                     turns_matter = not all(crosses)
                     rail = NearlyCrossingRail(arm, place, length, arms, crosses)
@@ -520,7 +464,7 @@ class SolutionPlan(KnownLinks):
 
         ``part`` is its diagonal or rail, ``upright`` its sign there on the side +1.
         """
-        name, sides = closing_name(dyad), _SIDES[dyad.kind]
+        name, sides = closing_name(dyad), SIDES[dyad.kind]
         crosses = any(getattr(part, 'crosses', ()))
         first, second = (outer.name for outer in dyad.outer)
         meaning = {
@@ -540,54 +484,6 @@ class SolutionPlan(KnownLinks):
         sign = self._nominal[name].sign if self._nominal else (written or 1) * upright
         self.two_ways.append(TwoWays(dyad, len(self.steps), written, crosses, upright))
         self.add(step.with_sign(sign))
-
-
-def assembly_sides(structure: Structure) -> dict[str, tuple[str, ...]]:
-    """Return the pins and sliders whose side is to be written, with the sides they may have."""
-    sides = {}
-    for group in structure.groups:
-        if closes_in_two_ways(group):
-            sides[closing_name(group)] = tuple(_SIDES[group.kind])
-    return sides
-
-
-def written_sides(closure: LoopClosure) -> dict[str, str]:
-    """Return the side of each dyad as the file writes it, or as its pose draws it."""
-    pose = closure.linkage.pose
-    drawn = sides_at(closure, closure.posed(*pose.inputs)) if pose and pose.drawn else {}
-    return {**drawn, **closure.linkage.assembly}
-
-
-def undrawn(linkage: Linkage, structure: Structure) -> Linkage:
-    """Return a linkage whose pose says nothing of the links of dyads, so that sides tell all."""
-    pose = linkage.pose
-    if pose is None or not pose.drawn:
-        return linkage
-    groups = (group for group in structure.groups if isinstance(group, Iterated))
-    iterated = {link for group in groups for link in group.links}
-    on = carriers(structure.links)
-    points = {name: place for name, place in pose.points.items() if {*on[name]} <= iterated}
-    angles = {link: angle for link, angle in pose.angles.items() if link in iterated}
-    return replace(linkage, pose=Pose(pose.inputs, points, angles))
-
-
-def sides_at(closure: LoopClosure, position: Position) -> dict[str, str]:
-    """
-    Return the side of each dyad that closes in two ways, as it lies at a position.
-
-    A dyad in line has none.
-    """
-    found: dict[str, str] = {}
-    groups: tuple[Group, ...] = closure.structure.groups
-    for step, number, pose in zip(
-        closure.steps, closure.step_groups, position.poses, strict=False
-    ):
-        group = groups[number]
-        if isinstance(step, TwoSided) and isinstance(group, Dyad):
-            side = step.side_of(pose)  # type: ignore[attr-defined]  # each such dyad has one
-            words = _SIDES[group.kind].items()
-            found |= {closing_name(group): word for word, sign in words if sign * side > 0.0}
-    return found
 
 
 def _facing(coordinate: int, base: Angle, vector: complex) -> Angle:

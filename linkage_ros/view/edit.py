@@ -43,7 +43,7 @@ from linkage_ros.files.linkage_rewriting import rewritten
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage, RevoluteJoint
-from linkage_ros.kinematics.plan import assembly_sides, undrawn, written_sides
+from linkage_ros.kinematics.sides import assembly_sides, undrawn, written_sides
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import assur_groups
 

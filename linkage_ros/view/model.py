@@ -37,8 +37,8 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.javascript import JavaScript
 from linkage_ros.kinematics.compiling.source import source, STATUSES, Subject
 from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage
-from linkage_ros.kinematics.plan import assembly_sides, written_sides
 from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.sides import assembly_sides, written_sides
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.scene.notes import linkage_notes

@@ -30,6 +30,7 @@ import pytest
 import yaml
 
 from .conftest import json_keys, on_terminal, Run
+from ..docs.blocks import missing
 from ..support.commands import environment
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
@@ -454,3 +455,61 @@ def test_solve_is_open_beyond_the_range_that_check_names(linkage: Run) -> None:
     )
     rows = [line.split() for line in answer.stdout.splitlines()[1:]]
     assert [row[1] for row in rows] == ['open', 'closed', 'open']
+
+
+# `linkage check` on sides, turns and lengths that nearly make a change point.
+
+
+PARALLELOGRAM = 'a: 0.08, b: 0.1, c: 0.08, d: 0.1'
+ROCKERS = 'a: 0.1, b: 0.06, c: 0.08, d: 0.12'
+LEG = """
+links:
+  ground: {hip: [0, 0]}
+  front_crank: {hip: [0, 0], A: [0.09, 0]}
+  rear_crank: {hip: [0, 0], B: [0.09, 0]}
+  front_shin: {A: [0, 0], foot: [0.162, 0]}
+  rear_shin: {B: [0, 0], foot: [0.162, 0]}
+input:
+  - {joint: front_joint, parent: ground, child: front_crank}
+  - {joint: rear_joint, parent: ground, child: rear_crank}
+joints: {front_knee: {parent: front_crank, child: front_shin}}
+"""
+
+
+@pytest.mark.parametrize(
+    ('text', 'lines'),
+    [
+        (
+            f'{LEG}pose: {{inputs: [-0.8, -2.3], points: {{foot: [0, -0.2]}}}}',
+            [
+                'turns … they count: send unwrapped angles, …',
+                '3 … pin foot right of B→A, as drawn (it changes at change points)',
+            ],
+        ),
+        (
+            f'{LEG}pose: {{inputs: [-0.8, -2.3], points: {{foot: [0, 0.1]}}}}',
+            ['3 … pin foot left of B→A, as drawn (it changes at change points)'],
+        ),
+        (
+            f'four_bar: {{{PARALLELOGRAM}, pose: {{inputs: [-1], angles: {{rocker: -1}}}}}}',
+            ['2 … pin B right of A→O4, as drawn (it changes at change points)'],
+        ),
+        (
+            'four_bar: {a: 0.0333, b: 0.1, c: 0.0333333, d: 0.1}',
+            ['2 … parallelogram to within 3.3e-05 m; else a …'],
+        ),
+        (
+            f'angles: degrees\nfour_bar: {{{ROCKERS}, input: {{limits: [250, 330]}}}}',
+            ['range … 281.537°, toggle, to 330.000°, limit of crank_joint', 'toggles 281.537°, …'],
+        ),
+    ],
+    ids=['leg below', 'leg above', 'parallelogram', 'rounded digit', 'toggle'],
+)
+def test_check_tells_what_is_true_on_the_drawing(
+    text: str, lines: list[str], linkage: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / 'x.yaml'
+    file.write_text(text)
+    answer = linkage('check', str(file))
+    assert answer.returncode == 0, answer.stderr
+    assert not missing(lines, answer.stdout)

@@ -27,7 +27,7 @@ from linkage_ros.drawing.painting import degree_step
 from linkage_ros.errors import FileError
 from linkage_ros.files.linkage_file import assemblies, load
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.resources import linkage_names
+from linkage_ros.resources import linkage_names, named_file
 import pytest
 
 pytest.importorskip('matplotlib')
@@ -188,18 +188,40 @@ def test_a_file_that_closes_in_no_assembly_is_told_as_always(tmp_path):
         assemblies(file)
 
 
-def test_the_picture_of_assemblies_has_the_line_for_the_file(tmp_path, monkeypatch, capsys):
+UNITS = 'units: mm\nangles: degrees\n'
+IN_MM = UNITS + re.sub(r'0\.\d+', lambda of: f'{1e3 * float(of[0]):g}', WITHOUT_SIDES)
+
+
+@pytest.mark.parametrize('text', [WITHOUT_SIDES, IN_MM], ids=['m', 'mm'])
+def test_the_picture_of_assemblies_has_the_pose_for_the_file(text, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    Path('x.yaml').write_text(WITHOUT_SIDES)
+    Path('x.yaml').write_text(text)
     assert main(['draw', 'x.yaml', '--assemblies', '-o', 'x.svg']) == 0
-    assert capsys.readouterr().out == 'x.svg\n'
+    *lines, file = capsys.readouterr().out.splitlines()
+    assert file == 'x.svg'
     titles = re.findall('<!-- (.*?) -->', Path('x.svg').read_text('utf-8'), re.DOTALL)
-    lines = [title.partition('\n')[0] for title in titles if title.startswith('assembly')]
-    assert lines[0] == 'assembly: {B: left, D: left}'
-    assert len(lines) == 4
-    for line in lines:
-        Path('y.yaml').write_text(f'{WITHOUT_SIDES}{line}\n')
-        load('y.yaml')
+    folded = [title for title in titles if title.startswith('pose')]
+    assert len(lines) == len(folded) == 4
+    for line, title, drawn in zip(lines, folded, assemblies('x.yaml').values(), strict=True):
+        assert line.startswith(title)
+        Path('y.yaml').write_text(f'{text}{line}\n')
+        found = load('y.yaml')
+        at = found.linkage.pose.inputs
+        assert found.position(*at).joints == drawn.position(*at).joints
+
+
+@pytest.mark.parametrize('name', ['parallelogram', 'jansen_leg', 'slider_crank', 'watt_1'])
+def test_the_pose_of_each_assembly_of_the_gallery_leads_back(name, tmp_path, capsys):
+    assert main(['draw', name, '--assemblies', '-o', str(tmp_path / 'x.svg')]) == 0
+    lines = capsys.readouterr().out.splitlines()[:-1]
+    text = named_file(name, 'linkages').read_text('utf-8')
+    own = re.sub(r'(?m)^(assembly|pose):.*\n(  .*\n)*', '', text)
+    for line, drawn in zip(lines, assemblies(name).values(), strict=True):
+        file = tmp_path / 'y.yaml'
+        file.write_text(f'{own}{line}\n')
+        found = load(file)
+        at = found.linkage.pose.inputs
+        assert found.position(*at).joints == drawn.position(*at).joints
 
 
 @pytest.mark.parametrize(

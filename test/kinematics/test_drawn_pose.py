@@ -28,7 +28,8 @@ import random
 from typing import NamedTuple
 
 from linkage_ros.effects.tolerance import alter, ToleranceParameters
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.drawn_pose import drawn_pose
 from linkage_ros.kinematics.linkage import (
@@ -39,7 +40,7 @@ from linkage_ros.kinematics.linkage import (
     RevoluteJoint,
     Slider,
 )
-from linkage_ros.kinematics.plan import sides_at
+from linkage_ros.kinematics.sides import sides_at
 import pytest
 
 from .linkages import four_bar_linkage
@@ -241,6 +242,76 @@ def test_a_pose_that_does_not_tell_lists_the_assemblies_and_what_tells():
         assert f'[{place.real:.4g}, {place.imag:.4g}] m' in error.value.remedy
 
 
+LEG = """
+units: mm
+angles: degrees
+links:
+  ground: {hip: [0, 0]}
+  front_crank: {hip: [0, 0], A: [90, 0]}
+  rear_crank: {hip: [0, 0], B: [90, 0]}
+  front_shin: {A: [0, 0], foot: [162, 0]}
+  rear_shin: {B: [0, 0], foot: [162, 0]}
+input:
+  - {joint: front_joint, parent: ground, child: front_crank}
+  - {joint: rear_joint, parent: ground, child: rear_crank}
+joints: {front_knee: {parent: front_crank, child: front_shin}}
+"""
+
+LIFT = """
+links:
+  ground: {P0: [0, 0]}
+  arm_a: {P0: [0, 0], M: [0.5, 0], T1: [1, 0]}
+  arm_b: {S0: [0, 0], M: [0.5, 0], T2: [1, 0]}
+  platform: {T2: [0, 0], load: [0.4, 0.1]}
+sliders:
+  foot: {point: S0, along: ground, through: P0, direction: [1, 0]}
+  top: {point: T1, along: platform, through: T2, direction: [1, 0]}
+input: {joint: foot_slide, slider: foot, limits: [0.3, 0.99]}
+joints: {platform_joint: {parent: ground, child: platform}}
+"""
+
+
+def loaded(tmp_path, text):
+    file = tmp_path / 'drawn.yaml'
+    file.write_text(text)
+    return load(file)
+
+
+@pytest.mark.parametrize('half', [20, 30, 45, 60, 80])
+@pytest.mark.parametrize('drawn_half', [25, 45, 70])
+def test_a_leg_of_two_motors_on_one_axis_stands_as_drawn(half, drawn_half, tmp_path):
+    pose = (
+        f'pose: {{inputs: [{-90 + drawn_half}, {-90 - drawn_half}], points: {{foot: [9, -190]}}}}'
+    )
+    closure = loaded(tmp_path, LEG + pose)
+    at = radians(-90 + half), radians(-90 - half)
+    foot = closure.points(closure.position(*at))['front_shin', 'foot']
+    below = 0.09 * cos(radians(half)) + sqrt(0.162**2 - (0.09 * sin(radians(half))) ** 2)
+    assert abs(foot + 1j * below) < 1e-12
+
+
+def test_a_scissor_lift_stands_as_drawn_and_says_what_a_pose_leaves_open(tmp_path):
+    pose = 'pose: {inputs: [0.866], points: {M: [0.4, 0.2], load: [0.4, 0.6]}}'
+    closure = loaded(tmp_path, LIFT + pose)
+    for slide in (0.4, 0.6, 0.9):
+        points = closure.points(closure.position(slide))
+        assert abs(points['arm_a', 'T1'] - complex(slide, sqrt(1.0 - slide**2))) < 1e-12
+        assert abs(points['platform', 'load'] - complex(0.4, 0.1 + sqrt(1.0 - slide**2))) < 1e-12
+    with pytest.raises(
+        FileError, match=r'pose: does not tell \{top: ahead\} from \{top: behind\}'
+    ):
+        loaded(tmp_path, LIFT + 'pose: {inputs: [0.866], points: {M: [0.4, 0.2]}}')
+
+
+@pytest.mark.parametrize('at', ['[-60]', '[60]', '[150]'])
+def test_a_shorthand_takes_a_pose(at, tmp_path):
+    side = -1 if at == '[-60]' else 1
+    drawn = f'pose: {{inputs: {at}, angles: {{rocker: {at[1:-1]}}}}}'
+    lengths = 'a: 0.08, b: 0.1, c: 0.0799999, d: 0.1'
+    closure = loaded(tmp_path, f'angles: degrees\nfour_bar: {{{lengths}, {drawn}}}')
+    assert closure.position(side).joints[1] == pytest.approx(side, abs=1e-5)
+
+
 # Near change points, against a continuation that knows no sides: it steps along the crank's angle
 # from the drawn pose, and goes on along the curve of its last steps, so that it crosses each
 # change point straight on. Newton's method then takes each pose to a changed length.
@@ -361,3 +432,54 @@ def test_tolerance_leaves_the_linkage_on_its_branch(name, seed):
     for at, angles in ONCE[name, 1].items():
         coupler, rocker = made.position(at).joints
         assert max(off(coupler + at, angles[0]), off(rocker, angles[1])) < radians(0.2)
+
+
+def _slider_crank(rod, offset):
+    return Linkage(
+        {
+            'ground': {'O': (0.0, 0.0), 'Q': (0.0, offset)},
+            'crank': {'O': (0.0, 0.0), 'A': (0.1, 0.0)},
+            'rod': {'A': (0.0, 0.0), 'B': (rod, 0.0)},
+        },
+        (Input('crank_joint', 'ground', 'crank'),),
+        {'line': 'ahead'},
+        {'rod': RevoluteJoint('ground', 'rod')},
+        {'line': Slider('B', 'ground', 'Q', (1.0, 0.0))},
+    )
+
+
+def _swivel(crank, offset):
+    return Linkage(
+        {
+            'ground': {'O': (0.0, 0.0), 'D': (0.1, 0.0)},
+            'crank': {'O': (0.0, 0.0), 'A': (crank, 0.0)},
+            'rail': {'A': (0.0, 0.0), 'Q': (0.0, offset), 'T': (0.1, 0.0)},
+        },
+        (Input('crank_joint', 'ground', 'crank'),),
+        {'line': 'ahead'},
+        {'rail': RevoluteJoint('ground', 'rail')},
+        {'line': Slider('D', 'rail', 'Q', (1.0, 0.0))},
+    )
+
+
+# The angle of rod and rail, known without solving: an isosceles slider-crank has its rod at the
+# negative angle of the crank, a straight rail whose crank is as long as the ground turns at half.
+TURNING = {
+    'isosceles slider-crank': (lambda by: _slider_crank(0.1 + by, 0.0), lambda phi: -phi),
+    'slider-crank beside': (lambda by: _slider_crank(0.1, by), lambda phi: -phi),
+    'swivel': (lambda by: _swivel(0.1 + by, 0.0), lambda phi: 0.5 * phi - 0.5 * pi),
+    'swivel beside': (lambda by: _swivel(0.1, by), lambda phi: 0.5 * phi - 0.5 * pi),
+}
+
+
+@pytest.mark.parametrize('name', TURNING)
+@pytest.mark.parametrize('by', CHANGED)
+def test_sliders_next_to_change_points_follow_the_nominal_linkage(name, by):
+    made, angle = TURNING[name]
+    closure = Closure(replace(made(by), nominal=made(0.0)))
+    for degrees in (-430, -300, -60, 50, 130, 250, 400, 670):
+        phi = radians(degrees)
+        assert off(closure.position(phi).joints[0], angle(phi)) < 6e-3
+        velocity = closure.velocity(closure.position(phi), 1.0)
+        ahead = closure.position(phi + 1e-6).joints[0] - closure.position(phi - 1e-6).joints[0]
+        assert remainder(ahead, tau) / 2e-6 == pytest.approx(velocity.joints[0], abs=1e-6)

@@ -20,11 +20,13 @@ import json
 from math import remainder, tau
 from pathlib import Path
 import random
+from typing import Any
 
 from linkage_ros.kinematics import closure as closure_module
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Pose, RevoluteJoint, Side
+from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Pose, RevoluteJoint
 from linkage_ros.kinematics.results import Position
+from linkage_ros.kinematics.sides import sides_at
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.kinematics.topology import assur_groups, Driven, Iterated, Structure
@@ -179,7 +181,8 @@ def chain(rng: random.Random, lengths: tuple[float, float, float, float], tail: 
     rocker = four_bar.position(x).joints[0]
     tip = made.legs[0].reach * rect(1.0, made.pose[2] - rocker)
     links['driver']['A0'] = (tip.real, tip.imag)
-    assembly: dict[str, Side] = {'B': 'left'}
+    # With a pose the side is the one there, and a change point may lie between.
+    assembly: dict[str, Any] = sides_at(four_bar, four_bar.position(x))
     joints = dict(linkage.joints)
     assert linkage.pose is not None
     if tail:

@@ -140,7 +140,9 @@ def linkages(draw: st.DrawFn) -> Linkage:
             | st.builds(
                 Pose,
                 st.tuples(*[NUMBERS] * len(linkage.inputs)),
-                st.dictionaries(st.sampled_from(fresh[-1:]), POINTS),
+                # Points of the ground tell nothing: any place of them is read.
+                st.dictionaries(st.sampled_from(sorted(links['ground'])), POINTS),
+                st.dictionaries(st.just('ground'), st.floats(-1e9, 1e9)),
             )
         ),
         draw(

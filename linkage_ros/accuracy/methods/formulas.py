@@ -47,7 +47,7 @@ from linkage_ros.accuracy.methods import ACCELERATION, Joints, Method, Motion, R
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
-from linkage_ros.kinematics.plan import written_sides
+from linkage_ros.kinematics.sides import written_sides
 from linkage_ros.kinematics.topology import assur_groups, Driven
 import numpy as np
 
