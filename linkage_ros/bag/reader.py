@@ -44,6 +44,7 @@ from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY, STATS_RECORD, UNFI
 from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
 from linkage_ros.errors import BagError, quoted
 from linkage_ros.files.file_access import read_regular
+from linkage_ros.files.file_kinds import BINARY, kind_of_bytes
 from linkage_ros.files.yaml_file import bounded_yaml
 from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
@@ -160,8 +161,8 @@ def is_finished(file: Path) -> bool:
     if not start:
         raise BagError(file, 'is empty', 'its recording never began, or the power failed in it')
     if not start.startswith(MCAP0_MAGIC):
-        text = start.isascii() and not any(code in start for code in b'\0\x1b')
-        found = 'is a text file' if text else f'starts with {quoted(start[:length])}'
+        kind = kind_of_bytes(start)
+        found = f'starts with {quoted(start[:length])}' if kind.noun == BINARY.noun else f'is {kind.noun}'
         raise BagError(
             file, f'{found}, and no MCAP file', "name a bag's folder, or its .mcap file"
         )

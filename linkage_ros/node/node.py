@@ -130,8 +130,9 @@ def _reporting(transition: Transition) -> Transition:
 class LinkageNode(LifecycleNode):
     """Solves a linkage for a crank; docs/reference lists topics, parameters and services."""
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, *, logs_failure: bool = True, **options: Any) -> None:
         super().__init__('linkage_node', **options)
+        self._logs_failure = logs_failure
         declare_parameters(self, LINKAGE_NODE)
         self.failure: LinkageError | None = None
         """Reason why the node could not be configured."""
@@ -206,7 +207,8 @@ class LinkageNode(LifecycleNode):
         except LinkageError as error:
             self._scene_topics.disconnect()
             self.failure = error
-            self.get_logger().error(str(error))
+            if self._logs_failure:
+                self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         for note in scene_notes(scene):
             self.get_logger().warning(str(note))
