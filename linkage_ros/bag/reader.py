@@ -162,7 +162,8 @@ def is_finished(file: Path) -> bool:
         raise BagError(file, 'is empty', 'its recording never began, or the power failed in it')
     if not start.startswith(MCAP0_MAGIC):
         kind = kind_of_bytes(start)
-        found = f'starts with {quoted(start[:length])}' if kind.noun == BINARY.noun else f'is {kind.noun}'
+        binary = kind.noun == BINARY.noun
+        found = f'starts with {quoted(start[:length])}' if binary else f'is {kind.noun}'
         raise BagError(
             file, f'{found}, and no MCAP file', "name a bag's folder, or its .mcap file"
         )

@@ -179,7 +179,7 @@ def finite(value: float) -> float | None:
 
 
 def fixed(value: float, digits: int) -> str:
-    """Return a number with fixed decimals, a large one by a power of ten; never a negative zero."""
+    """Return a number with fixed decimals, a large one with an exponent; never a negative zero."""
     written = f'{value:.{digits}f}' if abs(value) < _ALL_DIGITS else f'{value:.15g}'
     return written.lstrip('-') if float(written) == 0.0 else written
 

@@ -50,6 +50,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _STEPS = 36
@@ -139,6 +140,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
             if number % _TOLD == 0:
                 advance(number, len(question.inputs))
             rows.append(_row(closure, question, given))
+    _show_reach(closure, question.inputs[: len(arguments.at)])
     kind = arguments.format or 'table'
     if arguments.output is not None:
         kind = FORMATS[arguments.output.suffix.lower()]
@@ -158,6 +160,16 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     atomic_write(arguments.output, answer.encode())
     print(arguments.output)
     return 0
+
+
+def _show_reach(closure: Closure, typed: Sequence[tuple[float, ...]]) -> None:
+    """Say once where the linkage closes, if it does not at an input that was typed."""
+    for given in typed:
+        ranges = () if closure.position(*given).joints else InputSweep(closure, given).ranges
+        if ranges:
+            name = closure.linkage.inputs[0].joint
+            print(f'linkage solve: note: {name} closes {describe(ranges)}', file=sys.stderr)
+            return
 
 
 class Question(NamedTuple):

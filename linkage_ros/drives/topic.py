@@ -127,6 +127,7 @@ class TopicDrive(Drive):
         '_estimate',
         '_max_lead',
         '_needs_rate',
+        'jump',
         'max_age',
         'sample',
     )
@@ -135,6 +136,8 @@ class TopicDrive(Drive):
     """Age of the newest sample above which there is no crank state, in [ns]."""
     sample: tuple[int, _Values, _Values, _Values] | None
     """The newest good sample: its stamp, in [ns], angles, rates, and accelerations."""
+    jump: float
+    """Greatest change of the first input from one sample to the next, in [rad] or [m]."""
 
     def __init__(self, use: TopicParameters, needs_rate: bool) -> None:
         self._carry_forward = use.carry_forward
@@ -144,6 +147,7 @@ class TopicDrive(Drive):
         self._bend = -tau * use.cutoff
         self._needs_rate = needs_rate or use.carry_forward or self._estimate
         self.sample = None
+        self.jump = 0.0
 
     @property
     def stamp(self) -> int:
@@ -176,8 +180,13 @@ class TopicDrive(Drive):
             return Rejection.STAMP_ZERO
         if stamp > now + self._max_lead:
             return Rejection.STAMP_FUTURE
-        if self.sample is not None and stamp < self.sample[0]:
-            return Rejection.STAMP_OLD
+        if self.sample is not None:
+            before, last = self.sample[:2]
+            if stamp < before:
+                return Rejection.STAMP_OLD
+            jump = abs(angles[0] - last[0])
+            if jump > self.jump:
+                self.jump = jump
         self.sample = (stamp, angles, rates, self._bent(stamp, rates) if self._estimate else zeros)
         return None
 

@@ -421,6 +421,7 @@ class LinkageNode(LifecycleNode):
             return
         period = self.get_parameter('warning_period').value
         self._warnings.check(loop.counts, loop.pipeline.closures, self.crank_topic, period)
+        self._warnings.check_jumps(loop.pipeline.lines, self.crank_topic)
         wrenches = [each.topic_name for each in self._scene_topics.wrenches]
         self._warnings.check_wrenches([*zip(wrenches, loop.counts.wrenches, strict=True)], period)
         silence = self._clock_silence()
