@@ -46,14 +46,13 @@ def scene_notes(scene: Scene) -> Iterator[FileError]:
     """Yield the notes on a scene and its linkages."""
     for member in scene.members:
         content = member.linkage_content
-        yield from map(content.located, linkage_notes(member.linkage, content.units))
-        if scene.rate and content.units.length == 'm':
-            yield from map(content.located, _of_lengths(member.linkage))
+        notes = linkage_notes(member.linkage, content.units, scene.rate)
+        yield from map(content.located, notes)
         yield from map(member.content.located, _of_member(member))
 
 
-def linkage_notes(linkage: Linkage, units: Units) -> Iterator[DefinitionError]:
-    """Yield the notes on a linkage of a file in some units."""
+def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator[DefinitionError]:
+    """Yield the notes on a linkage of a file in some units, which ticks at a rate in [Hz]."""
     turning = {given.joint: not given.slider for given in linkage.inputs} | {
         name: isinstance(joint, RevoluteJoint) for name, joint in linkage.joints.items()
     }
@@ -77,12 +76,7 @@ def linkage_notes(linkage: Linkage, units: Units) -> Iterator[DefinitionError]:
             f'is {ratio:g} times as long as {shortest!r}',
             'write all lengths in metres, or all in millimetres with units: mm',
         )
-
-
-def _of_lengths(linkage: Linkage) -> Iterator[DefinitionError]:
-    lengths = _lengths(linkage)
-    longest = max(lengths, key=lengths.__getitem__, default='')
-    if longest and lengths[longest] > _LONG:
+    elif rate and units.length == 'm' and lengths[longest] > _LONG:
         yield DefinitionError(
             f'links.{longest}',
             f'is {lengths[longest]:g} m long',
