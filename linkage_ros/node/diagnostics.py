@@ -603,8 +603,8 @@ class Warnings:
             if jump > _MORE_THAN_A_TURN and not given.slider:
                 self.warn(
                     f'jump {given.joint}',
-                    f'{crank_topic}: {given.joint} changed by {jump:.4g} rad from one sample to the '
-                    'next, more than a turn; if these are degrees, publish radians',
+                    f'{crank_topic}: {given.joint} changed by {jump:.4g} rad between two '
+                    'samples, more than a turn; if these are degrees, publish radians',
                     inf,
                 )
 

@@ -23,12 +23,12 @@ from .conftest import CONFIG
 from ..support.scenes import LONG_COUPLER
 
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
-LIMITED = '''links: {{ground: {{A: [0, 0], D: [0.1, 0]}}, a: {{A: [0, 0], B: [0.04, 0]}}, b: {{B: [0, 0],
-  C: [0.1, 0]}}, c: {{D: [0, 0], C: [0.09, 0]}}}}
+LIMITED = """links: {{ground: {{A: [0, 0], D: [0.1, 0]}}, a: {{A: [0, 0], B: [0.04, 0]}},
+  b: {{B: [0, 0], C: [0.1, 0]}}, c: {{D: [0, 0], C: [0.09, 0]}}}}
 input: {{joint: crank_joint, parent: ground, child: a, limits: {}}}
 assembly: {{C: left}}
 joints: {{rocker_joint: {{parent: ground, child: c}}}}
-'''
+"""
 SINE = 'drive: {sine: {amplitude: 45, frequency: 1}}\n'
 
 # Linkage, rest of the scene, and the notes without the folder.
@@ -67,12 +67,7 @@ NOTES = {
     'lengths in millimetres': (
         'four_bar: {a: 40, b: 120, c: 80, d: 100}\n',
         'rate: 1000\n',
-        [
-            (
-                'linkage.yaml: links.coupler: is 120 m long; '
-                'if it is in millimetres, write units: mm'
-            )
-        ],
+        [('linkage.yaml: links.coupler: is 120 m long; if it is in millimetres, write units: mm')],
     ),
     'lengths in millimetres that are named': (
         'units: mm\nfour_bar: {a: 40, b: 12000, c: 12000, d: 100}\n',
