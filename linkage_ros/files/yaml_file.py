@@ -134,7 +134,11 @@ _IN_PLAIN_WORDS = (
     ("'\\t'", 'has a tab', 'write spaces instead of tabs'),
     ('expected <block end>', 'is indented otherwise than the lines above it', _INDENT),
     ('mapping values are not allowed', 'has a colon where none can be', _INDENT),
-    ("could not find expected ':'", 'has a key without a colon', 'write key: value'),
+    (
+        "could not find expected ':'",
+        'has a key without a colon, or too long a one',
+        'write key: value',
+    ),
     ("expected ',' or '}'", 'has a { that does not end, or no comma', 'close it: {x: 1, y: 2}'),
     ("expected ',' or ']'", 'has a [ that does not end, or no comma', 'close it: [1, 2]'),
 )

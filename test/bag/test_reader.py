@@ -116,7 +116,7 @@ def test_a_file_without_an_index_is_read(tmp_path):
     [
         (b'', 'is empty; its recording never began'),
         (b'rate: 1000\n', "is a text file, and no MCAP file; name a bag's folder, or its .mcap"),
-        (b'SQLite format 3\0', "starts with b'SQLite f', and no MCAP file"),
+        (b'SQLite format 3\0', 'is an SQLite file, as older bags are, and no MCAP file'),
         (MCAP0_MAGIC[:5], 'and no MCAP file'),
         (MCAP0_MAGIC, 'has no end'),
         (MCAP0_MAGIC * 2, 'is damaged: '),

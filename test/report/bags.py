@@ -26,11 +26,13 @@ from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 from mcap.reader import make_reader
 import numpy as np
 
 from ..cli.recorded import BEGIN, JOINT_STATE, MS, scene_file, SECOND, STORE, topic
+from ..support.messages import wrench_stamped
 
 STATES, CRANK, FAULTS = '/joint_states', '/crank_states', '/linkage/faults'
 WITHHELD, RESETS, HEALTH = '/linkage/withheld', '/linkage/resets', '/diagnostics'
@@ -74,6 +76,7 @@ def write(
     scene: Path | None = None,
     name: str = '',
     types: Mapping[str, str] = TYPES,
+    wrenches: Sequence[str] = (),
 ) -> Path:
     """Write a bag, of a scene's run or of nobody's; return its folder."""
     attachments = {}
@@ -90,6 +93,7 @@ def write(
             'resets_topic': RESETS,
             'diagnostics_topic': HEALTH,
             'extra_topics': [],
+            'wrench_topics': [*wrenches],
         }
         attachments[RUN_FILE] = ('application/json', json.dumps(said).encode())
     numbers = {each: number for number, each in enumerate(types)}
@@ -310,6 +314,57 @@ def fingers(folder: Path) -> Path:
             yield STATES, stamp, stamp, writer.write(stamp, angles, [])
 
     return write(folder / 'fingers', messages(), scene)
+
+
+def late(folder: Path) -> Path:
+    """Write a run whose crank comes 0.6 s after its beginning."""
+    folder.mkdir()
+    scene = scene_file(
+        folder, 'drive: {topic: {}}\n', 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
+    )
+    writer = JointStateWriter(['coupler_joint', 'rocker_joint'])
+
+    def messages() -> Iterator[Message]:
+        yield HEALTH, BEGIN, BEGIN, _diagnostics(0, BEGIN)
+        for row in range(60, 160):
+            stamp = BEGIN + row * PERIOD
+            yield (
+                STATES,
+                stamp,
+                stamp,
+                writer.write(stamp, follow(0.04, 0.12, 0.08, 0.1, 0.01 * row), []),
+            )
+
+    return write(folder / 'late', messages(), scene)
+
+
+PUSH, TWIST = '/linkage_node/wrenches/coupler', '/linkage_node/wrenches/rocker'
+
+
+def pushed(folder: Path) -> Path:
+    """Write a run of a four-bar on whose links two topics put wrenches, at times of their own."""
+    folder.mkdir()
+    scene = scene_file(
+        folder,
+        'rate: 100\ndrive: {torque: {start: 1.0}}\nloads: {wrenches: {coupler: {}, rocker: {}}}\n',
+        shipped('linkages/four_bar.yaml').read_text('utf-8'),
+    )
+    writer = JointStateWriter(['coupler_joint', 'rocker_joint'])
+
+    def messages() -> Iterator[Message]:
+        for row in range(100):
+            stamp = BEGIN + row * PERIOD
+            if row % 2:
+                yield PUSH, stamp, stamp, wrench_stamped(3.0 * row, 4.0 * row, 0.0)
+            if row % 5 == 0:
+                yield TWIST, stamp, stamp, wrench_stamped(0.0, -1.0, 0.1 * row)
+            if row == 50:
+                yield TWIST, stamp, stamp, b'no message'
+            angles = follow(0.04, 0.12, 0.08, 0.1, 1.0 + 0.01 * row)
+            yield STATES, stamp, stamp, writer.write(stamp, angles, [])
+
+    types = TYPES | dict.fromkeys((PUSH, TWIST), 'geometry_msgs/msg/WrenchStamped')
+    return write(folder / 'pushed', messages(), scene, types=types, wrenches=[PUSH, TWIST])
 
 
 def joint_states(bag: Path, of: str) -> list[tuple[int, int, int, list[str], Sequence[float]]]:
