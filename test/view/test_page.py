@@ -383,6 +383,7 @@ def test_points_inputs_and_sides_are_chosen_by_clicking(browser: Any, tmp_path: 
         page.wait_for_function("() => View.state().text.includes('{B: right}')")
         agrees(page)
         page.check('input[value=trace]')
+        page.wait_for_function(QUIET)  # the picture fits the other assembly then
         page.mouse.click(*middle(page, 'O4', 'B'))
         page.wait_for_function("() => View.state().text.includes('traced: [P, P1]')")
         page.get_by_label('trace P no more').click()
