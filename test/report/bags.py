@@ -287,6 +287,7 @@ def empty(folder: Path) -> Path:
     return write(folder / 'empty', [], scene_file(folder, DRILL_SCENE, DRILL))
 
 
+FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 FINGERS = """
 rate: 100
 linkages:
@@ -302,7 +303,7 @@ linkages:
 def fingers(folder: Path) -> Path:
     """Write a run of two four-bars, the right of which turns the other way, and twice as fast."""
     folder.mkdir()
-    scene = scene_file(folder, FINGERS, 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
+    scene = scene_file(folder, FINGERS, FOUR_BAR)
     sides = ('left', 'right')
     names = [f'{side}_{joint}_joint' for side in sides for joint in ('crank', 'coupler', 'rocker')]
     writer = JointStateWriter(names)
@@ -319,21 +320,17 @@ def fingers(folder: Path) -> Path:
 def late(folder: Path) -> Path:
     """Write a run whose crank comes 0.6 s after its beginning."""
     folder.mkdir()
-    scene = scene_file(
-        folder, 'drive: {topic: {}}\n', 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
-    )
-    writer = JointStateWriter(['coupler_joint', 'rocker_joint'])
+    scene = scene_file(folder, 'rate: 100\ndrive: {topic: {}}\n', FOUR_BAR)
+    crank = JointStateWriter(['crank_joint'])
+    states = JointStateWriter(['coupler_joint', 'rocker_joint'])
 
     def messages() -> Iterator[Message]:
         yield HEALTH, BEGIN, BEGIN, _diagnostics(0, BEGIN)
         for row in range(60, 160):
-            stamp = BEGIN + row * PERIOD
-            yield (
-                STATES,
-                stamp,
-                stamp,
-                writer.write(stamp, follow(0.04, 0.12, 0.08, 0.1, 0.01 * row), []),
-            )
+            stamp, angle = BEGIN + row * PERIOD, 0.01 * row
+            joints = follow(0.04, 0.12, 0.08, 0.1, angle)
+            yield CRANK, stamp, stamp, crank.write(stamp, [angle], [1.0])
+            yield STATES, stamp, stamp, states.write(stamp, joints, [])
 
     return write(folder / 'late', messages(), scene)
 

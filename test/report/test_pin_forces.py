@@ -125,9 +125,9 @@ def test_wrenches_on_links_are_plotted_as_they_were_recorded(tmp_path):
     rows = np.arange(1, 100, 2)
     assert force == pytest.approx(5.0 * rows)
     assert np.diff(times) == pytest.approx(times[1] - times[0])
-    times, moment = curve(found, 'rocker', 'moment of a load')
+    moment = np.array(curve(found, 'rocker', 'moment of a load')[1], float)
     assert moment[np.isfinite(moment)] == pytest.approx(0.1 * np.arange(0, 100, 5))
     titles = {each['key']: [one['name'] for one in each['curves']] for each in plots(found)}
     assert titles['loads'] == ['coupler', 'rocker']
-    assert titles['load_moments'] == ['rocker'] or 'coupler' in titles['load_moments']
+    assert 'rocker' in titles['load_moments']
     assert found.left_out['wrenches', 'malformed message'] == 1
