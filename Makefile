@@ -30,7 +30,7 @@ unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLU
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema cost effects docs lint format
+.PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema reference cost effects docs lint format
 .PHONY: test_nodes test_rest clean damage kills endurance disk attacks mutants accuracy_page report lock sbom compiled
 
 help:
@@ -52,6 +52,7 @@ help:
 	@echo 'make endurance run 24 h in minutes and 10 min over DDS, into docs/recordings (25 min)'
 	@echo 'make gallery   draw the linkages that come with the package, and the moving pictures of the README'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
+	@echo 'make reference write the schemas, and the reference of files, parameters and commands'
 	@echo 'make cost      measure the cost of every effect, into docs/cost.md'
 	@echo 'make effects   draw the pictures of drives, effects and faults for docs/effects.md'
 	@echo 'make report    record a run, and take a picture of its report for docs/report.png'
@@ -94,7 +95,7 @@ $(DEMO): setup.py requirements/demo.txt
 	@$(BIN)/python -c 'import pip' 2>/dev/null || { \
 	  echo '.venv: creating a virtual environment with $(PYTHON)'; \
 	  $(PYTHON) -m venv --clear .venv; }
-	@echo '.venv: installing ROS 2 Jazzy, numpy and matplotlib (some 400 MB)'
+	@echo '.venv: installing ROS 2 Jazzy, matplotlib and the page of a run (some 500 MB)'
 	@$(call install_by,requirements/demo.txt)
 	@echo '.venv: installing this checkout'
 	@$(PIP_INSTALL) --no-build-isolation --editable .
@@ -204,6 +205,9 @@ schema: $(STAMP)
 	  file=config/schema/$$kind.schema.json; \
 	  $(BIN)/linkage scene --schema $$kind >$$file.new && mv $$file.new $$file || exit $$?; \
 	done
+
+reference: schema
+	@$(BIN)/python -m docs.make_reference
 
 cost: $(STAMP)
 	@$(BIN)/python -m docs.make_cost

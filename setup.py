@@ -62,8 +62,6 @@ REPORT = [
     'python-flint>=0.6,<1',
     'rich>=13,<16',
 ]
-# `make demo`: a node, tables, a picture, and the installer.
-DEMO = [*ROS, 'matplotlib>=3.6,<4', 'rich>=13,<16', SETUPTOOLS, 'uv']
 # Synthesis by fitting and searching; exact synthesis needs numpy only.
 DESIGN = ['scipy>=1.11,<2']
 # Export of bags as Parquet; CSV needs no package. From 26 on pyarrow refuses numpy 1.x, which
@@ -71,6 +69,8 @@ DESIGN = ['scipy>=1.11,<2']
 EXPORT = ['pyarrow>=14,<26']
 # `linkage view`: a server for this machine, edits that keep a file's comments, DXF files.
 VIEW = ['aiohttp>=3.9,<4', 'ezdxf>=1.1,<2', 'plotly>=6,<8', 'ruamel.yaml>=0.18,<1']
+# `make demo`: a node, tables, a picture, the page of the run, and the installer.
+DEMO = [*ROS, *VIEW, 'matplotlib>=3.6,<4', 'rich>=13,<16', SETUPTOOLS, 'uv']
 # `linkage fmu`: the wrapper between FMI and Python.
 FMU = ['pythonfmu3>=0.3.4,<0.4']
 # Completion of the command line in bash, zsh and fish.

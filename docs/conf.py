@@ -19,8 +19,7 @@
 """
 The documentation site: Sphinx, pages in MyST's Markdown, the theme Furo.
 
-``make docs`` builds it into build/docs. All pages are also readable on a forge. Reference text
-between ``made`` comments is inserted while the site is built.
+``make docs`` builds it into build/docs. All pages are also readable on a forge.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from linkage_ros import __version__
 
-from docs.website.reference import insert_parts
+from docs.website.links import make_links_local
 from docs.website.tutorial import PercentParser
 
 project = 'linkage_ros'
@@ -83,7 +82,7 @@ def setup(app: Any) -> dict[str, Any]:
     """Connect the extensions of this site to Sphinx."""
     app.add_source_suffix('.py', 'percent')
     app.add_source_parser(PercentParser)
-    app.connect('source-read', lambda _app, docname, source: insert_parts(docname, source))
+    app.connect('source-read', lambda _app, docname, source: make_links_local(docname, source))
     app.connect('missing-reference', _unlinked)
     app.connect('autodoc-process-signature', _readable)
     return {'parallel_read_safe': True, 'parallel_write_safe': True}

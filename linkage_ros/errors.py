@@ -27,6 +27,7 @@ from copyreg import __newobj__  # type: ignore[attr-defined]
 from difflib import get_close_matches
 from importlib.util import find_spec
 from os import PathLike
+import re
 from typing import Any
 
 _LONGEST_VALUE = 80
@@ -144,6 +145,12 @@ def did_you_mean(name: str, names: Iterable[str], otherwise: str) -> str:
     """Return the remedy for an unknown name: the nearest known name, or ``otherwise``."""
     near = get_close_matches(name, list(names), n=1)
     return f'did you mean {near[0]!r}?' if near else otherwise
+
+
+def decimal_comma(typed: str) -> str:
+    """Return what to say where a number may have been typed with a decimal comma; or ''."""
+    maybe = re.fullmatch(r'[-+]?\d+,\d+', typed)
+    return '; a decimal has a point, not a comma' if maybe else ''
 
 
 def quoted(value: Any) -> str:

@@ -50,6 +50,7 @@ from linkage_ros.bag.other_formats import (
 from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
 from linkage_ros.errors import BagError, quoted
 from linkage_ros.files.file_access import read_regular
+from linkage_ros.files.file_kinds import BINARY, kind_of_bytes
 from linkage_ros.files.yaml_file import bounded_yaml
 from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
@@ -178,8 +179,9 @@ def is_finished(file: Path) -> bool:
         raise BagError(file, 'is empty', 'its recording never began, or the power failed in it')
     refuse_other_format(file, start)
     if not start.startswith(MCAP0_MAGIC):
-        text = start.isascii() and not any(code in start for code in b'\0\x1b')
-        found = 'is a text file' if text else f'starts with {quoted(start[:length])}'
+        kind = kind_of_bytes(start)
+        binary = kind.noun == BINARY.noun
+        found = f'starts with {quoted(start[:length])}' if binary else f'is {kind.noun}'
         raise BagError(
             file, f'{found}, and no MCAP file', "name a bag's folder, or its .mcap file"
         )

@@ -23,8 +23,8 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
-from linkage_ros.errors import LinkageError, listed
-from linkage_ros.files.file_access import check_new, check_suffix
+from linkage_ros.errors import decimal_comma, LinkageError, listed
+from linkage_ros.files.file_access import check_new, check_output_name
 from linkage_ros.kinematics.linkage import Linkage
 
 PICTURES = ('.png', '.svg', '.pdf')
@@ -105,7 +105,7 @@ def output(suffixes: Collection[str]) -> Callable[[str], Path]:
 
     def read(text: str) -> Path:
         file = Path(text)
-        check_suffix(file, suffixes)
+        check_output_name(file, suffixes)
         return file
 
     return read
@@ -182,12 +182,17 @@ def inputs(
         raise LinkageError(
             f'{option} {",".join(f"{value:g}" for value in typed)}',
             f'{len(typed)} value(s) for {len(given)} input(s)',
-            f'write {option} {",".join(driven.joint.upper() for driven in given)}',
+            f'write {option} {",".join(driven.joint.upper() for driven in given)}'
+            + decimal_comma(','.join(f'{value:g}' for value in typed)),
         )
     return tuple(
         radians(value) if in_degrees and not driven.slider else value
         for value, driven in zip(typed, given, strict=True)
     )
+
+
+_ALL_DIGITS = 1e15
+"""From here on a double has no decimals."""
 
 
 def wrapped(angle: float) -> float:
@@ -202,8 +207,8 @@ def finite(value: float) -> float | None:
 
 
 def fixed(value: float, digits: int) -> str:
-    """Return a number with fixed decimals; never a negative zero."""
-    written = f'{value:.{digits}f}'
+    """Return a number with fixed decimals, a large one with an exponent; never a negative zero."""
+    written = f'{value:.{digits}f}' if abs(value) < _ALL_DIGITS else f'{value:.15g}'
     return written.lstrip('-') if float(written) == 0.0 else written
 
 

@@ -27,7 +27,7 @@ from typing import Any
 
 from linkage_ros.cli.arguments import add_file, add_radians, AngleUnit, finite
 from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
-from linkage_ros.files.linkage_file import load
+from linkage_ros.files.linkage_file import linkage_content, read_closure
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.kinematics.ranges import iterated
@@ -43,6 +43,7 @@ from linkage_ros.kinematics.sweep_analysis import (
     worst_residual,
 )
 from linkage_ros.kinematics.topology import Driven, Dyad, Group, Iterated, links_of
+from linkage_ros.resources import named_file
 from linkage_ros.scene.notes import linkage_notes
 
 _SINGULAR = {
@@ -70,9 +71,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Check the linkage; an invalid file raises before this returns."""
-    closure = load(arguments.file)
-    for note in linkage_notes(closure.linkage):
-        print(f'linkage check: note: {arguments.file}: {note}', file=sys.stderr)
+    file = named_file(arguments.file, 'linkages')
+    content = linkage_content(file)
+    closure = read_closure(content, file.stem)
+    for note in linkage_notes(closure.linkage, content.units):
+        print(f'linkage check: note: {content.located(note)}', file=sys.stderr)
     with progress('parts examined') as advance:
         account = {'file': arguments.file, **account_of(closure, advance)}
     if arguments.json:

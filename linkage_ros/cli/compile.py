@@ -29,8 +29,7 @@ from threading import Event
 from linkage_ros.cli.arguments import add_file, add_output
 from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quoted
 from linkage_ros.files.file_access import atomic_write
-from linkage_ros.files.linkage_file import read_closure
-from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.files.linkage_file import linkage_content, read_closure
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.languages import C_NAME, c_name, LANGUAGES
 from linkage_ros.kinematics.compiling.source import source, Subject
@@ -60,7 +59,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     output: Path = arguments.output
     language = LANGUAGES[output.suffix.lower()]
     file = named_file(arguments.file, 'linkages')
-    content, _ = read_yaml(file)
+    content = linkage_content(file)
     closure = read_closure(content)
     in_c = output.suffix.lower() in ('.c', '.h')
     subject = Subject(

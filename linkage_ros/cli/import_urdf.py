@@ -31,6 +31,7 @@ from linkage_ros.cli.arguments import add_output, LINKAGES
 from linkage_ros.cli.robot_model import write_or_print
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import read_regular
+from linkage_ros.files.file_kinds import kind_of_folder
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.files.yaml_file import parse_yaml
@@ -78,6 +79,9 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     file = arguments.file
     try:
         data = read_regular(file, _LARGEST_FILE)
+    except IsADirectoryError:
+        reason = f'is {kind_of_folder(file).noun}, and no URDF'
+        raise LinkageError(file, reason, 'name a URDF file') from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise LinkageError(file, f'cannot be read ({reason})', 'name a URDF file') from None

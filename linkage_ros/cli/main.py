@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 import os
+import re
 import sys
 from threading import Event
 from types import ModuleType
@@ -30,6 +31,7 @@ from typing import Any, NoReturn
 from linkage_ros import __version__
 from linkage_ros.cli.terminal import clean_output, give_up_output
 from linkage_ros.errors import (
+    decimal_comma,
     did_you_mean,
     LinkageError,
     listed,
@@ -88,6 +90,15 @@ EXIT_CODES = {
 """The exit codes of all commands."""
 
 
+# What argparse says of a value that its type does not read.
+_INVALID = re.compile(r"invalid (?:float|int|number|(whole) number) value: ('(.*)')")
+
+
+def _in_plain_words(found: re.Match[str]) -> str:
+    kind = 'whole number' if found[1] or 'int value' in found[0] else 'number'
+    return f'{found[2]} is no {kind}{decimal_comma(found[3])}'
+
+
 class Parser(argparse.ArgumentParser):
     """A parser that answers a wrong word in one line, with the nearest right one."""
 
@@ -111,6 +122,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print one line, and exit as for any wrong input."""
+        message = _INVALID.sub(_in_plain_words, message)
         self.exit(2, f'{self.prog}: {message} (see {self.prog} --help)\n')
 
 

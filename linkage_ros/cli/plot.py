@@ -13,7 +13,11 @@
 # limitations under the License.
 
 
-"""Draw the joints of a bag, and their rates, over its crank, the first where there are several."""
+"""
+Draw the joints of a bag, and their rates, over its crank or over time.
+
+Of several linkages the first is drawn. A curve breaks at lost ticks, and where none was published.
+"""
 
 from __future__ import annotations
 
@@ -34,13 +38,20 @@ from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.messages.joint_state import JointStateReader, Rejection
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.names import picture_text
 from linkage_ros.replay.replay import replay
 from linkage_ros.signals import StoppedError
 import numpy as np
+from numpy.typing import NDArray
 
+Bools = NDArray[np.bool_]
+Floats = NDArray[np.float64]
 Values = tuple[float, ...]
 """Values of joints, in [rad] or [m], and per second."""
+
+_STEADY, _UNSTEADY = 1.5, 5.0
+"""Usual steps that make a gap, of ticks at a rate and of ticks that come with samples."""
 
 EXAMPLE = 'linkage plot my_bag -o my_bag.png'
 
@@ -49,23 +60,39 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_bag(parser)
     add_output(parser, PICTURES, 'BAG.png')
+    parser.add_argument(
+        '--over', choices=('crank', 'time'), default='crank', help='the axis (default: crank)'
+    )
     add_trust(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Draw the bag."""
     picture = output_or(arguments, beside(arguments.bag, '.png'))
-    draw(arguments.bag, picture, stop, trust_effects=arguments.trust_effects)
+    draw(
+        arguments.bag,
+        picture,
+        stop,
+        over_time=arguments.over == 'time',
+        trust_effects=arguments.trust_effects,
+    )
     print(picture)
     return 0
 
 
-def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = False) -> None:
+def draw(
+    bag_path: Path,
+    picture: Path,
+    stop: Event,
+    *,
+    over_time: bool = False,
+    trust_effects: bool = False,
+) -> None:
     """
-    Draw a bag: each published joint, and its rate if recorded, over the range of the crank.
+    Draw a bag: each published joint, and its rate if recorded, over the crank or over time.
 
-    Angles are continuous over this range, as in `linkage draw`, in whichever turn they were
-    recorded.
+    Angles are continuous over the range of the crank, as in `linkage draw`, in whichever turn they
+    were recorded.
 
     Raises
     ------
@@ -81,10 +108,11 @@ def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = Fa
     # The x axis is the crank of the first linkage; its joints are drawn.
     member = scene.members[0]
     reader = JointStateReader(member.joints)
+    times: list[int] = []
     cranks: list[Values] = []
     positions: list[Values] = []
     rates: list[Values] = []
-    for _, recorded, _, tick in replay(bag, scene):
+    for at, recorded, _, tick in replay(bag, scene):
         if stop.is_set():
             raise StoppedError
         crank_state = tick.looks[0].crank
@@ -95,16 +123,85 @@ def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = Fa
             continue
         if isinstance(sample, Rejection):
             raise BagError(bag_path, f'a joint state: {sample.value}', 'name another bag')
+        times.append(at)
         cranks.append(tuple(crank_state.angles))
         positions.append(sample.angles)
         rates.append(sample.rates or ())
     if not positions:
         raise BagError(bag_path, 'holds no joint states', 'record a run with a crank')
-    joints, joint_rates = curves(member.linkage, cranks, positions, rates)
+    seconds = (np.array(times) - times[0]) / NANOSECONDS
+    gaps = is_after_gap(seconds, steady=scene.rate > 0.0)
+    if over_time:
+        recorded_joints = cranks, positions, rates
+        joints, joint_rates = curves_over_time(member.linkage, seconds, *recorded_joints, gaps)
+    else:
+        joints, joint_rates = curves(member.linkage, cranks, positions, rates, gaps)
     if not joints:
         raise BagError(bag_path, 'holds no joint but its crank', 'name another bag')
     title = f'{scene.name}: {len(positions)} joint states'
-    _paint(title, member.linkage.inputs[0], joints, joint_rates, picture)
+    driven = None if over_time else member.linkage.inputs[0]
+    _paint(title, driven, joints, joint_rates, picture)
+
+
+def is_after_gap(times: Floats, *, steady: bool) -> Bools:
+    """
+    Return for each joint state whether ticks were lost before it, or nothing was published.
+
+    Parameters
+    ----------
+    times
+        Times of the joint states, in [s].
+    steady
+        Whether the ticks have a rate; else they come with samples, at any times.
+
+    """
+    steps = np.diff(times)
+    longest = (_STEADY if steady else _UNSTEADY) * float(np.median(steps)) if len(steps) else 0.0
+    # Where the clock was set back, another part of the run begins.
+    return np.concatenate([[False], (steps > longest) | (steps < 0.0)])
+
+
+def curves_over_time(
+    linkage: Linkage,
+    times: Floats,
+    cranks: Sequence[Values],
+    positions: Sequence[Values],
+    rates: Sequence[Values],
+    gaps: Bools,
+) -> tuple[list[Curve], list[Curve]]:
+    """Return crank and joints over the times, and the joints' rates; see `curves`."""
+    driven = linkage.inputs[0]
+    named = {
+        name: (isinstance(joint, RevoluteJoint), [values[place] for values in positions])
+        for place, (name, joint) in enumerate(linkage.joints.items())
+    }
+    # The last, so that joints and rates have the same colours.
+    named.setdefault(driven.joint, (not driven.slider, [inputs[0] for inputs in cranks]))
+    joints = []
+    for name, (turning, values) in named.items():
+        breaks = gaps.copy()
+        if turning:  # an angle may be wrapped
+            breaks[1:] |= np.abs(np.diff(values)) > pi
+        joints.append(_broken(name, turning, times, np.array(values), breaks))
+    joint_rates = [
+        _broken(
+            name,
+            isinstance(joint, RevoluteJoint),
+            times,
+            np.array([each[place] if each else nan for each in rates]),
+            gaps,
+        )
+        for place, (name, joint) in enumerate(linkage.joints.items())
+        if any(rates)
+    ]
+    return joints, joint_rates
+
+
+def _broken(name: str, turning: bool, x: Floats, y: Floats, breaks: Bools) -> Curve:
+    """Return a curve that begins anew at the breaks."""
+    at = np.flatnonzero(breaks)
+    points = (tuple(np.insert(values, at, nan).tolist()) for values in (x, y))
+    return Curve(name, turning, *points)
 
 
 def curves(
@@ -112,6 +209,7 @@ def curves(
     cranks: Sequence[Values],
     positions: Sequence[Values],
     rates: Sequence[Values],
+    gaps: Bools | None = None,
 ) -> tuple[list[Curve], list[Curve]]:
     """
     Return the joints over the crank, and their rates if they were recorded.
@@ -124,6 +222,8 @@ def curves(
         Its inputs at each joint state, in [rad] or [m].
     positions, rates
         Its joints, in [rad] or [m], and per second; () for rates that were not recorded.
+    gaps
+        For each joint state whether its curve begins anew there, as after lost ticks.
 
     """
     driven = linkage.inputs[0]
@@ -139,13 +239,15 @@ def curves(
     order = [*range(end, len(crank)), *range(end)]
     crank = crank[order]
     begins = np.arange(len(crank)) == len(crank) - end
+    if gaps is not None:
+        begins |= gaps[order]
     if not driven.slider:
         begins[1:] |= np.abs(np.diff(crank)) > pi
     joints, joint_rates = [], []
     for place, (name, joint) in enumerate(linkage.joints.items()):
         if name == driven.joint:
             continue
-        turning, label = isinstance(joint, RevoluteJoint), name
+        turning = isinstance(joint, RevoluteJoint)
         values = np.array([positions[i][place] for i in order])
         breaks = begins.copy()
         if turning:
@@ -157,14 +259,11 @@ def curves(
                 known = piece[np.isfinite(values[piece])]
                 if len(known):
                     values[known] -= tau * np.round(np.median(turns[known]))
-        gaps = np.flatnonzero(breaks)
-        x = tuple(np.insert(crank, gaps, nan).tolist())
-        joints.append(Curve(label, turning, x, tuple(np.insert(values, gaps, nan).tolist())))
+        joints.append(_broken(name, turning, crank, values, breaks))
         if any(rates):
             # At a toggle there are no rates.
             its_rates = np.array([rates[i][place] if rates[i] else nan for i in order])
-            y = tuple(np.insert(its_rates, gaps, nan).tolist())
-            joint_rates.append(Curve(label, turning, x, y))
+            joint_rates.append(_broken(name, turning, crank, its_rates, breaks))
     return joints, joint_rates
 
 
@@ -173,8 +272,13 @@ def _is_within(value: float, interval: InputRange) -> bool:
 
 
 def _paint(
-    title: str, driven: Input, joints: Sequence[Curve], rates: Sequence[Curve], picture: Path
+    title: str,
+    driven: Input | None,
+    joints: Sequence[Curve],
+    rates: Sequence[Curve],
+    picture: Path,
 ) -> None:
+    """Paint curves over the crank; over time, if none is driven."""
     context = settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
     from matplotlib.ticker import AutoLocator
@@ -187,14 +291,17 @@ def _paint(
         )
         grid = figure.add_gridspec(len(parts), 1)
         drawn = []
+        in_degrees = driven is not None and not driven.slider
         for number, part in enumerate(parts):
             panels = joint_axes(grid[number], part)
-            drawn.append((panels, part, plot_joints(panels, part, degrees_x=not driven.slider)))
+            drawn.append((panels, part, plot_joints(panels, part, degrees_x=in_degrees)))
             for axes in panels.values() if part is rates else ():
                 axes.yaxis.set_major_locator(AutoLocator())
                 axes.set_ylabel(f'rate of {axes.get_ylabel()[:-1]}/s]')
         lowest = list(drawn[-1][0].values())[-1]
-        if driven.slider:
+        if driven is None:
+            lowest.set_xlabel('time since the first joint state [s]')
+        elif driven.slider:
             show_lengths(
                 lowest.xaxis, picture_text(driven.joint), max(map(abs, lowest.get_xlim()))
             )

@@ -309,6 +309,7 @@ def run_scene(
                 patience=patience,
                 view=display,
                 at_end=at_end,
+                raises=True,
             )
     finally:
         display.close()

@@ -36,7 +36,7 @@ from linkage_ros.cli.arguments import add_force, add_set, bounded, PICTURES, SCE
 from linkage_ros.cli.export import export
 from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import clean, LinkageError
-from linkage_ros.files.file_access import check_suffix, remove_bag
+from linkage_ros.files.file_access import check_output_name, remove_bag
 from linkage_ros.files.tables import check_kind, KINDS, table_file
 from linkage_ros.messages.joint_values import EFFORT, POSITION, RATE, UNITS
 from linkage_ros.scene.load import load_scene
@@ -117,7 +117,7 @@ def _output(text: str) -> Path:
     """Read the name of a folder, which has no suffix, or of a table or picture."""
     file = Path(text)
     if file.suffix:
-        check_suffix(file, (*KINDS, *PICTURES))
+        check_output_name(file, (*KINDS, *PICTURES))
     return file
 
 
@@ -135,7 +135,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             raise LinkageError(option, 'is for a study', 'add --seeds or --sweep')
     output: Path = arguments.output
     if output.suffix:
-        check_suffix(output, KINDS)
+        check_output_name(output, KINDS)
         check_kind(output)
     scene = _loaded(arguments)
     ticks = check_simulated(scene, arguments.seconds)
@@ -193,10 +193,10 @@ def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str,
 def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) -> int:
     """Run a study; return 1 if a signal stopped it, or no run succeeded."""
     output: Path = arguments.output
-    check_suffix(output, (*KINDS, *PICTURES))  # not a folder
+    check_output_name(output, (*KINDS, *PICTURES))  # not a folder
     pictures = [file for file in (output, arguments.picture) if file and file.suffix not in KINDS]
     if pictures:
-        check_suffix(pictures[-1], PICTURES)
+        check_output_name(pictures[-1], PICTURES)
         from linkage_ros.drawing.painting import settings  # local import: only for a picture
 
         settings()  # without matplotlib, say so before the study is run

@@ -140,6 +140,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
             if number % _TOLD == 0:
                 advance(number, len(question.inputs))
             rows.append(_row(closure, question, given))
+    _show_reach(closure, question.inputs[: len(arguments.at)], arguments.angles)
     kind = arguments.format or 'table'
     if arguments.output is not None:
         kind = FORMATS[arguments.output.suffix.lower()]
@@ -159,6 +160,21 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     atomic_write(arguments.output, answer.encode())
     print(arguments.output)
     return 0
+
+
+def _show_reach(closure: Closure, typed: Sequence[tuple[float, ...]], angles: AngleUnit) -> None:
+    """Say once where the linkage closes, if it does not at an input that was typed."""
+    for given in typed:
+        ranges = () if closure.position(*given).joints else InputSweep(closure, given).ranges
+        if ranges:
+            ends = [
+                [angles.value_text(end, one.turning) for end in (one.lowest, one.highest)]
+                for one in ranges
+            ]
+            told = ' and '.join(f'from {low} to {high}' for low, high in ends)
+            name = closure.linkage.inputs[0].joint
+            print(f'linkage solve: note: {name} closes {told}', file=sys.stderr)
+            return
 
 
 class Question(NamedTuple):

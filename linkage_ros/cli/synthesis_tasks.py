@@ -90,8 +90,8 @@ def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
     named = [option for option, value in tasks.items() if value]
     if len(named) != 1:
         raise LinkageError(
-            listed(named, ' and ') or 'linkage synthesize',
-            'stand for two tasks' if named else 'nothing is asked for',
+            listed(named, ' and ') or 'the task',
+            'stand for two tasks' if named else 'is not said',
             f'name one of {listed(tasks)}',
         )
     work = {'--pair': _pairs, '--function': _function, '--path': _path, '--pose': _motion}

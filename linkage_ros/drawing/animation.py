@@ -53,7 +53,7 @@ from linkage_ros.drawing.painting import (
 )
 from linkage_ros.drawing.shapes import carried_shapes, link_frames, Shape
 from linkage_ros.errors import check_installed, LinkageError
-from linkage_ros.files.file_access import atomic_write, check_suffix
+from linkage_ros.files.file_access import atomic_write, check_output_name
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.names import picture_text
@@ -127,7 +127,7 @@ def check_kind(file: Path) -> None:
     MP4.
     """
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
-    check_suffix(file, KINDS)
+    check_output_name(file, KINDS)
     if file.suffix.lower() == '.mp4':
         from matplotlib.animation import FFMpegWriter  # local import: an extra, and slow to load
 

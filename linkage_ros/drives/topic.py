@@ -143,6 +143,7 @@ class TopicDrive(Drive):
         '_max_lead',
         '_needs_rate',
         '_sliding',
+        'jump',
         'max_age',
         'sample',
     )
@@ -151,6 +152,8 @@ class TopicDrive(Drive):
     """Age of the newest sample above which there is no crank state, in [ns]."""
     sample: tuple[int, _Values, _Values, _Values] | None
     """The newest good sample with rates: its stamp, in [ns], angles, rates, accelerations."""
+    jump: float
+    """Greatest change of the first input from one sample to the next, in [rad] or [m]."""
 
     def __init__(
         self, use: TopicParameters, needs_rate: bool, inputs: Sequence[Input] = ()
@@ -166,6 +169,7 @@ class TopicDrive(Drive):
         self._last: tuple[int, _Values] | None = None
         """Stamp and angles of the newest good sample."""
         self.sample = None
+        self.jump = 0.0
 
     @property
     def stamp(self) -> int:
@@ -200,8 +204,13 @@ class TopicDrive(Drive):
             return Rejection.STAMP_ZERO
         if stamp > now + self._max_lead:
             return Rejection.STAMP_FUTURE
-        if self._last is not None and stamp < self._last[0]:
-            return Rejection.STAMP_OLD
+        if self._last is not None:
+            before, last = self._last
+            if stamp < before:
+                return Rejection.STAMP_OLD
+            jump = abs(angles[0] - last[0])
+            if jump > self.jump:
+                self.jump = jump
         if not complete:
             known = self._differences(stamp, angles) if self._needs_rate else zeros
             if known is None:

@@ -79,14 +79,22 @@ def _check(status: os.stat_result, file: str | Path) -> None:
     raise OSError(EINVAL, f'{what}, not a regular file', str(file))
 
 
-def check_suffix(file: Path, suffixes: Collection[str]) -> None:
-    """Check that the name of a file to write has one of some suffixes, whatever its case."""
+def check_output_name(file: Path, suffixes: Collection[str]) -> None:
+    """Check the name of a file to write: its suffix, whatever its case, and its folder."""
     ending = file.suffix.lower()
     if ending not in suffixes:
         raise LinkageError(
             file,
             f'ends in {ending!r}' if ending else 'has no ending',
             f'name a file that ends in {listed(suffixes, " or ")}',
+        )
+    _check_folder(file)
+
+
+def _check_folder(file: Path) -> None:
+    if not os.path.lexists(file.parent):
+        raise LinkageError(
+            file, f'there is no folder {file.parent}', f'make it: mkdir -p {file.parent}'
         )
 
 
@@ -123,6 +131,7 @@ def atomic_write(file: str | Path, data: bytes) -> None:
     the file cannot be written.
     """
     try:
+        _check_folder(Path(file))
         target = Path(file).resolve()
         if target.exists() and not target.is_file():
             raise LinkageError(file, 'is there already and is no file', 'name another file')

@@ -22,6 +22,7 @@ from dataclasses import replace
 from itertools import chain, product, repeat
 from math import inf
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from linkage_ros.errors import DefinitionError, FileError, listed, quoted
@@ -41,9 +42,9 @@ from linkage_ros.kinematics.linkage import (
     Slider,
 )
 from linkage_ros.kinematics.sides import assembly_sides, undrawn
-from linkage_ros.kinematics.sweep_analysis import check_limits
+from linkage_ros.kinematics.sweep_analysis import check_closes, check_limits
 from linkage_ros.kinematics.topology import assur_groups
-from linkage_ros.resources import named_file
+from linkage_ros.resources import linkage_names, named_file
 
 _KEYS = (
     'units',
@@ -97,10 +98,24 @@ def load(linkage: str | PathLike[str]) -> Closure:
 
     """
     file = named_file(linkage, 'linkages')
+    return read_closure(linkage_content(file), file.stem)
+
+
+def linkage_content(file: Path) -> Section:
+    """Return the content of a linkage file; refuse a scene, and name its linkage."""
     content, _ = read_yaml(file)
     if 'linkage' in content or 'linkages' in content:
-        raise content.error('', 'is a scene', 'name a linkage file; load_scene() reads scenes')
-    return read_closure(content, file.stem)
+        raise content.error('', 'is a scene', f'name {_linkage_of(content, file)}')
+    return content
+
+
+def _linkage_of(scene: Section, file: Path) -> str:
+    """Return how to name the linkage of a scene in its place."""
+    name = scene.mapping.get('linkage')
+    if not isinstance(name, str):
+        return 'the file of one of its linkages'
+    known = name in linkage_names()
+    return f'its linkage, {name if known else file.parent / name}'
 
 
 def read_linkage(content: Section) -> Linkage:
@@ -315,12 +330,7 @@ def closable(content: Section, linkage: Linkage, name: str, shorthand: str = '')
     """Return a linkage of a file as a closure, and check that it closes."""
     try:
         closure = Closure(linkage, name)
-        if len(linkage.inputs) == 1 and not closure.closing_ranges:
-            raise DefinitionError(
-                'links',
-                'the loops close at no value of the input',
-                'the longest link of a loop must be shorter than its others together',
-            )
+        check_closes(closure)
         check_limits(closure)
     except DefinitionError as error:
         where = error.where
@@ -447,8 +457,7 @@ def assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
 
     """
     file = named_file(linkage, 'linkages')
-    content, _ = read_yaml(file)
-    return closures(content, file.stem)
+    return closures(linkage_content(file), file.stem)
 
 
 def closures(content: Section, name: str) -> dict[str, Closure]:

@@ -191,7 +191,9 @@ class Section:
         if not _is_pair(value) or not all(map(isfinite, value)):
             remedy = 'write two finite numbers: [x, y]'
             if isinstance(value, list) and len(value) > 2 and all(map(_is_number, value)):
-                remedy += '; a decimal has a point, not a comma: [0.040, 0]'
+                whole = all(float(part).is_integer() for part in value)
+                comma = '; a decimal has a point, not a comma: [0.040, 0]'
+                remedy += comma if whole else '; a planar linkage has no z'
             raise self.error(key, f'{quoted(value)} is not a point', remedy)
         x, y = (self._si(key, part, unit) for part in value)
         self._check_most(key, value, (x, y), most, unit)
@@ -219,7 +221,9 @@ class Section:
         value = self._take(key, None if required else {}, 'a mapping')
         line = self._line_of(key)
         if not isinstance(value, dict):
-            raise self.error(key, f'{quoted(value)} is not a mapping', f'write {key}: {{…}}')
+            remedy = f'write {key}: {_as_mapping(value)}'
+            reason = 'is empty' if value is None else f'{quoted(value)} is not a mapping'
+            raise self.error(key, reason, remedy)
         path = '.'.join(filter(None, (self._path, key)))
         return Section(self.file, path, value, line, self.units)
 
@@ -355,6 +359,14 @@ def _is_list_of_finite(value: Any) -> bool:
 
 def _is_pair(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+
+
+def _as_mapping(value: Any) -> str:
+    """Return how a mapping of names is written, for names that stand there without one."""
+    names = value if isinstance(value, list) else [value]
+    if not names or not all(isinstance(name, str) and fullmatch(r'\w+', name) for name in names):
+        return '{…}'
+    return f'{{{listed(f"{name}: {{}}" for name in names)}}}'
 
 
 def _in(unit: str) -> str:

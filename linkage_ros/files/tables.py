@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from linkage_ros.errors import FileError, LinkageError, quoted
-from linkage_ros.files.file_access import check_suffix, read_regular, replaced
+from linkage_ros.files.file_access import check_output_name, read_regular, replaced
 from linkage_ros.names import csv_text
 
 Row = Sequence[float | int | None]
@@ -74,7 +74,7 @@ def check_kind(file: Path) -> None:
         Its suffix is unknown, or the library for it is not installed or does not run here.
 
     """
-    check_suffix(file, KINDS)
+    check_output_name(file, KINDS)
     if file.suffix.lower() == '.parquet':
         _check_pyarrow()
 

@@ -28,6 +28,7 @@ from typing import Any, cast, ClassVar
 
 from linkage_ros.errors import FileError, quoted
 from linkage_ros.files.file_access import read_regular
+from linkage_ros.files.file_kinds import kind_of_bytes, kind_of_folder
 from linkage_ros.files.section import LinedDict, Section
 import yaml
 
@@ -128,6 +129,21 @@ for _tag, _pattern, _first in (
         f'tag:yaml.org,2002:{_tag}', re.compile(f'(?:{_pattern})$'), [*_first, '']
     )
 
+_INDENT = 'give the keys of one mapping the same number of spaces'
+_IN_PLAIN_WORDS = (
+    ("'\\t'", 'has a tab', 'write spaces instead of tabs'),
+    ('expected <block end>', 'is indented otherwise than the lines above it', _INDENT),
+    ('mapping values are not allowed', 'has a colon where none can be', _INDENT),
+    (
+        "could not find expected ':'",
+        'has a key without a colon, or too long a one',
+        'write key: value',
+    ),
+    ("expected ',' or '}'", 'has a { that does not end, or no comma', 'close it: {x: 1, y: 2}'),
+    ("expected ',' or ']'", 'has a [ that does not end, or no comma', 'close it: [1, 2]'),
+)
+"""A part of what PyYAML says of a line; what is wrong, and the remedy."""
+
 LARGEST_FILE = 1_000_000
 """Most bytes of a file."""
 
@@ -151,6 +167,9 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
     """
     try:
         data = read_regular(file, LARGEST_FILE)
+    except IsADirectoryError:
+        kind = kind_of_folder(Path(file))
+        raise FileError(file, '', f'is {kind.noun}, and no file in YAML', kind.remedy) from None
     except OSError as error:
         raise FileError(
             file, '', f'cannot be read ({error.strerror})', 'name a file that can be read'
@@ -177,6 +196,9 @@ def parse_yaml(data: bytes, file: str) -> Section:
         As in `read_yaml`.
 
     """
+    kind = kind_of_bytes(data)
+    if kind.is_foreign:
+        raise FileError(file, '', f'is {kind.noun}, and no file in YAML', kind.remedy)
     if len(data) > LARGEST_FILE:
         raise FileError(file, '', f'is larger than {LARGEST_FILE} bytes', 'name a YAML file')
     try:
@@ -193,8 +215,12 @@ def parse_yaml(data: bytes, file: str) -> Section:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = mark.line + 1 if mark else 0
-        reason = f'is not valid YAML ({error.problem or error.context})'
-        raise FileError(file, '', reason, 'correct the line', line) from None
+        problem = str(error.problem or error.context)
+        reason, remedy = next(
+            (words for part, *words in _IN_PLAIN_WORDS if part in problem),
+            (f'is not valid YAML ({problem})', 'correct the line'),
+        )
+        raise FileError(file, '', reason, remedy, line) from None
     except (yaml.YAMLError, ValueError) as error:
         text = str(error).splitlines()[0]
         raise FileError(file, '', f'is not valid YAML ({text})', 'correct the file') from None

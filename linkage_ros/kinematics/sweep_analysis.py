@@ -538,7 +538,37 @@ def worst_residual(closure: LoopClosure) -> tuple[float, tuple[float, ...], int]
     return (*max(found), len(found)) if found else None
 
 
-# Checks that a linkage can be within its limits.
+# Checks that a linkage closes, and that it can be within its limits.
+
+
+def check_closes(closure: LoopClosure) -> None:
+    """
+    Refuse a linkage whose loops close at no value of its only input.
+
+    The DefinitionError says which links miss each other, and by how much where they are nearest.
+    """
+    if len(closure.linkage.inputs) != 1 or closure.closing_ranges:
+        return
+
+    def distance(position: Position) -> tuple[int, float]:
+        return -len(position.poses), position.gap
+
+    states = [(inputs[0], position) for inputs, position in grid(closure, _SAMPLES)]
+    value, nearest = min(states, key=lambda state: distance(state[1]))
+    step = abs(states[1][0] - states[0][0])
+    between = golden(lambda at: closure.position(at).gap, value - step, value + step)[1]
+    nearest = min(nearest, closure.position(between), key=distance)
+    group = closure.structure.groups[closure.step_groups[len(nearest.poses) - 1]]
+    sliders = {block: f'slider {name}' for name, block in closure.structure.blocks.items()}
+    links = [sliders.get(link, link) for link in links_of(group)]
+    if len(links) == 1:
+        links.append('the rest')
+    raise DefinitionError(
+        'links',
+        f'the loops close at no value of the input; {listed(links, " and ")} miss each other by '
+        f'{nearest.gap:.3g} m or more',
+        'the longest link of a loop must be shorter than its others together',
+    )
 
 
 def check_limits(closure: LoopClosure) -> None:

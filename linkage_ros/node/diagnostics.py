@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, tau
 from operator import itemgetter
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -688,6 +688,18 @@ class Warnings:
                 before = count if self.warn(kind, f'{told}{_of(line)}', period) else before
             self._chattered[kind] = before
 
+    def check_jumps(self, lines: Sequence[LinkagePipeline], crank_topic: str) -> None:
+        """Warn once of a crank that jumps by more than a turn from one sample to the next."""
+        for line in lines:
+            given, jump = line.closure.linkage.inputs[0], getattr(line.drive, 'jump', 0.0)
+            if jump > _MORE_THAN_A_TURN and not given.slider:
+                self.warn(
+                    f'jump {given.joint}',
+                    f'{crank_topic}: {given.joint} changed by {jump:.4g} rad between two '
+                    'samples, more than a turn; if these are degrees, publish radians',
+                    inf,
+                )
+
     def check_wrenches(self, topics: Sequence[tuple[str, WrenchCounts]], period: float) -> None:
         """
         Warn of rejected wrenches since the last such warning.
@@ -733,6 +745,9 @@ class Warnings:
         self._logger.warning(line)
         return True
 
+
+# A crank that is wrapped into a turn jumps by one.
+_MORE_THAN_A_TURN = 1.01 * tau
 
 _UNCLOSED = {
     Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',

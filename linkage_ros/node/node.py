@@ -132,8 +132,9 @@ def _reporting(transition: Transition) -> Transition:
 class LinkageNode(LifecycleNode):
     """Solves a linkage for a crank; docs/reference lists topics, parameters and services."""
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, *, logs_failure: bool = True, **options: Any) -> None:
         super().__init__('linkage_node', **options)
+        self._logs_failure = logs_failure
         declare_parameters(self, LINKAGE_NODE)
         self.failure: LinkageError | None = None
         """Reason why the node could not be configured."""
@@ -208,7 +209,8 @@ class LinkageNode(LifecycleNode):
         except LinkageError as error:
             self._scene_topics.disconnect()
             self.failure = error
-            self.get_logger().error(str(error))
+            if self._logs_failure:
+                self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         for note in scene_notes(scene):
             self.get_logger().warning(str(note))
@@ -422,6 +424,7 @@ class LinkageNode(LifecycleNode):
         period = self.get_parameter('warning_period').value
         self._warnings.check(loop.counts, loop.pipeline.closures, self.crank_topic, period)
         self._warnings.check_age(loop.counts, self.crank_topic, loop.pipeline.max_age, period)
+        self._warnings.check_jumps(loop.pipeline.lines, self.crank_topic)
         wrenches = [each.topic_name for each in self._scene_topics.wrenches]
         self._warnings.check_chatter(loop.pipeline.lines, period)
         self._warnings.check_wrenches([*zip(wrenches, loop.counts.wrenches, strict=True)], period)

@@ -69,6 +69,7 @@ def run_linkage_node(
     patience: float = 0.0,
     view: View | None = None,
     at_end: Callable[[LinkageNode], None] | None = None,
+    raises: bool = False,
 ) -> int:
     """
     Run the linkage node until the event is set, or for a time.
@@ -89,6 +90,8 @@ def run_linkage_node(
         Displays the run.
     at_end
         Called after the run has ended and its bag is closed.
+    raises
+        Whether a wrong configuration is raised, for a terminal, and not logged.
 
     Returns
     -------
@@ -99,6 +102,8 @@ def run_linkage_node(
     ------
     StoppedError
         A signal arrived before the node was configured.
+    LinkageError
+        The configuration is wrong, if ``raises``.
 
     """
     # The tick shares the interpreter with executor and recorder: at the default switch interval it
@@ -110,7 +115,7 @@ def run_linkage_node(
             args=['linkage_node', *arguments], signal_handler_options=SignalHandlerOptions.NO
         )
         given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
-        node = LinkageNode(parameter_overrides=given)
+        node = LinkageNode(parameter_overrides=given, logs_failure=not raises)
     except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
         print(f'linkage_node: {_first_line(error)}; see linkage_node --help', file=sys.stderr)
         rclpy.try_shutdown()
@@ -119,6 +124,8 @@ def run_linkage_node(
     executor.add_node(node)
     try:
         code = _spin(node, executor, stop, seconds, patience, view)
+        if raises and node.failure is not None:
+            raise node.failure
         if code == EXIT_OK and at_end is not None:
             at_end(node)
         if node.recording.failure or (node.loop is not None and node.loop.failure):

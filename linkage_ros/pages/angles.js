@@ -1,11 +1,13 @@
 /* Copyright 2026 The linkage_ros authors. Licensed under the Apache License, Version 2.0. */
-/* How a page shows angles: in radians or degrees, continuous or within half a turn of zero. */
+/* How a page shows values: angles in radians or degrees, continuous or within half a turn of zero;
+ * lengths in the unit of the file. */
 
 const Angles = (() => {
   const TURN = 2 * Math.PI;
   const DEGREE = Math.PI / 180;
   const IN_DEGREES = { rad: '°', 'rad/s': '°/s' };
-  const chosen = { degrees: false, wrapped: false };
+  const NOTHING = 1e-12; // rad or m: what is less is rounding
+  const chosen = { degrees: false, wrapped: false, length: { length: 'm', factor: 1 } };
 
   /** Return an angle within half a turn of zero, in [rad]. */
   const wrap = (angle) => angle - TURN * Math.round(angle / TURN);
@@ -13,6 +15,7 @@ const Angles = (() => {
   /** Return the unit in which numbers of an SI unit are shown, and the factor to it. */
   function shown(unit) {
     const degrees = chosen.degrees && IN_DEGREES[unit];
+    if (unit === 'm') return { unit: chosen.length.length, factor: 1 / chosen.length.factor };
     return degrees ? { unit: degrees, factor: 1 / DEGREE } : { unit, factor: 1 };
   }
 
@@ -28,10 +31,10 @@ const Angles = (() => {
 
   /** Return a joint's value with its unit; an angle also as turns and degrees. */
   function readout(value, unit) {
-    if (unit !== 'rad') return `${value.toPrecision(6)} ${unit}`;
-    const angle = chosen.wrapped ? wrap(value) : value;
     const { unit: own, factor } = shown(unit);
-    const number = (angle * factor).toPrecision(6);
+    const angle = chosen.wrapped && unit === 'rad' ? wrap(value) : value;
+    const number = (Math.abs(angle) < NOTHING ? 0 : angle * factor).toPrecision(6);
+    if (unit !== 'rad') return `${number} ${own}`;
     if (!chosen.degrees) return `${number} rad (${turnsAndDegrees(angle)})`;
     return Math.abs(angle) < TURN ? `${number}${own}` : `${number}${own} (${turnsAndDegrees(angle)})`;
   }

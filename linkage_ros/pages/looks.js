@@ -42,6 +42,7 @@ const Looks = (() => {
     return {
       color: colour((i + length - 1) % length, ink),
       dash: DASHES[Math.floor(i / length) % DASHES.length],
+      simplify: false, // else Plotly leaves out points, and a curve has corners
     };
   }
 

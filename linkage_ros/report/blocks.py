@@ -235,14 +235,15 @@ def rows_of(
     block
         The messages of each topic.
     topics
-        Kind of each topic; topics without one are left out.
+        Kind of each topic, one of `KINDS` or a kind of its own; topics without one are left out.
     own
         Distinguishes the run's joint states from the samples if they share a topic.
     clock
         The clock of the run.
 
     """
-    kinds: dict[str, list[Entry]] = {kind: [] for kind in KINDS}
+    kinds: dict[str, list[Entry]] = {kind: [] for kind in (*topics.values(), *KINDS)}
+    kinds[_OTHER_RECORDER] = kinds.pop(_OTHER_RECORDER)  # the last
     for topic, entries in block.items():
         kind = topics.get(topic)
         if kind == 'states' and own is not None:

@@ -35,7 +35,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
+from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.joint_values import MessageValues, Values, WRENCHES
+from linkage_ros.messages.wrench import read_wrench
 from linkage_ros.replay.verify import turning_joints
 from linkage_ros.report.decimation import (
     capacity,
@@ -287,6 +289,39 @@ class SceneCurves:
 def _milliseconds(durations: Times) -> Numbers:
     """Return durations in [ns] as a column in [ms]."""
     return (durations * 1e-6).astype(np.float64)[:, None]
+
+
+class LinkWrenches:
+    """
+    Collects the wrenches on links, of a window, each from its topic.
+
+    Messages that are ``left_out`` are counted by reason.
+    """
+
+    def __init__(self, topics: Sequence[str], window: Window) -> None:
+        self._kept = {}
+        for topic in topics:
+            name = short(topic.rpartition('/')[2])
+            columns = [Column(name, 'load', 'N'), Column(name, 'moment of a load', 'N·m')]
+            space = FORCE_BYTES // len(topics)
+            self._kept[topic] = BoundedCurves(topic, columns, space, window)
+        self.left_out: Counter[str] = Counter()
+
+    def add(self, topic: str, times: Times, messages: Sequence[bytes]) -> None:
+        """Add the messages of a topic at run times in [ns]."""
+        numbers = np.full((len(messages), 2), np.nan)
+        for row, message in enumerate(messages):
+            wrench = read_wrench(message)
+            if isinstance(wrench, Rejection):
+                self.left_out[wrench.value] += 1
+            else:
+                numbers[row] = np.hypot(wrench.fx, wrench.fy), wrench.moment
+        self._kept[topic].add(times, numbers)
+
+    def curves(self) -> list[Curves]:
+        """Return the curves of each topic with messages."""
+        found = (kept.curves() for kept in self._kept.values())
+        return [each for each in found if each is not None]
 
 
 class PinForces:

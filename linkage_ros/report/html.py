@@ -294,7 +294,12 @@ def _plots(run: Run) -> Iterator[str]:
     zero = zero_plots(run)
     if zero:
         yield f'<p class="note">Zero throughout, so not plotted: {escape("; ".join(zero))}.</p>'
-    notes = {'lateness': LATENESS_NOTE, 'age': AGE_NOTE, 'pin_forces': FORCE_NOTE}
+    notes = {
+        'lateness': LATENESS_NOTE,
+        'age': AGE_NOTE,
+        'pin_forces': FORCE_NOTE,
+        'loads': FORCE_NOTE,
+    }
     for plot in found:
         yield _plot(plot['key'], f'{plot["title"]} [{plot["unit"]}]', notes.get(plot['key'], ''))
     yield '</section>'

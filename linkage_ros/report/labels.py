@@ -54,6 +54,8 @@ QUANTITIES = {
     ('effort', 'N·m or N'): ('efforts', 'Efforts'),
     ('force', 'N'): ('pin_forces', 'Forces in pins and sliders'),
     ('moment', 'N·m'): ('pin_moments', 'Moments in pins and sliders'),
+    ('load', 'N'): ('loads', 'Forces on links'),
+    ('moment of a load', 'N·m'): ('load_moments', 'Moments on links'),
     ('lateness', 'ms'): ('lateness', 'How late ticks were'),
     ('age', 'ms'): ('age', 'How old the input was at a tick'),
 }

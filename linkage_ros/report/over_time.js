@@ -80,7 +80,7 @@ const OverTime = (() => {
     const traces = plot.curves.map((each, i) => {
       const part = groups[each.of].part(each.column, ...view, most, angleOf(plot));
       const name = Looks.label(each.name);
-      const line = named ? Looks.line(each.name, ink.ink) : { color: ink.faint };
+      const line = named ? Looks.line(each.name, ink.ink) : { color: ink.faint, simplify: false };
       return {
         type: 'scatter',
         mode: part.x.length < width / 8 ? 'lines+markers' : 'lines',
@@ -91,7 +91,7 @@ const OverTime = (() => {
         text: texts(part, unit, factor),
         rows: part.rows,
         hovertemplate: `<b>${name}</b><br>%{text}<extra></extra>`,
-        line: { ...line, width: 1.5, simplify: false },
+        line: { ...line, width: 1.5 },
         marker: { size: 4, color: line.color },
         connectgaps: false,
       };

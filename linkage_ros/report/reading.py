@@ -36,6 +36,7 @@ from linkage_ros.replay.replay import own_joint_states, recorded_scene
 from linkage_ros.report.blocks import Blocks, Entry, Progress, Rows, rows_of, RunClock, times_of
 from linkage_ros.report.curves import (
     BoundedCurves,
+    LinkWrenches,
     MOST_LINKAGES,
     NO_ROOM,
     PinForces,
@@ -234,6 +235,9 @@ class SceneRun:
         self._forces = PinForces(', '.join(forces), window)
         for name in forces:
             self._topics.setdefault(name, 'forces')
+        self._loads = LinkWrenches(run.wrenches, window)
+        self._loaded = {name: f'wrenches {name}' for name in run.wrenches}
+        self._topics = {**self._loaded, **self._topics}
         self._topics.pop('', None)
         shared = run.crank_topic == run.joint_states_topic
         self._own = own_joint_states(scene) if shared else None
@@ -287,6 +291,9 @@ class SceneRun:
             self._lanes['withheld'].add(time, time)
         self._look_at_states(states, read)
         self._forces.add(rows['forces'].passed, rows['forces'].data)
+        for topic, kind in self._loaded.items():
+            if kind in rows:  # unless its name is that of another topic of the run
+                self._loads.add(topic, rows[kind].passed, rows[kind].data)
         self._curves.add_ticks(np.union1d(states.passed[read.good], withheld.passed))
         for time, message in zip(health.passed.tolist(), health.data, strict=True):
             self._health.take(message, time)
@@ -304,8 +311,10 @@ class SceneRun:
         forces = self._forces.curves()
         if forces is not None:
             curves.append(forces)
+        curves += self._loads.curves()
         left_out = self._curves.left_out
         left_out |= {('pin forces', reason): n for reason, n in self._forces.left_out.items()}
+        left_out |= {('wrenches', reason): n for reason, n in self._loads.left_out.items()}
         for what, reader in (('joint states', self._states), ('samples', self._samples)):
             left_out |= {(what, reason): n for reason, n in reader.left_out.items() if n}
         if self._judge.ignored:

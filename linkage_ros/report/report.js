@@ -16,6 +16,9 @@ const Report = (() => {
     ),
   };
   const linkages = frames ? data.linkages.map((said) => new Picture.Linkage(said, frames)) : [];
+  const posed = frames ? frames.times.findIndex(
+    (time, number) => linkages.every((linkage) => linkage.hasPose(number, time)),
+  ) : -1;
   const whole = Object.freeze([
     data.since, data.until > data.since ? data.until : data.since + 1,
   ]);
@@ -24,7 +27,8 @@ const Report = (() => {
     linkages,
     whole,
     view: whole,
-    time: data.since,
+    // The first pose: a crank may have come after the run began.
+    time: posed < 0 ? data.since : Math.max(data.since, frames.times[posed]),
     speed: 1,
     playing: false,
     seek,

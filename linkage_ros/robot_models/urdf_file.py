@@ -22,6 +22,7 @@ from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.errors import FileError, listed, quoted
+from linkage_ros.files.file_kinds import kind_of_bytes
 from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
 
 # The content of a URDF: links and joints by name.
@@ -91,6 +92,9 @@ def read_urdf(data: bytes, file: str) -> UrdfFile:
     try:
         root = ET.fromstring(data)
     except ET.ParseError as error:
+        noun = kind_of_bytes(data).noun
+        if noun not in ('a URDF', 'an XML file'):
+            raise FileError(file, '', f'is {noun}, and no URDF', 'name a URDF file') from None
         line, _ = error.position
         raise FileError(file, '', f'is no XML ({error})', 'name a URDF file', line) from None
     except (ValueError, LookupError) as error:  # unknown encoding in the XML declaration

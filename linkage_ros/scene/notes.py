@@ -22,17 +22,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
-from math import dist, hypot, tau
+from math import dist, hypot, isfinite, tau
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.kinematics.linkage import carriers, Linkage
+from linkage_ros.files.units import Units
+from linkage_ros.kinematics.linkage import carriers, Linkage, RevoluteJoint
 
 if TYPE_CHECKING:
     from linkage_ros.scene.scene import Scene, SceneLinkage
 
 _OTHER_UNIT = 300.0
 """Ratio of two links above which a unit was probably mistaken; mm for m make it 1000."""
+
+_LONG = 3.0
+"""Length above which metres were probably mistaken for millimetres, in [m]."""
 
 _WEAK = 0.1
 """Gravity below which its unit was probably mistaken, in [m/s²]; 9.81 mm/s² is 0.01."""
@@ -41,18 +45,27 @@ _WEAK = 0.1
 def scene_notes(scene: Scene) -> Iterator[FileError]:
     """Yield the notes on a scene and its linkages."""
     for member in scene.members:
-        yield from map(member.linkage_content.located, linkage_notes(member.linkage))
+        content = member.linkage_content
+        notes = linkage_notes(member.linkage, content.units, scene.rate)
+        yield from map(content.located, notes)
         yield from map(member.content.located, _of_member(member))
 
 
-def linkage_notes(linkage: Linkage) -> Iterator[DefinitionError]:
-    """Yield the notes on a linkage."""
-    pins = {name for name, links in carriers(linkage.links).items() if len(links) > 1}
-    lengths = {}
-    for link, points in linkage.links.items():
-        joined = [place for name, place in points.items() if name in pins]
-        if len(joined) > 1:
-            lengths[link] = max(dist(one, other) for one, other in combinations(joined, 2))
+def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator[DefinitionError]:
+    """Yield the notes on a linkage of a file in some units, which ticks at a rate in [Hz]."""
+    turning = {given.joint: not given.slider for given in linkage.inputs} | {
+        name: isinstance(joint, RevoluteJoint) for name, joint in linkage.joints.items()
+    }
+    for name, limits in linkage.limits.items():
+        ends = [abs(end) for end in (limits.low, limits.high) if isfinite(end)]
+        if units.angle == 'radians' and turning[name] and max(ends, default=0.0) > tau:
+            driven = name in (given.joint for given in linkage.inputs)
+            yield DefinitionError(
+                'input.limits' if driven else f'joints.{name}.limits',
+                f'{max(ends):g} rad is more than a turn',
+                'if it is in degrees, write angles: degrees',
+            )
+    lengths = _lengths(linkage)
     if not lengths:
         return
     shortest, longest = (of(lengths, key=lengths.__getitem__) for of in (min, max))
@@ -63,6 +76,23 @@ def linkage_notes(linkage: Linkage) -> Iterator[DefinitionError]:
             f'is {ratio:g} times as long as {shortest!r}',
             'write all lengths in metres, or all in millimetres with units: mm',
         )
+    elif rate and units.length == 'm' and lengths[longest] > _LONG:
+        yield DefinitionError(
+            f'links.{longest}',
+            f'is {lengths[longest]:g} m long',
+            'if it is in millimetres, write units: mm',
+        )
+
+
+def _lengths(linkage: Linkage) -> dict[str, float]:
+    """Return for each link the greatest distance between its pins, in [m]."""
+    pins = {name for name, links in carriers(linkage.links).items() if len(links) > 1}
+    lengths = {}
+    for link, points in linkage.links.items():
+        joined = [place for name, place in points.items() if name in pins]
+        if len(joined) > 1:
+            lengths[link] = max(dist(one, other) for one, other in combinations(joined, 2))
+    return lengths
 
 
 def _of_member(member: SceneLinkage) -> Iterator[DefinitionError]:

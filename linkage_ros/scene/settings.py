@@ -128,7 +128,11 @@ def blamed(error: FileError, content: Section, settings: Sequence[str]) -> FileE
     for setting in reversed(settings):
         key = setting.partition('=')[0].replace('"', '')
         if error.file == content.file and _is_within(error.key, _counted(content, key)):
-            return _error(setting, f'{error.key}: {error.reason}', error.remedy)
+            remedy = error.remedy
+            mapping = remedy.removeprefix(f'write {key.rpartition(".")[2]}: ')
+            if mapping != remedy:  # as in a file
+                remedy = f"write --set '{key}={mapping}'"
+            return _error(setting, f'{error.key}: {error.reason}', remedy)
     return error
 
 

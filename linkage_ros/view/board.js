@@ -8,7 +8,7 @@ const Board = (() => {
   const [LETTERS, MOST_LINES, LINE] = [44, 4, 16]; // of what is said at a pin; a line in pixels
   const HIGH = 12; // pixels: the letters of a name
   const PALE = 0.22;
-  const LOOKED_AT = 36; // poses of a ghost, to see how far it reaches
+  const LOOKED_AT = 72; // poses, to see how far a linkage reaches
   const ALONG = 9; // pixels beside a bar that are the bar's
 
   /** Return a text in lines that are short enough for a narrow picture. */
@@ -45,28 +45,47 @@ const Board = (() => {
       }
     }
 
-    /** Fit the picture to all that the linkage and its ghosts come to. */
+    /** Fit the picture to all that the linkage, and its ghosts if they are shown, come to. */
     fit(ink) {
-      if (!this.linkage.frameOfPicture) this.linkage.wider = this.shown.ghosts ? this.ghostReach() : null;
+      if (!this.linkage.frameOfPicture) this.linkage.reached = this.reachOfAll();
       super.fit({ ...ink, ...this.words() });
     }
 
-    /** Return the corners of what the ghosts come to over the range of the input. */
-    ghostReach() {
-      const { size } = this.linkage.drawn;
+    /**
+     * Return the corners of what comes by over the range of the input; null if that is nothing.
+     *
+     * The range is that in which the linkage is: in another one it may be elsewhere.
+     */
+    reachOfAll() {
+      const { drawn: { shapes, size }, inputs } = this.linkage;
       const found = [Infinity, Infinity, -Infinity, -Infinity];
-      const [low, high] = this.linkage.range();
-      for (const ghost of this.ghosts) {
-        for (let i = 0; i <= LOOKED_AT; i++) {
-          ghost.seek([low + ((high - low) * i) / LOOKED_AT, ...this.linkage.inputs.slice(1)]);
-          if (!ghost.closed) continue;
-          for (const { place: [x, y] } of ghost.pins()) {
-            [found[0], found[1]] = [Math.min(found[0], x - 2 * size), Math.min(found[1], y - 2 * size)];
-            [found[2], found[3]] = [Math.max(found[2], x + 2 * size), Math.max(found[3], y + 2 * size)];
+      const take = (linkage, ofGround) => {
+        for (const { link, points } of shapes) {
+          if ((link === 'ground') !== ofGround) continue;
+          for (let i = 0; i < points.length; i += 2) {
+            const [x, y] = linkage.place(link, points[i], points[i + 1]);
+            [found[0], found[1]] = [Math.min(found[0], x), Math.min(found[1], y)];
+            [found[2], found[3]] = [Math.max(found[2], x), Math.max(found[3], y)];
           }
         }
+      };
+      const [low, high] = this.linkage.range();
+      let moves = false;
+      for (const linkage of [this.linkage, ...(this.shown.ghosts ? this.ghosts : [])]) {
+        const { now } = linkage;
+        for (let i = 0; i <= LOOKED_AT; i++) {
+          const value = i < LOOKED_AT ? low + ((high - low) * i) / (LOOKED_AT - 1) : inputs[0];
+          linkage.now = linkage.motion([value, ...inputs.slice(1)]);
+          if (!linkage.closed) continue;
+          moves = true;
+          take(linkage, false);
+        }
+        linkage.now = now;
       }
-      return found;
+      if (!moves) return null;
+      take(this.linkage, true);
+      const edge = 3 * size;
+      return [found[0] - edge, found[1] - edge, found[2] + edge, found[3] + edge];
     }
 
     paint() {

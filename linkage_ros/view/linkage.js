@@ -58,11 +58,7 @@ const Motion = (() => {
 
     /** Return the corners of the picture; they stay while a pin is dragged. */
     get reach() {
-      if (this.frameOfPicture) return this.frameOfPicture;
-      const [left, bottom, right, top] = this.drawn.frame;
-      if (!this.wider) return [left, bottom, right, top];
-      const [l, b, r, t] = this.wider;
-      return [Math.min(left, l), Math.min(bottom, b), Math.max(right, r), Math.max(top, t)];
+      return this.frameOfPicture ?? this.reached ?? this.drawn.frame;
     }
 
     get times() {

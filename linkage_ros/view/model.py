@@ -104,7 +104,7 @@ def model(
         found = _model(closure, name, text, content.units, inputs, drawn)
         if whole:
             found['others'] = _others(closure, content)
-            found |= _analysis(closure)
+            found |= _analysis(closure, content.units)
     except DefinitionError as error:
         raise content.located(error) from None
     return found
@@ -116,7 +116,7 @@ def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
     drawn = drawn_in_frames(view(closure, inputs))
     return _model(closure, name or closure.name, '', Units(), inputs, drawn) | {
         'others': [],
-        **_analysis(closure),
+        **_analysis(closure, Units()),
     }
 
 
@@ -242,7 +242,7 @@ def _others(closure: Closure, content: Section) -> list[dict[str, Any]]:
     return [{'text': text, 'program': program_of(other)} for text, other in others[:_MOST_GHOSTS]]
 
 
-def _analysis(closure: Closure) -> dict[str, Any]:
+def _analysis(closure: Closure, units: Units) -> dict[str, Any]:
     """Return ranges, toggles, quality over the first input, and warnings."""
     way = InputSweep(closure, usual_inputs(closure))
     values: list[float] = []
@@ -259,7 +259,7 @@ def _analysis(closure: Closure) -> dict[str, Any]:
             each.value for each in closure.singular_inputs if each.status is Status.TOGGLE
         ],
         'quality': {'input': values, 'transmission_angle': angles, 'margin': conditioning},
-        'warnings': list(_warnings(closure, [each for each in angles if each is not None])),
+        'warnings': list(_warnings(closure, units, [each for each in angles if each is not None])),
     }
 
 
@@ -274,8 +274,8 @@ def _margin(closure: Closure, way: InputSweep, value: float) -> tuple[float, flo
     return margin.transmission_angle, margin.conditioning
 
 
-def _warnings(closure: Closure, angles: list[float]) -> Iterator[str]:
-    for note in linkage_notes(closure.linkage):
+def _warnings(closure: Closure, units: Units, angles: list[float]) -> Iterator[str]:
+    for note in linkage_notes(closure.linkage, units):
         yield str(note)
     if angles and min(angles) < _POOR:
         yield f'transmission angle down to {round(degrees(min(angles)), 2):g}°'

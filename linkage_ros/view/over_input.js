@@ -9,6 +9,7 @@ const OverInput = (() => {
   const SECOND_AXIS = 58; // pixels
   const WILD = 6; // times the span of the others: values as far as these are beside a toggle
   const [POOR, FAIR] = [Math.PI / 6, Math.PI / 4];
+  const ORDER = { joints: 0, rates: 1, accelerations: 2 };
   const QUALITY = { poor: '#d55e00', fair: '#e6b422', good: '#009e73' };
 
   /** Return the states over the range of the first input, the others held. */
@@ -87,7 +88,9 @@ const OverInput = (() => {
   }
 
   class Plot {
-    constructor(figure) {
+    /** `rate` returns that of the first input, in [rad/s] or [m/s]. */
+    constructor(figure, rate) {
+      this.rate = rate;
       this.figure = figure;
       this.place = figure.querySelector('.plot');
       this.key = figure.dataset.key;
@@ -134,7 +137,7 @@ const OverInput = (() => {
         }),
         shapes: toggles,
         ...(both && {
-          yaxis2: Page.axis(`[m${SECONDS[this.key]}]`, ink, {
+          yaxis2: Page.axis(`[${Angles.shown('m').unit}${SECONDS[this.key]}]`, ink, {
             overlaying: 'y', side: 'right', automargin: false, showgrid: false, tickmode: 'auto',
             range: within(traces.filter(({ yaxis }) => yaxis === 'y2')),
           }),
@@ -150,7 +153,8 @@ const OverInput = (() => {
 
     /** Return the values of a joint in its unit, null where the loops do not close. */
     values(linkage, found, i) {
-      const values = found.map(([, state]) => state[this.key][i] ?? null);
+      const times = this.rate() ** ORDER[this.key];
+      const values = found.map(([, state]) => (i in state[this.key] ? times * state[this.key][i] : null));
       const turns = this.key === 'joints' && linkage.model.joints[i].unit === 'rad';
       if (!turns || !linkage.closed) return values;
       const at = Math.round(share(linkage, found[0][0], found[COUNT - 1][0]) * (COUNT - 1));

@@ -51,10 +51,13 @@ _TOOLS = {
     'trace': 'trace a point',
     'input': 'choose the input',
 }
+_QUALITY = {'#d55e00': 'below 30°', '#e6b422': '30 to 45°', '#009e73': 'above 45°'}
+"""Colour of a transmission angle."""
+
 _CURVES = {
     'joints': 'Joints',
-    'rates': 'Rates, at an input rate of 1 rad/s or 1 m/s',
-    'accelerations': 'Accelerations, at a constant input rate of 1 rad/s or 1 m/s',
+    'rates': 'Rates',
+    'accelerations': 'Accelerations, at a constant input rate',
 }
 
 
@@ -132,6 +135,8 @@ def _body(title: str, mode: str, can_save: bool) -> Iterator[str]:
     yield '<div class="controls"><button type="button" id="play" aria-label="Play">▶</button>'
     yield '<label>angles in <select id="angles"><option value="degrees">degrees</option>'
     yield '<option value="radians">radians</option></select></label>'
+    yield '<label>ω <input type="number" id="rate" step="any" value="1" aria-label="rate of the '
+    yield 'first input"> <span id="rate-unit"></span></label>'
     for what, checked in {
         'names': 'names', 'ghosts': 'other assemblies', 'centres': 'instant centres'
     }.items():  # fmt: skip
@@ -158,10 +163,11 @@ def _body(title: str, mode: str, can_save: bool) -> Iterator[str]:
         yield '</figure>'
         if key == 'joints':
             yield '<figure class="band"><figcaption>Transmission angle '
-            yield '<span class="key"><i style="background:#d55e00"></i>below 30°'
-            yield '<i style="background:#e6b422"></i>30 to 45°'
-            yield '<i style="background:#009e73"></i>above 45°; the line is the singularity '
-            yield 'margin, from 0 at a singularity to 1</span></figcaption>'
+            yield '<span class="key">'
+            for colour, of in _QUALITY.items():
+                yield f'<span><i style="background:{colour}"></i>{of}</span>'
+            yield '; the line is the singularity margin, from 0 at a singularity to 1</span>'
+            yield '</figcaption>'
             yield '<div><canvas id="band" role="img" aria-label="transmission angle over the '
             yield 'input"></canvas></div></figure>'
     yield '</div>'

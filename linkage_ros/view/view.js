@@ -25,6 +25,7 @@ const View = (() => {
   let settling = 0; // requests for a whole model
   let dragged = null; // { pin, inputs }: the drag that is under way
   let grip = 0; // angle between the hand and the crank it turns
+  let rate = 1; // of the first input, in [rad/s] or [m/s]
 
   const driven = () => linkage.model.driven;
   const mayEdit = () => editing && there;
@@ -37,6 +38,8 @@ const View = (() => {
   /** Show another model of the linkage; of one during a drag, ranges and checks are the old ones. */
   function show(model, inputs = null) {
     const before = linkage;
+    Looks.order(model.joints.map((joint) => joint.name));
+    Angles.chosen.length = model.unit;
     const kept = model.ranges ? {} : {
       ranges: before.model.ranges, toggles: before.model.toggles, quality: before.model.quality,
       warnings: before.model.warnings,
@@ -48,6 +51,7 @@ const View = (() => {
     linkage.seek(inputs ?? (same ? before.inputs : linkage.inputs));
     if (!linkage.closed && !inputs) linkage.seek(model.inputs.map((input) => input.value));
     linkage.frameOfPicture = dragged ? before.reach : null;
+    showRate();
     board.take(linkage);
     if (!dragged) board.fit(Picture.ink());
     if (model.ranges || !dragged) form();
@@ -106,6 +110,13 @@ const View = (() => {
         : `, read ${Angles.readout(read, joint.unit)}`;
       facts.push([joint.name, `${Angles.readout(linkage.now.joints[i], joint.unit)}${sensed}`]);
     });
+    if (linkage.closed) {
+      const { unit, factor } = Angles.shown('m');
+      for (const { point, link, at } of linkage.drawn.traced) {
+        const place = linkage.place(link, ...at).map((value) => (value * factor).toFixed(decimals()));
+        facts.push([point, `${place.join(', ')} ${unit}`]);
+      }
+    }
     named('readout').replaceChildren(...facts.map(([name, text]) => {
       const row = document.createElement('div');
       const term = document.createElement('dt');
@@ -114,6 +125,25 @@ const View = (() => {
       row.append(term, told);
       return row;
     }));
+  }
+
+  /** Return how many decimals tell a place to a ten thousandth of the picture. */
+  function decimals() {
+    const [left, , right] = linkage.reach;
+    const fine = ((right - left) * Angles.shown('m').factor) / 1e4;
+    return Math.min(12, Math.max(0, Math.ceil(-Math.log10(fine || 1))));
+  }
+
+  /** Return the unit of the first input, in which its rate is typed; ω is in radians. */
+  function unitOfRate() {
+    const { unit } = linkage.model.inputs[0];
+    return unit === 'rad' ? { unit, factor: 1 } : Angles.shown(unit);
+  }
+
+  function showRate() {
+    const { unit, factor } = unitOfRate();
+    named('rate-unit').textContent = `${unit}/s`;
+    named('rate').value = Number((rate * factor).toPrecision(6));
   }
 
   // Sliders.
@@ -560,10 +590,11 @@ const View = (() => {
   function begin() {
     Angles.chosen.degrees = true;
     Looks.order(data.model.joints.map((joint) => joint.name));
+    Angles.chosen.length = data.model.unit;
     board = new Board.Drawing(named('drawing'), linkage);
     board.take(linkage);
     Hand.attach(board, act);
-    plots = [...document.querySelectorAll('figure[data-key]')].map((f) => new OverInput.Plot(f));
+    plots = [...document.querySelectorAll('figure[data-key]')].map((f) => new OverInput.Plot(f, () => rate));
     form();
     board.fit(Picture.ink());
     Page.keepDrawn([board.canvas.parentElement], () => {
@@ -614,6 +645,13 @@ const View = (() => {
       Angles.chosen.degrees = event.target.value === 'degrees';
       curves();
       moved();
+    });
+    showRate();
+    named('rate').addEventListener('change', ({ target }) => {
+      const typed = target.valueAsNumber / unitOfRate().factor;
+      if (Number.isFinite(typed)) rate = typed;
+      showRate();
+      curves();
     });
     document.addEventListener('keydown', press);
     if (!editing) return;

@@ -63,7 +63,7 @@ def refused(linkage: Run, *typed: str) -> str:
         ),
         (
             ['-o', 'no/a.c'],
-            'no/a.c: cannot be written (No such file or directory); name another file',
+            'no/a.c: there is no folder no; make it: mkdir -p no',
         ),
     ],
 )

@@ -554,10 +554,10 @@ BAD = [
     # what is typed behind the bag, what the answer says
     (['-o', 'x.txt'], "x.txt: ends in '.txt'; name a file that ends in .csv or .parquet"),
     (['-o', 'x'], 'x: has no ending; name a file that ends in .csv or .parquet'),
-    (['-o', 'no/x.csv'], 'no/x.csv: cannot be written: No such file or directory'),
+    (['-o', 'no/x.csv'], 'no/x.csv: there is no folder no; make it: mkdir -p no'),
     pytest.param(
         ['-o', 'no/x.parquet'],
-        'no/x.parquet: cannot be written: No such file or directory',
+        'no/x.parquet: there is no folder no; make it: mkdir -p no',
         marks=needs_pyarrow,
     ),
     (['-o', 'folder.csv'], 'folder.csv: exists, and is no file; name another file'),

@@ -18,7 +18,7 @@ from math import remainder, tau
 from pathlib import Path
 
 from linkage_ros.cli import plot as command
-from linkage_ros.cli.plot import curves
+from linkage_ros.cli.plot import curves, curves_over_time, is_after_gap
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
@@ -106,6 +106,30 @@ def test_a_reading_that_is_no_number_hides_itself_only():
         assert np.isfinite(joint.y).sum() == 99
 
 
+@pytest.mark.parametrize('lost', [(), (100,), (100, 101), (50, 150, 151, 152)])
+def test_a_curve_breaks_where_ticks_were_lost(lost):
+    closure = closure_of('four_bar')
+    rows = [row for row in range(200) if row not in lost]
+    cranks = [(0.01 * row,) for row in rows]
+    positions = [closure.position(*crank).joints for crank in cranks]
+    times, no_rates = 0.001 * np.array(rows), [()] * len(rows)
+    gaps = is_after_gap(times, steady=True)
+    parts = 1 + len([row for row in lost if row - 1 not in lost])
+    over_crank, _ = curves(closure.linkage, cranks, positions, no_rates, gaps)
+    over_time, _ = curves_over_time(closure.linkage, times, cranks, positions, no_rates, gaps)
+    assert [curve.name for curve in over_time] == ['coupler_joint', 'rocker_joint', 'crank_joint']
+    for curve in (*over_crank, *over_time):
+        assert len([x for x, _ in pieces(curve) if len(x)]) == parts
+    for curve, place in zip(over_time, range(2), strict=False):
+        y = np.array(curve.y)
+        assert y[~np.isnan(y)].tolist() == [values[place] for values in positions]
+
+
+def test_samples_at_any_times_have_no_gaps_but_silences():
+    times = np.cumsum([0.01, 0.02, 0.005, 0.02, 0.01, 0.5, 0.01])
+    assert is_after_gap(times, steady=False).tolist() == [False] * 5 + [True, False]
+
+
 def test_axes_name_quantities_and_units(tmp_path: Path) -> None:
     scene = scene_file(tmp_path, 'effects: {velocity: {}}\n')
     bag = Recorded(
@@ -117,3 +141,14 @@ def test_axes_name_quantities_and_units(tmp_path: Path) -> None:
         assert f'<!-- {label} -->' in text
     # At the end of its position and at that of its rate.
     assert text.count('<!-- rocker_joint -->') == 2
+
+
+def test_the_axis_of_time_has_its_unit(tmp_path: Path) -> None:
+    scene = scene_file(tmp_path, 'effects: {velocity: {}}\n')
+    bag = Recorded(
+        tmp_path / 'bag', scene, lambda row: {'crank_joint': (1.0 + 0.007 * row, 7.0)}
+    ).run(300)
+    assert answer(command, bag, '--over', 'time', '-o', tmp_path / 'x.svg') == 0
+    text = (tmp_path / 'x.svg').read_text()
+    assert '<!-- time since the first joint state [s] -->' in text
+    assert text.count('<!-- crank_joint -->') == 1

@@ -291,7 +291,7 @@ def test_an_error_in_radians_is_told_in_radians(linkage: Run) -> None:
 
 WRONG = [
     # what is typed, what the answer names
-    ([], 'nothing is asked for; name one of --pair'),
+    ([], 'the task: is not said; name one of --pair'),
     (['--pair', '1', '2'], 'pairs: there are 1; three make a four-bar'),
     ([*SOURCE_003, *POSES], '--pair and --pose: stand for two tasks'),
     (['--pair', '25', '30', '--pair', '25', '30', '--pair', '1', '2'], 'pairs 1 and 2: are the'),

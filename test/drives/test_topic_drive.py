@@ -380,3 +380,15 @@ def test_all_that_the_scene_publishes_is_a_state(interface):
     without = SYSTEM.replace(f'<state_interface name="{interface}"/>', '')
     with pytest.raises(AssertionError, match='set_state'):
         Hardware(without, '1.1.0').read(pipeline().tick(0).message)
+
+
+@pytest.mark.parametrize(
+    ('angles', 'jump'),
+    [([0.0, 0.1, 0.3], 0.2), ([3.1, -3.1], 6.2), ([179.0, -179.0, -178.0], 358.0), ([5.0], 0.0)],
+)
+def test_the_greatest_jump_between_samples_is_kept(angles, jump):
+    """A crank in degrees, when it is wrapped, jumps by 360 rad."""
+    drive = TopicDrive(CARRIED, needs_rate=True)
+    for number, angle in enumerate(angles):
+        assert drive.offer(sample(1000 + number, angle), NOW) is GOOD
+    assert drive.jump == pytest.approx(jump)

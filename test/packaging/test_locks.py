@@ -161,3 +161,8 @@ def test_a_release_lists_itself_and_its_hard_dependencies_with_versions(
     python = f'{sys.version_info.major}.{sys.version_info.minor}'
     assert found == dict(installed_by(root / 'requirements' / 'run.txt', python))
     assert found.keys() >= HARD
+
+
+def test_make_demo_installs_what_serves_the_page_that_the_demo_names(root):
+    view = {requirement.name for requirement in wanted(root, 'view')}
+    assert view <= {requirement.name for requirement in wanted(root, 'demo')}

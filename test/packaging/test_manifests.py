@@ -158,3 +158,16 @@ def test_policy_grants_no_wildcard(root):
     assert len(names) == len(set(names))
     # Of the links only the scene knows the names.
     assert all(re.fullmatch(r'(~?/)?[a-z_]+|wrenches/\*', name) for name in names)
+    assert all(re.fullmatch(r'(~?/)?[a-z_]+', name) for name in names)
+
+
+def test_what_the_readme_installs_serves_the_page_that_a_run_names(root):
+    """A user who has not the `view` extra would be told of a command that does not start."""
+    text = (root / 'README.md').read_text('utf-8')
+    lines = re.findall(r'^pip install (.*)$', text, re.MULTILINE)
+    assert lines
+    for line in lines:
+        found = re.findall(r"'([^'\[]*)\[([^\]]*)\]'", line)
+        # What is seen without scrolling works in a checkout: nothing is on an index yet.
+        assert found[0][0] == '.'
+        assert all({*extras.split(',')} >= {'ros', 'report', 'view'} for _, extras in found)

@@ -26,11 +26,13 @@ from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 from mcap.reader import make_reader
 import numpy as np
 
 from ..cli.recorded import BEGIN, JOINT_STATE, MS, scene_file, SECOND, STORE, topic
+from ..support.messages import wrench_stamped
 
 STATES, CRANK, FAULTS = '/joint_states', '/crank_states', '/linkage/faults'
 WITHHELD, RESETS, HEALTH = '/linkage/withheld', '/linkage/resets', '/diagnostics'
@@ -74,6 +76,7 @@ def write(
     scene: Path | None = None,
     name: str = '',
     types: Mapping[str, str] = TYPES,
+    wrenches: Sequence[str] = (),
 ) -> Path:
     """Write a bag, of a scene's run or of nobody's; return its folder."""
     attachments = {}
@@ -90,6 +93,7 @@ def write(
             'resets_topic': RESETS,
             'diagnostics_topic': HEALTH,
             'extra_topics': [],
+            'wrench_topics': [*wrenches],
         }
         attachments[RUN_FILE] = ('application/json', json.dumps(said).encode())
     numbers = {each: number for number, each in enumerate(types)}
@@ -283,6 +287,7 @@ def empty(folder: Path) -> Path:
     return write(folder / 'empty', [], scene_file(folder, DRILL_SCENE, DRILL))
 
 
+FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 FINGERS = """
 rate: 100
 linkages:
@@ -298,7 +303,7 @@ linkages:
 def fingers(folder: Path) -> Path:
     """Write a run of two four-bars, the right of which turns the other way, and twice as fast."""
     folder.mkdir()
-    scene = scene_file(folder, FINGERS, 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
+    scene = scene_file(folder, FINGERS, FOUR_BAR)
     sides = ('left', 'right')
     names = [f'{side}_{joint}_joint' for side in sides for joint in ('crank', 'coupler', 'rocker')]
     writer = JointStateWriter(names)
@@ -310,6 +315,53 @@ def fingers(folder: Path) -> Path:
             yield STATES, stamp, stamp, writer.write(stamp, angles, [])
 
     return write(folder / 'fingers', messages(), scene)
+
+
+def late(folder: Path) -> Path:
+    """Write a run whose crank comes 0.6 s after its beginning."""
+    folder.mkdir()
+    scene = scene_file(folder, 'rate: 100\ndrive: {topic: {}}\n', FOUR_BAR)
+    crank = JointStateWriter(['crank_joint'])
+    states = JointStateWriter(['coupler_joint', 'rocker_joint'])
+
+    def messages() -> Iterator[Message]:
+        yield HEALTH, BEGIN, BEGIN, _diagnostics(0, BEGIN)
+        for row in range(60, 160):
+            stamp, angle = BEGIN + row * PERIOD, 0.01 * row
+            joints = follow(0.04, 0.12, 0.08, 0.1, angle)
+            yield CRANK, stamp, stamp, crank.write(stamp, [angle], [1.0])
+            yield STATES, stamp, stamp, states.write(stamp, joints, [])
+
+    return write(folder / 'late', messages(), scene)
+
+
+PUSH, TWIST = '/linkage_node/wrenches/coupler', '/linkage_node/wrenches/rocker'
+
+
+def pushed(folder: Path) -> Path:
+    """Write a run of a four-bar on whose links two topics put wrenches, at times of their own."""
+    folder.mkdir()
+    scene = scene_file(
+        folder,
+        'rate: 100\ndrive: {torque: {start: 1.0}}\nloads: {wrenches: {coupler: {}, rocker: {}}}\n',
+        shipped('linkages/four_bar.yaml').read_text('utf-8'),
+    )
+    writer = JointStateWriter(['coupler_joint', 'rocker_joint'])
+
+    def messages() -> Iterator[Message]:
+        for row in range(100):
+            stamp = BEGIN + row * PERIOD
+            if row % 2:
+                yield PUSH, stamp, stamp, wrench_stamped(3.0 * row, 4.0 * row, 0.0)
+            if row % 5 == 0:
+                yield TWIST, stamp, stamp, wrench_stamped(0.0, -1.0, 0.1 * row)
+            if row == 50:
+                yield TWIST, stamp, stamp, b'no message'
+            angles = follow(0.04, 0.12, 0.08, 0.1, 1.0 + 0.01 * row)
+            yield STATES, stamp, stamp, writer.write(stamp, angles, [])
+
+    types = TYPES | dict.fromkeys((PUSH, TWIST), 'geometry_msgs/msg/WrenchStamped')
+    return write(folder / 'pushed', messages(), scene, types=types, wrenches=[PUSH, TWIST])
 
 
 def joint_states(bag: Path, of: str) -> list[tuple[int, int, int, list[str], Sequence[float]]]:

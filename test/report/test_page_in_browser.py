@@ -240,6 +240,38 @@ def test_light_and_dark_are_what_the_reader_has_chosen_also_while_it_is_open(dri
     assert not drill.said
 
 
+BROKEN = """() => {
+  const broken = [];
+  const walk = document.createTreeWalker(document.getElementById('readout'), NodeFilter.SHOW_TEXT);
+  for (let node = walk.nextNode(); node; node = walk.nextNode()) {
+    for (const found of node.data.matchAll(/[A-Za-z]+/g)) {
+      const range = document.createRange();
+      range.setStart(node, found.index);
+      range.setEnd(node, found.index + found[0].length);
+      if (range.getClientRects().length > 1) broken.push(found[0]);
+    }
+  }
+  return broken;
+}"""
+
+
+def test_it_opens_at_the_first_pose(browser, folder):
+    """A crank may come long after the run began: an empty picture would say nothing."""
+    with opened(browser, page_of(bags.late(folder / 'late'))) as shown:
+        assert shown.page.evaluate(PINS) is not None
+        assert float(readout(shown.page)['time'].removesuffix(' s')) == pytest.approx(
+            0.6, abs=0.05
+        )
+        assert not shown.said
+
+
+def test_at_400_pixels_no_word_of_the_readout_is_broken(browser, drill_file):
+    with opened(browser, drill_file, width=400) as shown:
+        for time in (0.0, 2.05, 5.1):
+            shown.page.evaluate('(time) => Report.seek(time)', time)
+            assert shown.page.evaluate(BROKEN) == []
+
+
 def test_the_bar_moves_the_pose_to_the_recorded_one(drill, recorded):
     times, pins = recorded
     end = drill.page.evaluate('Report.whole[1]')

@@ -14,6 +14,7 @@
 
 """Forces in pins that were recorded are plotted, and what is zero throughout is not."""
 
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.messages.joint_values import MessageValues, PlanarWrenchWriter, WRENCHES
 from linkage_ros.report.curves import LATER_PINS, PinForces
 from linkage_ros.report.data import plots, zero_plots
@@ -23,6 +24,7 @@ from linkage_ros.resources import shipped
 import numpy as np
 import pytest
 
+from . import bags
 from .runs import BEGIN, but, curve, read, recorded
 
 SCENE = """\
@@ -115,3 +117,17 @@ def test_other_messages_are_counted_and_left_out():
     forces = collected((1, b'no message'), (2, good), (3, other))
     assert forces.left_out == {'malformed message': 1, LATER_PINS: 1}
     assert forces.curves().rows == 2
+
+
+def test_wrenches_on_links_are_plotted_as_they_were_recorded(tmp_path):
+    found = read(read_bag(bags.pushed(tmp_path / 'pushed')))
+    times, force = curve(found, 'coupler', 'load')
+    rows = np.arange(1, 100, 2)
+    assert force == pytest.approx(5.0 * rows)
+    assert np.diff(times) == pytest.approx(times[1] - times[0])
+    moment = np.array(curve(found, 'rocker', 'moment of a load')[1], float)
+    assert moment[np.isfinite(moment)] == pytest.approx(0.1 * np.arange(0, 100, 5))
+    titles = {each['key']: [one['name'] for one in each['curves']] for each in plots(found)}
+    assert titles['loads'] == ['coupler', 'rocker']
+    assert 'rocker' in titles['load_moments']
+    assert found.left_out['wrenches', 'malformed message'] == 1

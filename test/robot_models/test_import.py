@@ -366,7 +366,7 @@ class TestCommand:
             (['urdf', 'nowhere.yaml'], 'linkage urdf: nowhere.yaml: '),
             (['mjcf', 'nowhere.yaml'], 'linkage mjcf: nowhere.yaml: '),
             (['import', 'nowhere.urdf'], 'linkage import: nowhere.urdf: cannot be read (No such'),
-            (['import', '.'], 'linkage import: .: cannot be read (Is a directory); name a URDF'),
+            (['import', '.'], 'linkage import: .: is a folder, and no URDF; name a URDF'),
         ],
     )
     def test_a_file_that_is_not_there(self, typed, message, capsys, tmp_path, monkeypatch):

@@ -237,7 +237,7 @@ def test_a_file_takes_the_place_of_the_one_before(tmp_path):
 
 # A name within the test's folder, and the error.
 NOT_WRITTEN = {
-    'no/linkage.yaml': 'cannot be written (No such file or directory); name another file',
+    'no/linkage.yaml': 'there is no folder ',
     'file/linkage.yaml': 'cannot be written (Not a directory); name another file',
     '.': 'is there already and is no file; name another file',
     'pipe': 'is there already and is no file; name another file',

@@ -23,6 +23,12 @@ from .conftest import CONFIG
 from ..support.scenes import LONG_COUPLER
 
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
+LIMITED = """links: {{ground: {{A: [0, 0], D: [0.1, 0]}}, a: {{A: [0, 0], B: [0.04, 0]}},
+  b: {{B: [0, 0], C: [0.1, 0]}}, c: {{D: [0, 0], C: [0.09, 0]}}}}
+input: {{joint: crank_joint, parent: ground, child: a, limits: {}}}
+assembly: {{C: left}}
+joints: {{rocker_joint: {{parent: ground, child: c}}}}
+"""
 SINE = 'drive: {sine: {amplitude: 45, frequency: 1}}\n'
 
 # Linkage, rest of the scene, and the notes without the folder.
@@ -38,6 +44,36 @@ NOTES = {
         ],
     ),
     'degrees that are named': (FOUR_BAR, f'{SINE}angles: degrees', []),
+    'limits in degrees': (
+        LIMITED.format('[10, 170]'),
+        '',
+        [
+            (
+                'linkage.yaml:3: input.limits: 170 rad is more than a turn; '
+                'if it is in degrees, write angles: degrees'
+            )
+        ],
+    ),
+    'limits in degrees that are named': (
+        LIMITED.format('[-500, 500]') + 'angles: degrees\n',
+        '',
+        [],
+    ),
+    'limits in radians': (
+        LIMITED.format('[-3.2, 6.2]'),
+        '',
+        [],
+    ),
+    'lengths in millimetres': (
+        'four_bar: {a: 40, b: 120, c: 80, d: 100}\n',
+        'rate: 1000\n',
+        [('linkage.yaml: links.coupler: is 120 m long; if it is in millimetres, write units: mm')],
+    ),
+    'lengths in millimetres that are named': (
+        'units: mm\nfour_bar: {a: 40, b: 12000, c: 12000, d: 100}\n',
+        'rate: 1000\n',
+        [],
+    ),
     'a slide of many metres': (
         (CONFIG / 'linkages' / 'scotch_yoke.yaml').read_text(),
         'drive: {sine: {amplitude: 0.5, frequency: 1}}',
@@ -75,7 +111,7 @@ def test_a_link_of_another_unit_is_noted_by_check_and_scene(tmp_path, capsys):
     folder = folder_with(tmp_path, LONG_COUPLER, SINE.replace('45', '0.5'))
     for command, name in (('check', 'linkage'), ('scene', 'scene')):
         assert main([command, str(folder / f'{name}.yaml')]) == 0
-        place = f'{folder}/linkage.yaml' + (':5' if command == 'scene' else '')
+        place = f'{folder}/linkage.yaml:5'
         assert capsys.readouterr().err == (
             f"linkage {command}: note: {place}: links.coupler: is 3000 times as long as 'crank'; "
             'write all lengths in metres, or all in millimetres with units: mm\n'

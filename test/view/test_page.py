@@ -207,6 +207,87 @@ def test_curves_have_no_leaps_and_end_before_what_a_toggle_makes_unbounded(
         assert 0.0 < top < most / 10
 
 
+SLIDER_CRANK_IN_MM = """\
+units: mm
+links:
+  ground: {O: [0, 0], G: [200, 0]}
+  crank: {O: [0, 0], A: [40, 0]}
+  rod: {A: [0, 0], B: [120, 0], P: [60, 30]}
+sliders:
+  cylinder: {point: B, along: ground, through: G, direction: [1, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {cylinder: ahead}
+joints:
+  rod_joint: {parent: crank, child: rod}
+  piston_slide: {slider: cylinder}
+traced: [P]
+"""
+CURVES = """key => document.querySelector(`[data-key=${key}] .plot`).data.map(
+  ({ x, y, line }) => ({ x, y, line }))"""
+
+
+def readouts(page: Any) -> dict[str, str]:
+    return dict(page.evaluate(
+        "() => [...document.querySelectorAll('#readout div')].map((row) => "
+        "[row.querySelector('dt').textContent, row.querySelector('dd').textContent])"
+    ))  # fmt: skip
+
+
+def test_all_points_of_a_curve_are_drawn(browser: Any, stills: Callable[[str], Path]) -> None:
+    """Plotly leaves out points that seem to lie on a line: a smooth curve has corners then."""
+    with opened(browser, stills('four_bar')) as shown:
+        for key in ('joints', 'rates', 'accelerations'):
+            for curve in shown.page.evaluate(CURVES, key):
+                assert curve['line']['simplify'] is False
+
+
+def test_rates_are_those_at_the_rate_that_was_typed(
+    browser: Any, stills: Callable[[str], Path]
+) -> None:
+    with opened(browser, stills('four_bar')) as shown:
+        page = shown.page
+        page.select_option('#angles', 'radians')
+        page.fill('#rate', '-2.5')
+        page.press('#rate', 'Enter')
+        closure = load('four_bar')
+        for key in ('rates', 'accelerations'):
+            curves = page.evaluate(CURVES, key)
+            for number in (0, 100, 250):
+                position = closure.position(curves[0]['x'][number])
+                found = velocity = closure.velocity(position, -2.5)
+                if key == 'accelerations':
+                    found = closure.acceleration(position, velocity, 0.0)
+                shown_here = [curve['y'][number] for curve in curves]
+                assert shown_here == pytest.approx(list(found.joints), abs=1e-9)
+
+
+def test_lengths_are_in_the_unit_of_the_file_and_traced_points_have_coordinates(
+    browser: Any, tmp_path: Path
+) -> None:
+    file = tmp_path / 'mm.html'
+    file.write_text(page_of(model(SLIDER_CRANK_IN_MM, 'mm'), mode='still'), 'utf-8')
+    closure = closure_of(SLIDER_CRANK_IN_MM)
+    with opened(browser, file) as shown:
+        told = readouts(shown.page)
+        (angle,) = state(shown.page)['inputs']
+        position = closure.position(angle)
+        slide, unit = told['piston_slide'].split()
+        assert unit == 'mm'
+        assert float(slide) == pytest.approx(1e3 * position['piston_slide'], rel=1e-5)
+        x, y, unit = told['P'].replace(',', '').split()
+        assert unit == 'mm'
+        place = 1e3 * position.points['P']
+        assert complex(float(x), float(y)) == pytest.approx(place, abs=0.02)
+
+
+def test_a_reading_of_rounding_is_zero(browser: Any, stills: Callable[[str], Path]) -> None:
+    with opened(browser, stills('four_bar')) as shown:
+        for value, unit, text in (
+            (-6.6e-16, 'rad', '0.00000°'), (2e-13, 'm', '0.00000 m'), (1e-9, 'm', '1.00000e-9 m'),
+        ):  # fmt: skip
+            assert shown.page.evaluate('([v, u]) => Angles.readout(v, u)', [value, unit]) == text
+
+
 # With a server.
 
 
@@ -302,6 +383,7 @@ def test_points_inputs_and_sides_are_chosen_by_clicking(browser: Any, tmp_path: 
         page.wait_for_function("() => View.state().text.includes('{B: right}')")
         agrees(page)
         page.check('input[value=trace]')
+        page.wait_for_function(QUIET)  # the picture fits the other assembly then
         page.mouse.click(*middle(page, 'O4', 'B'))
         page.wait_for_function("() => View.state().text.includes('traced: [P, P1]')")
         page.get_by_label('trace P no more').click()
@@ -311,6 +393,28 @@ def test_points_inputs_and_sides_are_chosen_by_clicking(browser: Any, tmp_path: 
         page.mouse.click(*middle(page, 'O4', 'B', 0.7))
         page.wait_for_function("() => View.state().text.includes('input: {joint: rocker_joint')")
         agrees(page)
+        page.wait_for_function(QUIET)
+        # The joints that are new have colours of their own, and the picture fits where they go.
+        for key in ('joints', 'rates', 'accelerations'):
+            curves = page.evaluate(CURVES, key)
+            assert len({curve['line']['color'] for curve in curves}) == len(curves) == 2
+        low, high = page.evaluate('() => View.linkage.range()')
+        for share in (0.01, 0.3, 0.7, 0.99):
+            page.evaluate('(value) => View.seek([value])', low + share * (high - low))
+            assert page.evaluate(OUTSIDE) == 0
+
+
+OUTSIDE = """() => {
+  const { width, tall } = View.board.size;
+  return View.linkage.drawn.shapes.flatMap(({ link, points }) => {
+    const found = [];
+    for (let i = 0; i < points.length; i += 2) {
+      const [x, y] = View.board.toPixel(View.linkage.place(link, points[i], points[i + 1]));
+      if (x < 0 || x > width || y < 0 || y > tall) found.push([x, y]);
+    }
+    return found;
+  }).length;
+}"""
 
 
 def middle(page: Any, one: str, other: str, share: float = 0.5) -> tuple[float, float]:

@@ -14,11 +14,10 @@
 
 
 """
-Reference pages, made from the code while the site is built.
+Write the made parts of the reference pages; ``make reference`` runs it.
 
-A page requests a part by a comment on a line of its own, ``<!-- made: commands -->``. A forge does
-not show these parts; `linkage scene --list`, `linkage COMMAND --help` and config/schema have the
-same content. Links to files of the checkout, which work on a forge, become downloads.
+A part stands between two comments on lines of their own, ``<!-- made: commands -->`` and
+``<!-- end -->``. The written text is committed, so that a forge and the site show the same.
 """
 
 from __future__ import annotations
@@ -84,8 +83,8 @@ def _command(name: str) -> Iterator[str]:
         ]
         if rows:
             yield table((plain(group.title or '').capitalize(), ''), rows)
-        elif group.description:  # the example
-            yield f'```text\n{group.description}\n```\n'
+        elif group.description:
+            yield f'Example: `{group.description}`\n'
 
 
 def _narrow(prog: str) -> argparse.HelpFormatter:
@@ -230,26 +229,21 @@ MADE: Mapping[str, Callable[[], str]] = {
 }
 """The parts that a page can request, by name."""
 
-_DOCS = Path(__file__).resolve().parents[1]
-_LINK = re.compile(r'(?<!!)\[([^\]\n]+)\]\((\.\./[^)#\s]+)(?:#[^)]*)?\)')
-_MARK = re.compile(r'^<!-- made: (.+) -->$', re.MULTILINE)
+_PAGES = Path(__file__).parent / 'reference'
+_PART = re.compile(r'^<!-- made: ([\w ]+) -->$.*?^<!-- end -->$', re.MULTILINE | re.DOTALL)
 
 
-def insert_parts(docname: str, source: list[str]) -> None:
-    """Insert the requested parts into a page, the only item of a list that Sphinx passes."""
-    names = _MARK.findall(source[0])
-    unknown = sorted({*names} - {*MADE})
-    assert not unknown, f'{docname}: unknown parts {", ".join(unknown)}'
-    text = _LINK.sub(lambda found: _local_link(found, (_DOCS / docname).parent), source[0])
-    source[0] = _MARK.sub(lambda found: MADE[found[1]](), text)
+def made_pages() -> dict[Path, str]:
+    """Return the text of each page that has made parts, with these parts made anew."""
+    pages = {page: page.read_text('utf-8') for page in sorted(_PAGES.glob('*.md'))}
+    return {page: _PART.sub(_made, text) for page, text in pages.items() if _PART.search(text)}
 
 
-def _local_link(link: re.Match[str], folder: Path) -> str:
-    """Return a link within the site; a link to a file of the checkout becomes a download."""
-    shown, to = link.groups()
-    target = (folder / to).resolve()
-    if target.is_relative_to(_DOCS):
-        return link[0]
-    if target.is_file():
-        return f'{{download}}`{shown.strip("`")} <{to}>`'
-    return shown
+def _made(part: re.Match[str]) -> str:
+    name = part[1]
+    return f'<!-- made: {name} -->\n\n{MADE[name]().strip()}\n\n<!-- end -->'
+
+
+if __name__ == '__main__':
+    for page, text in made_pages().items():
+        page.write_text(text, 'utf-8')

@@ -1,0 +1,250 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every command with a file of every wrong kind: one line says what the file is."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+import shutil
+from threading import Event
+
+from linkage_ros.cli.main import module_of, parser_of
+from linkage_ros.errors import LinkageError
+import pytest
+
+from .recorded import Recorded, scene_file
+from ..support.commands import linkage
+
+OF_LINKAGES = {
+    'check': '', 'solve': '', 'draw': '-o x.svg', 'animate': '-o x.svg', 'compile': '-o x.c',
+}  # fmt: skip
+OF_SCENES = {
+    'scene': '', 'cost': '', 'simulate': '--seconds 1 -o x.csv', 'fmu': '-o x.fmu', 'urdf': '',
+    'mjcf': '', 'view': '-o x.html', 'accuracy': '--quick',
+}  # fmt: skip
+OF_BAGS = {
+    'plot': '-o x.svg', 'info': '', 'report': '-o x.html', 'export': '-o x.csv', 'play': '',
+    'replay': '',
+}  # fmt: skip
+WITH_BAGS_TOO = {'animate', 'view'}
+
+FILES = {
+    'urdf': (b'<?xml version="1.0"?>\n<!-- by hand -->\n<robot name="r"/>\n', 'a URDF'),
+    'xml': (b'<mujoco model="m"/>', 'a model of MuJoCo'),
+    'html': (b'<!doctype html>\n<html></html>', 'a web page'),
+    'svg': (b'<svg xmlns="http://www.w3.org/2000/svg"/>', 'a picture'),
+    'png': (b'\x89PNG\r\n\x1a\n' + bytes(range(256)), 'a picture'),
+    'fmu': (b'PK\x03\x04\x14\0', 'a ZIP file'),
+    'db3': (b'SQLite format 3\0' + bytes(84), 'an SQLite file'),
+    'bag': (b'#ROSBAG V2.0\n\x45\0\0\0', 'a bag of ROS 1'),
+    'bin': (bytes(range(256)) * 10, 'no text file'),
+    'empty': (b' \n', 'empty'),
+}
+"""Content of a file, and how a person calls it."""
+
+LINKAGE = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
+SCENE = b'linkage: four_bar\nrate: 100\n'
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('kinds')
+    for kind, (content, _) in FILES.items():
+        (folder / f'x_{kind}.yaml').write_bytes(content)
+    (folder / 'linkage.yaml').write_bytes(LINKAGE)
+    (folder / 'scene.yaml').write_bytes(SCENE)
+    (folder / 'folder').mkdir()
+    bag = folder / 'my_bag'
+    Recorded(bag, scene_file(folder, 'rate: 100\n'), lambda _: {'crank_joint': (1.0, 1.0)}).run(9)
+    shutil.copy(next(bag.glob('*.mcap')), folder / 'x.mcap')
+    return folder
+
+
+def answer(command: str, *typed: str) -> str:
+    """Return the one line for which a command refuses its file."""
+    module = import_module(module_of(command))
+    parser = parser_of(command, module)
+    with pytest.raises(LinkageError) as refused:
+        module.run(parser.parse_args(typed), Event())
+    line = str(refused.value)
+    for dress in ('\n', 'None', 'load_scene', 'Is a directory', '[ERROR]'):
+        assert dress not in line
+    return line
+
+
+@pytest.mark.parametrize('command', [*OF_LINKAGES, *OF_SCENES, *OF_BAGS, 'import'])
+@pytest.mark.parametrize('kind', FILES)
+def test_a_file_of_another_kind_is_called_by_its_name(
+    folder: Path, command: str, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    name, noun = f'x_{kind}.yaml', FILES[kind][1]
+    if (command, kind) == ('import', 'urdf'):
+        pytest.skip('the right kind')
+    more = {**OF_LINKAGES, **OF_SCENES, **OF_BAGS}.get(command, '').split()
+    line = answer(command, name, *more)
+    assert line.startswith(f'{name}: ')
+    if command in OF_BAGS and kind in ('bin', 'db3', 'bag'):
+        return  # the reader of bags shows how it starts, or how to convert it
+    if command == 'import' and kind in ('xml', 'svg'):
+        assert line.startswith(f'{name}: holds <')
+    else:
+        assert f' is {noun}' in line
+    if kind == 'urdf' and command not in OF_BAGS:
+        assert line.endswith('linkage import makes a linkage file of a URDF')
+
+
+@pytest.mark.parametrize('command', sorted({*OF_LINKAGES, *OF_SCENES} - WITH_BAGS_TOO))
+@pytest.mark.parametrize('bag', ['my_bag', 'x.mcap'])
+def test_a_bag_in_the_place_of_a_linkage_is_called_so(
+    folder: Path, command: str, bag: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    line = answer(command, bag, *{**OF_LINKAGES, **OF_SCENES}[command].split())
+    assert line.startswith(f'{bag}: is a bag, ')
+    assert line.endswith('linkage info, plot and report read bags')
+
+
+@pytest.mark.parametrize('command', sorted(OF_LINKAGES))
+def test_a_scene_in_the_place_of_a_linkage_names_its_linkage(
+    folder: Path, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    (folder / 'below').mkdir(exist_ok=True)
+    (folder / 'below' / 's.yaml').write_text('linkage: l.yaml\n')
+    more = OF_LINKAGES[command].split()
+    assert answer(command, 'scene.yaml', *more) == (
+        'scene.yaml: is a scene; name its linkage, four_bar'
+    )
+    assert answer(command, 'below/s.yaml', *more).endswith('name its linkage, below/l.yaml')
+
+
+@pytest.mark.parametrize('command', [*OF_BAGS, 'import'])
+@pytest.mark.parametrize(('name', 'noun'), [('linkage', 'linkage'), ('scene', 'scene')])
+def test_a_linkage_or_a_scene_in_the_place_of_a_bag_or_a_urdf_is_called_so(
+    folder: Path, command: str, name: str, noun: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    line = answer(command, f'{name}.yaml', *OF_BAGS.get(command, '').split())
+    assert f'is a {noun} file, and no ' in line
+
+
+WRITTEN_WRONGLY = {
+    'links:\n\tground: {O: [0, 0]}\n': (2, 'has a tab; write spaces instead of tabs'),
+    'links:\n  ground:\n    O: [0, 0]\n   P: [1, 0]\n': (4, 'is indented otherwise'),
+    'links: {ground: {O: [0, 0]\njoints: {}\n': (2, ''),
+    'links:\n  ground: {O: [0, 0}\n': (2, 'has a [ that does not end'),
+    'links\n  ground: {}\n': (2, 'has a colon where none can be'),
+    'links: ground\n': (1, 'write links: {ground: {}}'),
+    'links:\njoints: {}\n': (1, 'is empty; write links: {…}'),
+    'links: {ground: {O: [0, 0, 0.5]}}\n': (1, 'a planar linkage has no z'),
+    'links: {ground: {O: [0,04, 0]}}\n': (1, 'a decimal has a point, not a comma'),
+}
+
+
+@pytest.mark.parametrize('text', WRITTEN_WRONGLY)
+def test_a_mistake_in_a_file_is_told_in_plain_words(tmp_path: Path, text: str) -> None:
+    file = tmp_path / 'l.yaml'
+    file.write_text(text)
+    line, words = WRITTEN_WRONGLY[text]
+    told = answer('check', str(file))
+    assert f'{file}:{line}: ' in told
+    assert words in told
+    assert 'token' not in told
+
+
+# Words that are typed.
+
+
+def typed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """Return the one line for which typed words are refused."""
+    try:
+        return answer(*words)
+    except SystemExit:
+        (line,) = capsys.readouterr().err.splitlines()
+        return line
+
+
+@pytest.mark.parametrize(
+    ('line', 'words'),
+    [
+        ('synthesize', 'the task: is not said; name one of --pair'),
+        ('solve four_bar --at 40,5', 'a decimal has a point, not a comma'),
+        ('synthesize --pair 0 0 --pair 30 17 --pair 60 38,5', "'38,5' is no number; a decimal"),
+        ('simulate demo -o x.csv --seconds 0,5', "'0,5' is no number; a decimal has a point"),
+        ('solve four_bar --steps 4.5', "'4.5' is no whole number"),
+        ('scene demo --set drive=topic', "write --set 'drive={topic: {}}'"),
+        ('scene demo --set effects=[velocity,effort]', "'effects={velocity: {}, effort: {}}'"),
+    ],
+)
+def test_what_is_typed_wrongly_is_told_in_plain_words(
+    capsys: pytest.CaptureFixture[str], line: str, words: str
+) -> None:
+    assert words in typed(capsys, *line.split())
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        'draw four_bar -o no/x.svg', 'solve four_bar -o no/x.csv', 'animate four_bar -o no/x.gif',
+        'compile four_bar -o no/x.c', 'urdf four_bar -o no/x.urdf', 'fmu four_bar -o no/x.fmu',
+        'gallery four_bar -o no/x.yaml', 'simulate demo --seconds 1 -o no/x.csv',
+        'simulate demo --seconds 1 --seeds 2 -o no/x.svg', 'view four_bar -o no/x.html',
+    ],
+)  # fmt: skip
+def test_a_folder_that_is_not_there_is_named_before_the_work(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command, *words = line.split()
+    assert answer(command, *words) == (f'{words[-1]}: there is no folder no; make it: mkdir -p no')
+
+
+@pytest.mark.parametrize('at', ['1e300', '-1e17', '1e15'])
+def test_a_large_number_is_written_short(capsys: pytest.CaptureFixture[str], at: str) -> None:
+    module = import_module(module_of('solve'))
+    module.run(parser_of('solve', module).parse_args(['four_bar', f'--at={at}']), Event())
+    assert max(map(len, capsys.readouterr().out.split())) < 30
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('four_bar: {a: 0.04, b: 0.72, c: 0.08, d: 0.1}', 'by 0.5 m or more'),
+        ('four_bar: {a: 0.04, b: 0.12, c: 0.58, d: 0.1}', 'by 0.32 m or more'),
+        ('units: mm\nfour_bar: {a: 40, b: 120, c: 80, d: 400}', 'by 160 mm or more'),
+    ],
+)
+def test_a_loop_that_never_closes_names_links_and_distance(
+    tmp_path: Path, text: str, words: str
+) -> None:
+    # The longest link of four, less the sum of the others.
+    file = tmp_path / 'l.yaml'
+    file.write_text(text)
+    told = answer('check', str(file))
+    assert f'coupler and rocker miss each other {words}' in told
+
+
+@pytest.mark.ros
+def test_run_answers_like_every_other_command(tmp_path: Path) -> None:
+    for command in ('run', 'simulate -o x.csv --seconds 1'):
+        name, *more = command.split()
+        done = linkage(tmp_path, name, 'nope.yaml', *more)
+        assert done.returncode == 2
+        assert done.stderr == (
+            f'linkage {name}: nope.yaml: cannot be read (No such file or directory); '
+            'name a file that can be read\n'
+        )

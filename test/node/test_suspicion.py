@@ -1,0 +1,55 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A crank that jumps by more than a turn is suspected to be in degrees, once."""
+
+from linkage_ros.messages.joint_state import CrankSample
+from linkage_ros.node.diagnostics import Warnings
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene
+import pytest
+
+SECOND = 10**9
+
+
+class Said(list):
+    """Takes the place of a logger."""
+
+    def warning(self, line):
+        self.append(line)
+
+
+@pytest.mark.parametrize(
+    ('linkage', 'angles', 'said'),
+    [
+        ('four_bar', [170.0, 179.0, -180.0, -171.0], 1),  # degrees, wrapped
+        ('four_bar', [0.0, 90.0, 180.0, 270.0], 1),  # degrees, four samples a turn
+        ('four_bar', [3.0, 3.1, -3.1, -3.0], 0),  # radians, wrapped
+        ('four_bar', [0.0, 0.1, 6.3, 12.5], 0),  # radians, nearly a turn a sample
+        ('elliptic_trammel', [0.0, 0.1], 0),
+    ],
+)
+def test_a_crank_that_jumps_by_more_than_a_turn_is_told_once(linkage, angles, said):
+    pipeline = Pipeline(load_scene(linkage, ['drive={topic: {}}']))
+    (line,) = pipeline.lines
+    for number, angle in enumerate(angles):
+        stamp = (1 + number) * SECOND // 100
+        assert line.drive.offer(CrankSample(stamp, (angle,), (0.0,)), stamp) is None
+    lines = Said()
+    warnings = Warnings(lines)
+    for _ in range(3):
+        warnings.check_jumps(pipeline.lines, '/crank_states')
+    assert len(lines) == said
+    assert all('if these are degrees, publish radians' in each for each in lines)
