@@ -355,6 +355,8 @@ def find_crank_topic(
         topic: [_reader(member, scene.dependent_joints) for member in scene.members]
         for topic in _candidates(bag, drive, run, recorded, typed)
     }
+    if drive == 'torque' and len(readers) == 1:
+        return next(iter(readers))  # also where no command came: the linkage moved without
     wanting = {topic: set(range(len(scene.members))) for topic in readers}
     names: dict[str, None] = {}
     for topic, _, _, data in messages if readers else ():

@@ -245,25 +245,6 @@ def test_a_format_beside_a_file_is_refused(tmp_path: Path) -> None:
     assert '--format json: is for what is printed' in answer.stderr
 
 
-@pytest.mark.parametrize(
-    'typed',
-    [
-        'solve four_bar -o x.csv', 'draw four_bar -o x.svg', 'compile four_bar -o x.c',
-        'urdf four_bar -o x.urdf', 'mjcf four_bar -o x.xml', 'gallery four_bar -o x.yaml',
-        'fmu four_bar -o x.fmu', 'export my_bag -o x.csv', 'plot my_bag -o x.svg',
-        'report my_bag -o x.html',
-        'synthesize --pair 0 0 --pair 30 17 --pair 60 38 -o x.yaml',
-    ],
-)  # fmt: skip
-def test_a_file_that_exists_is_replaced(folder: Path, typed: str) -> None:
-    file = folder / typed.rsplit(maxsplit=1)[-1]
-    file.write_text('old')
-    answer = linkage(folder, *typed.split())
-    assert answer.returncode == 0, answer.stderr
-    assert not file.read_bytes().startswith(b'old')
-    file.unlink()
-
-
 # Keys that are set.
 
 
