@@ -59,7 +59,7 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
         key, equal, text = setting.partition('=')
         parts = _PART.findall(key)
         # On one line no value can add further keys.
-        if not equal or '.'.join(parts) != key or not setting.isprintable():
+        if not (equal and parts) or '.'.join(parts) != key or not setting.isprintable():
             raise _error(setting, f'{quoted(setting)} is no setting', 'write KEY=VALUE: rate=500')
         within: Any = content.mapping
         outer = ''

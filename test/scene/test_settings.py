@@ -73,6 +73,7 @@ REFUSED = {
     'loads.forces."".x=7': 'is no setting; write KEY=VALUE',
     'loads..forces=7': 'is no setting; write KEY=VALUE',
     '.=7': 'is no setting; write KEY=VALUE',
+    '=7': 'is no setting; write KEY=VALUE',
 }
 
 
