@@ -483,3 +483,21 @@ def test_sliders_next_to_change_points_follow_the_nominal_linkage(name, by):
         velocity = closure.velocity(closure.position(phi), 1.0)
         ahead = closure.position(phi + 1e-6).joints[0] - closure.position(phi - 1e-6).joints[0]
         assert remainder(ahead, tau) / 2e-6 == pytest.approx(velocity.joints[0], abs=1e-6)
+
+
+@pytest.mark.parametrize('name', [*FAMILIES, *TURNING])
+def test_many_states_at_once_are_those_of_one_next_to_a_change_point(name):
+    if name in FAMILIES:
+        linkage = four_bar_linkage(changed(FAMILIES[name], 2, 1e-6), 'left')
+    else:
+        made, _ = TURNING[name]
+        linkage = replace(made(1e-6), nominal=made(0.0))
+    closure = Closure(linkage)
+    angles = [0.1 + 0.37 * k for k in range(-30, 30)]
+    batch = closure.solve(angles)
+    for k, at in enumerate(angles):
+        position = closure.position(at)
+        assert position.joints == pytest.approx(batch.positions[:, k], abs=1e-12)
+        if position.status.has_rates:
+            velocity = closure.velocity(position, 1.0)
+            assert velocity.joints == pytest.approx(batch.velocities[:, k], rel=1e-9, abs=1e-9)
