@@ -136,7 +136,7 @@ _IN_PLAIN_WORDS = (
     ('mapping values are not allowed', 'has a colon where none can be', _INDENT),
     (
         "could not find expected ':'",
-        'has a key without a colon, or too long a one',
+        'has a key without a colon',
         'write key: value',
     ),
     ("expected ',' or '}'", 'has a { that does not end, or no comma', 'close it: {x: 1, y: 2}'),
