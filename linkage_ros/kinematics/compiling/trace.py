@@ -188,7 +188,9 @@ def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
     settled: dict[int, bool] = {}
     of_steps: list[Tree] = []
     for step in closure.steps:
-        leaf = partial(_status_of, step, known, (len(known.coordinates), len(known.pins)), tape, settled)
+        leaf = partial(
+            _status_of, step, known, (len(known.coordinates), len(known.pins)), tape, settled
+        )
         leaf(())
         made = tape.decisions
         held: tuple[bool, ...] = ()
