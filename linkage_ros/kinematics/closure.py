@@ -381,7 +381,9 @@ class Closure:
         Raises
         ------
         ValueError
-            If the arrays do not fit each other, the linkage or ``out``.
+            If the arrays do not fit each other, the linkage or ``out``, or values are masked.
+        TypeError
+            If a value is not a number.
 
         """
         return self._solver.solve(inputs, rates, accelerations, derivatives, out)

@@ -240,7 +240,9 @@ def test_a_damaged_account_of_the_run_is_refused(tmp_path, damaged):
 #
 # They were recorded on 22 November 2026, before linkages were compiled: all shipped linkages with
 # one input and a closed form, through their ranges and a little beyond; forces, friction and play;
-# a torque drive; a cylinder behind a delay.
+# a torque drive; a cylinder behind a delay. On 25 November 51 of the 638 messages of the gallery
+# were written anew, those of andrews_squeezer, double_rocker and jansen_leg: a dyad's differences
+# start from the one that cancels least, and positions changed by up to 8.9e-16 rad.
 
 
 FOLDER = Path(__file__).parent / 'recorded'

@@ -22,8 +22,15 @@ from û1 to û2::
     E1 + s1·û1 = E2 + s2·û2        s1 = (E2 − E1) × û2 / sin δ        s2 = (E2 − E1) × û1 / sin δ
 
 The rates solve the same equations for the difference of the links' velocities at the pin, the
-accelerations for that of their accelerations, including Coriolis terms. Parallel lines do not
-meet, or coincide: open, or indeterminate.
+accelerations for that of their accelerations, including Coriolis terms. Seen from one of the
+links, a slide is multiplied by the relative turn only::
+
+    ṡ1 = ((Ė2 − Ė1 − ω1 × (E2 − E1)) × û2 − (ω2 − ω1)·s2)/sin δ
+    ṡ2 = ((Ė2 − Ė1 − ω2 × (E2 − E1)) × û1 − (ω2 − ω1)·s1)/sin δ
+
+The slides are rounded, and 1/sin δ amplifies that: with both turns times both slides, a chain
+whose links turn almost alike lost 5 u·κ. Parallel lines do not meet, or coincide: open, or
+indeterminate.
 """
 
 from __future__ import annotations
@@ -112,14 +119,19 @@ class PRPDyad(_CrossingLines):
         first, second = resolved(between, units, across.imag, known)
         return PRPPose(Status.CLOSED, 0.0, first, second, across, units)
 
-    def rates(self, pose: PRPPose, _known: State, speeds: State) -> tuple[float, float]:
+    def rates(self, pose: PRPPose, known: State, speeds: State) -> tuple[float, float]:
         """Append the rates of both slides."""
         one, other = pose.units
         turn, other_turn = (speeds.coordinates[k] for k in self.arms)
         start, end = (speeds.pins[k] for k in self._starts)
-        carried = end + 1j * (other_turn * pose.second) * other
-        carried -= start + 1j * (turn * pose.first) * one
-        return resolved(carried, pose.units, pose.across.imag, speeds)
+        begin, finish = (known.pins[k] for k in self._starts)
+        away, drift = finish - begin, end - start
+        swing, sine = other_turn - turn, pose.across.imag
+        first = (cross(drift - 1j * turn * away, other) - swing * pose.second) / sine
+        second = (cross(drift - 1j * other_turn * away, one) - swing * pose.first) / sine
+        speeds.coordinates.append(first)
+        speeds.coordinates.append(second)
+        return first, second
 
     def accelerations(
         self,
