@@ -139,3 +139,33 @@ def test_a_tick_that_goes_on_does_not_say_that_no_message_came(monkeypatch, name
             counts, '/crank', ['crank_joint'], 100.0, interval, NANOSECONDS, lambda: ['/other']
         )
     assert [line[: len(start)] for line, start in zip(lines, expected, strict=True)] == expected
+
+
+# The drive's max_age [s], the messages received before all fall silent, and after how many whole
+# seconds of silence the first warning comes: never, if a drive goes on without new samples.
+PATIENCE = {
+    'no message ever came': (0.0, 0, 3),
+    'samples that hold for ever': (0.0, 5, None),
+    'samples that hold for less than the patience': (0.5, 5, 3),
+    'samples that hold for long': (6.0, 5, 7),
+    'none came, of those that hold for long': (6.0, 0, 7),
+}
+
+
+@pytest.mark.parametrize('name', PATIENCE)
+def test_silence_is_warned_of_when_no_sample_holds_any_more(monkeypatch, name):
+    max_age, received, first = PATIENCE[name]
+    now = [0.0]
+    monkeypatch.setattr(diagnostics, 'monotonic', lambda: now[0])
+    counts, lines = Counts(), Said()
+    counts.received = counts.used = received
+    warnings = Warnings(lines)
+    warned = []
+    for second in range(10):
+        now[0], counts.ticks = float(second), 100 * second
+        warnings.check_silence(
+            counts, '/crank', ['crank_joint'], 100.0, 0.01, round(max_age * NANOSECONDS), list
+        )
+        warned += [second] * (len(lines) - len(warned))
+    # The first look, at 0 s, sees what has been received.
+    assert warned == ([] if first is None else [first])

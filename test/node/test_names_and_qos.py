@@ -124,7 +124,9 @@ def test_with_both_remappings_of_the_docs_it_does_not_take_itself_for_the_crank(
     assert graph.value('crank', 'Topic') == '/joint_states'
     graph.publisher(JointState, '/joint_states', node='impostor')
     wait_for(
-        lambda: publisher.publish(crank(0.7)) or 'Several' in graph.status('crank').message,
+        lambda: (
+            publisher.publish(crank(0.7)) or 'several publishers' in graph.status('crank').message
+        ),
         'the warning of a second publisher',
     )
     named = graph.value('crank', 'Publishers').split(', ')

@@ -495,7 +495,7 @@ WRONG = [
     ('bag --rate 0', '--rate: 0 is not between 0.01 and 1000'),
     ('bag --rate 1001', '--rate: 1001 is not between 0.01 and 1000'),
     ('bag --rate nan', '--rate: nan is not between 0.01 and 1000'),
-    ('bag --rate fast', "--rate: invalid number value: 'fast'"),
+    ('bag --rate fast', "argument --rate: 'fast' is no number"),
     ('bag --clock 0', '--clock: 0 is not between 0.1 and 10000'),
     ('bag --start -1', '--start: -1 is not between 0 and 1e+09'),
     ('bag --ros-args -r', '--ros-args: '),
