@@ -57,6 +57,7 @@ def test_every_command_that_takes_a_linkage_gets_changed_ones() -> None:
         'import',
         'synthesize',
         'gallery',
+        'compare',
         'completion',
     }
     assert set(files.COMMANDS) == set(COMMANDS) - without

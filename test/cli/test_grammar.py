@@ -23,6 +23,7 @@ from math import tau
 from pathlib import Path
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 
@@ -74,6 +75,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     Recorded(folder / 'my_bag', scene, lambda tick: {'crank_joint': (tau * tick / 100, tau)}).run(
         100
     )
+    shutil.copytree(folder / 'my_bag', folder / 'other_bag')
     return folder
 
 
@@ -171,7 +173,18 @@ def test_a_name_that_is_nearly_right_is_told(name: str) -> None:
 # Metavars and outputs.
 
 
-METAVARS = {'BAG', 'FILE', 'FILE|BAG', 'FILE|SCENE|BAG', 'NAME', 'SCENE', 'SHELL', 'TOPIC', 'URDF'}
+METAVARS = {
+    'BAG',
+    'FILE',
+    'FILE|BAG',
+    'FILE|SCENE|BAG',
+    'NAME',
+    'OTHER',
+    'SCENE',
+    'SHELL',
+    'TOPIC',
+    'URDF',
+}
 """How arguments without an option are called, in all commands."""
 
 

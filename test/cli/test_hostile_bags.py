@@ -305,9 +305,10 @@ def sensor(parameters, context):
 
 # Arguments after the bag, by command; at least one line for each command that takes a bag.
 TYPED = {
+    'compare': [['strange']],
     'info': [[], ['--json']],
     'report': [[]],
-    'export': [['-o', 'x.csv'], ['-o', 'x.csv', '--topic', '/joint_states']],
+    'export': [['-o', 'x.csv'], ['-o', 'y.csv', '--topic', '/joint_states']],
     'plot': [[]],
     'play': [['--rate', '1000']],
     'recover': [['-o', 'recovered']],
@@ -407,7 +408,8 @@ def test_a_report_names_it(folder: Path) -> None:
 
 @pytest.mark.parametrize('command', ['info', 'report', 'plot', 'replay'])
 def test_who_trusts_a_bag_is_told_first_what_runs(folder: Path, command: str) -> None:
-    ended = typed(folder, command, 'strange', '--trust-effects')
+    force = ['--force'] * (command in {'report', 'plot'})
+    ended = typed(folder, command, 'strange', '--trust-effects', *force)
     assert (folder / RAN).exists()
     assert ended.stderr.startswith(
         f'linkage: strange is trusted: imports {EFFECT}, and the name leads to '

@@ -115,7 +115,7 @@ def test_from_within_the_bag_it_is_written_beside_it(
 
 REFUSED = {
     'a folder': ('taken.html', 'taken.html: is a folder; name another file with -o'),
-    'no folder': ('gone/x.html', 'gone/x.html: lies in no folder that there is; name another'),
+    'no folder': ('gone/x.html', 'gone/x.html: there is no folder gone; make it: mkdir -p gone'),
     'another kind': ('x.pdf', "x.pdf: ends in '.pdf'; name a file that ends in .html or .htm"),
     'no kind': ('x', 'x: has no ending; name a file that ends in .html or .htm'),
     'a device': ('/dev/full', '/dev/full: has no ending; name a file'),

@@ -52,8 +52,8 @@ READS = {
     'cost': (['four.yaml'], PARSE),
     'accuracy': (['four.yaml', '-o', 'page'], PARSE),
     'demo': ([], PARSE),
-    'import': (['x.urdf', '-o', 'x.yaml'], 'linkage_ros.cli.import_urdf:read_urdf'),
-    'synthesize': (['--pairs', 'x.csv'], 'csv:reader'),
+    'import': (['robot.urdf', '-o', 'x.yaml'], 'linkage_ros.cli.import_urdf:read_urdf'),
+    'synthesize': (['--pairs', 'pairs.csv'], 'csv:reader'),
 }
 
 COMPUTE = (
@@ -138,8 +138,8 @@ assert stop.is_set() and stop.wait(60.0)
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / 'four.yaml').write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
-    (tmp_path / 'x.urdf').write_text('<robot/>')
-    (tmp_path / 'x.csv').write_text('1,2\n3,4\n5,7\n')
+    (tmp_path / 'robot.urdf').write_text('<robot/>')
+    (tmp_path / 'pairs.csv').write_text('1,2\n3,4\n5,7\n')
     return tmp_path
 
 

@@ -294,7 +294,7 @@ def test_no_state_makes_numpy_warn():
     angles = [0.0, -0.0, pi, 1e-310, 1e308, nan, inf, *np.linspace(-7.0, 7.0, 50)]
     with warnings.catch_warnings(), np.errstate(all='warn'):
         warnings.simplefilter('error')
-        for lengths in (*SHAPES.values(), *CHANGE_POINTS.values(), (1.0, 1e-200, 1e-200, 1.0)):
+        for lengths in (*SHAPES.values(), *CHANGE_POINTS.values(), (1.0, 1e-29, 1e-29, 1.0)):
             solved(four_bars_of(*lengths, 1), angles)
 
 
