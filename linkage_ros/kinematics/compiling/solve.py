@@ -24,7 +24,7 @@ they are called for these.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, isfinite
+from math import isfinite
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import all_finite
@@ -34,7 +34,7 @@ from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction, Number
 from linkage_ros.kinematics.compiling.real_program import Lowered, lowered
 from linkage_ros.kinematics.compiling.trace import Branch, fates, joints, Tree, Wanted
-from linkage_ros.kinematics.doubles import HUGE, scale_of, to_doubles
+from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_doubles
 from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -121,8 +121,9 @@ class Solver:
             alone = each.ndim < 2 if driven == 1 else not np.iterable(each)
             given += _numbers(name, [each] if alone else list(each), driven, count)
         numbers: list[Any] = [value if value.ndim else float(value) for value in given]
-        if _has_huge(numbers[driven:], driven):
-            return self._solve_huge(given, derivatives, out)
+        with np.errstate(all='ignore'):
+            if _has_huge(numbers[driven:], driven):
+                return self._solve_huge(given, derivatives, out)
         batch = _room(self._width, count, derivatives, out)
         # A constant 0 or 1 is folded into the program.
         kinds = [int(n) if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
@@ -153,18 +154,18 @@ class Solver:
         """Solve with scaled rates and accelerations: what overflows is infinite."""
         driven = self._driven
         inputs, rates, changes = given[:driven], given[driven:][:driven], given[2 * driven :]
-        with np.errstate(over='ignore', under='ignore'):
-            scale = scale_of(rates, changes)
-            batch = self.solve(
-                inputs,
-                [rate * scale for rate in rates],
-                [change * scale * scale for change in changes] or None,
-                derivatives,
-                out,
-            )
-            for values in (batch.velocities, batch.accelerations, batch.accelerations):
-                if values is not None:
-                    np.divide(values, scale, out=values)
+        huge = [_are_huge(value, k < driven) for k, value in enumerate((*rates, *changes))]
+        scale = np.where(np.any(np.broadcast_arrays(*huge), axis=0), SHRINK, 1.0)
+        batch = self.solve(
+            inputs,
+            [rate * scale for rate in rates],
+            [change * scale * scale for change in changes] or None,
+            derivatives,
+            out,
+        )
+        for values in (batch.velocities, batch.accelerations, batch.accelerations):
+            if values is not None:
+                np.divide(values, scale, out=values)
         return batch
 
     def _solve(self, block: _Block, programs: Sequence[_Program], one: Compiled) -> None:
@@ -304,13 +305,17 @@ def _comes_to(form: ArrayForm, fate: Tree, status: Status) -> Number:
 def _has_huge(numbers: Sequence[Any], driven: int) -> bool:
     """Return whether a finite rate, or an acceleration after the rates, is huge."""
     for k, number in enumerate(numbers):
-        if isinstance(number, float):
-            size = abs(number)
-        else:  # not abs(), which would take memory
-            size = max(number.max(), -number.min()) if number.size else 0.0
-        if (HUGE if k < driven else HUGE * HUGE) <= size < inf:
+        # The sum of the squares is usually small: then it is the only pass over the memory.
+        squares = number * number if isinstance(number, float) else np.dot(number, number)
+        if squares < HUGE * HUGE:
+            continue
+        if np.any(_are_huge(number, k < driven) & np.isfinite(number)):
             return True
     return False
+
+
+def _are_huge(values: Any, rates: bool) -> Any:
+    return np.abs(values) >= (HUGE if rates else HUGE * HUGE)
 
 
 def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> list[Array]:
