@@ -124,6 +124,11 @@ class Solver:
         with np.errstate(all='ignore'):
             if _has_huge(numbers[driven:], driven):
                 return self._solve_huge(given, derivatives, out)
+            return self._solve_blocks(numbers, derivatives, out)
+
+    def _solve_blocks(self, numbers: list[Any], derivatives: int, out: Batch | None) -> Batch:
+        """Solve with usual rates, block by block."""
+        driven, count = self._driven, len(numbers[0])
         batch = _room(self._width, count, derivatives, out)
         # A constant 0 or 1 is folded into the program.
         kinds = [int(n) if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
@@ -133,21 +138,20 @@ class Solver:
         rows = np.empty((max((f.rows for f in functions), default=0), longest + _APART))
         rows = rows[:, :longest]
         masks = np.empty((max((f.masks for f in functions), default=0), longest), bool)
-        with np.errstate(all='ignore'):
-            for start in range(0, count, BLOCK):
-                part = slice(start, start + BLOCK)
-                block = _Block(
-                    # Adding 0.0 makes 0.0 of −0.0, which is the same input.
-                    [
-                        *(n[part] + 0.0 for n in numbers[:driven]),
-                        *(n[part] if isinstance(n, np.ndarray) else n for n in numbers[driven:]),
-                    ],
-                    batch.status[part],
-                    [array[:, part] for array in batch[1:] if array is not None],
-                    rows,
-                    masks,
-                )
-                self._solve(block, programs, self._compiled(derivatives))
+        for start in range(0, count, BLOCK):
+            part = slice(start, start + BLOCK)
+            block = _Block(
+                # Adding 0.0 makes 0.0 of −0.0, which is the same input.
+                [
+                    *(n[part] + 0.0 for n in numbers[:driven]),
+                    *(n[part] if isinstance(n, np.ndarray) else n for n in numbers[driven:]),
+                ],
+                batch.status[part],
+                [array[:, part] for array in batch[1:] if array is not None],
+                rows,
+                masks,
+            )
+            self._solve(block, programs, self._compiled(derivatives))
         return batch
 
     def _solve_huge(self, given: list[Array], derivatives: int, out: Batch | None) -> Batch:
@@ -211,7 +215,8 @@ class _Block(NamedTuple):
         """Mark the states that are not finite; return the others, or None if all are finite."""
         self.status.fill(_CLOSED)
         for values in self.given[:driven]:
-            if not np.isfinite(values.sum()):
+            # The sum of the squares is finite if all are, unless one is above 1e150.
+            if not np.isfinite(np.dot(values, values)):
                 self.status[~np.isfinite(values)] = _INDETERMINATE
         return np.flatnonzero(self.status == _CLOSED) if self.status.any() else None
 
@@ -305,12 +310,16 @@ def _comes_to(form: ArrayForm, fate: Tree, status: Status) -> Number:
 def _has_huge(numbers: Sequence[Any], driven: int) -> bool:
     """Return whether a finite rate, or an acceleration after the rates, is huge."""
     for k, number in enumerate(numbers):
-        # The sum of the squares is usually small: then it is the only pass over the memory.
-        squares = number * number if isinstance(number, float) else np.dot(number, number)
-        if squares < HUGE * HUGE:
-            continue
-        if np.any(_are_huge(number, k < driven) & np.isfinite(number)):
-            return True
+        values = np.atleast_1d(number)
+        if values.strides == (0,):  # one number for all states
+            values = values[:1]
+        for start in range(0, len(values), BLOCK):
+            part = values[start : start + BLOCK]
+            # The sum of the squares is usually small: then it is the only pass over the memory.
+            if not np.dot(part, part) < HUGE * HUGE and np.any(
+                _are_huge(part, k < driven) & np.isfinite(part)
+            ):
+                return True
     return False
 
 
