@@ -31,7 +31,7 @@ from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.checks import check
-from linkage_ros.kinematics.doubles import HUGE, scale_of, to_double
+from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_double
 from linkage_ros.kinematics.limits import Bounds, limited, without_mirrored, zero_length
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.plan import SolutionPlan
@@ -290,7 +290,7 @@ class Closure:
         if getattr(velocity, 'closure', None) is not self:
             self._check_own('velocity', velocity)
         a = self._coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
-        if a is None or velocity.rates is None:
+        if a is None or type(velocity.rates) is Velocity:
             numbers = self._doubles('accelerations', accelerations)
             return self._huge_acceleration(position, velocity, numbers)
         changes = State(a, [])
@@ -302,23 +302,22 @@ class Closure:
         """Return the velocity at rates of which one is huge: infinite where it overflows."""
         if not (position.status.has_rates and all_finite(rates)):
             raise _no_motion('rates', rates, position.status)
-        scale = float(scale_of(rates, ()))
-        found = self.velocity(position, *(rate * scale for rate in rates))
-        joints, state = _multiplied(found, 1.0 / scale)
-        return Velocity(joints, state, None, self)
+        found = self.velocity(position, *(rate * SHRINK for rate in rates))
+        return Velocity(*_multiplied(found, 1.0 / SHRINK), found, self)
 
     def _huge_acceleration(
         self, position: Position, velocity: Velocity, accelerations: tuple[float, ...]
     ) -> Acceleration:
         if not all_finite(accelerations):
             raise _no_motion('accelerations', accelerations, position.status)
-        rates = self.inputs_of(velocity.state)
-        scale = float(scale_of(rates, accelerations))
-        scaled = self.velocity(position, *(rate * scale for rate in rates))
-        changes = (change * scale * scale for change in accelerations)
+        scaled = velocity.rates
+        if not isinstance(scaled, Velocity):
+            rates = self.inputs_of(velocity.state)
+            scaled = self.velocity(position, *(rate * SHRINK for rate in rates))
+        changes = (change * SHRINK * SHRINK for change in accelerations)
         found = self.acceleration(position, scaled, *changes)
-        once = Acceleration(*_multiplied(found, 1.0 / scale), self)
-        return Acceleration(*_multiplied(once, 1.0 / scale), self)
+        once = Acceleration(*_multiplied(found, 1.0 / SHRINK), self)
+        return Acceleration(*_multiplied(once, 1.0 / SHRINK), self)
 
     def compiled(self, derivatives: int, wanted: Wanted | None = None) -> Compiled:
         """

@@ -21,7 +21,6 @@ A number beyond the doubles is infinite, as the literal ``1e400`` is in Python.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf
 from typing import Any, TYPE_CHECKING
 
@@ -31,7 +30,15 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array
 
 HUGE = 2.0**400
-"""Rates and accelerations from here on are scaled, lest a square or a product overflow."""
+"""
+Rates from here on are scaled by `SHRINK`, lest a square or a product overflow.
+
+So are accelerations from its square on. Accelerations are scaled by the square of `SHRINK`: those
+of the joints are linear in those of the inputs, and quadratic in their rates.
+"""
+
+SHRINK = 2.0**-700
+"""A power of two: it changes no digit."""
 
 
 def to_double(what: str, value: Any, remedy: str = '') -> float:
@@ -84,17 +91,3 @@ def to_doubles(what: str, values: Any) -> Array:
         raise TypeError(f'{what}: {quoted(first[0] if first else values)} is not a number')
     doubles = [to_double(what, value) for value in array.ravel().tolist()]
     return np.array(doubles, np.float64).reshape(array.shape)
-
-
-def scale_of(rates: Sequence[Any], accelerations: Sequence[Any]) -> Any:
-    """
-    Return the powers of two that scale huge rates and accelerations to about 1; 1 for others.
-
-    Each is a number, or an array with one for each state. Accelerations are scaled by the square:
-    those of the joints are linear in those of the inputs, and quadratic in their rates.
-    """
-    import numpy as np  # local import: usual rates need none
-
-    sizes = [*map(np.abs, rates), *(np.sqrt(np.abs(each)) for each in accelerations)]
-    size = np.max(np.broadcast_arrays(*sizes), axis=0)
-    return np.where(size >= HUGE, np.ldexp(1.0, 1 - np.frexp(size)[1]), 1.0)

@@ -300,8 +300,8 @@ class Velocity(_JointValues):
     joints
         Rates of the published joints, in [rad/s] or [m/s].
     state, rates
-        Rates of coordinates and pins, and what each step needs for its accelerations; None for
-        rates so huge that a square of them would overflow.
+        Rates of coordinates and pins, and what each step needs for its accelerations; for rates so
+        huge that a square of them would overflow, the velocity at smaller ones.
     closure
         The closure that found them.
 

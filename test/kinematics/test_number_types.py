@@ -312,6 +312,26 @@ def test_huge_and_usual_rates_side_by_side():
     assert not many.status.any()
 
 
+@pytest.mark.parametrize('name', MACHINES)
+@pytest.mark.parametrize('other', [nan, inf, -inf])
+def test_a_rate_that_is_not_finite_leaves_huge_ones_beside_it_alone(name, other):
+    closure = lr.load(name)
+    many = closure.solve([0.7, 0.7], rates=[1e160, other], accelerations=[1.0, other])
+    rates, changes = exact(closure, 0.7, 1e160, 1.0)
+    for found, true in ((many.velocities, rates), (many.accelerations, changes)):
+        assert all(map(agrees, found[:, 0], true))
+
+
+def test_a_slider_whose_rate_overflows_in_the_unit_of_the_steps():
+    trammel = lr.load('elliptic_trammel')
+    position = trammel.position(0.05)
+    assert trammel.scale < 1.0
+    velocity = trammel.velocity(position, 1.7e308)
+    found = trammel.acceleration(position, velocity, 1e239).joints
+    for one, true in zip(found, exact(trammel, 0.05, 1.7e308, 1e239)[1], strict=True):
+        assert agrees(one, true)
+
+
 def test_points_move_at_huge_rates_too():
     position = FOUR_BAR.position(0.7)
     velocity = FOUR_BAR.velocity(position, 1e160)

@@ -27,6 +27,7 @@ from linkage_ros.kinematics.compiling.source import (
     Subject,
 )
 from linkage_ros.kinematics.compiling.tape import Operation
+from linkage_ros.kinematics.status import Status
 
 _NOTES = (
     '',
@@ -92,6 +93,22 @@ class C(Language):
             for number, text in enumerate(group)
         ]
         return [*lines, f'return {status};']
+
+    def scaled(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+        names = [f'scaled_{name}' for name in GIVEN[1 : 1 + len(given)]]
+        returned = RETURNED[: 1 + len(given)]
+        arguments = ', '.join((GIVEN[0], *names, *returned))
+        arrays = zip(names, given, strict=True)
+        valid = f'status <= {self.status.format(Status.LIMITED.name)}'
+        return [
+            *(f'const double {name}[] = {{{", ".join(group)}}};' for name, group in arrays),
+            f'const enum {self._name}_status status =',
+            f'    {self.function(len(given))}({arguments});',
+            f'for (int i = 0; {valid} && i < {len(subject.joints)}; ++i) {{',
+            *(f'    {name}[i] *= up;' for order in (1, 2) for name in returned[order:]),
+            '}',
+            'return status;',
+        ]
 
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
         name, function = self._name, self.function(subject.derivatives)

@@ -42,6 +42,9 @@ function copysign(size, sign) {
 _FOR_A_PAGE = ('joints', 'rates', 'accelerations', 'frames', 'frameRates')
 """What the function of a page returns beside its status."""
 
+_ORDERS = {RETURNED[1]: 1, RETURNED[2]: 2, 'rates': 1, 'accelerations': 2, 'frameRates': 1}
+"""Which of all results are derivatives, and of what order."""
+
 
 class JavaScript(Language):
     """
@@ -80,10 +83,24 @@ class JavaScript(Language):
         )
         return [f'return {{status: {status}{"".join(arrays)}}};']
 
+    def scaled(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+        arguments = ''.join(f', [{", ".join(group)}]' for group in given)
+        return [
+            f'const found = {self.function(len(given))}(inputs{arguments});',
+            *(
+                f'found.{name} = found.{name}.map((each) => each{" * up" * _ORDERS[name]});'
+                for name in self._returned(subject)
+                if name in _ORDERS
+            ),
+            'return found;',
+        ]
+
+    def _returned(self, subject: Subject) -> Sequence[str]:
+        return self._names if subject.frames else self._names[: 1 + subject.derivatives]
+
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
         given = GIVEN[: 1 + subject.derivatives]
-        returned = self._names if subject.frames else self._names[: 1 + subject.derivatives]
-        empty = ', '.join(f'{name}: []' for name in returned)
+        empty = ', '.join(f'{name}: []' for name in self._returned(subject))
         comment = (f' * {line}'.rstrip() for line in (*head, *_NOTES))
         statuses = (f'    {status}: {number},' for number, status in enumerate(STATUSES))
         name = self.function(subject.derivatives)

@@ -24,7 +24,7 @@ they are called for these.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, isfinite
+from math import isfinite
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import all_finite
@@ -34,7 +34,7 @@ from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction, Number
 from linkage_ros.kinematics.compiling.real_program import Lowered, lowered
 from linkage_ros.kinematics.compiling.trace import Branch, fates, joints, Tree, Wanted
-from linkage_ros.kinematics.doubles import HUGE, scale_of, to_doubles
+from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_doubles
 from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -121,8 +121,14 @@ class Solver:
             alone = each.ndim < 2 if driven == 1 else not np.iterable(each)
             given += _numbers(name, [each] if alone else list(each), driven, count)
         numbers: list[Any] = [value if value.ndim else float(value) for value in given]
-        if _has_huge(numbers[driven:], driven):
-            return self._solve_huge(given, derivatives, out)
+        with np.errstate(all='ignore'):
+            if _has_huge(numbers[driven:], driven):
+                return self._solve_huge(given, derivatives, out)
+            return self._solve_blocks(numbers, derivatives, out)
+
+    def _solve_blocks(self, numbers: list[Any], derivatives: int, out: Batch | None) -> Batch:
+        """Solve with usual rates, block by block."""
+        driven, count = self._driven, len(numbers[0])
         batch = _room(self._width, count, derivatives, out)
         # A constant 0 or 1 is folded into the program.
         kinds = [int(n) if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
@@ -132,39 +138,38 @@ class Solver:
         rows = np.empty((max((f.rows for f in functions), default=0), longest + _APART))
         rows = rows[:, :longest]
         masks = np.empty((max((f.masks for f in functions), default=0), longest), bool)
-        with np.errstate(all='ignore'):
-            for start in range(0, count, BLOCK):
-                part = slice(start, start + BLOCK)
-                block = _Block(
-                    # Adding 0.0 makes 0.0 of −0.0, which is the same input.
-                    [
-                        *(n[part] + 0.0 for n in numbers[:driven]),
-                        *(n[part] if isinstance(n, np.ndarray) else n for n in numbers[driven:]),
-                    ],
-                    batch.status[part],
-                    [array[:, part] for array in batch[1:] if array is not None],
-                    rows,
-                    masks,
-                )
-                self._solve(block, programs, self._compiled(derivatives))
+        for start in range(0, count, BLOCK):
+            part = slice(start, start + BLOCK)
+            block = _Block(
+                # Adding 0.0 makes 0.0 of −0.0, which is the same input.
+                [
+                    *(n[part] + 0.0 for n in numbers[:driven]),
+                    *(n[part] if isinstance(n, np.ndarray) else n for n in numbers[driven:]),
+                ],
+                batch.status[part],
+                [array[:, part] for array in batch[1:] if array is not None],
+                rows,
+                masks,
+            )
+            self._solve(block, programs, self._compiled(derivatives))
         return batch
 
     def _solve_huge(self, given: list[Array], derivatives: int, out: Batch | None) -> Batch:
         """Solve with scaled rates and accelerations: what overflows is infinite."""
         driven = self._driven
         inputs, rates, changes = given[:driven], given[driven:][:driven], given[2 * driven :]
-        with np.errstate(over='ignore', under='ignore'):
-            scale = scale_of(rates, changes)
-            batch = self.solve(
-                inputs,
-                [rate * scale for rate in rates],
-                [change * scale * scale for change in changes] or None,
-                derivatives,
-                out,
-            )
-            for values in (batch.velocities, batch.accelerations, batch.accelerations):
-                if values is not None:
-                    np.divide(values, scale, out=values)
+        huge = [_are_huge(value, k < driven) for k, value in enumerate((*rates, *changes))]
+        scale = np.where(np.any(np.broadcast_arrays(*huge), axis=0), SHRINK, 1.0)
+        batch = self.solve(
+            inputs,
+            [rate * scale for rate in rates],
+            [change * scale * scale for change in changes] or None,
+            derivatives,
+            out,
+        )
+        for values in (batch.velocities, batch.accelerations, batch.accelerations):
+            if values is not None:
+                np.divide(values, scale, out=values)
         return batch
 
     def _solve(self, block: _Block, programs: Sequence[_Program], one: Compiled) -> None:
@@ -210,7 +215,8 @@ class _Block(NamedTuple):
         """Mark the states that are not finite; return the others, or None if all are finite."""
         self.status.fill(_CLOSED)
         for values in self.given[:driven]:
-            if not np.isfinite(values.sum()):
+            # The sum of the squares is finite if all are, unless one is above 1e150.
+            if not np.isfinite(np.dot(values, values)):
                 self.status[~np.isfinite(values)] = _INDETERMINATE
         return np.flatnonzero(self.status == _CLOSED) if self.status.any() else None
 
@@ -304,13 +310,21 @@ def _comes_to(form: ArrayForm, fate: Tree, status: Status) -> Number:
 def _has_huge(numbers: Sequence[Any], driven: int) -> bool:
     """Return whether a finite rate, or an acceleration after the rates, is huge."""
     for k, number in enumerate(numbers):
-        if isinstance(number, float):
-            size = abs(number)
-        else:  # not abs(), which would take memory
-            size = max(number.max(), -number.min()) if number.size else 0.0
-        if (HUGE if k < driven else HUGE * HUGE) <= size < inf:
-            return True
+        values = np.atleast_1d(number)
+        if values.strides == (0,):  # one number for all states
+            values = values[:1]
+        for start in range(0, len(values), BLOCK):
+            part = values[start : start + BLOCK]
+            # The sum of the squares is usually small: then it is the only pass over the memory.
+            if not np.dot(part, part) < HUGE * HUGE and np.any(
+                _are_huge(part, k < driven) & np.isfinite(part)
+            ):
+                return True
     return False
+
+
+def _are_huge(values: Any, rates: bool) -> Any:
+    return np.abs(values) >= (HUGE if rates else HUGE * HUGE)
 
 
 def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> list[Array]:

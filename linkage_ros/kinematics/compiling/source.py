@@ -36,6 +36,7 @@ from linkage_ros.kinematics.compiling.real_program import Program, program
 from linkage_ros.kinematics.compiling.tape import Operation
 from linkage_ros.kinematics.compiling.trace import Branch, Motion, Solved, Tree
 from linkage_ros.kinematics.compiling.writer import uses, Writer
+from linkage_ros.kinematics.doubles import SHRINK
 from linkage_ros.kinematics.limits import Bound
 from linkage_ros.kinematics.linkage import RevoluteJoint
 from linkage_ros.kinematics.status import Status
@@ -49,6 +50,9 @@ FUNCTIONS = ('position', 'velocity', 'motion')
 
 GIVEN = ('inputs', 'rates', 'accelerations')
 RETURNED = ('joints', 'joint_rates', 'joint_accelerations')
+
+_USUAL = (inf, 1e120, 1e240)
+"""Larger rates and accelerations are scaled, as `HUGE` says."""
 
 UNDECIDED = 'UNDECIDED'
 
@@ -137,6 +141,10 @@ class Language(ABC):
         """Write that a condition does not hold; this is true for NaN too."""
         return f'!{condition}' if condition.isidentifier() else f'!({condition})'
 
+    def below(self, number: str, most: str) -> str:
+        """Write that the size of a number is below a bound."""
+        return f'{self.functions["abs"]}({number}) < {most}'
+
     def block(self, condition: str, lines: Sequence[str]) -> list[str]:
         """Write lines that run if a condition holds."""
         return [f'if ({condition}) {{', *(f'    {line}' for line in lines), '}']
@@ -165,6 +173,10 @@ class Language(ABC):
     @abstractmethod
     def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
         """Write lines that return a status and values."""
+
+    @abstractmethod
+    def scaled(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+        """Write lines that call the function with scaled rates, and scale its results back."""
 
     @abstractmethod
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
@@ -243,9 +255,25 @@ class _Body:
             array, index = divmod(number, count)
             given.append(language.assigned(operation.name, f'{GIVEN[array]}[{index}]'))
             self._writer.name(operation, operation.name)
-        finite = f' {language.conjunction} '.join(f'{language.finite}({o.name})' for o in inputs)
-        leave = language.left(language.status.format(Status.INDETERMINATE.name))
-        given += language.block(language.negated(finite), [leave])
+        lines = [language.left(language.status.format(Status.INDETERMINATE.name))]
+        finite = [f'{language.finite}({each.name})' for each in inputs]
+        usual = finite[:count]
+        groups = list(zip(*[iter(each.name for each in inputs)] * count, strict=True))
+        for most, names in zip(_USUAL[1:], groups[1:], strict=False):
+            usual += (language.below(name, language.constant(most)) for name in names)
+        if usual != finite:
+            scaled = [
+                [f'{name}{" * down" * order}' for name in names]
+                for order, names in enumerate(groups[1:], 1)
+            ]
+            lines = [
+                *self._unless(finite, lines),
+                language.comment.format('What overflows is infinite, nothing is NaN.'),
+                language.assigned('down', language.constant(SHRINK)),
+                language.assigned('up', language.constant(1.0 / SHRINK)),
+                *language.scaled(self._subject, scaled),
+            ]
+        given += self._unless(usual, lines)
         self._follow(self._program.tree)
         constants = []
         for value, name in self._named.items():
@@ -258,6 +286,12 @@ class _Body:
         code = (f'    {line}' for line in (*given, *self._writer.lines))
         wrapped = (part for line in code for part in language.wrapped(line))
         return [*(f'    {line}' for line in constants), *wrapped]
+
+    def _unless(self, conditions: Sequence[str], lines: Sequence[str]) -> list[str]:
+        """Write lines that run unless all conditions hold."""
+        language = self._language
+        all_hold = f' {language.conjunction} '.join(conditions)
+        return language.block(language.negated(all_hold), lines)
 
     def _follow(self, tree: Tree) -> None:
         """Write a tree: the usual path continues, every other one is a block that returns."""

@@ -101,7 +101,7 @@ for (let i = 0; i < given.length; i += 3 * n) {
     const part = (k) => given.slice(i + k * n, i + (k + 1) * n);
     const found = motion(part(0), part(1), part(2));
     const values = [...found.joints, ...found.joint_rates, ...found.joint_accelerations];
-    told.push([names[found.status], values]);
+    told.push([names[found.status], values.map(String)]);
 }
 writeFileSync('told', JSON.stringify(told));
 """
@@ -116,7 +116,8 @@ def run_javascript(what: Subject, given: Sequence[State], folder: Path) -> list[
     typed = ['node', 'run.js', str(len(what.closure.linkage.inputs))]
     subprocess.run(typed, cwd=folder, check=True, timeout=60)
     return [
-        Told(name, tuple(values)) for name, values in json.loads((folder / 'told').read_text())
+        Told(name, tuple(map(float, values)))
+        for name, values in json.loads((folder / 'told').read_text())
     ]
 
 
