@@ -282,7 +282,10 @@ def test_a_csv_holds_no_formula_and_the_names(tmp_path: Path) -> None:
         assert [re.sub("^'(?='*[-=+@\uff1d])", '', cell) for cell in found] == heads
     for closure in linkages(12):
         (tmp_path / 'odd.yaml').write_text(linkage_text(closure.linkage), 'utf-8')
-        assert run(tmp_path, 'solve', 'odd.yaml', '--steps', '2', '-o', 'a.csv').returncode == 0
+        assert (
+            run(tmp_path, 'solve', 'odd.yaml', '--steps', '2', '-o', 'a.csv', '--force').returncode
+            == 0
+        )
         found, *_ = csv.reader(io.StringIO(file.read_text('utf-8')))
         assert not any(cell[0] in '=+-@\uff1d' for cell in found)
 

@@ -168,7 +168,7 @@ ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: lr.load('none.yaml'), lr.FileError, 'none.yaml: cannot be read'),
     (lambda: lr.load(''), lr.FileError, "'': is neither a file nor a name"),
     (lambda: lr.load(3), TypeError, '3 is neither a path nor a name; name a file, or one of a'),
-    (lambda: lr.load(SCENE), lr.FileError, 'demo.yaml: is a scene; name a linkage file; load_s'),
+    (lambda: lr.load(SCENE), lr.FileError, 'demo.yaml: is a scene; name its linkage, '),
     (lambda: lr.Pipeline('demo'), TypeError, "scene: 'demo' is not a Scene; load_scene() reads"),
     (lambda: lr.load_scene('dem'), lr.FileError, "did you mean 'demo'?"),
     (lambda: FIVE_BAR.position(1, None), TypeError, 'inputs: None is not a number; solve()'),

@@ -290,7 +290,7 @@ def describe_group(
             assembly = _assembly(group, sides.get(closing_name(group), 'in line with'))
             parts = (getattr(one, 'diagonal', getattr(one, 'rail', None)) for one in steps)
             if any(any(getattr(part, 'crosses', ())) for part in parts):
-                assembly += ', as drawn (it changes at change points)'
+                assembly += ' as drawn, changing at change points'
         return f'{group.kind} dyad', links, 'closed form', assembly
     (equations,) = (step.equation_count for step in steps if hasattr(step, 'equation_count'))
     return (
@@ -433,11 +433,14 @@ def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tupl
         else:
             yield 'range', 'every angle'
     for status, name in _SINGULAR.items():
-        places = [
-            angles.value_text(_brought_within(one['input'], account['ranges'], turning), turning)
-            + ('' if one['within_limits'] else ' beyond the limits')
+        found = sorted(
+            (_brought_within(one['input'], account['ranges'], turning), one['within_limits'])
             for one in account['singular_inputs']
             if one['status'] == status.value
+        )
+        places = [
+            angles.value_text(value, turning) + ('' if within else ' beyond the limits')
+            for value, within in found
         ]
         if places or status is not Status.INDETERMINATE:
             yield name, ', '.join(places) or 'none'

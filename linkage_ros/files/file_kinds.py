@@ -26,13 +26,13 @@ class FileKind(NamedTuple):
     """A kind of file."""
 
     noun: str
-    remedy: str = 'name a linkage file'  # Where a linkage file is needed
+    remedy: str = 'name a scene or a linkage file'  # Where one of these is needed
     is_foreign: bool = True  # No linkage or scene, not even with mistakes
 
 
 _BAG = FileKind('a bag', 'linkage info, plot and report read bags')
 _EMPTY = FileKind('empty', 'linkage gallery four_bar prints an example')
-BINARY = FileKind('no text file', 'name a linkage file, which is UTF-8 text')
+BINARY = FileKind('no text file', 'name a scene or a linkage file, which is UTF-8 text')
 _NOT_UTF_8 = BINARY._replace(is_foreign=False)
 _UTF_16 = FileKind('text in UTF-16', 'save it as UTF-8 text')
 _TEXT = FileKind('a text file', is_foreign=False)

@@ -345,7 +345,8 @@ def remove_folder(folder):
 
 
 def remove_folder_and_make_it_again(folder):
-    shutil.rmtree(folder)
+    while folder.exists():  # the recorder may write into it meanwhile
+        shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
 
 

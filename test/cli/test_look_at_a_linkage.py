@@ -483,16 +483,16 @@ joints: {front_knee: {parent: front_crank, child: front_shin}}
             f'{LEG}pose: {{inputs: [-0.8, -2.3], points: {{foot: [0, -0.2]}}}}',
             [
                 'turns … they count: send unwrapped angles, …',
-                '3 … pin foot right of B→A, as drawn (it changes at change points)',
+                '3 … pin foot right of B→A as drawn, changing at change points',
             ],
         ),
         (
             f'{LEG}pose: {{inputs: [-0.8, -2.3], points: {{foot: [0, 0.1]}}}}',
-            ['3 … pin foot left of B→A, as drawn (it changes at change points)'],
+            ['3 … pin foot left of B→A as drawn, changing at change points'],
         ),
         (
             f'four_bar: {{{PARALLELOGRAM}, pose: {{inputs: [-1], angles: {{rocker: -1}}}}}}',
-            ['2 … pin B right of A→O4, as drawn (it changes at change points)'],
+            ['2 … pin B right of A→O4 as drawn, changing at change points'],
         ),
         (
             'four_bar: {a: 0.0333, b: 0.1, c: 0.0333333, d: 0.1}',

@@ -287,5 +287,5 @@ def test_without_matplotlib_it_says_what_to_install(monkeypatch, tmp_path):
 
 
 def test_a_picture_that_cannot_be_written_is_said_in_a_line(tmp_path):
-    with pytest.raises(LinkageError, match='cannot be written'):
+    with pytest.raises(LinkageError, match='there is no folder'):
         draw_design(EXAMPLE, 'none', tmp_path / 'missing' / 'none.png')

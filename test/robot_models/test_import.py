@@ -390,7 +390,7 @@ class TestCommand:
         folder = tmp_path / 'x.urdf'
         folder.mkdir()
         assert main(['urdf', str(LINKAGES / 'four_bar.yaml'), '-o', str(folder)]) == 2
-        assert 'is there already and is no file' in capsys.readouterr().err
+        assert 'exists already; name another' in capsys.readouterr().err
 
     @pytest.mark.parametrize('typed', [['--close', 'a'], ['--at', 'a=b'], ['--at', 'a']])
     def test_options_that_are_none(self, typed, capsys):

@@ -65,7 +65,7 @@ def test_shipped_linkages_that_forces_can_move(file):
 
 # The text after `masses: `, and the error.
 BAD = {
-    'a list': ('[crank]', "masses: ['crank'] is not a mapping; write masses: {…}"),
+    'a list': ('[crank]', "masses: ['crank'] is not a mapping; write masses: {crank: {}}"),
     'a number': ('{crank: 0.1}', 'masses.crank: 0.1 is not a mapping; write crank: {…}'),
     'no such link': (
         f'{{krank: {CRANK}}}',

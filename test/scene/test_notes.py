@@ -123,7 +123,7 @@ def test_a_simulation_notes_what_is_in_its_scene_and_what_is_set(tmp_path, capsy
     typed = ['simulate', str(scene), '--seconds', '0.01', '-o', str(tmp_path / 'x.csv')]
     note = 'drive.sine.amplitude: 45 rad is more than a turn'
     for more, count in (([], 1), (['--set', 'angles=degrees'], 0)):
-        assert main([*typed, *more]) == 0
+        assert main([*typed, *more, '--force']) == 0
         assert capsys.readouterr().err.count(note) == count
 
 

@@ -37,7 +37,7 @@ import pytest
 
 from .linkages import apart, CRANK_ROCKER, crank_rocker, worst_error
 from ..bag.test_replay import Run, sample
-from ..support.scenes import scene_of, shipped
+from ..support.scenes import four_bar_text, scene_of, shipped
 
 # Scenes that name a solver or an accuracy: read, built, run and replayed.
 
@@ -231,7 +231,9 @@ def test_refused_when_it_is_built(text):
 
 @pytest.mark.parametrize('forces', ['effects: {effort: {}}', 'drive: {torque: {}}'])
 def test_the_closed_form_that_the_refusal_recommends_is_taken(forces):
-    assert Pipeline(scene_of(f'solver: closed_form\n{forces}')).lines
+    masses = ((0.2, 0.02, 1e-4), (0.3, 0.06, 1e-3), (0.2, 0.04, 1e-3))
+    linkage = four_bar_text(0.04, 0.12, 0.08, 0.1, masses)
+    assert Pipeline(scene_of(f'solver: closed_form\n{forces}', linkage)).lines
 
 
 def test_what_is_read_the_schema_takes():

@@ -675,7 +675,7 @@ def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
         (['four_bar', '--port', '{taken}'], '--port {taken}: is taken; name another one, or '),
         (['four_bar', '--node', 'x'], '--node: shows a node, not a file; leave four_bar out'),
         (['--node', '-o', 'x.html'], '-o: cannot hold a node that runs; leave it out'),
-        (['four_bar', '-o', 'no/x.html'], 'no/x.html: lies in no folder that there is; '),
+        (['four_bar', '-o', 'no/x.html'], 'no/x.html: there is no folder no; '),
     ],
 )
 def test_what_cannot_be_shown_is_told_in_one_line(
