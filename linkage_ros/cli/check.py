@@ -434,13 +434,13 @@ def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tupl
             yield 'range', 'every angle'
     for status, name in _SINGULAR.items():
         found = sorted(
-            (_brought_within(one['input'], account['ranges'], turning), one['within_limits'])
+            (not one['within_limits'], _brought_within(one['input'], account['ranges'], turning))
             for one in account['singular_inputs']
             if one['status'] == status.value
         )
         places = [
-            angles.value_text(value, turning) + ('' if within else ' beyond the limits')
-            for value, within in found
+            angles.value_text(value, turning) + (' beyond the limits' if beyond else '')
+            for beyond, value in found
         ]
         if places or status is not Status.INDETERMINATE:
             yield name, ', '.join(places) or 'none'
