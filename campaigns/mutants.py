@@ -108,6 +108,16 @@ class Mutant(NamedTuple):
     end: int
     changed: str
 
+    def cut(self, source: bytes) -> tuple[bytes, bytes, bytes]:
+        """Return the file before the expression, the expression, and the file after it."""
+        begin, end = self.begin, self.end
+        return source[:begin], source[begin:end], source[end:]
+
+    def change(self, source: bytes) -> bytes:
+        """Return the file with the changed expression."""
+        before, _, after = self.cut(source)
+        return before + self.changed.encode() + after
+
 
 class Fate(NamedTuple):
     """What became of a mutant."""
@@ -188,7 +198,7 @@ def try_mutant(mutant: Mutant) -> Fate:
             shutil.copy(file, root)
         file = file_of(mutant.module, root)
         source = file.read_bytes()
-        file.write_bytes(source[: mutant.begin] + mutant.changed.encode() + source[mutant.end :])
+        file.write_bytes(mutant.change(source))
         tests = [f'test/{name}' for name in dict.fromkeys(TESTS[mutant.module])]
         return Fate(mutant, first_failure(root, tests))
 
@@ -241,7 +251,7 @@ def main() -> int:
     for fate in results_of(try_mutant, chosen, arguments.jobs):
         fates.append(fate)
         mutant = fate.mutant
-        text = file_of(mutant.module).read_bytes()[mutant.begin : mutant.end].decode()
+        text = mutant.cut(file_of(mutant.module).read_bytes())[1].decode()
         end = f'killed by {fate.killer}' if fate.killer else 'LIVES'
         say(f'{mutant.module}.py:{mutant.line}: {text} -> {mutant.changed}: {end}')
         advance(1)

@@ -31,10 +31,9 @@ from typing import Any
 # Sphinx may be started in any folder.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from linkage_ros import __version__
-
 from docs.website.links import make_links_local
 from docs.website.tutorial import PercentParser
+from linkage_ros import __version__
 
 project = 'linkage_ros'
 author = 'The linkage_ros authors'

@@ -103,7 +103,7 @@ def read(text: str, file: str = '') -> Closure:
 def linkages(step: int) -> Iterator[Closure]:
     """Yield four-bars whose names are the hostile ones from every so many on."""
     for start in range(0, len(HOSTILE), step):
-        yield four_bar(tuple((HOSTILE * 2)[start : start + _ROLES]))
+        yield four_bar(tuple((HOSTILE * 2)[start:][:_ROLES]))
 
 
 def subject(closure: Closure) -> Subject:

@@ -309,7 +309,7 @@ def run_scene(
                 patience=patience,
                 view=display,
                 at_end=at_end,
-                raises=True,
+                raise_errors=True,
             )
     finally:
         display.close()

@@ -115,6 +115,11 @@ class Drive(Protocol):
     def state(self, now: int, /) -> CrankState | None:
         """Return the crank state at a time, in [ns]; None if there is none."""
 
+    @property
+    def chattered(self) -> int:
+        """Return the number of steps in which motor and crank met and parted too often."""
+        return 0
+
     def straight(self, _inputs: int, leave: str) -> Lines:
         """
         Return `state` as generated lines that compute the fields of `CrankState` from ``now``.
@@ -129,6 +134,14 @@ class Drive(Protocol):
         """
         lines = ['crank = state(now)', 'if crank is None:', f'    {leave}', f'{_CRANK} = crank']
         return Lines(lines, {'state': self.state})
+
+
+def describe_chatter(steps: int) -> str:
+    """Return a line on the steps that `Drive.chattered` counts."""
+    return (
+        f'drive.torque.play: motor and crank met and parted too often in {steps} steps, at whose '
+        'ends the play was closed; shorten the step, or look at the controller'
+    )
 
 
 @dataclass(frozen=True)

@@ -364,6 +364,11 @@ def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]
     )
 
 
+def _without_winding(motion: Any) -> Any:
+    """Return the motion of motor and mechanism, without the current of a winding."""
+    return getattr(motion, 'moved', motion)
+
+
 class TorqueDrive(Drive):
     """
     A mechanism moved by commanded efforts.
@@ -551,7 +556,7 @@ class TorqueDrive(Drive):
                 f'at a rate of {self._motion.rate:.4g}',
                 'shorten the step, look at the controller, or write on_chatter: close',
             )
-        hurries = getattr(self._motion, 'moved', self._motion).trials < _FEW_TRIALS
+        hurries = _without_winding(self._motion).trials < _FEW_TRIALS
         self._made_up = self._least_made_up if hurries else self._most_made_up
 
     def _bearing(self, motion: Any, acceleration: float) -> tuple[float, float]:
@@ -561,7 +566,7 @@ class TorqueDrive(Drive):
             resting, within = self._motor.at_rest(mechanism, motion)
             force, holding = force + resting, holding + within
         least, most = force - holding, force + holding
-        behind_play = getattr(motion, 'moved', motion)
+        behind_play = _without_winding(motion)
         if not isinstance(behind_play, Motion):
             # Through the play passes what is left after the motor's own inertia, as a push.
             own = behind_play.motor.terms.inertia * acceleration
@@ -571,17 +576,9 @@ class TorqueDrive(Drive):
 
     @property
     def chattered(self) -> int:
-        """Number of steps in which motor and crank met and parted too often."""
-        coarse: int = getattr(getattr(self._motion, 'moved', self._motion), 'coarse', 0)
+        """Return the number of steps in which motor and crank met and parted too often."""
+        coarse: int = getattr(_without_winding(self._motion), 'coarse', 0)
         return coarse
-
-    def describe_chatter(self, before: int = 0) -> str:
-        """Return a line on the steps that `chattered` counts, but for the first ones of them."""
-        return (
-            f'drive.torque.play: motor and crank met and parted too often in '
-            f'{self.chattered - before} steps, at whose ends the play was closed; shorten the '
-            'step, or look at the controller'
-        )
 
     @property
     def motor(self) -> tuple[float, float, float | None]:

@@ -406,13 +406,15 @@ class Mechanics:
         """
         worst, blamed = 0.0, None
         for terms in places:
-            pairs = zip(self.curved, terms.laws[len(terms.laws) - len(self.curved) :], strict=True)
+            first = len(terms.laws) - len(self.curved)
+            pairs = zip(self.curved, terms.laws[first:], strict=True)
             falls = {r: r.law.steepest * at.factor**2 / terms.inertia for r, at in pairs if r.law}
             if sum(falls.values()) > worst:
                 worst, blamed = sum(falls.values()), max(falls, key=falls.__getitem__)
         if blamed is not None:
+            joint = self.closure.structure.joints[blamed.joint].name
             check_step(
-                f'effects.friction.joints.{self.closure.structure.joints[blamed.joint].name}.stribeck',
+                f'effects.friction.joints.{joint}.stribeck',
                 worst,
                 method,
                 step,

@@ -123,8 +123,8 @@ class SolutionPlan(KnownLinks):
 
     def _choose_sides(self) -> None:
         """Bring the new dyads into the assembly that the file tells, or refuse it."""
-        new = self.two_ways[self._settled :]
-        self._settled = len(self.two_ways)
+        settled, self._settled = self._settled, len(self.two_ways)
+        new = self.two_ways[settled:]
         if self._nominal:
             return
         pose = self._linkage.pose

@@ -30,6 +30,7 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from linkage_ros.drives.drive import describe_chatter
 from linkage_ros.errors import listed
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
@@ -53,6 +54,9 @@ OK, WARN, ERROR, STALE = (
 )
 
 _RATE_TOLERANCE = 0.1
+
+# A crank that is wrapped into a turn jumps by one.
+_MORE_THAN_A_TURN = 1.01 * tau
 
 CLOCK_PATIENCE = 2.0
 """How long ``/clock`` may be silent without a warning, in [s] of the steady clock."""
@@ -415,7 +419,7 @@ class DiagnosticsSummary:
 
 def chattered(lines: Sequence[LinkagePipeline]) -> int:
     """Return the number of steps in which motor and crank met and parted too often."""
-    return sum(getattr(line.drive, 'chattered', 0) for line in lines)
+    return sum(line.drive.chattered for line in lines)
 
 
 def is_interleaved(before: int, now: int) -> bool:
@@ -681,11 +685,11 @@ class Warnings:
     def check_chatter(self, lines: Sequence[LinkagePipeline], period: float) -> None:
         """Warn of steps in which motor and crank met and parted too often, once a period [s]."""
         for line in lines:
-            kind, count = f'chatter {line.member.name}', getattr(line.drive, 'chattered', 0)
+            kind, count = f'chatter {line.member.name}', line.drive.chattered
             before = min(self._chattered.get(kind, 0), count)  # a reset counts anew
             if count > before:
-                told: str = line.drive.describe_chatter(before)  # type: ignore[attr-defined]
-                before = count if self.warn(kind, f'{told}{_of(line)}', period) else before
+                told = f'{describe_chatter(count - before)}{_of(line)}'
+                before = count if self.warn(kind, told, period) else before
             self._chattered[kind] = before
 
     def check_jumps(self, lines: Sequence[LinkagePipeline], crank_topic: str) -> None:
@@ -745,9 +749,6 @@ class Warnings:
         self._logger.warning(line)
         return True
 
-
-# A crank that is wrapped into a turn jumps by one.
-_MORE_THAN_A_TURN = 1.01 * tau
 
 _UNCLOSED = {
     Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',

@@ -69,7 +69,7 @@ def run_linkage_node(
     patience: float = 0.0,
     view: View | None = None,
     at_end: Callable[[LinkageNode], None] | None = None,
-    raises: bool = False,
+    raise_errors: bool = False,
 ) -> int:
     """
     Run the linkage node until the event is set, or for a time.
@@ -90,7 +90,7 @@ def run_linkage_node(
         Displays the run.
     at_end
         Called after the run has ended and its bag is closed.
-    raises
+    raise_errors
         Whether a wrong configuration is raised, for a terminal, and not logged.
 
     Returns
@@ -103,7 +103,7 @@ def run_linkage_node(
     StoppedError
         A signal arrived before the node was configured.
     LinkageError
-        The configuration is wrong, if ``raises``.
+        The configuration is wrong, if ``raise_errors``.
 
     """
     # The tick shares the interpreter with executor and recorder: at the default switch interval it
@@ -115,7 +115,7 @@ def run_linkage_node(
             args=['linkage_node', *arguments], signal_handler_options=SignalHandlerOptions.NO
         )
         given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
-        node = LinkageNode(parameter_overrides=given, logs_failure=not raises)
+        node = LinkageNode(parameter_overrides=given, logs_failure=not raise_errors)
     except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
         print(f'linkage_node: {_first_line(error)}; see linkage_node --help', file=sys.stderr)
         rclpy.try_shutdown()
@@ -124,7 +124,7 @@ def run_linkage_node(
     executor.add_node(node)
     try:
         code = _spin(node, executor, stop, seconds, patience, view)
-        if raises and node.failure is not None:
+        if raise_errors and node.failure is not None:
             raise node.failure
         if code == EXIT_OK and at_end is not None:
             at_end(node)

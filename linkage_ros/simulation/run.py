@@ -32,6 +32,7 @@ from linkage_ros.bag.recorder import Recorder
 from linkage_ros.bag.run_events import WITH_THE_RUN
 from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.drives.drive import describe_chatter
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.single_values import text_message
@@ -166,8 +167,8 @@ def simulate(
             counts = dict(zip((topic.name for _, topic in topics), recording.written, strict=True))
             writer.close({'linkage_ros.dropped': json.dumps(dict.fromkeys(counts, 0))})
     for line in loop.pipeline.lines:
-        if getattr(line.drive, 'chattered', 0):
-            warn(line.drive.describe_chatter())  # type: ignore[attr-defined]
+        if line.drive.chattered:
+            warn(describe_chatter(line.drive.chattered))
     return counts
 
 

@@ -31,9 +31,8 @@ def test_each_mutant_differs_in_one_expression_and_parses(module):
     mutants = [*mutants_of(module)]
     assert len(mutants) > 50
     for mutant in Random(1).sample(mutants, 10):
-        changed = source[: mutant.begin] + mutant.changed.encode() + source[mutant.end :]
-        assert ast.dump(ast.parse(changed)) != original
-        assert source[: mutant.begin].count(b'\n') + 1 == mutant.line
+        assert ast.dump(ast.parse(mutant.change(source))) != original
+        assert mutant.cut(source)[0].count(b'\n') + 1 == mutant.line
 
 
 def test_the_tests_beside_each_module_are_there():

@@ -18,12 +18,11 @@ from __future__ import annotations
 
 import re
 
+from docs.make_reference import MADE, made_pages
 from linkage_ros.cli.main import COMMANDS
 from linkage_ros.cli.scene import REGISTRIES
 from linkage_ros.scene.schema import linkage_schema, scene_schema
 import pytest
-
-from docs.make_reference import MADE, made_pages
 
 from .blocks import ROOT
 

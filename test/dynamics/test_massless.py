@@ -64,12 +64,13 @@ def statics(angle, torque, force, at):
         for link, sign in links.items():
             row = 3 * ('crank', 'coupler', 'rocker').index(link)
             rows[row, 2 * number] = rows[row + 1, 2 * number + 1] = sign
-            rows[row + 2, 2 * number : 2 * number + 2] = -sign * place.imag, sign * place.real
+            rows[row + 2, [2 * number, 2 * number + 1]] = -sign * place.imag, sign * place.real
     rows[2, 8] = 1.0
     right[3:6] = -force.real, -force.imag, -(at.real * force.imag - at.imag * force.real)
     right[8] = -torque
     found = np.linalg.solve(rows, right)
-    return found[8], {name: found[2 * n : 2 * n + 2] for n, (name, *_) in enumerate(pins)}
+    forces = found[:8].reshape(4, 2)
+    return found[8], {name: force for (name, *_), force in zip(pins, forces, strict=True)}
 
 
 @pytest.mark.parametrize('masses', ['', MASSLESS], ids=['no masses', 'mass: 0'])

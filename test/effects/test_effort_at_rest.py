@@ -55,7 +55,7 @@ class Rest:
     commands: tuple[float, ...] = ()
     # What the drive exerts by a command, by hand: its least and its greatest; the command itself
     # if it has no range.
-    range: Callable[[float], tuple[float, float]] = lambda command: (command, command)
+    exerted: Callable[[float], tuple[float, float]] = lambda command: (command, command)
 
 
 GEAR = 'torque_constant: 0.1, resistance: 2, ratio: 10, efficiency: 0.8, back_efficiency: 0.7'
@@ -93,42 +93,42 @@ STATES = {
     ),
     'the brake holds': Rest(
         0.2, 'on_timeout: brake, brake: 20', borne=(0.0, 0.0), commands=(None,),
-        range=lambda _: (-20.0, 20.0),
+        exerted=lambda _: (-20.0, 20.0),
     ),
     'the brake holds a part, friction the rest': Rest(
         0.2, 'on_timeout: brake, brake: 5', RUBS, borne=(-1.5, 1.5), commands=(None,),
-        range=lambda _: (-5.0, 5.0),
+        exerted=lambda _: (-5.0, 5.0),
     ),
     'friction holds what it can, and the brake the rest': Rest(
         0.2, 'on_timeout: brake, brake: 5', HOLDS, borne=(-1.5, 1.5), commands=(None,),
-        range=lambda _: (-5.0, 5.0),
+        exerted=lambda _: (-5.0, 5.0),
     ),
     'nothing is commanded': Rest(TOP, effects=RUBS, borne=(-1.5, 1.5), commands=(None,),
-                                 range=lambda _: (0.0, 0.0)),
+                                 exerted=lambda _: (0.0, 0.0)),
     'a motor without loss, stalled at a stop': Rest(
         1.5, 'motor: {torque_constant: 0.1, resistance: 2, ratio: 10, command: voltage}',
-        linkage=LIMITED, borne=(-inf, 0.0), commands=(1.0, 12.0), range=lambda u: (0.5 * u,) * 2,
+        linkage=LIMITED, borne=(-inf, 0.0), commands=(1.0, 12.0), exerted=lambda u: (0.5 * u,) * 2,
     ),
     'a motor by current, held by friction': Rest(
         TOP, 'motor: {torque_constant: 0.1, ratio: 10, command: current}', RUBS,
-        borne=(-1.5, 1.5), commands=(-0.5, 0.0, 1.0), range=lambda i: (i, i),
+        borne=(-1.5, 1.5), commands=(-0.5, 0.0, 1.0), exerted=lambda i: (i, i),
     ),
     'a motor with a gear, stalled at a stop': Rest(
         1.5, f'motor: {{{GEAR}, command: voltage, voltage: 12, current: 5}}', linkage=LIMITED,
-        borne=(-inf, 0.0), commands=(6.0, 12.0, 24.0), range=by_voltage,
+        borne=(-inf, 0.0), commands=(6.0, 12.0, 24.0), exerted=by_voltage,
     ),
     'its gear holds': Rest(
         0.5, f'motor: {{{GEAR}, command: voltage, voltage: 12, current: 5}}', linkage=LIMITED,
-        borne=(0.0, 0.0), commands=(10.0, 12.0), range=by_voltage,
+        borne=(0.0, 0.0), commands=(10.0, 12.0), exerted=by_voltage,
     ),
     'a motor that gives an effort, at a stop': Rest(
         1.5, f'motor: {{{GEAR}, command: effort, current: 5}}', linkage=LIMITED,
         borne=(-inf, 0.0), commands=(0.8, 3.0, 9.0),
-        range=lambda effort: geared(min(0.5, effort / 8.0)),
+        exerted=lambda effort: geared(min(0.5, effort / 8.0)),
     ),
     'a winding, stalled at a stop': Rest(
         1.5, f'motor: {{{GEAR}, inductance: 0.004, command: voltage, voltage: 12, current: 5}}',
-        linkage=LIMITED, borne=(-inf, 0.0), commands=(6.0, 12.0, 24.0), range=by_voltage,
+        linkage=LIMITED, borne=(-inf, 0.0), commands=(6.0, 12.0, 24.0), exerted=by_voltage,
     ),
     'behind play, at a stop': Rest(
         1.5, 'play: {width: 1.0e-4, inertia: 1.0e-3}', linkage=LIMITED, borne=(-inf, 0.0),
@@ -169,7 +169,7 @@ def test_the_drive_exerts_its_command_whatever_bears_the_load(name, command):
     at, rate, effort, torque = rested(state, command)
     # Behind play the motor comes with a little blow.
     assert (at, rate) == (pytest.approx(state.at, abs=1e-3 if 'play' in state.torque else 0), 0.0)
-    least, most = state.range(command)
+    least, most = state.exerted(command)
     load = WEIGHT * cos(at)
     assert least - 1e-9 <= effort <= most + 1e-9
     # The free body: what the drive does not bear, something else does.

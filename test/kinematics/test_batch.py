@@ -189,7 +189,7 @@ def check_against_scalar(
     scalar = FourBar(*lengths, sign)
     for i, angle in enumerate(phi):
         code, position, velocity, change = (array[..., i] for array in found)
-        pose = scalar.close(angle)
+        pose = scalar.close(angle + 0.0)  # an input of −0.0 is 0.0
         condition = max(lengths) ** 2 / abs(pose.cross) if pose.cross else inf
         if condition > 1e6 and STATUSES[code] is not pose.status:
             # Which float next to a limit is the last that closes, or toggles, may differ.

@@ -50,7 +50,7 @@ class Drawing(NamedTuple):
     """A linkage without sides, and where its points and links are drawn."""
 
     linkage: Linkage
-    input: float
+    at: float
     places: dict[tuple[str, str], complex]
     angles: dict[str, float]
     tells: list[str]  # For each dyad a point that tells its side
@@ -152,11 +152,11 @@ def drawing(seed: int, dyads: int) -> Drawing:
 
 def posed(drawn: Drawing, points: Mapping[str, complex], angles: Mapping[str, float]) -> Closure:
     named = {name: (place.real, place.imag) for name, place in points.items()}
-    return Closure(replace(drawn.linkage, pose=Pose((drawn.input,), named, dict(angles))))
+    return Closure(replace(drawn.linkage, pose=Pose((drawn.at,), named, dict(angles))))
 
 
 def is_as_drawn(closure: Closure, drawn: Drawing) -> bool:
-    found = closure.points(closure.position(drawn.input))
+    found = closure.points(closure.position(drawn.at))
     return all(abs(found[key] - place) < 1e-6 for key, place in drawn.places.items())
 
 
@@ -211,11 +211,11 @@ def test_the_pose_to_copy_leads_back_and_sides_are_those_of_the_drawing(seed, dy
     drawn = drawing(seed, dyads)
     places = {name: place for (_, name), place in drawn.places.items() if name in drawn.tells}
     closure = posed(drawn, places, {})
-    position = closure.position(drawn.input)
+    position = closure.position(drawn.at)
     again = Closure(replace(drawn.linkage, pose=drawn_pose(closure, position)))
-    assert again.position(drawn.input).joints == position.joints
+    assert again.position(drawn.at).joints == position.joints
     sides = sides_at(closure, position)
-    by_sides = Closure(replace(drawn.linkage, assembly=sides, pose=Pose((drawn.input,), {})))
+    by_sides = Closure(replace(drawn.linkage, assembly=sides, pose=Pose((drawn.at,), {})))
     assert is_as_drawn(by_sides, drawn)
     # Each side of a pose that draws the other one is refused, and both are named.
     name, side = random.Random(seed).choice(list(sides.items()))

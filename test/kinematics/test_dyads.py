@@ -379,7 +379,7 @@ NEEDLES = {
 }
 
 
-@pytest.mark.parametrize('exponent', [-900, -300, -41, -1, 1, 2, 41, 300, 900])
+@pytest.mark.parametrize('exponent', [-500, -300, -41, -1, 1, 2, 41, 300, 900])
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
 def test_scaling_by_a_power_of_two_changes_no_bit(exponent, crank_angle):
     factor = 2.0**exponent

@@ -95,8 +95,9 @@ class C(Language):
         return [*lines, f'return {status};']
 
     def scaled(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
-        names = [f'scaled_{name}' for name in GIVEN[1 : 1 + len(given)]]
-        returned = RETURNED[: 1 + len(given)]
+        end = 1 + len(given)
+        names = [f'scaled_{name}' for name in GIVEN[1:end]]
+        returned = RETURNED[:end]
         arguments = ', '.join((GIVEN[0], *names, *returned))
         arrays = zip(names, given, strict=True)
         valid = f'status <= {self.status.format(Status.LIMITED.name)}'

@@ -157,7 +157,8 @@ class Solver:
     def _solve_huge(self, given: list[Array], derivatives: int, out: Batch | None) -> Batch:
         """Solve with scaled rates and accelerations: what overflows is infinite."""
         driven = self._driven
-        inputs, rates, changes = given[:driven], given[driven:][:driven], given[2 * driven :]
+        inputs, moved = given[:driven], given[driven:]
+        rates, changes = moved[:driven], moved[driven:]
         huge = [_are_huge(value, k < driven) for k, value in enumerate((*rates, *changes))]
         scale = np.where(np.any(np.broadcast_arrays(*huge), axis=0), SHRINK, 1.0)
         batch = self.solve(
@@ -314,7 +315,7 @@ def _has_huge(numbers: Sequence[Any], driven: int) -> bool:
         if values.strides == (0,):  # one number for all states
             values = values[:1]
         for start in range(0, len(values), BLOCK):
-            part = values[start : start + BLOCK]
+            part = values[start:][:BLOCK]
             # The sum of the squares is usually small: then it is the only pass over the memory.
             if not np.dot(part, part) < HUGE * HUGE and np.any(
                 _are_huge(part, k < driven) & np.isfinite(part)

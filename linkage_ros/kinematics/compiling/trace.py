@@ -218,8 +218,9 @@ def _status_of(
 ) -> Status | None:
     """Return the status of a step with given first decisions; None if it is closed."""
     # What the step appended before.
-    del known.coordinates[count[0] :]
-    del known.pins[count[1] :]
+    coordinates, pins = count
+    del known.coordinates[coordinates:]
+    del known.pins[pins:]
     tape.begin(decided, settled)
     status = step.close(known).status
     return None if status is Status.CLOSED else status

@@ -39,7 +39,7 @@ class TwoSided:
 
     @property
     def sign(self) -> int:
-        """The assembly, +1 or −1."""
+        """Return the assembly, +1 or −1."""
         return int(self._sign)
 
     def with_sign(self, sign: int) -> Any:

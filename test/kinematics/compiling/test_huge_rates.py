@@ -36,8 +36,9 @@ def huge_states(name: str) -> list[State]:
     found = []
     for state in states(closure, 30, name):
         rates = [rng.choice((-1.0, 1.0)) * 10.0 ** rng.choice(EXPONENTS) for _ in range(2 * n)]
-        ways = (rates, [*rates[:n], *state[2 * n :]], [*state[n : 2 * n], *rates[n:]])
-        found += [(*state[:n], *some) for some in ways]
+        at, given = state[:n], state[n:]
+        ways = (rates, [*rates[:n], *given[n:]], [*given[:n], *rates[n:]])
+        found += [(*at, *some) for some in ways]
     at = found[0][:n]
     found += [(*at, *[rate] * n, *[change] * n) for rate in (inf, nan) for change in (0.0, 1e300)]
     return found
