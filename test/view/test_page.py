@@ -247,8 +247,15 @@ def test_rates_are_those_at_the_rate_that_was_typed(
     with opened(browser, stills('four_bar')) as shown:
         page = shown.page
         page.select_option('#angles', 'radians')
+        before = page.evaluate(CURVES, 'accelerations')[0]['y'][100]
         page.fill('#rate', '-2.5')
         page.press('#rate', 'Enter')
+        # Curves that were drawn just now are drawn again a little later.
+        page.wait_for_function(
+            "before => document.querySelector('[data-key=accelerations] .plot').data[0].y[100] "
+            '!== before',
+            arg=before,
+        )
         closure = load('four_bar')
         for key in ('rates', 'accelerations'):
             curves = page.evaluate(CURVES, key)
