@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.compiling.linkage import Compiled
     from linkage_ros.kinematics.compiling.solve import Solver
     from linkage_ros.kinematics.compiling.trace import Wanted
+    from linkage_ros.kinematics.inverse_closure import Inverse, InverseClosure
     from linkage_ros.kinematics.link_frames import LinkFrames
     from linkage_ros.kinematics.point_tracker import PointTracker
     from numpy.typing import ArrayLike
@@ -111,6 +112,9 @@ class Closure:
     by_steps: ClassVar[bool] = True
     """Whether its steps close it, which can be compiled; other solvers have a way of their own."""
 
+    gap_unit: str = 'm'
+    """Unit of the gap of an open position."""
+
     def __init__(self, linkage: Linkage, name: str = '') -> None:
         if not isinstance(linkage, Linkage):
             raise TypeError(f'linkage: {quoted(linkage)} is not a Linkage; load() reads files')
@@ -149,6 +153,7 @@ class Closure:
         """The limits between which its joints stay."""
         self._keep_limits()
         self._compiled: list[Compiled] = []
+        self._inverses: dict[str, Inverse] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle the definition: the copy builds the rest anew, to the same bits."""
@@ -392,6 +397,70 @@ class Closure:
         from linkage_ros.kinematics.compiling.solve import Solver  # local import: needs numpy
 
         return Solver(self, len(self.linkage.joints))
+
+    def driven_by(
+        self, joint: str, branch: int | None = None, *, near: float | None = None
+    ) -> InverseClosure:
+        """
+        Return the linkage with a dependent joint as its input.
+
+        Parameters
+        ----------
+        joint
+            A published joint, or a coordinate of a traced point, such as ``P.x``.
+        branch
+            Number of the branch on which the crank is, as `cranks` returns it. If there is only
+            one branch within the limits, it need not be named.
+        near
+            Instead of the branch a crank on it, in [rad] or [m].
+
+        Raises
+        ------
+        DefinitionError
+            If the joint is unknown or does not move, or several branches are within the limits.
+
+        """
+        from linkage_ros.kinematics.inverse_closure import (
+            InverseClosure,  # local import: only few ask for it
+        )
+
+        inverse = self._inverse(joint)
+        return InverseClosure(self, inverse, inverse.branch(branch, near))
+
+    def cranks(self, joint: str, value: float) -> list[tuple[int, float]]:
+        """
+        Return all cranks at which a joint has a value, within the limits.
+
+        Parameters
+        ----------
+        joint
+            As in `driven_by`.
+        value
+            Its value, in [rad] or [m].
+
+        Returns
+        -------
+        cranks : list
+            Pairs of a branch's number and the crank on it, in [rad] or [m].
+
+        Raises
+        ------
+        DefinitionError
+            As `driven_by`.
+
+        """
+        return self._inverse(joint).cranks(to_double('value', value))
+
+    def _inverse(self, joint: str) -> Inverse:
+        """Return a joint with its branches over the crank; they are made once."""
+        from linkage_ros.kinematics.inverse_closure import (
+            inverse_of,  # local import: only few ask for it
+        )
+
+        with BUILD_LOCK:
+            if joint not in self._inverses:
+                self._inverses[joint] = inverse_of(self, joint)
+            return self._inverses[joint]
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:
         """

@@ -151,6 +151,7 @@ class LoopClosure(Protocol):
     input_names: tuple[str, ...]
     joint_names: tuple[str, ...]
     scale: float
+    gap_unit: str
     steps: tuple[Step, ...]
     step_groups: tuple[int, ...]
     turning: tuple[bool, ...]
@@ -281,7 +282,7 @@ class Position(_JointValues):
 
     @property
     def _title(self) -> str:
-        by = f' by {self.gap:.3g} m' if self.gap else ''
+        by = f' by {self.gap:.3g} {self.closure.gap_unit}' if self.gap else ''
         return f'Position {self.status.value}{by}'
 
     def _repr_svg_(self) -> str | None:

@@ -1,0 +1,478 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The crank as a function of a joint: one on each branch of the joint over the crank.
+
+A branch is a piece of the crank's range on which the joint moves one way. It ends where the joint
+turns back, or where the range ends. Let s go from 0 to 1 while the joint y goes from its lowest
+value a to its highest b, so that y − a grows as s² if the joint turns back at a, and as s if it
+does not; likewise at b::
+
+    both     s = 2/π·atan2(√(y − a), √(b − y))         a only   s = √((y − a)/(b − a))
+    b only   s = 1 − √((b − y)/(b − a))                neither  s = (y − a)/(b − a)
+
+The crank is a smooth function of s, also at the ends. A table of it starts Newton's method on the
+compiled closed form; two steps are usual. So a crank depends on y and the branch, on nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from math import atan2, ceil, floor, inf, isfinite, nan, pi, remainder, sin, sqrt, tau
+from typing import NamedTuple, TYPE_CHECKING
+
+from linkage_ros.errors import DefinitionError, did_you_mean, listed
+from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
+from linkage_ros.kinematics.compiling.linkage import Compiled
+from linkage_ros.kinematics.compiling.trace import Motion, Wanted
+from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.ranges import golden, last_inside
+from linkage_ros.kinematics.results import InputRange
+from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure
+
+_CELLS = 32
+"""Cells of a table, for each turn of the crank."""
+
+_SAMPLES, _MOST_SAMPLES = 720, 20_000
+_STEPS, _LAST = 6, 1e-9
+"""Most Newton steps, and the greatest last one, of a branch's width: the next is its square."""
+
+_BISECTIONS = 120
+_SAME = 1e-9
+"""A joint that moves less than this does not move, in [rad] or of the linkage's size."""
+
+_FLAT = 1e-13
+"""A joint that turns back and again within this only slows down, likewise."""
+
+_BESIDE = 1e-2
+"""Greatest distance of cranks between which an output slows down, in [rad] or [m]."""
+
+_DEEPER = 10.0
+"""Depth that a valley may have below its sample, relative to the height of those beside it."""
+
+_FLAT_SLOPE = 1e-9
+"""The slope of an output that stands, of its mean slope on the branch."""
+
+_NEAR, _NEARER = 1e-6, 1e-8
+"""Where the slope is taken near an end of a branch, of its width: it tells the kind of the end."""
+
+
+class Output(NamedTuple):
+    """What a branch is of: a published joint, or a coordinate of a traced point."""
+
+    name: str
+    turning: bool
+    wanted: Wanted  # Its value, rate and acceleration, each in a group
+    joint: RevoluteJoint | SlideJoint | None  # None for a coordinate
+
+    @property
+    def unit(self) -> str:
+        """Return its unit."""
+        return 'rad' if self.turning else 'm'
+
+
+def output_named(closure: Closure, name: str) -> Output:
+    """Return the output of a name, such as ``rocker_joint`` or ``P.x``; refuse unknown names."""
+    if name in closure.input_names:
+        raise DefinitionError(name, 'is an input', 'name a joint that depends on it')
+    if name in closure.joint_names:
+        number = closure.joint_names.index(name)
+
+        def joint(motion: Motion) -> Sequence[Sequence[float]]:
+            return [part.joints[number : number + 1] for part in motion if part is not None]
+
+        return Output(name, closure.turning[number], joint, closure.linkage.joints[name])
+    point, _, axis = name.rpartition('.')
+    traced = [f'{each}.{way}' for each in closure.linkage.traced for way in 'xy']
+    if name not in traced:
+        known = [joint for joint in closure.joint_names if joint not in closure.input_names]
+        raise DefinitionError(
+            name,
+            'is neither a published joint nor a coordinate of a traced point',
+            did_you_mean(name, [*known, *traced], f'name one of {listed([*known, *traced])}'),
+        )
+    key = next((link, point) for link, at in closure.linkage.links.items() if point in at)
+
+    def coordinate(motion: Motion) -> Sequence[Sequence[float]]:
+        position, velocity, acceleration = motion
+        if not position.status.has_pose:
+            return []
+        places = [closure.points(position)[key]]
+        if velocity is not None:
+            # Its velocity does not depend on the accelerations.
+            known = acceleration or closure.acceleration(position, velocity, 0.0)
+            places += closure.point_motion(position, velocity, known)[key][1:]
+        groups = 3 if acceleration else 2
+        return [[place.real if axis == 'x' else place.imag] for place in places[:groups]]
+
+    return Output(name, False, coordinate, None)
+
+
+class CrankBranch:
+    """
+    A piece of the crank's range on which an output moves one way.
+
+    Attributes
+    ----------
+    number
+        Its number, from 1.
+    low, high
+        The lowest and the highest value of the output, in [rad] or [m].
+    first, last
+        The cranks there, in [rad] or [m].
+    turns_back
+        For both whether the output turns back there; else the range of the crank ends there.
+    least, most
+        The ends of the crank, in [rad] or [m].
+    by
+        For low and high the joint whose limits end the branch there; '' if none does.
+    period, rise
+        Of an output that turns on with the crank: the turns of both after which the poses repeat,
+        in [rad]; else 0.
+
+    """
+
+    def __init__(
+        self,
+        evaluate: OutputFunction,
+        piece: Sequence[tuple[float, float]],
+        number: int,
+        by: tuple[str, str] = ('', ''),
+        period: float = 0.0,
+    ) -> None:
+        self.number = number
+        self.turning, self.crank_turns = evaluate.turning, evaluate.crank_turns
+        self._evaluate = evaluate
+        self.rises = piece[-1][1] > piece[0][1]
+        self.by = by if self.rises else by[::-1]
+        if not self.rises:
+            piece = piece[::-1]
+        (self.first, self.low), (self.last, self.high) = piece[0], piece[-1]
+        self.least, self.most = sorted((self.first, self.last))
+        width = self.most - self.least
+        self._greatest_last = _LAST * width
+        rounding = UNIT_ROUNDOFF * (max(map(abs, (self.low, self.high))) + evaluate.size)
+        self.slack = 8.0 * rounding
+        """A value beyond an end by no more is at the end."""
+        self.period, self.rise = (period, self.high - self.low) if period else (0.0, 0.0)
+        near = [
+            [abs(evaluate(end + share * (other - end))[1]) for share in (_NEAR, _NEARER)]
+            for end, other in ((self.first, self.last), (self.last, self.first))
+        ]
+        self.turns_back = tuple(10.0 * nearer < far for far, nearer in near)
+        self.steep = tuple(nearer > 3.0 * far for far, nearer in near)
+        """For both ends whether the output ends with an infinite slope: at a toggle."""
+        low_back, high_back = self.turns_back
+        self._lowest = self.low + rounding * low_back
+        self._highest = self.high - rounding * high_back
+        self.flat = _FLAT_SLOPE * (self.high - self.low) / width
+        """With a smaller slope the output stands, and the crank has no rate."""
+        self._tabulate(piece, near)
+
+    def _tabulate(
+        self, piece: Sequence[tuple[float, float]], near: Sequence[Sequence[float]]
+    ) -> None:
+        """Make the table of cranks and their slopes at equal steps of s."""
+        turns = ceil((self.most - self.least) / tau) if self._evaluate.crank_turns else 1
+        self._cells = cells = _CELLS * max(1, turns)
+        self._steep_cells = [i for i, is_steep in zip((0, cells - 1), self.steep) if is_steep]
+        self.cranks, slopes = [self.first], [0.0]
+        way, height = (1.0 if self.last > self.first else -1.0), self.high - self.low
+        k = 0
+        for i in range(1, cells):
+            y, rise = self._at_share(i / cells)
+            while k < len(piece) - 2 and piece[k + 1][1] < y:
+                k += 1
+            crank, slope = self._narrow(y, piece[k][0], piece[k + 1][0])
+            self.cranks.append(crank)
+            slopes.append(rise / abs(slope) if slope else inf)
+        self.cranks.append(self.last)
+        slopes.append(0.0)
+        both = all(self.turns_back)
+        for end, i in enumerate((0, cells)):
+            far, nearer = near[end]
+            if self.turns_back[end]:
+                # y = end ± k·s², and it bends by f″ = slope/distance: dθ/ds = √(2k/f″).
+                bend = far / (_NEAR * (self.most - self.least))
+                slopes[i] = sqrt((0.5 * pi * pi if both else 2.0) * height / bend)
+            elif not self.steep[end]:
+                slopes[i] = self._at_share(i / cells)[1] / nearer if nearer else inf
+        self._slopes = []
+        for i, slope in enumerate(slopes):
+            # Within three times the slopes beside it, the table rises or falls everywhere.
+            beside = [abs(self.cranks[j + 1] - self.cranks[j]) for j in (i - 1, i) if 0 <= j < cells]
+            self._slopes.append(way * min(slope / cells, 3.0 * min(beside)))
+
+    def _at_share(self, s: float) -> tuple[float, float]:
+        """Return the output at s, and its derivative by s."""
+        height = self.high - self.low
+        if all(self.turns_back):
+            return self.low + height * sin(0.5 * pi * s) ** 2, 0.5 * pi * height * sin(pi * s)
+        if self.turns_back[0]:
+            return self.low + height * s * s, 2.0 * height * s
+        if self.turns_back[1]:
+            return self.high - height * (1.0 - s) ** 2, 2.0 * height * (1.0 - s)
+        return self.low + height * s, height
+
+    def _share(self, y: float) -> float:
+        """Return s of a value between the ends."""
+        low, high = y - self.low, self.high - y
+        if self.turns_back[0]:
+            if self.turns_back[1]:
+                return atan2(sqrt(low), sqrt(high)) * (2.0 / pi)
+            return sqrt(low / (self.high - self.low))
+        if self.turns_back[1]:
+            return 1.0 - sqrt(high / (self.high - self.low))
+        return low / (self.high - self.low)
+
+    def beyond(self, y: float) -> float:
+        """Return how much a value is beyond the branch, in its unit; 0 if it is reached."""
+        y -= self._turns_before(y)
+        away = max(self.low - y, y - self.high)
+        return away if away > self.slack else 0.0
+
+    def _turns_before(self, y: float) -> float:
+        """Return the whole turns, in [rad], that are left out of a value."""
+        if self.low <= y <= self.high:
+            return 0.0
+        if self.rise:
+            return self.rise * floor((y - self.low) / self.rise)
+        if self.turning:
+            return tau * round((y - 0.5 * (self.low + self.high)) / tau)
+        return 0.0
+
+    def find(self, y: float) -> tuple[float, float]:
+        """
+        Return the crank at a value that is reached, and the slope of the output there.
+
+        In [rad] or [m]; where the output turns back, the slope is 0.
+        """
+        turns = 0.0
+        if not self.low <= y <= self.high:
+            before = self._turns_before(y)
+            y -= before
+            turns = before / self.rise * self.period if self.rise else 0.0
+            turns = turns if self.rises else -turns
+        if y <= self._lowest:
+            return self.first + turns, 0.0 if self.turns_back[0] else inf
+        if y >= self._highest:
+            return self.last + turns, 0.0 if self.turns_back[1] else inf
+        cells = self._cells
+        place = self._share(y) * cells
+        i = min(int(place), cells - 1)
+        t = place - i
+        p, q, s, e = self.cranks[i], self.cranks[i + 1], self._slopes[i], self._slopes[i + 1]
+        crank = p + t * (s + t * (3.0 * (q - p) - 2.0 * s - e + t * (2.0 * (p - q) + s + e)))
+        if i not in self._steep_cells:
+            fast, turning, last = self._evaluate.fast, self.turning, self._greatest_last
+            for _ in range(_STEPS):
+                found = fast(crank, 1.0)
+                if found is None:
+                    break
+                ((value,), (slope,)) = found
+                off = value - y
+                if turning:
+                    off = remainder(off, tau)
+                if not slope:
+                    break
+                step = off / slope
+                crank -= step
+                if -last < step < last:
+                    if self.least <= crank <= self.most:
+                        return crank + turns, slope
+                    break
+        crank, slope = self._narrow(y, p, q)
+        return crank + turns, slope
+
+    def _narrow(self, y: float, below: float, above: float) -> tuple[float, float]:
+        """Return the crank at a value between two others, to neighbouring floats, and the slope."""
+        crank = 0.5 * (below + above)
+        slope = nan
+        for number in range(_BISECTIONS):
+            value, slope = self._evaluate(crank)
+            off = value - y
+            if self.turning:
+                off = remainder(off, tau)
+            if off == 0.0:
+                break
+            below, above = (crank, above) if off < 0.0 else (below, crank)
+            middle = 0.5 * (below + above)
+            step = off / slope if slope else inf
+            better = crank - step
+            if number % 4 == 3 or not min(below, above) < better < max(below, above):
+                better = middle
+            if better == crank or middle in (below, above):
+                break
+            small = abs(better - crank) <= 2.0 * UNIT_ROUNDOFF * abs(crank)
+            crank = better
+            if small:
+                break
+        return crank, slope
+
+
+class OutputFunction:
+    """An output over the crank, with its slope, both NaN where the linkage does not close."""
+
+    def __init__(self, closure: Closure, output: Output) -> None:
+        compiled = Compiled(closure, 1, output.wanted, within_limits=False)
+        self._compiled = compiled
+        self.fast = compiled.fast
+        self.turning = output.turning
+        self.crank_turns = not closure.linkage.inputs[0].slider
+        self.size = tau if output.turning else closure.scale
+        """The size of numbers that it is a difference of, in its unit."""
+
+    def __call__(self, crank: float) -> tuple[float, float]:
+        """Return the output and its slope at a crank."""
+        values = self.fast(crank, 1.0)
+        if values is None:
+            values = self._compiled.plain(crank, 1.0).values
+        (value,), (slope,) = ((*group, nan)[:1] for group in values)
+        return value, slope
+
+
+def crank_branches(closure: Closure, output: Output, *, limited: bool = True) -> list[CrankBranch]:
+    """
+    Return the branches of an output over a single input, by the crank at which they begin.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    output
+        The output.
+    limited
+        Whether the limits of its joints cut them.
+
+    Raises
+    ------
+    DefinitionError
+        If the output does not move.
+
+    """
+    evaluate = OutputFunction(closure, output)
+    ranges = InputSweep(closure).ranges if limited else closure.closing_ranges
+    branches: list[CrankBranch] = []
+    for interval in ranges:
+        period = interval.highest - interval.lowest if interval.whole else 0.0
+        for piece, turns_on in _pieces(evaluate, interval):
+            if abs(piece[-1][1] - piece[0][1]) > _SAME * evaluate.size:
+                by = dict(zip(interval[:2], interval.by, strict=True))
+                ends = by.get(piece[0][0], ''), by.get(piece[-1][0], '')
+                number, turns = len(branches) + 1, period * turns_on
+                branches.append(CrankBranch(evaluate, piece, number, ends, turns))
+    if ranges and not branches:
+        raise DefinitionError(output.name, 'does not move with the input', 'name another joint')
+    return branches
+
+
+def _pieces(
+    evaluate: OutputFunction, interval: InputRange
+) -> Iterator[tuple[list[tuple[float, float]], bool]]:
+    """
+    Yield the pieces of a range on which the output moves one way, and whether it turns on.
+
+    Each is a list of cranks with the output, in order.
+    """
+    low, high = interval.lowest, interval.highest
+    count = _SAMPLES
+    if interval.turning:
+        count = min(_MOST_SAMPLES, _SAMPLES * max(1, ceil((high - low) / tau)))
+    cranks = samples(interval, count)
+    if interval.whole:
+        # Symmetric linkages turn back at round angles, where the slope has no sign.
+        cranks = [crank + (high - low) * 0.307 / count for crank in cranks]
+    sampled = [(crank, *evaluate(crank)) for crank in cranks]
+    turns = list(_turning_points(evaluate, sampled))
+    if interval.whole:
+        turns = sorted(low + (turn - low) % (high - low) for turn in turns)
+    ends = _real_turns(evaluate, turns, interval)
+    known = [(crank, value) for crank, value, _ in sampled if isfinite(value)]
+    begin, end = low, high
+    if interval.whole:
+        if ends:
+            begin, end = ends[0], ends[0] + (high - low)
+        known = sorted((begin + (crank - begin) % (high - low), value) for crank, value in known)
+    places = [begin, *(turn for turn in ends if begin < turn < end), end]
+    for first, last in zip(places, places[1:]):
+        inner = [(crank, value) for crank, value in known if first < crank < last]
+        piece = [(first, evaluate(first)[0]), *inner, (last, evaluate(last)[0])]
+        yield _unwrapped(piece) if evaluate.turning else piece, interval.whole and not ends
+
+
+def _turning_points(
+    evaluate: OutputFunction, sampled: Sequence[tuple[float, float, float]]
+) -> Iterator[float]:
+    """Yield the cranks at which the slope changes its sign, also twice between samples."""
+    known = [(crank, slope) for crank, _, slope in sampled if isfinite(slope) and slope]
+
+    def within(sign: float) -> Callable[[float], bool]:
+        return lambda crank: evaluate(crank)[1] * sign > 0.0
+
+    for i in range(1, len(known)):
+        (before, slope_before), (here, slope) = known[i - 1 : i + 1]
+        if slope_before * slope < 0.0:
+            yield last_inside(within(slope_before), before, here)
+        elif i + 1 < len(known):
+            after, slope_after = known[i + 1]
+            sign = 1.0 if slope > 0.0 else -1.0
+            sides = sign * slope_before, sign * slope_after
+            # A valley that is shallow beside its height does not reach zero.
+            if min(sides) >= abs(slope) and _DEEPER * (sum(sides) - 2.0 * abs(slope)) > abs(slope):
+                least, at = golden(lambda x, s=sign: s * evaluate(x)[1], before, after)
+                if least < 0.0:
+                    yield last_inside(within(slope), before, at)
+                    yield last_inside(within(slope), after, at)
+
+
+def _real_turns(
+    evaluate: OutputFunction, ends: Sequence[float], interval: InputRange
+) -> list[float]:
+    """Return the turning points without those where the output only slows down."""
+    slight = _FLAT * evaluate.size
+    kept: list[float] = []
+
+    def are_same(one: float, other: float) -> bool:
+        off = evaluate(one)[0] - evaluate(other)[0]
+        return abs(remainder(off, tau) if evaluate.turning else off) <= slight
+
+    for end in ends:
+        if kept and end - kept[-1] < _BESIDE and are_same(kept[-1], end):
+            kept.pop()
+        else:
+            kept.append(end)
+    if not interval.whole:
+        outer = (interval.lowest, interval.highest)
+        return [
+            end
+            for end in kept
+            if not any(abs(end - one) < _BESIDE and are_same(end, one) for one in outer)
+        ]
+    if len(kept) > 1 and interval.highest - kept[-1] + kept[0] - interval.lowest < _BESIDE:
+        return kept[1:-1] if are_same(kept[0], kept[-1]) else kept
+    return kept
+
+
+def _unwrapped(piece: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return a piece with angles that go on through whole turns, its middle in (−π, π]."""
+    (first, value), *others = piece
+    found = [(first, value)]
+    for crank, angle in others:
+        found.append((crank, angle - tau * round((angle - found[-1][1]) / tau)))
+    turns = tau * round(0.5 * (found[0][1] + found[-1][1]) / tau)
+    return [(crank, angle - turns) for crank, angle in found]

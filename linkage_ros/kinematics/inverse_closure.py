@@ -1,0 +1,375 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A linkage with one of its dependent joints as the input.
+
+The closed form stays as it is and is inverted: the crank comes from a branch of the joint over the
+crank, everything else from the closed form at that crank. With y the joint, θ the crank, y = f(θ)::
+
+    θ̇ = ẏ/f′        θ̈ = (ÿ − f″·θ̇²)/f′
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil, floor, inf, isfinite, tau
+from typing import Any, NamedTuple, TYPE_CHECKING
+
+from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.kinematics.built_once import BuiltProperty
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.trace import Motion
+from linkage_ros.kinematics.crank_branches import (
+    crank_branches,
+    CrankBranch,
+    Output,
+    output_named,
+)
+from linkage_ros.kinematics.doubles import to_doubles
+from linkage_ros.kinematics.limits import Bounds
+from linkage_ros.kinematics.linkage import Input, Pose, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.results import (
+    Acceleration,
+    InputRange,
+    Position,
+    SingularInput,
+    SingularityMargin,
+    Velocity,
+)
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import State
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.batch import Batch
+
+_INSIDE = 1e-8
+"""Distance from a toggle of the crank at which rates are taken, of the branch's width."""
+
+
+class Inverse(NamedTuple):
+    """An output of a linkage with its branches over the crank."""
+
+    output: Output
+    branches: Sequence[CrankBranch]
+
+    def cranks(self, value: float) -> list[tuple[int, float]]:
+        """Return the cranks at which the output has a value, each after its branch."""
+        found = []
+        for branch in self.branches:
+            values = [value]
+            if self.output.turning and not branch.rise:
+                # A branch may span several turns.
+                lowest, highest = branch.low - branch.slack, branch.high + branch.slack
+                turns = range(ceil((lowest - value) / tau), floor((highest - value) / tau) + 1)
+                values = [value + tau * k for k in turns]
+            found += [(branch.number, branch.find(y)[0]) for y in values if not branch.beyond(y)]
+        return found
+
+    def branch(self, number: int | None = None, near: float | None = None) -> CrankBranch:
+        """Return the branch of a number, or the one nearest a crank, or the only one."""
+        name, branches = self.output.name, self.branches
+        if number is None and near is not None:
+            return min(branches, key=lambda branch: _distance(branch, near))
+        for branch in branches:
+            if branch.number == number or len(branches) == 1 and number is None:
+                return branch
+        unit = 'rad' if branches[0].crank_turns else 'm'
+        told = listed(f'{one.number} ({one.least:.6g} to {one.most:.6g} {unit})' for one in branches)
+        if number is not None:
+            raise DefinitionError(f'branch {number}', f'{name} has none of this number', f'use {told}')
+        raise DefinitionError(
+            name,
+            f'several cranks reach a value: {len(branches)} branches',
+            f'name a branch, or a crank near it; branches and their cranks: {told}',
+        )
+
+
+def _distance(branch: CrankBranch, crank: float) -> float:
+    """Return how far a crank is from a branch; one that turns is compared modulo a turn."""
+    if branch.crank_turns:
+        crank -= tau * round((crank - 0.5 * (branch.least + branch.most)) / tau)
+    return max(branch.least - crank, crank - branch.most, 0.0)
+
+
+def inverse_of(closure: Closure, name: str) -> Inverse:
+    """
+    Return an output with its branches.
+
+    Raises
+    ------
+    DefinitionError
+        If there are several inputs, or the output is unknown or does not move.
+
+    """
+    if len(closure.input_names) > 1:
+        raise DefinitionError(
+            name, f'there are {len(closure.input_names)} inputs', 'name as many joints'
+        )
+    output = output_named(closure, name)
+    branches = crank_branches(closure, output)
+    if not branches:
+        raise DefinitionError(name, 'nothing is within the limits', 'widen the limits')
+    return Inverse(output, branches)
+
+
+class _GivenState(State):
+    """A state of the linkage with the joint that is the input, or its rate."""
+
+    given: tuple[float, ...]
+
+
+def _given(value: float, coordinates: list[float], pins: list[complex]) -> _GivenState:
+    state = _GivenState(coordinates, pins)
+    state.given = (value,)
+    return state
+
+
+class InverseClosure(Closure):
+    """
+    A linkage with a dependent joint, or a coordinate of a traced point, as its input.
+
+    Its joints are the crank and the other published joints. `Closure.driven_by` makes it.
+
+    Parameters
+    ----------
+    closed
+        The linkage with its crank as the input.
+    inverse
+        The output with its branches.
+    branch
+        The branch on which the crank is.
+
+    """
+
+    by_steps = False
+
+    def __init__(self, closed: Closure, inverse: Inverse, branch: CrankBranch) -> None:
+        output = inverse.output
+        (crank,) = closed.linkage.inputs
+        joints: dict[str, RevoluteJoint | SlideJoint] = {
+            crank.joint: SlideJoint(crank.slider, crank.limits)
+            if crank.slider
+            else RevoluteJoint(crank.parent, crank.child, crank.limits)
+        }
+        others = [name for name in closed.joint_names if name not in (output.name, crank.joint)]
+        joints |= {name: closed.linkage.joints[name] for name in others}
+        self.closed, self.inverse, self.branch = closed, inverse, branch
+        self.gap_unit = output.unit
+        self.linkage = replace(
+            closed.linkage,
+            inputs=(_as_input(output),),
+            joints=joints,
+            pose=Pose((0.5 * (branch.low + branch.high),), {}),
+        )
+        self.name = closed.name
+        for same in (
+            'structure', 'scale', 'steps', 'step_groups', 'angles', 'slides', 'turns_with',
+            '_known', '_more_steps', '_point_index',
+        ):  # fmt: skip
+            setattr(self, same, getattr(closed, same))
+        self.input_names, self.joint_names = (output.name,), tuple(joints)
+        self._factors, self._single = None, True
+        self._others = [closed.joint_names.index(name) for name in others]
+        self.turning = (not crank.slider, *(closed.turning[number] for number in self._others))
+        self.bounds = Bounds(self.linkage)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self.closed).driven_by, (self.closed, *self.input_names, self.branch.number)
+
+    def position(self, *inputs: float) -> Position:
+        """
+        Close the loops at a value of the joint, in [rad] or [m].
+
+        Where the joint turns back, the position is a toggle: the crank is valid, its rate is not.
+        A value that the joint does not reach is open; the gap is how much it is beyond, in its
+        unit.
+        """
+        (y,) = self._numbers('inputs', inputs)
+        if not isfinite(y):
+            return Position(Status.INDETERMINATE, 0.0, (), _given(y, [0.0], []), [], self)
+        branch = self.branch
+        if beyond := branch.beyond(y):
+            return Position(Status.OPEN, beyond, (), _given(y, [0.0], []), [], self)
+        crank, slope = branch.find(y)
+        found = self.closed.position(crank)
+        status = found.status
+        if abs(slope) < branch.flat:
+            status = Status.TOGGLE
+        elif status is Status.TOGGLE and self._beside_toggle(found, crank):
+            status = Status.CLOSED
+        joints = self._joints_with(crank, found.joints)
+        return Position(status, found.gap, joints, _given(y, *found.state), found.poses, self)
+
+    def velocity(self, position: Position, *rates: float) -> Velocity:
+        if getattr(position, 'closure', None) is not self:
+            self._check_own('position', position)
+        (rate,) = self._numbers('rates', rates)
+        if not (position.status.has_rates and isfinite(rate)):
+            return self._huge_velocity(position, (rate,))
+        places = self._beside_toggle(position, position.joints[0])
+        found = [self._rates(place, rate) for place in places or [self._forward(position)]]
+        (crank,) = self.closed.inputs_of(found[-1].state)
+        joints = found[-1].joints
+        if places:  # The crank stands there; the others are extrapolated.
+            crank, joints = 0.0, _extrapolated(*(one.joints for one in found))
+        state = _given(rate, *found[-1].state)
+        return Velocity(self._joints_with(crank, joints), state, found[-1].rates, self)
+
+    def acceleration(
+        self, position: Position, velocity: Velocity, *accelerations: float
+    ) -> Acceleration:
+        if getattr(velocity, 'closure', None) is not self:
+            self._check_own('velocity', velocity)
+        (change,) = self._numbers('accelerations', accelerations)
+        (rate,) = self.inputs_of(velocity.state)
+        places = self._beside_toggle(position, position.joints[0])
+        found = []
+        for place in places or [self._forward(position)]:
+            moving = self._rates(place, rate)
+            bent = self.closed.acceleration(place, moving, 0.0)
+            _, (slope,), (bend,) = self._outputs(place, moving, bent)
+            # Not the slope itself: the output has the rate that is given.
+            (turn,) = self.closed.inputs_of(moving.state)
+            slope = slope / turn if turn else self._slope(place)
+            found.append(self.closed.acceleration(place, moving, (change - bend) / slope))
+        ends = [(*self.closed.inputs_of(one.state), *one.joints) for one in found]
+        crank, *joints = _extrapolated(*ends) if places else ends[0]
+        state = _given(change, *found[-1].state)
+        return Acceleration(self._joints_with(crank, joints), state, self)
+
+    def solve(
+        self,
+        *inputs: Any,
+        rates: Any = None,
+        accelerations: Any = None,
+        derivatives: int = 2,
+        out: Batch | None = None,
+    ) -> Batch:
+        """Solve many states as `Closure.solve`, one by one."""
+        from linkage_ros.kinematics.batch import Batch, CODES  # local import: it loads numpy
+        import numpy as np  # local import: the batch alone needs it
+
+        (given,) = self._one('inputs', inputs)
+        values = to_doubles('inputs', given)
+        speeds = np.broadcast_to(to_doubles('rates', 1.0 if rates is None else rates), values.shape)
+        changes = to_doubles('accelerations', 0.0 if accelerations is None else accelerations)
+        changes = np.broadcast_to(changes, values.shape)
+        shape = len(self.joint_names), len(values)
+        batch = out or Batch(
+            np.zeros(len(values), np.uint8), *(np.empty(shape) for _ in range(1 + derivatives))
+        )
+        for array in batch[1 : 2 + derivatives]:
+            array[...] = np.nan
+        for k, y in enumerate(values.tolist()):
+            position = self.position(y)
+            batch.status[k] = CODES[position.status]
+            if not position.joints:
+                continue
+            batch.positions[:, k] = position.joints
+            if derivatives and position.status.has_rates:
+                velocity = self.velocity(position, float(speeds[k]))
+                batch.velocities[:, k] = velocity.joints
+                if derivatives > 1:
+                    found = self.acceleration(position, velocity, float(changes[k]))
+                    batch.accelerations[:, k] = found.joints
+        return batch
+
+    def inputs_of(self, state: State) -> tuple[float, ...]:
+        """Return the joint that is the input, or its rate, in [rad] or [m]."""
+        assert isinstance(state, _GivenState), 'it makes all its states'
+        return state.given
+
+    @BuiltProperty
+    def input_ranges(self) -> tuple[InputRange, ...]:
+        """The range of the joint on its branch."""
+        one = self.branch
+        turns = max(1, round(abs(one.rise) / tau))
+        return (InputRange(one.low, one.high, self.inverse.output.turning, turns=turns, by=one.by),)
+
+    @BuiltProperty
+    def closing_ranges(self) -> tuple[InputRange, ...]:
+        """The same: limits cut the branch."""
+        return self.input_ranges
+
+    @BuiltProperty
+    def singular_inputs(self) -> tuple[SingularInput, ...]:
+        """Where the joint turns back: there the crank has no rate."""
+        ends = zip((self.branch.low, self.branch.high), self.branch.turns_back, strict=True)
+        return tuple(SingularInput(end, Status.TOGGLE) for end, back in ends if back)
+
+    @BuiltProperty
+    def zero_length(self) -> float | None:
+        """None: the range is that of a branch."""
+        return None
+
+    def singularity_margin(self, position: Position) -> SingularityMargin:
+        """Return how near a closed position is to a singularity, of the crank or of the joint."""
+        (y,) = position.inputs
+        distance = min((abs(y - one.value) for one in self.singular_inputs), default=inf)
+        margin = self.closed.singularity_margin(self._forward(position))
+        return margin._replace(toggle_distance=distance)
+
+    def _one(self, what: str, values: tuple[Any, ...]) -> tuple[Any, ...]:
+        if len(values) != 1:
+            name = self.input_names[0]
+            raise ValueError(f'{what}: {len(values)} given; give 1: {name}')
+        return values
+
+    def _numbers(self, what: str, values: tuple[float, ...]) -> tuple[float, ...]:
+        return self._doubles(what, self._one(what, values))
+
+    def _joints_with(self, crank: float, joints: Sequence[float]) -> tuple[float, ...]:
+        return (crank, *(joints[number] for number in self._others)) if joints else ()
+
+    def _forward(self, position: Position) -> Position:
+        """Return a position of this closure as one of the linkage with its crank as the input."""
+        closed, status = self.closed, position.status
+        return Position(status, position.gap, (), position.state, position.poses, closed)
+
+    def _beside_toggle(self, found: Position, crank: float) -> list[Position]:
+        """Return positions beside the end of the crank if it is a toggle there; else none."""
+        if not any(pose.status is Status.TOGGLE for pose in found.poses):
+            return []
+        branch = self.branch
+        end = int(abs(crank - branch.last) < abs(crank - branch.first))
+        if not branch.steep[end]:
+            return []
+        way = (branch.last - branch.first) * (-1.0 if end else 1.0)
+        return [self.closed.position(crank + way * _INSIDE * part) for part in (1.0, 0.25)]
+
+    def _outputs(self, *motion: Any) -> Any:
+        return self.inverse.output.wanted(Motion(*motion))
+
+    def _slope(self, forward: Position) -> float:
+        _, (slope,) = self._outputs(forward, self.closed.velocity(forward, 1.0), None)
+        return float(slope)
+
+    def _rates(self, forward: Position, rate: float) -> Velocity:
+        return self.closed.velocity(forward, rate / self._slope(forward))
+
+
+def _as_input(output: Output) -> Input:
+    joint = output.joint
+    if isinstance(joint, RevoluteJoint):
+        return Input(output.name, joint.parent, joint.child, limits=joint.limits)
+    if isinstance(joint, SlideJoint):
+        return Input(output.name, slider=joint.slider, limits=joint.limits)
+    return Input(output.name, slider=output.name)  # It slides, though along no line of a link.
+
+
+def _extrapolated(far: Sequence[float], near: Sequence[float]) -> tuple[float, ...]:
+    """Return values at a toggle from those at a distance and a quarter of it: √ distance."""
+    return tuple(2.0 * b - a for a, b in zip(far, near, strict=True))
