@@ -51,12 +51,12 @@ from linkage_ros.kinematics.step import Pose, State
 from linkage_ros.kinematics.topology import assur_groups, Structure
 
 if TYPE_CHECKING:
-    from linkage_ros import LinkagePage
+    from linkage_ros import InverseClosure, LinkagePage
     from linkage_ros.kinematics.batch import Batch
     from linkage_ros.kinematics.compiling.linkage import Compiled
     from linkage_ros.kinematics.compiling.solve import Solver
     from linkage_ros.kinematics.compiling.trace import Wanted
-    from linkage_ros.kinematics.inverse_closure import Inverse, InverseClosure
+    from linkage_ros.kinematics.crank_branches import Inverse
     from linkage_ros.kinematics.link_frames import LinkFrames
     from linkage_ros.kinematics.point_tracker import PointTracker
     from numpy.typing import ArrayLike
@@ -420,9 +420,7 @@ class Closure:
             If the joint is unknown or does not move, or several branches are within the limits.
 
         """
-        from linkage_ros.kinematics.inverse_closure import (
-            InverseClosure,  # local import: only few ask for it
-        )
+        from linkage_ros import InverseClosure  # local import: only few ask for it
 
         inverse = self._inverse(joint)
         return InverseClosure(self, inverse, inverse.branch(branch, near))
@@ -453,7 +451,7 @@ class Closure:
 
     def _inverse(self, joint: str) -> Inverse:
         """Return a joint with its branches over the crank; they are made once."""
-        from linkage_ros.kinematics.inverse_closure import (
+        from linkage_ros.kinematics.crank_branches import (
             inverse_of,  # local import: only few ask for it
         )
 

@@ -30,8 +30,9 @@ compiled closed form; two steps are usual. So a crank depends on y and the branc
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from math import atan2, ceil, floor, inf, isfinite, nan, pi, remainder, sin, sqrt, tau
-from typing import NamedTuple, TYPE_CHECKING
+from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, did_you_mean, listed
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
@@ -39,11 +40,8 @@ from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.trace import Motion, Wanted
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.ranges import golden, last_inside
-from linkage_ros.kinematics.results import InputRange
+from linkage_ros.kinematics.results import InputRange, LoopClosure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
-
-if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure
 
 _CELLS = 32
 """Cells of a table, for each turn of the crank."""
@@ -68,6 +66,9 @@ _DEEPER = 10.0
 _FLAT_SLOPE = 1e-9
 """The slope of an output that stands, of its mean slope on the branch."""
 
+_BESIDE_TOGGLE = 1e-12
+"""Distance from a toggle, of a branch's width, within which the crank is extrapolated."""
+
 _NEAR, _NEARER = 1e-6, 1e-8
 """Where the slope is taken near an end of a branch, of its width: it tells the kind of the end."""
 
@@ -86,7 +87,7 @@ class Output(NamedTuple):
         return 'rad' if self.turning else 'm'
 
 
-def output_named(closure: Closure, name: str) -> Output:
+def output_named(closure: LoopClosure, name: str) -> Output:
     """Return the output of a name, such as ``rocker_joint`` or ``P.x``; refuse unknown names."""
     if name in closure.input_names:
         raise DefinitionError(name, 'is an input', 'name a joint that depends on it')
@@ -94,7 +95,8 @@ def output_named(closure: Closure, name: str) -> Output:
         number = closure.joint_names.index(name)
 
         def joint(motion: Motion) -> Sequence[Sequence[float]]:
-            return [part.joints[number : number + 1] for part in motion if part is not None]
+            end = number + 1
+            return [part.joints[number:end] for part in motion if part is not None]
 
         return Output(name, closure.turning[number], joint, closure.linkage.joints[name])
     point, _, axis = name.rpartition('.')
@@ -190,7 +192,16 @@ class CrankBranch:
         """Make the table of cranks and their slopes at equal steps of s."""
         turns = ceil((self.most - self.least) / tau) if self._evaluate.crank_turns else 1
         self._cells = cells = _CELLS * max(1, turns)
-        self._steep_cells = [i for i, is_steep in zip((0, cells - 1), self.steep) if is_steep]
+        # For the cells beside a toggle: its crank and output, a crank beside it, and how far the
+        # output moves up to there.
+        self._steep_cells: dict[int, tuple[tuple[float, float], float, float]] = {}
+        middle = 0.5 * (self.first + self.last)
+        for i, is_steep, at in zip((0, cells - 1), self.steep, (piece[0], piece[-1]), strict=True):
+            if is_steep:
+                beside = at[0] + 2.0 * _BESIDE_TOGGLE * (middle - at[0])
+                moved = self._evaluate(beside)[0] - at[1]
+                moved = remainder(moved, tau) if self.turning else moved
+                self._steep_cells[i] = (at, beside, abs(moved))
         self.cranks, slopes = [self.first], [0.0]
         way, height = (1.0 if self.last > self.first else -1.0), self.high - self.low
         k = 0
@@ -204,19 +215,26 @@ class CrankBranch:
         self.cranks.append(self.last)
         slopes.append(0.0)
         both = all(self.turns_back)
-        for end, i in enumerate((0, cells)):
-            far, nearer = near[end]
-            if self.turns_back[end]:
+        for number, i in enumerate((0, cells)):
+            far, nearer = near[number]
+            if self.turns_back[number]:
                 # y = end ± k·s², and it bends by f″ = slope/distance: dθ/ds = √(2k/f″).
                 bend = far / (_NEAR * (self.most - self.least))
                 slopes[i] = sqrt((0.5 * pi * pi if both else 2.0) * height / bend)
-            elif not self.steep[end]:
+            elif not self.steep[number]:
                 slopes[i] = self._at_share(i / cells)[1] / nearer if nearer else inf
-        self._slopes = []
+        tangents = []
         for i, slope in enumerate(slopes):
             # Within three times the slopes beside it, the table rises or falls everywhere.
-            beside = [abs(self.cranks[j + 1] - self.cranks[j]) for j in (i - 1, i) if 0 <= j < cells]
-            self._slopes.append(way * min(slope / cells, 3.0 * min(beside)))
+            before, after = max(i - 1, 0), i + 2
+            chords = [abs(q - p) for p, q in pairwise(self.cranks[before:after])]
+            tangents.append(way * min(slope / cells, 3.0 * min(chords)))
+        # A cubic on each cell, from its start.
+        self._cubics = [
+            (p, s, 3.0 * (q - p) - 2.0 * s - e, 2.0 * (p - q) + s + e)
+            for (p, q), (s, e) in zip(pairwise(self.cranks), pairwise(tangents), strict=True)
+        ]
+        self._known = self._evaluate.fast, self.turning, self._greatest_last, self.least, self.most
 
     def _at_share(self, s: float) -> tuple[float, float]:
         """Return the output at s, and its derivative by s."""
@@ -276,10 +294,10 @@ class CrankBranch:
         place = self._share(y) * cells
         i = min(int(place), cells - 1)
         t = place - i
-        p, q, s, e = self.cranks[i], self.cranks[i + 1], self._slopes[i], self._slopes[i + 1]
-        crank = p + t * (s + t * (3.0 * (q - p) - 2.0 * s - e + t * (2.0 * (p - q) + s + e)))
+        p, s, bend, twist = self._cubics[i]
+        crank = p + t * (s + t * (bend + t * twist))
         if i not in self._steep_cells:
-            fast, turning, last = self._evaluate.fast, self.turning, self._greatest_last
+            fast, turning, last, least, most = self._known
             for _ in range(_STEPS):
                 found = fast(crank, 1.0)
                 if found is None:
@@ -293,15 +311,24 @@ class CrankBranch:
                 step = off / slope
                 crank -= step
                 if -last < step < last:
-                    if self.least <= crank <= self.most:
+                    if least <= crank <= most:
                         return crank + turns, slope
                     break
-        crank, slope = self._narrow(y, p, q)
+        else:
+            (end, value), beside, moved = self._steep_cells[i]
+            if (way := abs(y - value)) < moved:
+                # So near the toggle the closed form has too few digits: the crank goes as y².
+                return end + (beside - end) * (way / moved) ** 2 + turns, inf
+        crank, slope = self._narrow(y, p, self.cranks[i + 1], crank)
         return crank + turns, slope
 
-    def _narrow(self, y: float, below: float, above: float) -> tuple[float, float]:
-        """Return the crank at a value between two others, to neighbouring floats, and the slope."""
-        crank = 0.5 * (below + above)
+    def _narrow(
+        self, y: float, below: float, above: float, start: float = nan
+    ) -> tuple[float, float]:
+        """Return the crank at a value between two others, to the last bit, and the slope."""
+        crank = start
+        if not min(below, above) < crank < max(below, above):
+            crank = 0.5 * (below + above)
         slope = nan
         for number in range(_BISECTIONS):
             value, slope = self._evaluate(crank)
@@ -328,7 +355,7 @@ class CrankBranch:
 class OutputFunction:
     """An output over the crank, with its slope, both NaN where the linkage does not close."""
 
-    def __init__(self, closure: Closure, output: Output) -> None:
+    def __init__(self, closure: LoopClosure, output: Output) -> None:
         compiled = Compiled(closure, 1, output.wanted, within_limits=False)
         self._compiled = compiled
         self.fast = compiled.fast
@@ -346,7 +373,9 @@ class OutputFunction:
         return value, slope
 
 
-def crank_branches(closure: Closure, output: Output, *, limited: bool = True) -> list[CrankBranch]:
+def crank_branches(
+    closure: LoopClosure, output: Output, *, limited: bool = True
+) -> list[CrankBranch]:
     """
     Return the branches of an output over a single input, by the crank at which they begin.
 
@@ -389,6 +418,10 @@ def _pieces(
 
     Each is a list of cranks with the output, in order.
     """
+
+    def does_close(crank: float) -> bool:
+        return isfinite(evaluate(crank)[0])
+
     low, high = interval.lowest, interval.highest
     count = _SAMPLES
     if interval.turning:
@@ -401,18 +434,27 @@ def _pieces(
     turns = list(_turning_points(evaluate, sampled))
     if interval.whole:
         turns = sorted(low + (turn - low) % (high - low) for turn in turns)
-    ends = _real_turns(evaluate, turns, interval)
+    turns = _real_turns(evaluate, turns, interval)
     known = [(crank, value) for crank, value, _ in sampled if isfinite(value)]
     begin, end = low, high
     if interval.whole:
-        if ends:
-            begin, end = ends[0], ends[0] + (high - low)
+        if turns:
+            begin, end = turns[0], turns[0] + (high - low)
         known = sorted((begin + (crank - begin) % (high - low), value) for crank, value in known)
-    places = [begin, *(turn for turn in ends if begin < turn < end), end]
-    for first, last in zip(places, places[1:]):
+    places = [begin, *(turn for turn in turns if begin < turn < end), end]
+    for first, last in pairwise(places):
         inner = [(crank, value) for crank, value in known if first < crank < last]
-        piece = [(first, evaluate(first)[0]), *inner, (last, evaluate(last)[0])]
-        yield _unwrapped(piece) if evaluate.turning else piece, interval.whole and not ends
+        if not inner:
+            middle = 0.5 * (first + last)
+            inner = [(middle, evaluate(middle)[0])]
+        # The end of a range is rounded, and may lie beyond the toggle.
+        ends = [
+            end if isfinite(evaluate(end)[0]) else last_inside(does_close, inside, end)
+            for inside, end in ((inner[0][0], first), (inner[-1][0], last))
+        ]
+        piece = [(end, evaluate(end)[0]) for end in ends]
+        piece[1:1] = inner
+        yield _unwrapped(piece) if evaluate.turning else piece, interval.whole and not turns
 
 
 def _turning_points(
@@ -421,11 +463,14 @@ def _turning_points(
     """Yield the cranks at which the slope changes its sign, also twice between samples."""
     known = [(crank, slope) for crank, _, slope in sampled if isfinite(slope) and slope]
 
+    def signed(sign: float) -> Callable[[float], float]:
+        return lambda crank: evaluate(crank)[1] * sign
+
     def within(sign: float) -> Callable[[float], bool]:
         return lambda crank: evaluate(crank)[1] * sign > 0.0
 
     for i in range(1, len(known)):
-        (before, slope_before), (here, slope) = known[i - 1 : i + 1]
+        (before, slope_before), (here, slope) = known[i - 1], known[i]
         if slope_before * slope < 0.0:
             yield last_inside(within(slope_before), before, here)
         elif i + 1 < len(known):
@@ -434,7 +479,7 @@ def _turning_points(
             sides = sign * slope_before, sign * slope_after
             # A valley that is shallow beside its height does not reach zero.
             if min(sides) >= abs(slope) and _DEEPER * (sum(sides) - 2.0 * abs(slope)) > abs(slope):
-                least, at = golden(lambda x, s=sign: s * evaluate(x)[1], before, after)
+                least, at = golden(signed(sign), before, after)
                 if least < 0.0:
                     yield last_inside(within(slope), before, at)
                     yield last_inside(within(slope), after, at)
@@ -476,3 +521,73 @@ def _unwrapped(piece: list[tuple[float, float]]) -> list[tuple[float, float]]:
         found.append((crank, angle - tau * round((angle - found[-1][1]) / tau)))
     turns = tau * round(0.5 * (found[0][1] + found[-1][1]) / tau)
     return [(crank, angle - turns) for crank, angle in found]
+
+
+class Inverse(NamedTuple):
+    """An output of a linkage with its branches over the crank."""
+
+    output: Output
+    branches: Sequence[CrankBranch]
+
+    def cranks(self, value: float) -> list[tuple[int, float]]:
+        """Return the cranks at which the output has a value, each after its branch."""
+        found = []
+        for branch in self.branches:
+            values = [value]
+            if self.output.turning and not branch.rise:
+                # A branch may span several turns.
+                lowest, highest = branch.low - branch.slack, branch.high + branch.slack
+                turns = range(ceil((lowest - value) / tau), floor((highest - value) / tau) + 1)
+                values = [value + tau * k for k in turns]
+            found += [(branch.number, branch.find(y)[0]) for y in values if not branch.beyond(y)]
+        return found
+
+    def branch(self, number: int | None = None, near: float | None = None) -> CrankBranch:
+        """Return the branch of a number, or the one nearest a crank, or the only one."""
+        name, branches = self.output.name, self.branches
+        if number is None and near is not None:
+            return min(branches, key=lambda branch: _distance(branch, near))
+        for branch in branches:
+            if branch.number == number or (number is None and len(branches) == 1):
+                return branch
+        unit = 'rad' if branches[0].crank_turns else 'm'
+        told = listed(
+            f'{one.number} ({one.least:.6g} to {one.most:.6g} {unit})' for one in branches
+        )
+        if number is not None:
+            raise DefinitionError(
+                f'branch {number}', f'{name} has none of this number', f'use {told}'
+            )
+        raise DefinitionError(
+            name,
+            f'several cranks reach a value: {len(branches)} branches',
+            f'name a branch, or a crank near it; branches and their cranks: {told}',
+        )
+
+
+def _distance(branch: CrankBranch, crank: float) -> float:
+    """Return how far a crank is from a branch; one that turns is compared modulo a turn."""
+    if branch.crank_turns:
+        crank -= tau * round((crank - 0.5 * (branch.least + branch.most)) / tau)
+    return max(branch.least - crank, crank - branch.most, 0.0)
+
+
+def inverse_of(closure: LoopClosure, name: str) -> Inverse:
+    """
+    Return an output with its branches.
+
+    Raises
+    ------
+    DefinitionError
+        If there are several inputs, or the output is unknown or does not move.
+
+    """
+    if len(closure.input_names) > 1:
+        raise DefinitionError(
+            name, f'there are {len(closure.input_names)} inputs', 'name as many joints'
+        )
+    output = output_named(closure, name)
+    branches = crank_branches(closure, output)
+    if not branches:
+        raise DefinitionError(name, 'nothing is within the limits', 'widen the limits')
+    return Inverse(output, branches)

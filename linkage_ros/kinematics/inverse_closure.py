@@ -16,7 +16,7 @@
 A linkage with one of its dependent joints as the input.
 
 The closed form stays as it is and is inverted: the crank comes from a branch of the joint over the
-crank, everything else from the closed form at that crank. With y the joint, θ the crank, y = f(θ)::
+crank, everything else from the closed form at that crank. With the joint y = f(θ), θ the crank::
 
     θ̇ = ẏ/f′        θ̈ = (ÿ − f″·θ̇²)/f′
 """
@@ -25,19 +25,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil, floor, inf, isfinite, tau
-from typing import Any, NamedTuple, TYPE_CHECKING
+from math import inf, isfinite, tau
+from typing import Any, TYPE_CHECKING
 
-from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.trace import Motion
-from linkage_ros.kinematics.crank_branches import (
-    crank_branches,
-    CrankBranch,
-    Output,
-    output_named,
-)
+from linkage_ros.kinematics.crank_branches import CrankBranch, Inverse, Output
 from linkage_ros.kinematics.doubles import to_doubles
 from linkage_ros.kinematics.limits import Bounds
 from linkage_ros.kinematics.linkage import Input, Pose, RevoluteJoint, SlideJoint
@@ -57,72 +51,6 @@ if TYPE_CHECKING:
 
 _INSIDE = 1e-8
 """Distance from a toggle of the crank at which rates are taken, of the branch's width."""
-
-
-class Inverse(NamedTuple):
-    """An output of a linkage with its branches over the crank."""
-
-    output: Output
-    branches: Sequence[CrankBranch]
-
-    def cranks(self, value: float) -> list[tuple[int, float]]:
-        """Return the cranks at which the output has a value, each after its branch."""
-        found = []
-        for branch in self.branches:
-            values = [value]
-            if self.output.turning and not branch.rise:
-                # A branch may span several turns.
-                lowest, highest = branch.low - branch.slack, branch.high + branch.slack
-                turns = range(ceil((lowest - value) / tau), floor((highest - value) / tau) + 1)
-                values = [value + tau * k for k in turns]
-            found += [(branch.number, branch.find(y)[0]) for y in values if not branch.beyond(y)]
-        return found
-
-    def branch(self, number: int | None = None, near: float | None = None) -> CrankBranch:
-        """Return the branch of a number, or the one nearest a crank, or the only one."""
-        name, branches = self.output.name, self.branches
-        if number is None and near is not None:
-            return min(branches, key=lambda branch: _distance(branch, near))
-        for branch in branches:
-            if branch.number == number or len(branches) == 1 and number is None:
-                return branch
-        unit = 'rad' if branches[0].crank_turns else 'm'
-        told = listed(f'{one.number} ({one.least:.6g} to {one.most:.6g} {unit})' for one in branches)
-        if number is not None:
-            raise DefinitionError(f'branch {number}', f'{name} has none of this number', f'use {told}')
-        raise DefinitionError(
-            name,
-            f'several cranks reach a value: {len(branches)} branches',
-            f'name a branch, or a crank near it; branches and their cranks: {told}',
-        )
-
-
-def _distance(branch: CrankBranch, crank: float) -> float:
-    """Return how far a crank is from a branch; one that turns is compared modulo a turn."""
-    if branch.crank_turns:
-        crank -= tau * round((crank - 0.5 * (branch.least + branch.most)) / tau)
-    return max(branch.least - crank, crank - branch.most, 0.0)
-
-
-def inverse_of(closure: Closure, name: str) -> Inverse:
-    """
-    Return an output with its branches.
-
-    Raises
-    ------
-    DefinitionError
-        If there are several inputs, or the output is unknown or does not move.
-
-    """
-    if len(closure.input_names) > 1:
-        raise DefinitionError(
-            name, f'there are {len(closure.input_names)} inputs', 'name as many joints'
-        )
-    output = output_named(closure, name)
-    branches = crank_branches(closure, output)
-    if not branches:
-        raise DefinitionError(name, 'nothing is within the limits', 'widen the limits')
-    return Inverse(output, branches)
 
 
 class _GivenState(State):
@@ -264,28 +192,32 @@ class InverseClosure(Closure):
 
         (given,) = self._one('inputs', inputs)
         values = to_doubles('inputs', given)
-        speeds = np.broadcast_to(to_doubles('rates', 1.0 if rates is None else rates), values.shape)
+        speeds = np.broadcast_to(
+            to_doubles('rates', 1.0 if rates is None else rates), values.shape
+        )
         changes = to_doubles('accelerations', 0.0 if accelerations is None else accelerations)
         changes = np.broadcast_to(changes, values.shape)
         shape = len(self.joint_names), len(values)
-        batch = out or Batch(
-            np.zeros(len(values), np.uint8), *(np.empty(shape) for _ in range(1 + derivatives))
-        )
-        for array in batch[1 : 2 + derivatives]:
-            array[...] = np.nan
+        arrays = [np.full(shape, np.nan) for _ in range(1 + derivatives)]
+        status = np.empty(len(values), np.uint8)
         for k, y in enumerate(values.tolist()):
             position = self.position(y)
-            batch.status[k] = CODES[position.status]
+            status[k] = CODES[position.status]
             if not position.joints:
                 continue
-            batch.positions[:, k] = position.joints
+            arrays[0][:, k] = position.joints
             if derivatives and position.status.has_rates:
                 velocity = self.velocity(position, float(speeds[k]))
-                batch.velocities[:, k] = velocity.joints
+                arrays[1][:, k] = velocity.joints
                 if derivatives > 1:
                     found = self.acceleration(position, velocity, float(changes[k]))
-                    batch.accelerations[:, k] = found.joints
-        return batch
+                    arrays[2][:, k] = found.joints
+        if out is None:
+            return Batch(status, *arrays)
+        for mine, theirs in zip((status, *arrays), out, strict=False):
+            assert theirs is not None, 'it takes what was asked for'
+            theirs[...] = mine
+        return out
 
     def inputs_of(self, state: State) -> tuple[float, ...]:
         """Return the joint that is the input, or its rate, in [rad] or [m]."""
@@ -294,25 +226,27 @@ class InverseClosure(Closure):
 
     @BuiltProperty
     def input_ranges(self) -> tuple[InputRange, ...]:
-        """The range of the joint on its branch."""
+        """Return the range of the joint on its branch."""
         one = self.branch
         turns = max(1, round(abs(one.rise) / tau))
-        return (InputRange(one.low, one.high, self.inverse.output.turning, turns=turns, by=one.by),)
+        return (
+            InputRange(one.low, one.high, self.inverse.output.turning, turns=turns, by=one.by),
+        )
 
     @BuiltProperty
     def closing_ranges(self) -> tuple[InputRange, ...]:
-        """The same: limits cut the branch."""
+        """Return the same: limits cut the branch."""
         return self.input_ranges
 
     @BuiltProperty
     def singular_inputs(self) -> tuple[SingularInput, ...]:
-        """Where the joint turns back: there the crank has no rate."""
+        """Return where the joint turns back: there the crank has no rate."""
         ends = zip((self.branch.low, self.branch.high), self.branch.turns_back, strict=True)
         return tuple(SingularInput(end, Status.TOGGLE) for end, back in ends if back)
 
     @BuiltProperty
     def zero_length(self) -> float | None:
-        """None: the range is that of a branch."""
+        """Return none: the range is that of a branch."""
         return None
 
     def singularity_margin(self, position: Position) -> SingularityMargin:

@@ -1,0 +1,401 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Any joint of a linkage with one input is the input: the crank, its rates, and all branches."""
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from math import pi, remainder, sqrt, tau
+import os
+import pickle
+import random
+import subprocess
+import sys
+
+from linkage_ros import Closure, DefinitionError, Limits, linkage_names, load
+from linkage_ros.accuracy.reference import Reference, SingularError
+from linkage_ros.kinematics.batch import CODES
+from linkage_ros.kinematics.crank_branches import _pieces, CrankBranch
+from linkage_ros.kinematics.results import InputRange
+from linkage_ros.kinematics.status import Status
+import numpy as np
+import pytest
+
+from .linkages import four_bar_linkage
+
+U = 2.0**-53
+STATES = int(os.environ.get('LINKAGE_STATES', '100'))
+"""States on each branch; 10⁶ in all take LINKAGE_STATES=6000."""
+
+LINKAGES = [
+    name
+    for name in linkage_names()
+    if len(load(name).input_names) == 1 and name not in ('class_3', 'parallelogram')
+]
+
+
+@cache
+def gallery(name):
+    return load(name)
+
+
+def outputs(closure):
+    """Return the dependent joints that move."""
+    return [joint for joint in closure.joint_names if joint not in closure.input_names]
+
+
+def numbers(count):
+    """Return shares of a branch: at random, and at 1e-14 of both ends."""
+    rng = random.Random(1)
+    return [1e-14, 1.0 - 1e-14, *(rng.random() for _ in range(count))]
+
+
+def slopes_of(closure, joint, cranks):
+    """Return joint and slope at many cranks, by the blocks of `solve`, not by compiled code."""
+    batch = closure.solve(np.array(cranks), derivatives=1)
+    row = closure.joint_names.index(joint)
+    return batch.positions[row], batch.velocities[row]
+
+
+@pytest.mark.parametrize('name', LINKAGES)
+def test_crank_is_as_exact_as_the_roundings_allow(name):
+    """|θ − exact| ≤ 8·u·(|θ| + (|y| + 2π)/|f′| + 1), all of it times |f′|."""
+    closure = gallery(name)
+    for joint in outputs(closure):
+        for branch in closure.driven_by(joint, near=0.0).inverse.branches:
+            span = branch.high - branch.low
+            wanted = np.array([branch.low + share * span for share in numbers(STATES)])
+            cranks = np.array([branch.find(y)[0] for y in wanted])
+            found, slopes = slopes_of(closure, joint, cranks)
+            off = found - wanted
+            if branch.turning:
+                off -= tau * np.round(off / tau)
+            size = tau if branch.turning else closure.scale
+            bound = np.abs(slopes) * (np.abs(cranks) + 1.0) + np.abs(wanted) + size
+            known = np.isfinite(slopes)
+            for state, end in enumerate((branch.first, branch.last)):
+                if branch.steep[state]:  # The exact crank is some 1e-28 from its end.
+                    assert abs(cranks[state] - end) <= 8.0 * U * (abs(end) + 1.0)
+                    known[state] = False
+            assert known.sum() > 0.9 * len(known) - 2
+            assert np.max(np.abs(off[known]) / bound[known]) <= 8.0 * U, joint
+            if not any(branch.steep):
+                assert np.max(np.abs(off)) <= 4e-15, joint
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'double_rocker', 'jansen_leg'])
+def test_exact_crank_lies_within_the_bound(name):
+    """The joint, to fifty digits, passes the wanted value within the bound about the crank."""
+    closure = gallery(name)
+    reference = Reference(closure.linkage)
+    for joint in outputs(closure)[-2:]:
+        number = closure.joint_names.index(joint)
+        for branch in closure.driven_by(joint, near=0.0).inverse.branches:
+            for share in numbers(3):
+                y = branch.low + share * (branch.high - branch.low)
+                crank, slope = branch.find(y)
+                size = tau if branch.turning else closure.scale
+                bound = 8.0 * U * (abs(crank) + (abs(y) + size) / abs(slope) + 1.0)
+                sides = []
+                for place in (crank - bound, crank + bound):
+                    if not branch.least < place < branch.most:
+                        break  # The exact crank cannot be beyond the end.
+                    try:
+                        at = reference.solve([place])
+                    except (SingularError, ValueError):
+                        break
+                    off = at.joints[number] - y
+                    sides.append(off - tau * round(float(off) / tau) if branch.turning else off)
+                assert len(sides) < 2 or sides[0] * sides[1] <= 0, (joint, share)
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'double_rocker', 'klann_leg'])
+def test_rates_of_the_crank_give_the_joint_its_rates(name):
+    """The reference, driven by the crank's rates, moves the joint as was asked."""
+    closure = gallery(name)
+    reference = Reference(closure.linkage)
+    for joint in [*outputs(closure)[:2], outputs(closure)[-1]]:
+        number = closure.joint_names.index(joint)
+        for branch in closure.driven_by(joint, near=0.0).inverse.branches:
+            inverse = closure.driven_by(joint, branch.number)
+            for share in (0.1, 0.37, 0.8):
+                position = inverse.position(branch.low + share * (branch.high - branch.low))
+                velocity = inverse.velocity(position, 0.7)
+                acceleration = inverse.acceleration(position, velocity, -1.3)
+                truth = reference.solve(
+                    [position.joints[0]], [velocity.joints[0]], [acceleration.joints[0]]
+                )
+                assert float(truth.rates[number]) == pytest.approx(0.7, rel=1e-11)
+                assert float(truth.accelerations[number]) == pytest.approx(-1.3, rel=1e-10)
+                for row, other in enumerate(inverse.joint_names[1:], 1):
+                    at = closure.joint_names.index(other)
+                    assert velocity.joints[row] == pytest.approx(float(truth.rates[at]), rel=1e-9)
+                    assert position.joints[row] == closure.position(position.joints[0]).joints[at]
+
+
+def random_four_bars(count):
+    rng = random.Random(33)
+    while count:
+        lengths = tuple(rng.uniform(0.2, 1.0) for _ in range(4))
+        try:
+            closure = Closure(four_bar_linkage(lengths, rng.choice(('left', 'right'))))
+        except DefinitionError:
+            continue
+        if closure.input_ranges:
+            count -= 1
+            yield closure
+
+
+def scanned(closure, joint, value, count=40_000):
+    """Return how often a joint passes a value while the crank goes through its ranges."""
+    passed = 0
+    row = closure.joint_names.index(joint)
+    for low, high, *_ in closure.input_ranges:
+        # Denser towards the ends, as the joint is.
+        cranks = low + (high - low) * (0.5 - 0.5 * np.cos(np.linspace(0.0, pi, count)))
+        off = closure.solve(np.clip(cranks, low, high), derivatives=0).positions[row] - value
+        if closure.turning[row]:
+            off -= tau * np.round(off / tau)
+        signs = np.signbit(off)
+        passed += np.sum((signs[1:] != signs[:-1]) & (np.abs(np.diff(off)) < 1.0))
+    return int(passed)
+
+
+def closures_to_scan():
+    yield from (gallery(name) for name in LINKAGES)
+    yield from random_four_bars(STATES)
+
+
+def test_all_cranks_of_a_value_are_found():
+    rng = random.Random(5)
+    cases = 0
+    for closure in closures_to_scan():
+        joint = rng.choice(outputs(closure))
+        low, high = closure.input_ranges[0][:2]
+        value = closure.position(rng.uniform(low, high))[joint]
+        found = closure.cranks(joint, value)
+        for _, crank in found:
+            away = closure.position(crank)[joint] - value
+            turning = closure.turning[closure.joint_names.index(joint)]
+            slope = slopes_of(closure, joint, [crank])[1][0]
+            allowed = 1e-12 + 1e-14 * (abs(slope) if np.isfinite(slope) else 1e8)
+            assert abs(remainder(away, tau) if turning else away) <= allowed
+        cranks = sorted(remainder(crank, tau) for _, crank in found)
+        assert all(after - before > 1e-9 for before, after in pairwise(cranks))
+        assert len(found) >= scanned(closure, joint, value), (closure, joint, value)
+        cases += 1
+    assert cases >= STATES
+
+
+def test_calls_in_any_order_give_the_same_bits():
+    values = np.linspace(0.97, 2.24, 500).tolist()
+    once = [load('four_bar').driven_by('rocker_joint', 2).position(y).joints for y in values[::50]]
+    inverse = load('four_bar').driven_by('rocker_joint', 2)
+    random.Random(2).shuffle(values)
+    found = {y: inverse.position(y).joints for y in values}
+    assert [found[y] for y in sorted(values)[::50]] == once
+
+
+def test_joint_that_turns_back_is_a_toggle_there_and_open_beyond():
+    inverse = load('four_bar').driven_by('rocker_joint', branch=1)
+    # The dead centres of the crank-rocker: coupler and crank in line (cosine rule).
+    a, b, c, d = _lengths(load('four_bar').linkage)
+    for reach, end in ((b + a, inverse.branch.low), (b - a, inverse.branch.high)):
+        at_ground = np.arccos((c * c + d * d - reach * reach) / (2 * c * d))
+        assert end == pytest.approx(pi - at_ground, abs=1e-14)
+        position = inverse.position(end)
+        assert position.status is Status.TOGGLE
+        with pytest.raises(ValueError, match='toggle has none'):
+            inverse.velocity(position, 1.0)
+    beyond = inverse.position(inverse.branch.high + 0.25)
+    assert (beyond.status, beyond.gap) == (Status.OPEN, pytest.approx(0.25))
+    assert '0.25 rad' in repr(beyond)
+    assert inverse.position(float('nan')).status is Status.INDETERMINATE
+
+
+def _lengths(linkage):
+    def length(link):
+        (x, y), (u, v) = list(linkage.links[link].values())[:2]
+        return sqrt((x - u) ** 2 + (y - v) ** 2)
+
+    return [length(link) for link in ('crank', 'coupler', 'rocker', 'ground')]
+
+
+def test_crank_at_its_toggle_stands_while_the_joint_moves():
+    for number in (1, 2, 3, 4):
+        inverse = load('double_rocker').driven_by('right_rocker_joint', number)
+        end = inverse.input_ranges[0][inverse.branch.steep.index(True)]
+        middle = 0.5 * (inverse.branch.low + inverse.branch.high)
+        position = inverse.position(end)
+        velocity = inverse.velocity(position, 0.5)
+        acceleration = inverse.acceleration(position, velocity, 0.2)
+        assert position.status is Status.CLOSED
+        assert velocity.joints[0] == 0.0
+        step = 1e-4 if middle > end else -1e-4
+        beside = inverse.position(end + step)
+        assert beside.joints[0] == pytest.approx(
+            position.joints[0] + 0.5 * step**2 * acceleration.joints[0] / 0.25, abs=1e-10
+        )
+        moving = inverse.velocity(beside, 0.5)
+        assert velocity.joints == pytest.approx(moving.joints, abs=2e-3)
+        nearly = inverse.acceleration(beside, moving, 0.2)
+        assert acceleration.joints == pytest.approx(nearly.joints, abs=5e-3)
+
+
+def test_whole_turns_of_a_joint_that_turns_on_are_turns_of_the_crank():
+    inverse = load('drag_link').driven_by('rocker_joint')
+    first = inverse.position(1.0).joints[0]
+    for turns in (-3, 2, 1000):
+        crank = inverse.position(1.0 + tau * turns).joints[0]
+        assert crank - tau * turns == pytest.approx(first, abs=1e-12)
+    backwards = load('four_bar').driven_by('coupler_joint')
+    assert backwards.position(0.1 + tau).joints[0] < backwards.position(0.1).joints[0]
+
+
+def test_joint_that_oscillates_is_compared_modulo_a_turn():
+    inverse = load('four_bar').driven_by('rocker_joint', 1)
+    assert inverse.position(1.2 + 3 * tau).joints[0] == pytest.approx(
+        inverse.position(1.2).joints[0], abs=1e-13
+    )
+
+
+def test_limits_cut_branches():
+    linkage = load('four_bar').linkage
+    crank = replace(linkage.inputs[0], limits=Limits(0.5, 3.0))
+    closure = Closure(replace(linkage, inputs=(crank,)))
+    inverse = closure.driven_by('rocker_joint')  # Only one is left.
+    assert inverse.branch.by == ('crank_joint', 'crank_joint')
+    assert inverse.position(closure.position(3.0)['rocker_joint']).status is Status.CLOSED
+    ends = [closure.position(x)['rocker_joint'] for x in (0.5, 3.0)]
+    assert inverse.input_ranges[0][:2] == pytest.approx(tuple(ends), abs=1e-14)
+    assert inverse.position(ends[1] + 0.1).status is Status.OPEN
+    assert closure.cranks('rocker_joint', ends[1] + 0.1) == []
+
+
+def test_iterated_linkage_is_inverted_along_its_branch():
+    closure = load('class_3')
+    inverse = closure.driven_by('platform_joint', 1)
+    y = 0.5 * (inverse.branch.low + inverse.branch.high)
+    position = inverse.position(y)
+    again = closure.position(position.joints[0])
+    assert again['platform_joint'] == pytest.approx(y, abs=1e-14)
+    velocity = inverse.velocity(position, 1.0)
+    acceleration = inverse.acceleration(position, velocity, 0.0)
+    step = 1e-4
+    one, other = (inverse.position(y + k * step).joints[0] for k in (1, -1))
+    assert velocity.joints[0] == pytest.approx((one - other) / (2 * step), rel=1e-6)
+    bend = (one + other - 2 * position.joints[0]) / step**2
+    assert acceleration.joints[0] == pytest.approx(bend, rel=1e-4)
+
+
+def test_coordinate_of_a_traced_point_is_an_input():
+    closure = load('jansen_leg')
+    for branch, crank in closure.cranks('foot.y', -0.8):
+        assert closure.position(crank).points['foot'].imag == pytest.approx(-0.8, abs=1e-15)
+        inverse = closure.driven_by('foot.y', branch)
+        position = inverse.position(-0.8)
+        velocity = inverse.velocity(position, 0.1)
+        acceleration = inverse.acceleration(position, velocity, 0.2)
+        motion = next(
+            found
+            for (_, point), found in inverse.point_motion(position, velocity, acceleration).items()
+            if point == 'foot'
+        )
+        assert motion.place.imag == pytest.approx(-0.8, abs=1e-15)
+        assert motion.velocity.imag == pytest.approx(0.1, rel=1e-12)
+        assert motion.acceleration.imag == pytest.approx(0.2, rel=1e-11)
+
+
+def test_many_states_are_those_of_single_calls():
+    inverse = load('four_bar').driven_by('rocker_joint', 1)
+    values = np.linspace(0.5, 2.5, 40)
+    batch = inverse.solve(values, rates=2.0, accelerations=0.5)
+    for k, y in enumerate(values.tolist()):
+        position = inverse.position(y)
+        assert batch.status[k] == CODES[position.status]
+        if position.status.has_rates:
+            velocity = inverse.velocity(position, 2.0)
+            acceleration = inverse.acceleration(position, velocity, 0.5)
+            found = (position.joints, velocity.joints, acceleration.joints)
+            assert [tuple(group[:, k]) for group in batch[1:]] == [*found]
+
+
+def test_inverse_is_pickled_with_its_branch():
+    inverse = load('four_bar').driven_by('rocker_joint', 2)
+    position = inverse.position(1.5)
+    again = pickle.loads(pickle.dumps((inverse, position)))
+    assert again[0].position(1.5).joints == position.joints
+    assert again[1].inputs == (1.5,)
+
+
+@pytest.mark.parametrize(
+    ('name', 'arguments', 'line'),
+    [
+        ('four_bar', ('rockr_joint',), "did you mean 'rocker_joint'?"),
+        ('four_bar', ('crank_joint',), 'crank_joint: is an input'),
+        ('four_bar', ('rocker_joint',), '2 branches; name a branch, or a crank near it'),
+        ('four_bar', ('rocker_joint', 3), 'branch 3: rocker_joint has none of this number'),
+        ('five_bar', ('left_joint',), 'left_joint: there are 2 inputs'),
+        ('peaucellier', ('P.x',), 'P.x: does not move with the input'),
+    ],
+)
+def test_what_cannot_be_asked_is_one_line(name, arguments, line):
+    with pytest.raises(DefinitionError) as error:
+        load(name).driven_by(*arguments)
+    assert line in str(error.value)
+    assert '\n' not in str(error.value)
+
+
+def test_nothing_is_imported_that_was_not_asked_for():
+    code = (
+        'import sys, linkage_ros as lr; lr.load("four_bar").position(0.7); '
+        'print(sorted(name for name in sys.modules if "inverse" in name or "crank_br" in name))'
+    )
+    told = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == '[]'
+
+
+class Cubic:
+    """An output x³ + bend·x² over the crank, with slopes that are noisy as rounded ones."""
+
+    turning, crank_turns, size = False, True, 1.0
+
+    def __init__(self, bend=0.0):
+        self.bend = bend
+        self.rng = random.Random(3)
+
+    def __call__(self, crank):
+        noise = self.rng.uniform(-1e-16, 1e-16)
+        return crank**3 + self.bend * crank**2, 3.0 * crank**2 + 2.0 * self.bend * crank + noise
+
+    def fast(self, crank, _rate):
+        return tuple((value,) for value in self(crank))
+
+
+def test_flat_place_within_a_branch_goes_on():
+    output = Cubic()
+    ((piece, turns_on),) = _pieces(output, InputRange(-1.1, 0.9))
+    assert not turns_on
+    branch = CrankBranch(output, piece, 1)
+    for y in (-1.0, -1e-3, -1e-9, 1e-6, 0.5):
+        assert branch.find(y)[0] == pytest.approx(np.cbrt(y), rel=1e-12)
+    assert abs(branch.find(0.0)[1]) < branch.flat
+
+
+@pytest.mark.parametrize('bend', [1e-2, 1e-3, -1e-3])
+def test_joint_that_turns_back_only_a_little_has_three_branches(bend):
+    pieces = list(_pieces(Cubic(bend), InputRange(-1.1, 0.9)))
+    ends = [piece[0][0] for piece, _ in pieces[1:]]
+    assert ends == pytest.approx(sorted((0.0, -2.0 * bend / 3.0)), abs=1e-12)
