@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 import json
 from math import ceil, tau
 import sys
@@ -27,6 +28,7 @@ from typing import Any
 
 from linkage_ros.cli.arguments import add_file, add_radians, AngleUnit, finite
 from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
+from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.linkage_file import linkage_content, read_closure
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
@@ -66,6 +68,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_file(parser)
     parser.add_argument('--json', action='store_true', help='the same as JSON, in SI units')
+    parser.add_argument(
+        '--branches',
+        action='store_true',
+        help='add the branches of each dependent joint: the cranks on which it moves one way',
+    )
     add_radians(parser)
 
 
@@ -78,6 +85,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         print(f'linkage check: note: {content.located(note)}', file=sys.stderr)
     with progress('parts examined') as advance:
         account = {'file': arguments.file, **account_of(closure, advance)}
+        if arguments.branches:
+            account['branches'] = list(_branches(closure))
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
     else:
@@ -151,6 +160,30 @@ def account_of(
         ],
         **examined,
     }
+
+
+def _branches(closure: Closure) -> Iterator[dict[str, Any]]:
+    """Yield the branches of each joint that moves, and of each coordinate of a traced point."""
+    linkage = closure.linkage
+    if len(linkage.inputs) > 1:
+        raise LinkageError('--branches', f'there are {len(linkage.inputs)} inputs', 'leave it out')
+    names = [joint for joint in linkage.joints if joint != linkage.inputs[0].joint]
+    names += [f'{point}.{axis}' for point in linkage.traced for axis in 'xy']
+    for name in names:
+        with suppress(DefinitionError):  # It does not move.
+            for branch in closure.branches(name):
+                yield {
+                    'joint': name,
+                    'branch': branch.number,
+                    'input_low': branch.least,
+                    'input_high': branch.most,
+                    'unit': _unit(branch.turning),
+                    'low': branch.low,
+                    'high': branch.high,
+                    'turns_back': list(branch.turns_back),
+                    'limited_by': [by or None for by in branch.by],
+                    'rises': branch.rises,
+                }
 
 
 def _counts_turns(closure: Closure) -> bool:
@@ -379,6 +412,35 @@ def tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[Table]:
     if rows:
         heads = ['>', 'links', '>least', 'at']
         yield Table('Conditioning over the range, of what is iterated', heads, rows)
+    if 'branches' in account:
+        yield _branches_table(account, angles)
+
+
+def _branches_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
+    given = account['inputs'][0]
+    rows = []
+    for one in account['branches']:
+        cranks, joints = (
+            [angles.value_text(one[end], unit == 'rad') for end in ends]
+            for ends, unit in (
+                (('input_low', 'input_high'), given['unit']),
+                (('low', 'high'), one['unit']),
+            )
+        )
+        way = 'rises' if one['rises'] else 'falls'
+        by = ', '.join(sorted({name for name in one['limited_by'] if name}))
+        rows.append((one['joint'], str(one['branch']), *cranks, *joints, way, by))
+    heads = (
+        'joint',
+        '>branch',
+        f'>{given["joint"]} from',
+        '>to',
+        '>joint from',
+        '>to',
+        '',
+        'limits of',
+    )
+    return Table('Branches: between their ends a joint moves one way', heads, rows)
 
 
 def _facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str, str]]:

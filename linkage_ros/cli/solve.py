@@ -14,7 +14,7 @@
 
 
 """
-Solve a linkage at some inputs or over its range.
+Solve a linkage at some inputs, over its range, or for a value of a dependent joint.
 
 Angles are in (-π, π] rad. They are typed, and shown in the table, in degrees unless --radians is
 given; CSV and JSON hold radians. Slides are in metres.
@@ -27,7 +27,7 @@ from collections.abc import Iterator, Sequence
 import csv
 import io
 import json
-from math import degrees, radians
+from math import degrees, isfinite, nan, radians
 import sys
 from threading import Event
 from typing import Any, NamedTuple
@@ -83,6 +83,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
     add_at(parser, 'an input to solve for; may be repeated')
     parser.add_argument(
+        '--joint',
+        action='append',
+        type=_joint_value,
+        default=[],
+        metavar='NAME=VALUE',
+        help='solve for every input at which a dependent joint, or a coordinate of a traced point '
+        'such as P.x, has a value; --rate and --acceleration are then those of the joint; may be '
+        'repeated',
+    )
+    parser.add_argument(
         '--sweep', action='store_true', help='solve over the range; the default where no --at is'
     )
     parser.add_argument(
@@ -132,15 +142,10 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
             'leave it out: the suffix of the file says its format',
         )
     closure = load(arguments.file)
-    question = _question(closure, arguments)
-    columns = list(_columns(closure, question))
-    rows = []
-    with progress('states solved') as advance:
-        for number, given in enumerate(question.inputs):
-            if number % _TOLD == 0:
-                advance(number, len(question.inputs))
-            rows.append(_row(closure, question, given))
-    _show_reach(closure, question.inputs[: len(arguments.at)], arguments.angles)
+    if arguments.joint:
+        columns, rows = _inverse_table(closure, arguments)
+    else:
+        columns, rows = _forward_table(closure, arguments)
     kind = arguments.format or 'table'
     if arguments.output is not None:
         kind = FORMATS[arguments.output.suffix.lower()]
@@ -160,6 +165,87 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     atomic_write(arguments.output, answer.encode())
     print(arguments.output)
     return 0
+
+
+def _forward_table(
+    closure: Closure, arguments: argparse.Namespace
+) -> tuple[list[Column], list[list[Any]]]:
+    question = _question(closure, arguments)
+    rows = []
+    with progress('states solved') as advance:
+        for number, given in enumerate(question.inputs):
+            if number % _TOLD == 0:
+                advance(number, len(question.inputs))
+            rows.append(_row(closure, question, given))
+    _show_reach(closure, question.inputs[: len(arguments.at)], arguments.angles)
+    return list(_columns(closure, question)), rows
+
+
+def _inverse_table(
+    closure: Closure, arguments: argparse.Namespace
+) -> tuple[list[Column], list[list[Any]]]:
+    """Return a row for every input at which the joint has one of the typed values."""
+    name = arguments.joint[0][0]
+    swept = arguments.sweep or arguments.first is not None or arguments.last is not None
+    for option, given in (('--at', arguments.at), ('--sweep', swept)):
+        if given:
+            raise LinkageError(
+                f'--joint {name}', f'{option} is given too', 'leave one of them out'
+            )
+    columns, rows = [], []
+    for joint, typed in arguments.joint:
+        option = f'--joint {joint}={typed:g}'
+        if joint != name:
+            raise LinkageError(option, f'{name} is asked for too', 'ask for one joint at a time')
+        if joint in closure.input_names:
+            raise LinkageError(option, 'is an input', f'write --at {typed:g}')
+        turning = closure.branches(joint)[0].turning
+        value = arguments.angles.read(typed) if turning else typed
+        cranks = closure.cranks(joint, value)
+        if not cranks:
+            raise _unreached(closure, joint, value, option, arguments.angles)
+        for number, _ in cranks:
+            inverse = closure.driven_by(joint, number)
+            question = _question(inverse, arguments, [(value,)])
+            (row,) = (_row(inverse, question, given) for given in question.inputs)
+            columns = list(_columns(inverse, question))
+            crank = inverse.position(value).joints[0]
+            # The branch and its crank come first; the gap is 0.
+            rows.append([number, crank, row[1], value, *row[4:]])
+    own, status, _, crank_column, *others = columns
+    columns = [Column('branch', ''), crank_column, status, own, *others]
+    if own in others:  # A point's coordinate, of which --points shows all.
+        del columns[3]
+        for row in rows:
+            del row[3]
+    return columns, rows
+
+
+def _unreached(
+    closure: Closure, joint: str, value: float, option: str, angles: AngleUnit
+) -> LinkageError:
+    """Return the error for a value of a joint that no input within the limits reaches."""
+    free = closure.branches(joint, limited=False)
+    for branch in free:
+        if not branch.beyond(value):
+            beyond = closure.beyond(closure.position(branch.find(value)[0]))
+            reason = f'is reached only beyond limits: {beyond}'
+            return LinkageError(option, reason, 'ask for another value, or widen the limits')
+    ends = min(branch.low for branch in free), max(branch.high for branch in free)
+    low, high = (angles.value_text(end, free[0].turning) for end in ends)
+    return LinkageError(option, 'is not reached', f'{joint} goes from {low} to {high}')
+
+
+def _joint_value(text: str) -> tuple[str, float]:
+    """Read NAME=VALUE."""
+    name, _, value = text.rpartition('=')
+    try:
+        number = float(value)
+    except ValueError:
+        number = nan
+    if not name or not isfinite(number):
+        raise argparse.ArgumentTypeError(f'{text!r} is no joint with a value; write NAME=40')
+    return name, number
 
 
 def _show_reach(closure: Closure, typed: Sequence[tuple[float, ...]], angles: AngleUnit) -> None:
@@ -187,7 +273,11 @@ class Question(NamedTuple):
     points: dict[str, str]  # For each traced point, a link that carries it
 
 
-def _question(closure: Closure, arguments: argparse.Namespace) -> Question:
+def _question(
+    closure: Closure,
+    arguments: argparse.Namespace,
+    asked: Sequence[tuple[float, ...]] = (),
+) -> Question:
     linkage = closure.linkage
     in_degrees = arguments.angles.in_degrees
 
@@ -196,7 +286,7 @@ def _question(closure: Closure, arguments: argparse.Namespace) -> Question:
             return None
         return inputs(linkage, typed, option, in_degrees=in_degrees)
 
-    asked = [inputs(linkage, at, '--at', in_degrees=in_degrees) for at in arguments.at]
+    asked = [*asked, *(inputs(linkage, at, '--at', in_degrees=in_degrees) for at in arguments.at)]
     swept = arguments.sweep or arguments.first is not None or arguments.last is not None
     if swept or not asked:
         if len(linkage.inputs) > 1:
@@ -307,8 +397,8 @@ def _xy(place: complex) -> tuple[float, float]:
 
 def _table(columns: Sequence[Column], rows: Sequence[Sequence[Any]], angles: AngleUnit) -> Table:
     def cell(column: Column, value: Any) -> str:
-        if isinstance(value, str) or value is None:
-            return value or ''
+        if isinstance(value, str | int) or value is None:
+            return str(value or '')
         if column.name == 'gap':
             return f'{value:.3g}'
         return fixed(angles.of(value) if column.unit.startswith('rad') else value, _DIGITS)

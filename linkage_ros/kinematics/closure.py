@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.compiling.linkage import Compiled
     from linkage_ros.kinematics.compiling.solve import Solver
     from linkage_ros.kinematics.compiling.trace import Wanted
-    from linkage_ros.kinematics.crank_branches import Inverse
+    from linkage_ros.kinematics.crank_branches import CrankBranch, Inverse
     from linkage_ros.kinematics.link_frames import LinkFrames
     from linkage_ros.kinematics.point_tracker import PointTracker
     from numpy.typing import ArrayLike
@@ -448,6 +448,29 @@ class Closure:
 
         """
         return self._inverse(joint).cranks(to_double('value', value))
+
+    def branches(self, joint: str, *, limited: bool = True) -> Sequence[CrankBranch]:
+        """
+        Return the branches of a joint over the single input: on each it moves one way.
+
+        Parameters
+        ----------
+        joint
+            As in `driven_by`.
+        limited
+            Whether the limits of joints cut the branches.
+
+        Raises
+        ------
+        DefinitionError
+            As `driven_by`.
+
+        """
+        from linkage_ros.kinematics.crank_branches import (
+            inverse_of,  # local import: only few ask for it
+        )
+
+        return (self._inverse(joint) if limited else inverse_of(self, joint, False)).branches
 
     def _inverse(self, joint: str) -> Inverse:
         """Return a joint with its branches over the crank; they are made once."""

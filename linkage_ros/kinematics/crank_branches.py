@@ -572,9 +572,9 @@ def _distance(branch: CrankBranch, crank: float) -> float:
     return max(branch.least - crank, crank - branch.most, 0.0)
 
 
-def inverse_of(closure: LoopClosure, name: str) -> Inverse:
+def inverse_of(closure: LoopClosure, name: str, limited: bool = True) -> Inverse:
     """
-    Return an output with its branches.
+    Return an output with its branches; limits of joints cut them.
 
     Raises
     ------
@@ -587,7 +587,7 @@ def inverse_of(closure: LoopClosure, name: str) -> Inverse:
             name, f'there are {len(closure.input_names)} inputs', 'name as many joints'
         )
     output = output_named(closure, name)
-    branches = crank_branches(closure, output)
+    branches = crank_branches(closure, output, limited=limited)
     if not branches:
         raise DefinitionError(name, 'nothing is within the limits', 'widen the limits')
     return Inverse(output, branches)

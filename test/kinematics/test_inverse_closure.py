@@ -302,10 +302,10 @@ def test_iterated_linkage_is_inverted_along_its_branch():
 
 def test_coordinate_of_a_traced_point_is_an_input():
     closure = load('jansen_leg')
-    for branch, crank in closure.cranks('foot.y', -0.8):
-        assert closure.position(crank).points['foot'].imag == pytest.approx(-0.8, abs=1e-15)
+    for branch, crank in closure.cranks('foot.y', -0.08):
+        assert closure.position(crank).points['foot'].imag == pytest.approx(-0.08, abs=1e-15)
         inverse = closure.driven_by('foot.y', branch)
-        position = inverse.position(-0.8)
+        position = inverse.position(-0.08)
         velocity = inverse.velocity(position, 0.1)
         acceleration = inverse.acceleration(position, velocity, 0.2)
         motion = next(
@@ -313,7 +313,7 @@ def test_coordinate_of_a_traced_point_is_an_input():
             for (_, point), found in inverse.point_motion(position, velocity, acceleration).items()
             if point == 'foot'
         )
-        assert motion.place.imag == pytest.approx(-0.8, abs=1e-15)
+        assert motion.place.imag == pytest.approx(-0.08, abs=1e-15)
         assert motion.velocity.imag == pytest.approx(0.1, rel=1e-12)
         assert motion.acceleration.imag == pytest.approx(0.2, rel=1e-11)
 

@@ -1,0 +1,124 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``linkage solve --joint`` and ``check --branches``: which crank gives a joint a value."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from math import radians, remainder, tau
+from pathlib import Path
+
+from linkage_ros import load
+import pytest
+
+from .conftest import Run
+
+
+def solved(linkage: Run, *arguments: str) -> list[dict[str, str]]:
+    answer = linkage('solve', *arguments, '--format', 'csv')
+    assert answer.returncode == 0, answer.stderr
+    return list(csv.DictReader(io.StringIO(answer.stdout)))
+
+
+def test_every_branch_has_its_crank(linkage: Run) -> None:
+    rows = solved(linkage, 'four_bar', '--joint', 'rocker_joint=68.7549')
+    closure = load('four_bar')
+    assert [row['branch'] for row in rows] == ['1', '2']
+    for row in rows:
+        position = closure.position(float(row['crank_joint [rad]']))
+        assert position['rocker_joint'] == pytest.approx(radians(68.7549), abs=1e-15)
+        off = position['coupler_joint'] - float(row['coupler_joint [rad]'])
+        assert remainder(off, tau) == pytest.approx(0.0, abs=1e-14)
+
+
+def test_rates_are_those_of_the_joint(linkage: Run) -> None:
+    asked = ('--joint', 'foot.y=-0.08', '--rate', '0.01', '--acceleration', '0.02', '--points')
+    rows = solved(linkage, 'jansen_leg', *asked)
+    assert [row['branch'] for row in rows] == ['2', '3']
+    closure = load('jansen_leg')
+    for row in rows:
+        position = closure.position(float(row['crank_joint [rad]']))
+        velocity = closure.velocity(position, float(row['crank_joint rate [rad/s]']))
+        crank = float(row['crank_joint acceleration [rad/s²]'])
+        acceleration = closure.acceleration(position, velocity, crank)
+        motions = closure.point_motion(position, velocity, acceleration)
+        (foot,) = {motion for (_, point), motion in motions.items() if point == 'foot'}
+        found = [foot.place.imag, foot.velocity.imag, foot.acceleration.imag]
+        assert found == pytest.approx([-0.08, 0.01, 0.02], rel=1e-11)
+
+
+def test_table_and_json_hold_the_same(linkage: Run) -> None:
+    asked = ('four_bar', '--joint', 'rocker_joint=1.2', '--radians')
+    table = linkage('solve', *asked).stdout.splitlines()
+    assert table[0].split() == [
+        'branch', 'crank_joint', '[rad]', 'status',
+        'rocker_joint', '[rad]', 'coupler_joint', '[rad]',
+    ]  # fmt: skip
+    states = json.loads(linkage('solve', *asked, '--format', 'json').stdout)['states']
+    assert [state['branch'] for state in states] == [1, 2]
+    for line, state in zip(table[1:], states, strict=True):
+        assert float(line.split()[1]) == pytest.approx(state['crank_joint'], abs=1e-6)
+
+
+def limited(tmp_path: Path) -> str:
+    text = (Path(__file__).parents[2] / 'config/linkages/four_bar.yaml').read_text('utf-8')
+    free = 'child: crank}'
+    assert text.count(free) == 1
+    text = text.replace(free, 'child: crank, limits: [0.5, 3.0]}')
+    (tmp_path / 'limited.yaml').write_text(text, 'utf-8')
+    return 'limited.yaml'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'line'),
+    [
+        ('four_bar --joint rocker_joint=200', 'rocker_joint goes from 54.900° to 128.682°'),
+        ('four_bar --joint rockr_joint=3', "did you mean 'rocker_joint'?"),
+        ('four_bar --joint crank_joint=30', 'is an input; write --at 30'),
+        ('four_bar --joint rocker_joint', 'write NAME=40'),
+        ('four_bar --joint rocker_joint=nan', 'write NAME=40'),
+        ('four_bar --joint =3', 'write NAME=40'),
+        ('four_bar --joint rocker_joint=90 --at 3', '--at is given too'),
+        ('four_bar --joint rocker_joint=90 --sweep', '--sweep is given too'),
+        ('four_bar --joint rocker_joint=90 --from 3', '--sweep is given too'),
+        ('four_bar --joint rocker_joint=90 --joint P.x=3', 'one joint at a time'),
+        ('four_bar --joint rocker_joint=90 --rate 1,2', '2 value(s) for 1 input(s)'),
+        ('five_bar --joint left_rod_joint=3', 'there are 2 inputs'),
+        ('peaucellier --joint P.x=3', 'does not move with the input'),
+        ('limited.yaml --joint rocker_joint=55', 'is reached only beyond limits: crank_joint at'),
+    ],
+)
+def test_what_cannot_be_answered_is_one_line(
+    linkage: Run, tmp_path: Path, arguments: str, line: str
+) -> None:
+    limited(tmp_path)
+    answer = linkage('solve', *arguments.split())
+    assert answer.returncode != 0
+    assert line in answer.stderr
+    assert len(answer.stderr.splitlines()) == 1
+
+
+def test_branches_are_listed_with_their_ends(linkage: Run, tmp_path: Path) -> None:
+    shown = linkage('check', 'four_bar', '--branches').stdout
+    assert 'rocker_joint        1           24.147°  231.318°' in shown
+    account = json.loads(linkage('check', limited(tmp_path), '--branches', '--json').stdout)
+    (rocker,) = (one for one in account['branches'] if one['joint'] == 'rocker_joint')
+    assert (rocker['input_low'], rocker['input_high']) == (0.5, 3.0)
+    assert rocker['limited_by'] == ['crank_joint', 'crank_joint']
+    assert rocker['rises']
+    refused = linkage('check', 'five_bar', '--branches')
+    assert refused.stderr == 'linkage check: --branches: there are 2 inputs; leave it out\n'
