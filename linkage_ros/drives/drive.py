@@ -27,7 +27,7 @@ A drive that listens to a topic also has
 
 ``TOPIC``
     The topic; its messages are ``sensor_msgs/msg/JointState``.
-``reader(context) -> Callable[[bytes], sample | Rejection]``
+``reader(parameters, context) -> Callable[[bytes], sample | Rejection]``
     Build a function that reads a sample from a message; the drive then has ``offer(sample, now)``.
 """
 
@@ -58,6 +58,9 @@ DRIVES = {
     'torque': 'linkage_ros.drives.torque',
 }
 """Module of each drive, by name of the drive."""
+
+LARGEST = 1e10
+"""Larger angles, in [rad], are 2e-6 rad apart as doubles: no machine has them. Likewise rates."""
 
 
 class CrankState(NamedTuple):

@@ -36,17 +36,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import expm1, isfinite, isnan, nan, remainder, tau
 
-from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
+from linkage_ros.drives.drive import Context, CrankState, Drive, LARGEST, Reader
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, flag, number
+from linkage_ros.files.parameters import choice, flag, name, number, whole
 from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics.linkage import Input
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
-
-LARGEST = 1e10
-"""Larger angles, in [rad], are 2e-6 rad apart as doubles: no machine has them. Likewise rates."""
-
 
 TOPIC = 'crank_states'
 
@@ -85,13 +81,42 @@ class TopicParameters:
     cutoff: float = number(
         'of the low-pass behind the differences; 0: none', 0.0, unit='Hz', least=0.0, most=1e6
     )
+    joint: str = name(
+        'dependent joint that the samples name instead of the input, whose crank is computed; '
+        'absent, they name the input',
+        'joint',
+        '',
+    )
+    branch: int = whole(
+        'branch of that joint on which the crank is, as linkage check --branches lists them; 0: '
+        'the only one',
+        0,
+        least=0,
+        most=10_000,
+    )
 
 
 PARAMETERS = TopicParameters
 
 
-def reader(context: Context) -> Reader:
-    """Build the reader of the messages."""
+def reader(parameters: TopicParameters, context: Context) -> Reader:
+    """
+    Build the reader of the messages.
+
+    Raises
+    ------
+    DefinitionError
+        The joint does not tell the crank.
+
+    """
+    if parameters.joint:
+        from linkage_ros.drives.dependent_samples import (  # local import: few scenes name a joint
+            DependentSampleReader,
+            sampled_branch,
+        )
+
+        branch = sampled_branch(context.closure, parameters.joint, parameters.branch)
+        return DependentSampleReader(branch, context.prefix + parameters.joint).read
     return JointStateReader(context.inputs_in_messages).read
 
 
@@ -102,13 +127,15 @@ def build(parameters: TopicParameters, context: Context) -> TopicDrive:
     Raises
     ------
     DefinitionError
-        A low-pass has nothing to filter.
+        A low-pass has nothing to filter, or a branch has no joint.
 
     """
     if parameters.cutoff and parameters.acceleration == 'zero':
         raise DefinitionError(
             'drive.topic.cutoff', 'filters nothing', 'add acceleration: differenced'
         )
+    if parameters.branch and not parameters.joint:
+        raise DefinitionError('drive.topic.branch', 'is of no joint', 'name it: joint: NAME')
     return TopicDrive(parameters, context.needs_rate, context.closure.linkage.inputs)
 
 

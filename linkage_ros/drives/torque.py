@@ -198,7 +198,7 @@ class TorqueParameters:
 PARAMETERS = TorqueParameters
 
 
-def reader(context: Context) -> Reader:
+def reader(_parameters: TorqueParameters, context: Context) -> Reader:
     """Build the reader of the messages."""
     return JointEffortReader(context.inputs_in_messages[0], context.dependent).read
 

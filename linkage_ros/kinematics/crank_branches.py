@@ -276,9 +276,9 @@ class CrankBranch:
 
     def find(self, y: float) -> tuple[float, float]:
         """
-        Return the crank at a value that is reached, and the slope of the output there.
+        Return the crank at a value that is reached, and nearly the slope of the output there.
 
-        In [rad] or [m]; where the output turns back, the slope is 0.
+        In [rad] or [m]; where the output turns back, the slope is 0, at a toggle infinite.
         """
         turns = 0.0
         if not self.low <= y <= self.high:
@@ -321,6 +321,10 @@ class CrankBranch:
                 return end + (beside - end) * (way / moved) ** 2 + turns, inf
         crank, slope = self._narrow(y, p, self.cranks[i + 1], crank)
         return crank + turns, slope
+
+    def slope(self, crank: float) -> float:
+        """Return the slope of the output at a crank."""
+        return self._evaluate(crank)[1]
 
     def _narrow(
         self, y: float, below: float, above: float, start: float = nan

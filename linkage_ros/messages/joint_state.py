@@ -67,6 +67,7 @@ class Rejection(Enum):
     STAMP_INVALID = 'stamp negative or with 1e9 ns or more'
     STAMP_FUTURE = 'stamp in the future'
     STAMP_OLD = 'stamp older than the last'
+    NO_CRANK = 'no crank reaches the joint'
     WRENCH_NOT_FINITE = 'force or torque not finite'
     WRENCH_TOO_LARGE = 'force or torque beyond 1e9'
 

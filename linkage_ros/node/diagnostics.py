@@ -499,6 +499,7 @@ _REMEDIES = {
     Rejection.STAMP_ZERO: 'stamp the messages, or write drive: {topic: {stamp: arrival}}',
     Rejection.STAMP_INVALID: 'stamp the messages with the time',
     Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
+    Rejection.NO_CRANK: 'linkage check --branches says how far the joint goes on its branch',
     Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
 }
 

@@ -219,7 +219,7 @@ class LinkagePipeline:
         self.topic: str = getattr(drive_module, 'TOPIC', '')
         """Topic of the drive; '' for none."""
         self.drive: Drive = drive_module.build(drive_parameters, context)
-        self._read_message = drive_module.reader(context) if self.topic else None
+        self._read_message = drive_module.reader(drive_parameters, context) if self.topic else None
         self._spoil = injection.build('message') if injection is not None else []
         if self._spoil and not self.topic:
             raise DefinitionError(
@@ -631,7 +631,7 @@ class Pipeline:
             or any(not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines)
         )
         """Whether ticks without a message may matter to a replay."""
-        self._routes = SampleRouter({line: line.member.inputs for line in self.lines})
+        self._routes = SampleRouter({line: line.member.sampled for line in self.lines})
         self.addressed: tuple[LinkagePipeline, ...] = ()
         """Of several linkages, those whose inputs the last message named."""
         self._offered = 0

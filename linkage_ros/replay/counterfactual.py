@@ -378,7 +378,7 @@ def find_crank_topic(
     good = [topic for topic, left in wanting.items() if not left]
     if len(good) == 1:
         return good[0]
-    inputs = list(dict.fromkeys(name for member in scene.members for name in member.inputs))
+    inputs = list(dict.fromkeys(name for member in scene.members for name in member.sampled))
     if good:
         raise BagError(
             bag.path,
@@ -397,7 +397,7 @@ def find_crank_topic(
 def _reader(member: SceneLinkage, dependent: Collection[str]) -> Callable[[bytes], object]:
     if member.drive[0] == 'torque':
         return JointEffortReader(member.inputs[0], dependent).read
-    return JointStateReader(member.inputs).read
+    return JointStateReader(member.sampled).read
 
 
 def _candidates(

@@ -206,7 +206,7 @@ class SceneCurves:
 
     def __init__(self, scene: Scene, topics: tuple[str, str], bodies: int, window: Window) -> None:
         turning = turning_joints(scene)
-        inputs = [name for member in scene.members for name in member.inputs]
+        inputs = [name for member in scene.members for name in member.sampled]
         states, crank = topics
         self._window = window
         self._states = BoundedCurves(

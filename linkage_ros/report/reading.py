@@ -253,13 +253,13 @@ class SceneRun:
             )
             for member, line in zip(scene.members, pipeline.lines, strict=True)
         ]
-        inputs = [name for linkage in self._linkages for name in linkage.inputs]
+        inputs = [name for member in scene.members for name in member.sampled]
         self._states = JointStates(scene.joints, others=False)
         self._samples = JointStates(inputs, others=False)
         self._cranks = {
-            number: Crank(member, [inputs.index(name) for name in member.inputs])
-            for number, member in enumerate(scene.members)
-            if member.drive[0] == 'topic'
+            number: Crank(line, [inputs.index(name) for name in line.member.sampled])
+            for number, line in enumerate(pipeline.lines)
+            if line.member.drive[0] == 'topic'
         }
         self._first_joints = [scene.joints.index(linkage.joints[0]) for linkage in self._linkages]
         self._has_limits = any(member.linkage.limits for member in scene.members)

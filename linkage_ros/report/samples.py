@@ -26,15 +26,16 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from linkage_ros.bag.reader import Bag
+from linkage_ros.drives.dependent_samples import crank_of, sampled_branch
 from linkage_ros.errors import BagError
 from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
 from linkage_ros.replay.replay import read_change, turn
 from linkage_ros.report.blocks import Rows
 from linkage_ros.report.decimation import Flags, Numbers, Times
 from linkage_ros.report.labels import short
 from linkage_ros.report.run import Lane
-from linkage_ros.scene.scene import Scene, SceneLinkage
+from linkage_ros.scene.scene import Scene
 import numpy as np
 
 
@@ -44,16 +45,18 @@ class Crank:
 
     Parameters
     ----------
-    member
-        The linkage in its scene, driven from a topic.
+    line
+        The pipeline of the linkage, driven from a topic.
     columns
-        Columns of its inputs among those of the samples.
+        Columns of the joints that its samples name, among those of all samples.
 
     """
 
-    def __init__(self, member: SceneLinkage, columns: Sequence[int]) -> None:
+    def __init__(self, line: LinkagePipeline, columns: Sequence[int]) -> None:
         self._columns = list(columns)
-        self._carried = bool(getattr(member.drive[1], 'carry_forward', False))
+        of = line.member.drive[1]
+        self._carried = bool(of.carry_forward)
+        self._branch = sampled_branch(line.closure, of.joint, of.branch) if of.joint else None
         width = len(columns)
         self._number = np.array([-1])
         self._stamp = np.zeros(1, np.int64)
@@ -67,6 +70,10 @@ class Crank:
         """
         angles, rates = values[:, 0, self._columns], values[:, 1, self._columns]
         own: Flags = good & ~np.isnan(angles).any(axis=1)
+        if self._branch is not None:
+            pairs = zip(angles[own, 0].tolist(), rates[own, 0].tolist(), strict=True)
+            cranks = [crank_of(self._branch, *pair) for pair in pairs]
+            angles[own, 0], rates[own, 0] = np.array(cranks).reshape(-1, 2).T
         # The last sample of the block before precedes the first message of this one.
         self._number = np.concatenate([[-1], numbers[own]])
         self._stamp = np.concatenate([self._stamp[-1:], stamps[own]])

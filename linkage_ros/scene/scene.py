@@ -153,6 +153,13 @@ class SceneLinkage:
         """Return the names of its driven joints, as in messages."""
         return tuple(self.prefix + given.joint for given in self.linkage.inputs)
 
+    @property
+    def sampled(self) -> tuple[str, ...]:
+        """Return the joints that samples for its drive name: the driven ones, or a dependent."""
+        name, parameters = self.drive
+        dependent = parameters.joint if name == 'topic' else ''
+        return (self.prefix + dependent,) if dependent else self.inputs
+
 
 @dataclass(frozen=True, slots=True)
 class Scene:

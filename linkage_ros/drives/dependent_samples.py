@@ -1,0 +1,90 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Samples of a dependent joint, turned into samples of the crank on a branch of that joint."""
+
+from __future__ import annotations
+
+from math import isfinite, nan
+from typing import TYPE_CHECKING
+
+from linkage_ros.drives.drive import LARGEST
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.crank_branches import CrankBranch
+
+
+def sampled_branch(closure: Closure, joint: str, number: int) -> CrankBranch:
+    """
+    Return the branch of a joint on which the crank is; 0 stands for the only one.
+
+    Raises
+    ------
+    DefinitionError
+        As `Closure.driven_by`, with the key of the scene.
+
+    """
+    # Another solver has no branches of its own.
+    closed: Closure = getattr(closure, 'closed', closure)
+    try:
+        return closed.driven_by(joint, number or None).branch
+    except DefinitionError as error:
+        key = 'drive.topic.branch' if number else 'drive.topic.joint'
+        raise DefinitionError(key, f'{error.where}: {error.reason}', error.remedy) from None
+
+
+def crank_of(branch: CrankBranch, value: float, rate: float) -> tuple[float, float]:
+    """Return the crank and its rate for a value of the joint that is reached, and its rate."""
+    crank, slope = branch.find(value)
+    if abs(slope) < branch.flat:
+        return crank, nan
+    return crank, rate / (branch.slope(crank) if isfinite(slope) else slope)
+
+
+class DependentSampleReader:
+    """
+    Reads samples of a dependent joint from serialized messages, and returns those of the crank.
+
+    Where the joint turns back, the crank has no rate: it is absent, NaN.
+
+    Parameters
+    ----------
+    branch
+        The branch on which the crank is.
+    joint
+        Name of the joint in messages.
+
+    """
+
+    __slots__ = ('_branch', '_read')
+
+    def __init__(self, branch: CrankBranch, joint: str) -> None:
+        self._branch = branch
+        self._read = JointStateReader([joint]).read
+
+    def read(self, data: bytes) -> CrankSample | Rejection:
+        """Return the sample of the crank, or the reason for its rejection."""
+        sample = self._read(data)
+        if isinstance(sample, Rejection):
+            return sample
+        stamp, (value,), rates = sample
+        if not -LARGEST <= value <= LARGEST:
+            return sample  # The drive says why not.
+        if self._branch.beyond(value):
+            return Rejection.NO_CRANK
+        crank, rate = crank_of(self._branch, value, rates[0] if rates else nan)
+        return CrankSample(stamp, (crank,), (rate,) if rates else None)

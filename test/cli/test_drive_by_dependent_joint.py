@@ -1,0 +1,171 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``drive: {topic: {joint: …}}``: a scene driven by samples of a dependent joint."""
+
+from __future__ import annotations
+
+from collections import Counter
+import json
+from math import cos, sin
+from pathlib import Path
+from typing import Any
+
+from linkage_ros import FileError, load
+from linkage_ros.cli import replay, report
+from linkage_ros.messages.joint_state import Rejection
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene
+import pytest
+
+from .recorded import answer, JointStateWriter, MS, Recorded, scene_file, SECOND
+from ..support.messages import read_joint_state
+from ..support.scenes import pipeline_of
+
+RATES = 'effects: {velocity: {}, acceleration: {}}\n'
+BY_ROCKER = 'drive: {topic: {joint: rocker_joint, branch: 1}}\n'
+LINKAGE = load('four_bar')
+FILE = (Path(__file__).parents[2] / 'config/linkages/four_bar.yaml').read_text('utf-8')
+
+
+def swinging(seconds: float) -> tuple[float, float]:
+    """Return a crank that stays on the first branch of the rocker, and its rate."""
+    return 2.0 + 1.2 * sin(3.0 * seconds), 3.6 * cos(3.0 * seconds)
+
+
+def samples(seconds: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return crank and rate, and rocker and rate, of the same state."""
+    crank, rate = swinging(seconds)
+    position = LINKAGE.position(crank)
+    velocity = LINKAGE.velocity(position, rate)
+    return (crank, rate), (position['rocker_joint'], velocity['rocker_joint'])
+
+
+def joint_message(joint: str, stamp: int, value: float, rate: float) -> bytes:
+    return JointStateWriter([joint]).write(stamp, (value,), (rate,))
+
+
+def test_scene_publishes_what_the_scene_driven_by_the_crank_does() -> None:
+    by_crank = pipeline_of(RATES, FILE)
+    by_rocker = pipeline_of(RATES + BY_ROCKER, FILE)
+    for number in range(1, 800):
+        now = SECOND + number * MS
+        if number % 3 == 1:
+            crank, rocker = samples(number * 1e-3)
+            assert by_crank.offer(joint_message('crank_joint', now, *crank), now) is None
+            assert by_rocker.offer(joint_message('rocker_joint', now, *rocker), now) is None
+        one, other = (each.tick(now) for each in (by_crank, by_rocker))
+        first, second = (read_joint_state(tick.message) for tick in (one, other))
+        assert first.name == second.name
+        assert second.position == pytest.approx(first.position, abs=1e-12)
+        assert second.velocity == pytest.approx(first.velocity, abs=1e-11, rel=1e-11)
+
+
+def test_sample_whose_joint_is_not_reached_is_rejected_and_changes_nothing() -> None:
+    pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
+    assert pipeline.offer(joint_message('rocker_joint', SECOND, 1.2, 0.1), SECOND) is None
+    before = pipeline.tick(SECOND).message
+    told = Counter(
+        pipeline.offer(joint_message(joint, SECOND, value, 0.1), SECOND)
+        for joint, value in (
+            ('rocker_joint', 3.0),
+            ('rocker_joint', float('nan')),
+            ('rocker_joint', 1e11),
+            ('rocker_joint', -1e300),
+            ('crank_joint', 1.0),
+        )
+    )
+    assert told == {
+        Rejection.NO_CRANK: 1,
+        Rejection.NOT_FINITE: 1,
+        Rejection.TOO_LARGE: 2,
+        Rejection.MISSING: 1,
+    }
+    assert pipeline.tick(SECOND).message == before
+
+
+def test_crank_without_a_rate_gets_that_of_the_differences() -> None:
+    """Where the rocker turns back, its samples say nothing about the crank's rate."""
+    pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
+    end = LINKAGE.driven_by('rocker_joint', 1).branch.high
+    for stamp, value in ((SECOND, end - 1e-3), (SECOND + MS, end)):
+        assert pipeline.offer(joint_message('rocker_joint', stamp, value, 0.0), stamp) is None
+    found = pipeline.tick(SECOND + MS)
+    assert found.message
+    (rate,) = found.looks[0].crank.rates
+    cranks = [
+        LINKAGE.driven_by('rocker_joint', 1).position(y)['crank_joint'] for y in (end - 1e-3, end)
+    ]
+    assert rate == pytest.approx((cranks[1] - cranks[0]) / 1e-3)
+
+
+@pytest.mark.parametrize(
+    ('drive', 'line'),
+    [
+        ('{joint: rockr_joint}', "did you mean 'rocker_joint'?"),
+        ('{joint: rocker_joint}', 'drive.topic.joint: rocker_joint: several cranks reach a value'),
+        (
+            '{joint: rocker_joint, branch: 4}',
+            'drive.topic.branch: branch 4: rocker_joint has none',
+        ),
+        ('{branch: 1}', 'drive.topic.branch: is of no joint; name it: joint: NAME'),
+        ('{joint: rocker_joint, branch: -1}', 'drive.topic.branch'),
+    ],
+)
+def test_bad_drives_are_one_line(drive: str, line: str) -> None:
+    with pytest.raises(FileError) as error:
+        pipeline_of(f'drive: {{topic: {drive}}}\n', FILE)
+    assert line in str(error.value)
+    assert '\n' not in str(error.value)
+
+
+def test_linkages_of_one_scene_get_their_own_samples(tmp_path: Path) -> None:
+    text = (
+        'linkages:\n- {name: left, linkage: l.yaml, ' + BY_ROCKER.strip() + '}\n'
+        '- {name: right, linkage: l.yaml}\n'
+    )
+    pipeline = Pipeline(load_scene(scene_file(tmp_path, text, FILE)))
+    write = JointStateWriter(['right_crank_joint', 'left_rocker_joint']).write
+    crank, rocker = samples(0.2)
+    message = write(SECOND, (crank[0], rocker[0]), (crank[1], rocker[1]))
+    assert pipeline.offer(message, SECOND) is None
+    found = read_joint_state(pipeline.tick(SECOND).message)
+    values = dict(zip(found.name, found.position, strict=True))
+    assert values['left_rocker_joint'] == pytest.approx(values['right_rocker_joint'], abs=1e-14)
+
+
+def recorded(folder: Path) -> Path:
+    def rocker(number: int) -> dict[str, Any]:
+        if number == 100:
+            return {'rocker_joint': (3.0, 0.0)}  # no crank
+        return {} if number % 3 else {'rocker_joint': samples(number * 1e-3)[1]}
+
+    return Recorded(folder / 'bag', scene_file(folder, RATES + BY_ROCKER, FILE), rocker).run(300)
+
+
+def test_replay_has_the_bits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = recorded(tmp_path)
+    assert answer(replay, bag, '--json') == 0
+    assert json.loads(capsys.readouterr().out)['verdict'] == 'identical'
+    # Counterfactual: with one more effect, from the same samples.
+    assert answer(replay, bag, '--set', 'effects.bias.joints.rocker_joint=0.01', '--json') in (
+        0,
+        1,
+    )
+
+
+def test_report_shows_the_crank(tmp_path: Path) -> None:
+    page = tmp_path / 'run.html'
+    assert answer(report, recorded(tmp_path), '-o', page) == 0
+    assert Rejection.NO_CRANK.value in page.read_text('utf-8')
