@@ -32,6 +32,7 @@ from statistics import median
 from time import perf_counter_ns
 from typing import NamedTuple
 
+from linkage_ros.drives.dependent_samples import sampled_branch
 from linkage_ros.effects.dispatch import bringing, dependencies, in_order, module_of
 from linkage_ros.effects.stage import EFFECTS, FORCE_EFFECTS
 from linkage_ros.errors import FileError
@@ -39,7 +40,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.measuring import spread_of
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
 from linkage_ros.scene.scene import Scene, SceneLinkage
 
 _BEGIN = 1_000_000_000
@@ -51,9 +52,9 @@ _CRANK_RATE = 1.0
 def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
     """Yield times in [ns], each with a crank message, or b'' if the drives listen to no topic."""
     period = 1e9 / (scene.rate or _USUAL_RATE)
-    names = [name for member in scene.members for name in member.inputs]
+    names = [name for member in scene.members for name in member.sampled]
     write = JointStateWriter(names).write
-    paths = [path for closure in pipeline.closures for path in _paths(closure)]
+    paths = [path for line in pipeline.lines for path in _paths(line)]
     count = 0
     while True:
         now = _BEGIN + round(count * period)
@@ -69,10 +70,14 @@ def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
 Path = Callable[[float], tuple[float, float]]
 
 
-def _paths(closure: Closure) -> list[Path]:
+def _paths(line: LinkagePipeline) -> list[Path]:
     """Return for each input its value and rate at a time in [s]: a rotation or an oscillation."""
-    centers = usual_inputs(closure)
+    closure, joint = line.closure, line.member.dependent
     speed = tau * _CRANK_RATE
+    if joint:
+        branch = sampled_branch(closure, joint, line.member.drive[1].branch)
+        return [_swing(0.5 * (branch.low + branch.high), 0.4 * (branch.high - branch.low), speed)]
+    centers = usual_inputs(closure)
     if len(centers) > 1:
         sizes = [0.01 * closure.scale if i.slider else 0.01 for i in closure.linkage.inputs]
         return [_swing(c, size, speed) for c, size in zip(centers, sizes, strict=True)]

@@ -96,18 +96,23 @@ class _Sender:
         # A motor may be commanded by another quantity, which the message calls an effort too.
         command = getattr(getattr(parameters, 'motor', None), 'command', 'effort')
         quantities = {field: command if field == 'effort' else field for field in self._fields}
-        self._count = len(member.inputs)
-        self._write = JointStateWriter(member.inputs).write
+        self._count = len(member.sampled)
+        self._write = JointStateWriter(member.sampled).write
+        parts = (
+            [member.linkage.joints[member.dependent]]
+            if member.dependent
+            else (member.linkage.inputs)
+        )
         self.variables = [
             Variable(
                 f'{line.topic}.{joint}.{quantity}',
-                _UNITS[quantity][bool(given.slider)],
+                _UNITS[quantity][given.unit == 'm'],
                 f'{quantity} of the input {joint}'
                 if quantity == field
                 else f'{quantity} that is commanded to the motor of {joint}',
             )
             for field, quantity in quantities.items()
-            for joint, given in zip(member.inputs, member.linkage.inputs, strict=True)
+            for joint, given in zip(member.sampled, parts, strict=True)
         ]
 
     def message(self, stamp: int, values: Sequence[float]) -> bytes:

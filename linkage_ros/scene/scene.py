@@ -156,9 +156,13 @@ class SceneLinkage:
     @property
     def sampled(self) -> tuple[str, ...]:
         """Return the joints that samples for its drive name: the driven ones, or a dependent."""
+        return (self.prefix + self.dependent,) if self.dependent else self.inputs
+
+    @property
+    def dependent(self) -> str:
+        """Return the dependent joint that samples name instead of the input; '' for none."""
         name, parameters = self.drive
-        dependent = parameters.joint if name == 'topic' else ''
-        return (self.prefix + dependent,) if dependent else self.inputs
+        return parameters.joint if name == 'topic' else ''
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import islice
 import json
 from math import cos, sin
 from pathlib import Path
@@ -24,6 +25,8 @@ from typing import Any
 
 from linkage_ros import FileError, load
 from linkage_ros.cli import replay, report
+from linkage_ros.cost import feed
+from linkage_ros.fmu.stepped_scene import _Sender
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
@@ -31,7 +34,7 @@ import pytest
 
 from .recorded import answer, JointStateWriter, MS, Recorded, scene_file, SECOND
 from ..support.messages import read_joint_state
-from ..support.scenes import pipeline_of
+from ..support.scenes import pipeline_of, scene_of
 
 RATES = 'effects: {velocity: {}, acceleration: {}}\n'
 BY_ROCKER = 'drive: {topic: {joint: rocker_joint, branch: 1}}\n'
@@ -143,6 +146,16 @@ def test_linkages_of_one_scene_get_their_own_samples(tmp_path: Path) -> None:
     found = read_joint_state(pipeline.tick(SECOND).message)
     values = dict(zip(found.name, found.position, strict=True))
     assert values['left_rocker_joint'] == pytest.approx(values['right_rocker_joint'], abs=1e-14)
+
+
+def test_cost_and_fmu_feed_the_dependent_joint() -> None:
+    pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
+    (line,) = pipeline.lines
+    names = [variable.name for variable in _Sender(line).variables]
+    assert names == ['crank_states.rocker_joint.position', 'crank_states.rocker_joint.velocity']
+    for now, message in islice(feed(scene_of(RATES + BY_ROCKER, FILE), pipeline), 50):
+        assert pipeline.offer(message, now) is None
+        assert pipeline.tick(now).message
 
 
 def recorded(folder: Path) -> Path:
