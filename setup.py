@@ -186,6 +186,7 @@ setup(
         'console_scripts': [
             'linkage_node = linkage_ros.node.linkage_node:main',
             'crank_source = linkage_ros.node.crank_source:main',
+            'linkage_relay = linkage_ros.node.linkage_relay:main',
             'pd_controller = linkage_ros.node.pd_controller:main',
             'linkage = linkage_ros.__main__:main',
         ],

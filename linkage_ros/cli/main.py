@@ -46,6 +46,7 @@ COMMANDS = {
     'simulate': 'run a scene as fast as it goes, without ROS, to a bag, CSV or Parquet',
     'play': 'publish a bag on the graph, at its own pace or another',
     'echo': 'print the messages of a topic as YAML, or their rate',
+    'relay': 'relay commands of a dependent joint to its crank, as a ROS 2 node',
     'plot': 'draw the joints of a bag over the angle of its crank',
     'info': 'say what a bag holds, how well its loops closed, and where a toggle was nearest',
     'report': 'write a run as one HTML page: its linkage moving, plots, events, counts',

@@ -48,7 +48,9 @@ def installed(workspace):
     return workspace / 'install' / 'linkage_ros'
 
 
-@pytest.mark.parametrize('name', ['linkage_node', 'crank_source', 'pd_controller', 'linkage'])
+@pytest.mark.parametrize(
+    'name', ['linkage_node', 'linkage_relay', 'crank_source', 'pd_controller', 'linkage']
+)
 def test_ros2_run_finds_the_executables(installed, name):
     assert os.access(installed / 'lib' / 'linkage_ros' / name, os.X_OK)
 

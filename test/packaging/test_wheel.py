@@ -99,7 +99,9 @@ def test_tests_and_benchmarks_stay_out(prefix):
     assert not {'test', 'bench', 'examples', 'launch'} & packages
 
 
-@pytest.mark.parametrize('name', ['linkage_node', 'crank_source', 'pd_controller', 'linkage'])
+@pytest.mark.parametrize(
+    'name', ['linkage_node', 'linkage_relay', 'crank_source', 'pd_controller', 'linkage']
+)
 def test_executable_names_a_function_that_exists(prefix, root, name):
     script = (prefix / 'bin' / name).read_text('utf-8')
     module = next(

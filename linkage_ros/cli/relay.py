@@ -1,0 +1,56 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Relay commands of a dependent joint to its crank, as a ROS 2 node.
+
+The scene names the joint: drive: {topic: {joint: NAME, branch: N}}. JointState on joint_commands
+goes to crank_commands, JointTrajectory on joint_trajectory to crank_trajectory. It ends by Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+from threading import Event
+
+from linkage_ros.cli.arguments import add_set, bounded, SCENE_HELP
+from linkage_ros.errors import missing_packages_reported
+
+EXAMPLE = (
+    "linkage relay four_bar --set 'drive={topic: {joint: rocker_joint, branch: 1}}' --seconds 10"
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('scene', metavar='SCENE', help=SCENE_HELP)
+    add_set(parser)
+    parser.add_argument(
+        '--seconds',
+        type=bounded(0.0, 1e9),
+        default=0.0,
+        metavar='SECONDS',
+        help='how long; until a signal if not given',
+    )
+    parser.add_argument(
+        '--ros-args', nargs=argparse.REMAINDER, default=[], help='remappings: -r OLD:=NEW'
+    )
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Relay until the event is set."""
+    with missing_packages_reported():
+        relay = import_module('linkage_ros.node.relay')
+    return int(relay.run_relay(stop, arguments.scene, arguments.set, arguments.seconds))
