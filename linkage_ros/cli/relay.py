@@ -15,7 +15,7 @@
 """
 Relay commands of a dependent joint to its crank, as a ROS 2 node.
 
-The scene names the joint: drive: {topic: {joint: NAME, branch: N}}. JointState on joint_commands
+The scene names the joint, drive: {topic: {joint: NAME, branch: N}}, or --joint does. JointState on joint_commands
 goes to crank_commands, JointTrajectory on joint_trajectory to crank_trajectory. It ends by Ctrl-C.
 """
 
@@ -28,14 +28,20 @@ from threading import Event
 from linkage_ros.cli.arguments import add_set, bounded, SCENE_HELP
 from linkage_ros.errors import missing_packages_reported
 
-EXAMPLE = (
-    "linkage relay four_bar --set 'drive={topic: {joint: rocker_joint, branch: 1}}' --seconds 10"
-)
+EXAMPLE = 'linkage relay four_bar --joint rocker_joint --branch 1 --seconds 5'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('scene', metavar='SCENE', help=SCENE_HELP)
+    parser.add_argument('--joint', default='', metavar='NAME', help='the joint that is commanded')
+    parser.add_argument(
+        '--branch',
+        type=bounded(0, 10_000, int),
+        default=0,
+        metavar='N',
+        help='its branch, as linkage check --branches lists them; needed if there are several',
+    )
     add_set(parser)
     parser.add_argument(
         '--seconds',
@@ -53,4 +59,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Relay until the event is set."""
     with missing_packages_reported():
         relay = import_module('linkage_ros.node.relay')
-    return int(relay.run_relay(stop, arguments.scene, arguments.set, arguments.seconds))
+    settings = arguments.set
+    if arguments.joint:
+        topic = f'{{joint: {arguments.joint}, branch: {arguments.branch}}}'
+        settings = [f'drive={{topic: {topic}}}', *settings]
+    return int(relay.run_relay(stop, arguments.scene, settings, arguments.seconds))
