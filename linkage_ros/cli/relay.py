@@ -15,8 +15,9 @@
 """
 Relay commands of a dependent joint to its crank, as a ROS 2 node.
 
-The scene names the joint, drive: {topic: {joint: NAME, branch: N}}, or --joint does. JointState on joint_commands
-goes to crank_commands, JointTrajectory on joint_trajectory to crank_trajectory. It ends by Ctrl-C.
+The scene names the joint, drive: {topic: {joint: NAME, branch: N}}, or --joint does. JointState
+on joint_commands goes to crank_commands, JointTrajectory on joint_trajectory to
+crank_trajectory. It ends by Ctrl-C.
 """
 
 from __future__ import annotations
