@@ -160,6 +160,7 @@ accuracy: $(STAMP)
 	@status=0; \
 	$(BIN)/python -m campaigns.accuracy || status=$$?; \
 	$(BIN)/python -m campaigns.topologies || status=$$?; \
+	$(BIN)/python -m campaigns.inverse || status=$$?; \
 	exit $$status
 
 topologies: $(STAMP)

@@ -28,6 +28,7 @@ import time
 from bench.coming import ComersPlan, measure_comers
 from bench.compiled import measure_arrays, measure_chains, measure_gallery
 from bench.empty_scene import measure_empty_scene
+from bench.inverse import measure_inverse
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
 from bench.report import FOLDER, machine_table, PAGES, say, show, Table, write_page
@@ -103,6 +104,7 @@ def main() -> int:
             if arguments.only in (None, 'kinematics'):
                 say('kinematics: linkages solved with acceleration')
                 tables.append(measure_speed(_SPEED_QUICK if arguments.quick else _SPEED))
+                tables.append(measure_inverse(*((3, 500) if arguments.quick else (11, 5000))))
             if arguments.only in (None, 'compiled'):
                 say('compiled linkages against their plain steps')
                 amount = (1, 100) if arguments.quick else (11, 2000)

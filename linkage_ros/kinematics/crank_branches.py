@@ -333,8 +333,8 @@ class CrankBranch:
         crank = start
         if not min(below, above) < crank < max(below, above):
             crank = 0.5 * (below + above)
-        slope = nan
-        for number in range(_BISECTIONS):
+        slope, before = nan, inf
+        for _ in range(_BISECTIONS):
             value, slope = self._evaluate(crank)
             off = value - y
             if self.turning:
@@ -342,17 +342,16 @@ class CrankBranch:
             if off == 0.0:
                 break
             below, above = (crank, above) if off < 0.0 else (below, crank)
-            middle = 0.5 * (below + above)
             step = off / slope if slope else inf
+            if abs(step) <= 2.0 * UNIT_ROUNDOFF * abs(crank):
+                break
             better = crank - step
-            if number % 4 == 3 or not min(below, above) < better < max(below, above):
-                better = middle
-            if better == crank or middle in (below, above):
+            # Newton's method as long as it gains, else bisection.
+            if not min(below, above) < better < max(below, above) or abs(step) > 0.5 * before:
+                better = 0.5 * (below + above)
+            if better in (crank, below, above):
                 break
-            small = abs(better - crank) <= 2.0 * UNIT_ROUNDOFF * abs(crank)
-            crank = better
-            if small:
-                break
+            before, crank = abs(better - crank), better
         return crank, slope
 
 

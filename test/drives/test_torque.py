@@ -413,7 +413,10 @@ def test_what_is_wrong_in_a_scene_has_its_line():
 
 def test_it_reads_the_input_by_the_name_that_messages_have():
     context = replace(two_inputs(), prefix='left/')
-    assert reader(TorqueParameters(), context)(serialized(['left/left_crank'], efforts=[2.0])).effort == 2.0
+    assert (
+        reader(TorqueParameters(), context)(serialized(['left/left_crank'], efforts=[2.0])).effort
+        == 2.0
+    )
 
 
 @pytest.mark.parametrize('start', [0.0, pi])

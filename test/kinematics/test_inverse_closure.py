@@ -24,6 +24,7 @@ import random
 import subprocess
 import sys
 
+from campaigns.inverse import errors_of, passes_of, random_four_bars
 from linkage_ros import Closure, DefinitionError, Limits, linkage_names, load
 from linkage_ros.accuracy.reference import Reference, SingularError
 from linkage_ros.kinematics.batch import CODES
@@ -32,8 +33,6 @@ from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
-
-from .linkages import four_bar_linkage
 
 U = 2.0**-53
 STATES = int(os.environ.get('LINKAGE_STATES', '100'))
@@ -62,37 +61,16 @@ def numbers(count):
     return [1e-14, 1.0 - 1e-14, *(rng.random() for _ in range(count))]
 
 
-def slopes_of(closure, joint, cranks):
-    """Return joint and slope at many cranks, by the blocks of `solve`, not by compiled code."""
-    batch = closure.solve(np.array(cranks), derivatives=1)
-    row = closure.joint_names.index(joint)
-    return batch.positions[row], batch.velocities[row]
-
-
 @pytest.mark.parametrize('name', LINKAGES)
 def test_crank_is_as_exact_as_the_roundings_allow(name):
-    """|θ − exact| ≤ 8·u·(|θ| + (|y| + 2π)/|f′| + 1), all of it times |f′|."""
+    """|θ − exact| ≤ 8·u·(|θ| + (|y| + 2π)/|f′| + 1)."""
     closure = gallery(name)
     for joint in outputs(closure):
-        for branch in closure.driven_by(joint, near=0.0).inverse.branches:
-            span = branch.high - branch.low
-            wanted = np.array([branch.low + share * span for share in numbers(STATES)])
-            cranks = np.array([branch.find(y)[0] for y in wanted])
-            found, slopes = slopes_of(closure, joint, cranks)
-            off = found - wanted
-            if branch.turning:
-                off -= tau * np.round(off / tau)
-            size = tau if branch.turning else closure.scale
-            bound = np.abs(slopes) * (np.abs(cranks) + 1.0) + np.abs(wanted) + size
-            known = np.isfinite(slopes)
-            for state, end in enumerate((branch.first, branch.last)):
-                if branch.steep[state]:  # The exact crank is some 1e-28 from its end.
-                    assert abs(cranks[state] - end) <= 8.0 * U * (abs(end) + 1.0)
-                    known[state] = False
-            assert known.sum() > 0.9 * len(known) - 2
-            assert np.max(np.abs(off[known]) / bound[known]) <= 8.0 * U, joint
+        for branch in closure.branches(joint):
+            error, off = errors_of(closure, joint, branch, STATES, random.Random(1))
+            assert error <= 8.0, joint
             if not any(branch.steep):
-                assert np.max(np.abs(off)) <= 4e-15, joint
+                assert off <= 4e-15, joint
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'double_rocker', 'jansen_leg'])
@@ -102,7 +80,7 @@ def test_exact_crank_lies_within_the_bound(name):
     reference = Reference(closure.linkage)
     for joint in outputs(closure)[-2:]:
         number = closure.joint_names.index(joint)
-        for branch in closure.driven_by(joint, near=0.0).inverse.branches:
+        for branch in closure.branches(joint):
             for share in numbers(3):
                 y = branch.low + share * (branch.high - branch.low)
                 crank, slope = branch.find(y)
@@ -128,7 +106,7 @@ def test_rates_of_the_crank_give_the_joint_its_rates(name):
     reference = Reference(closure.linkage)
     for joint in [*outputs(closure)[:2], outputs(closure)[-1]]:
         number = closure.joint_names.index(joint)
-        for branch in closure.driven_by(joint, near=0.0).inverse.branches:
+        for branch in closure.branches(joint):
             inverse = closure.driven_by(joint, branch.number)
             for share in (0.1, 0.37, 0.8):
                 position = inverse.position(branch.low + share * (branch.high - branch.low))
@@ -145,37 +123,9 @@ def test_rates_of_the_crank_give_the_joint_its_rates(name):
                     assert position.joints[row] == closure.position(position.joints[0]).joints[at]
 
 
-def random_four_bars(count):
-    rng = random.Random(33)
-    while count:
-        lengths = tuple(rng.uniform(0.2, 1.0) for _ in range(4))
-        try:
-            closure = Closure(four_bar_linkage(lengths, rng.choice(('left', 'right'))))
-        except DefinitionError:
-            continue
-        if closure.input_ranges:
-            count -= 1
-            yield closure
-
-
-def scanned(closure, joint, value, count=40_000):
-    """Return how often a joint passes a value while the crank goes through its ranges."""
-    passed = 0
-    row = closure.joint_names.index(joint)
-    for low, high, *_ in closure.input_ranges:
-        # Denser towards the ends, as the joint is.
-        cranks = low + (high - low) * (0.5 - 0.5 * np.cos(np.linspace(0.0, pi, count)))
-        off = closure.solve(np.clip(cranks, low, high), derivatives=0).positions[row] - value
-        if closure.turning[row]:
-            off -= tau * np.round(off / tau)
-        signs = np.signbit(off)
-        passed += np.sum((signs[1:] != signs[:-1]) & (np.abs(np.diff(off)) < 1.0))
-    return int(passed)
-
-
 def closures_to_scan():
     yield from (gallery(name) for name in LINKAGES)
-    yield from random_four_bars(STATES)
+    yield from random_four_bars(STATES, random.Random(33))
 
 
 def test_all_cranks_of_a_value_are_found():
@@ -189,12 +139,13 @@ def test_all_cranks_of_a_value_are_found():
         for _, crank in found:
             away = closure.position(crank)[joint] - value
             turning = closure.turning[closure.joint_names.index(joint)]
-            slope = slopes_of(closure, joint, [crank])[1][0]
-            allowed = 1e-12 + 1e-14 * (abs(slope) if np.isfinite(slope) else 1e8)
+            position = closure.position(crank)
+            slope = closure.velocity(position, 1.0)[joint] if position.status.has_rates else 1e8
+            allowed = 1e-12 + 1e-14 * abs(slope)
             assert abs(remainder(away, tau) if turning else away) <= allowed
         cranks = sorted(remainder(crank, tau) for _, crank in found)
         assert all(after - before > 1e-9 for before, after in pairwise(cranks))
-        assert len(found) >= scanned(closure, joint, value), (closure, joint, value)
+        assert len(found) >= passes_of(closure, joint, value), (closure, joint, value)
         cases += 1
     assert cases >= STATES
 

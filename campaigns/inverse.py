@@ -1,0 +1,195 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+``python -m campaigns.inverse``: cranks of a joint's value, their errors and their number.
+
+On every branch of every joint of the shipped linkages of one input, at random values and at 1e-14
+of its ends, the error of a crank is compared with what roundings allow. On random four-bars, the
+number of cranks of a value is compared with the number of passes that a scan of the range finds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime
+from math import pi, tau
+import random
+import sys
+from typing import Any
+
+from bench import ROOT
+from bench.report import Table
+from campaigns.campaign import exit_code, machine_of, Page, parser_of, progress_lines, publish
+from linkage_ros.errors import DefinitionError
+from linkage_ros.files.linkage_file import load
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.crank_branches import CrankBranch
+from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
+from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.resources import linkage_names, named_file
+import numpy as np
+
+U = 2.0**-53
+_AT_ENDS = 1e-14
+_SCAN = 40_000
+
+PAGE = Page(
+    ROOT / 'docs' / 'accuracy' / 'inverse.md',
+    'How exact the cranks of a joint are',
+    """
+Made by `python -m campaigns.inverse --write`, a part of `make accuracy`.
+
+The error of a crank θ for a value y of a joint is given in units of u·(|θ| + (|y| + 2π)/|f′| + 1),
+with u = 2⁻⁵³ and the joint y = f(θ); for a slide the size of the linkage stands for 2π. The limit
+is 8. It is taken from the closed form at that crank, whose own errors count too. *off* is the
+greatest |f(θ) − y|, in rad or m; beside a toggle of the crank no double is nearer. The values are
+random, and two lie at 1e-14 of the ends of the branch.
+""",
+)
+
+
+def linkages() -> Iterator[tuple[str, Closure]]:
+    """Yield the shipped linkages of one input that are solved by dyads."""
+    for name in linkage_names():
+        closure = load(named_file(name, 'linkages'))
+        if len(closure.input_names) == 1 and not iterated(closure):
+            yield name, closure
+
+
+def outputs_of(closure: Closure) -> Iterator[tuple[str, list[CrankBranch]]]:
+    """Yield the dependent joints that move, with their branches."""
+    for joint in closure.joint_names:
+        if joint not in closure.input_names:
+            try:
+                yield joint, [*closure.branches(joint)]
+            except DefinitionError:
+                continue
+
+
+def errors_of(
+    closure: Closure, joint: str, branch: CrankBranch, count: int, rng: random.Random
+) -> tuple[float, float]:
+    """Return the greatest error of cranks, in units of what is allowed, and of the joint."""
+    shares = [_AT_ENDS, 1.0 - _AT_ENDS, *(rng.random() for _ in range(count))]
+    wanted = np.array([branch.low + share * (branch.high - branch.low) for share in shares])
+    cranks = np.array([branch.find(y)[0] for y in wanted.tolist()])
+    batch = closure.solve(cranks, derivatives=1)
+    assert batch.velocities is not None
+    row = closure.joint_names.index(joint)
+    off, slopes = batch.positions[row] - wanted, np.abs(batch.velocities[row])
+    if branch.turning:
+        off -= tau * np.round(off / tau)
+    size = tau if branch.turning else closure.scale
+    # Both sides times |f′|.
+    errors = np.abs(off) / (U * (slopes * (np.abs(cranks) + 1.0) + np.abs(wanted) + size))
+    for state, end in enumerate((branch.first, branch.last)):
+        if branch.steep[state]:  # The exact crank is some 1e-28 from its end.
+            errors[state] = abs(cranks[state] - end) / (U * (abs(end) + 1.0))
+    errors, off = errors[np.isfinite(errors)], np.abs(off[np.isfinite(slopes)])
+    assert len(errors) > 0.9 * len(wanted) - 2
+    return float(errors.max()), float(off.max())
+
+
+def random_four_bars(count: int, rng: random.Random) -> Iterator[Closure]:
+    """Yield four-bars of all kinds."""
+    while count:
+        a, b, c, d = (rng.uniform(0.2, 1.0) for _ in range(4))
+        linkage = Linkage(
+            links={
+                'ground': {'O': (0.0, 0.0), 'D': (d, 0.0)},
+                'crank': {'O': (0.0, 0.0), 'A': (a, 0.0)},
+                'coupler': {'A': (0.0, 0.0), 'B': (b, 0.0)},
+                'rocker': {'D': (0.0, 0.0), 'B': (c, 0.0)},
+            },
+            inputs=(Input('crank_joint', 'ground', 'crank'),),
+            assembly={'B': 'left' if rng.random() < 0.5 else 'right'},
+            joints={
+                'coupler_joint': RevoluteJoint('crank', 'coupler'),
+                'rocker_joint': RevoluteJoint('ground', 'rocker'),
+            },
+            sliders={},
+        )
+        closure = Closure(linkage)
+        if closure.input_ranges:
+            count -= 1
+            yield closure
+
+
+def passes_of(closure: Closure, joint: str, value: float, count: int = _SCAN) -> int:
+    """Return how often a joint passes a value while the crank goes through its ranges."""
+    passed = 0
+    row = closure.joint_names.index(joint)
+    for interval in closure.input_ranges:
+        low, high = interval.lowest, interval.highest
+        # Denser towards the ends, as the joint is.
+        cranks = low + (high - low) * (0.5 - 0.5 * np.cos(np.linspace(0.0, pi, count)))
+        off = closure.solve(np.clip(cranks, low, high), derivatives=0).positions[row] - value
+        if closure.turning[row]:
+            off -= tau * np.round(off / tau)
+        signs = np.signbit(off)
+        passed += int(np.sum((signs[1:] != signs[:-1]) & (np.abs(np.diff(off)) < 1.0)))
+    return passed
+
+
+def main() -> int:
+    """Run the campaign, and return the exit code."""
+    begin = datetime.now().astimezone()
+    parser = parser_of('inverse', __doc__, page=PAGE, jobs=1)
+    parser.add_argument('--states', type=int, default=6000, help='random values on each branch')
+    parser.add_argument('--four-bars', type=int, default=10_000, help='random four-bars to scan')
+    arguments = parser.parse_args()
+    rng = random.Random(arguments.seed)
+    table = Table('Errors', ('joint', 'branches', 'values', 'error', 'off'))
+    greatest, values = 0.0, 0
+    for name, closure in linkages():
+        for joint, branches in outputs_of(closure):
+            found = [errors_of(closure, joint, one, arguments.states, rng) for one in branches]
+            error, off = (max(each) for each in zip(*found, strict=True))
+            count = len(branches) * (arguments.states + 2)
+            greatest, values = max(greatest, error), values + count
+            cells = str(len(branches)), f'{count:,}', f'{error:.2f}', f'{off:.1e}'
+            table.rows.append((f'{name} {joint}', *cells))
+    table.rows.append(('all', '', f'{values:,}', f'{greatest:.2f}', ''))
+    missed, more = _compare(arguments.four_bars, rng)
+    scans = Table('Cranks of a value, on random four-bars', ('', ''))
+    scans.rows.extend(
+        [
+            ('four-bars', f'{arguments.four_bars:,}'),
+            ('with fewer cranks than a scan passes', str(missed)),
+            ('with more, since the scan is coarser', str(more)),
+        ]
+    )
+    machine: Any = machine_of(begin, arguments, 'values', values)
+    publish([table, scans, machine], PAGE if arguments.write else None)
+    return int(greatest > 8.0 or missed > 0)
+
+
+def _compare(count: int, rng: random.Random) -> tuple[int, int]:
+    """Return on how many four-bars cranks are missed, and on how many the scan misses some."""
+    missed = more = 0
+    advance = progress_lines(count, 'four-bars')
+    for closure in random_four_bars(count, rng):
+        joint = rng.choice(closure.joint_names)
+        low, high = closure.input_ranges[0][:2]
+        value = closure.position(rng.uniform(low, high))[joint]
+        found, passed = len(closure.cranks(joint, value)), passes_of(closure, joint, value)
+        missed += found < passed
+        more += found > passed
+        advance(1)
+    return missed, more
+
+
+if __name__ == '__main__':
+    sys.exit(exit_code(main))
