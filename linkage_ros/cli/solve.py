@@ -205,7 +205,7 @@ def _inverse_table(
         if not cranks:
             raise _unreached(closure, joint, value, option, arguments.angles)
         for number, _ in cranks:
-            inverse = closure.driven_by(joint, number)
+            inverse = closure.driven_by(joint, branch=number)
             question = _question(inverse, arguments, [(value,)])
             (row,) = (_row(inverse, question, given) for given in question.inputs)
             columns = list(_columns(inverse, question))

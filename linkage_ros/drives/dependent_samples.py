@@ -41,7 +41,7 @@ def sampled_branch(closure: Closure, joint: str, number: int) -> CrankBranch:
     # Another solver has no branches of its own.
     closed: Closure = getattr(closure, 'closed', closure)
     try:
-        return closed.driven_by(joint, number or None).branch
+        return closed.driven_by(joint, branch=number or None).branch
     except DefinitionError as error:
         key = 'drive.topic.branch' if number else 'drive.topic.joint'
         raise DefinitionError(key, f'{error.where}: {error.reason}', error.remedy) from None

@@ -25,7 +25,7 @@ from cmath import rect
 from collections.abc import Iterable, Sequence
 from math import inf
 from operator import mul
-from typing import Any, ClassVar, TYPE_CHECKING
+from typing import Any, ClassVar, overload, TYPE_CHECKING
 
 from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
@@ -398,31 +398,50 @@ class Closure:
 
         return Solver(self, len(self.linkage.joints))
 
+    @overload
     def driven_by(
-        self, joint: str, branch: int | None = None, *, near: float | None = None
-    ) -> InverseClosure:
+        self, joint: str, /, *, branch: int | None = None, near: float | None = None
+    ) -> InverseClosure: ...
+
+    @overload
+    def driven_by(self, joint: str, other: str, /, *others: str) -> Closure: ...
+
+    def driven_by(
+        self, *joints: str, branch: int | None = None, near: float | None = None
+    ) -> Closure:
         """
-        Return the linkage with a dependent joint as its input.
+        Return the linkage with other joints as its inputs.
+
+        With one input the closed form is inverted, along a branch. With several the loops are
+        solved in another order, in the assembly of the pose; some links may have to be iterated.
 
         Parameters
         ----------
-        joint
-            A published joint, or a coordinate of a traced point, such as ``P.x``.
+        *joints
+            As many joints as there are inputs: published ones; with one input also a coordinate
+            of a traced point, such as ``P.x``; with several also inputs that stay.
         branch
-            Number of the branch on which the crank is, as `cranks` returns it. If there is only
-            one branch within the limits, it need not be named.
+            With one input, the number of the branch on which the crank is, as `cranks` returns
+            it. If there is only one branch within the limits, it need not be named.
         near
             Instead of the branch a crank on it, in [rad] or [m].
 
         Raises
         ------
         DefinitionError
-            If the joint is unknown or does not move, or several branches are within the limits.
+            If a joint is unknown or does not move, several branches are within the limits, or the
+            joints do not move all of the linkage.
 
         """
+        if len(self.input_names) > 1 or len(joints) != 1:
+            from linkage_ros.kinematics.exchanged_inputs import (
+                exchange_inputs,  # local import: only few ask for it
+            )
+
+            return Closure(exchange_inputs(self, joints, Closure), self.name)
         from linkage_ros import InverseClosure  # local import: only few ask for it
 
-        inverse = self._inverse(joint)
+        inverse = self._inverse(*joints)
         return InverseClosure(self, inverse, inverse.branch(branch, near))
 
     def cranks(self, joint: str, value: float) -> list[tuple[int, float]]:

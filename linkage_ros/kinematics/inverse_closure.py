@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from math import inf, isfinite, tau
 from typing import Any, TYPE_CHECKING
 
@@ -115,7 +116,8 @@ class InverseClosure(Closure):
         self.bounds = Bounds(self.linkage)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self.closed).driven_by, (self.closed, *self.input_names, self.branch.number)
+        drive = partial(Closure.driven_by, branch=self.branch.number)
+        return drive, (self.closed, *self.input_names)
 
     def position(self, *inputs: float) -> Position:
         """

@@ -78,7 +78,7 @@ class CommandRelay:
             if member.dependent:
                 number = member.drive[1].branch
                 branch = sampled_branch(member.closure, member.dependent, number)
-                inverse = member.closure.driven_by(member.dependent, branch.number)
+                inverse = member.closure.driven_by(member.dependent, branch=branch.number)
                 self._inverses[member.sampled[0]] = inverse, member.inputs[0]
         if not self._inverses:
             raise DefinitionError(

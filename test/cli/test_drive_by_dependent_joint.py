@@ -101,14 +101,15 @@ def test_sample_whose_joint_is_not_reached_is_rejected_and_changes_nothing() -> 
 def test_crank_without_a_rate_gets_that_of_the_differences() -> None:
     """Where the rocker turns back, its samples say nothing about the crank's rate."""
     pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
-    end = LINKAGE.driven_by('rocker_joint', 1).branch.high
+    end = LINKAGE.driven_by('rocker_joint', branch=1).branch.high
     for stamp, value in ((SECOND, end - 1e-3), (SECOND + MS, end)):
         assert pipeline.offer(joint_message('rocker_joint', stamp, value, 0.0), stamp) is None
     found = pipeline.tick(SECOND + MS)
     assert found.message
     (rate,) = found.looks[0].crank.rates
     cranks = [
-        LINKAGE.driven_by('rocker_joint', 1).position(y)['crank_joint'] for y in (end - 1e-3, end)
+        LINKAGE.driven_by('rocker_joint', branch=1).position(y)['crank_joint']
+        for y in (end - 1e-3, end)
     ]
     assert rate == pytest.approx((cranks[1] - cranks[0]) / 1e-3)
 

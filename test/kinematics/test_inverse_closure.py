@@ -107,7 +107,7 @@ def test_rates_of_the_crank_give_the_joint_its_rates(name):
     for joint in [*outputs(closure)[:2], outputs(closure)[-1]]:
         number = closure.joint_names.index(joint)
         for branch in closure.branches(joint):
-            inverse = closure.driven_by(joint, branch.number)
+            inverse = closure.driven_by(joint, branch=branch.number)
             for share in (0.1, 0.37, 0.8):
                 position = inverse.position(branch.low + share * (branch.high - branch.low))
                 velocity = inverse.velocity(position, 0.7)
@@ -152,8 +152,11 @@ def test_all_cranks_of_a_value_are_found():
 
 def test_calls_in_any_order_give_the_same_bits():
     values = np.linspace(0.97, 2.24, 500).tolist()
-    once = [load('four_bar').driven_by('rocker_joint', 2).position(y).joints for y in values[::50]]
-    inverse = load('four_bar').driven_by('rocker_joint', 2)
+    once = [
+        load('four_bar').driven_by('rocker_joint', branch=2).position(y).joints
+        for y in values[::50]
+    ]
+    inverse = load('four_bar').driven_by('rocker_joint', branch=2)
     random.Random(2).shuffle(values)
     found = {y: inverse.position(y).joints for y in values}
     assert [found[y] for y in sorted(values)[::50]] == once
@@ -186,7 +189,7 @@ def _lengths(linkage):
 
 def test_crank_at_its_toggle_stands_while_the_joint_moves():
     for number in (1, 2, 3, 4):
-        inverse = load('double_rocker').driven_by('right_rocker_joint', number)
+        inverse = load('double_rocker').driven_by('right_rocker_joint', branch=number)
         end = inverse.input_ranges[0][inverse.branch.steep.index(True)]
         middle = 0.5 * (inverse.branch.low + inverse.branch.high)
         position = inverse.position(end)
@@ -216,7 +219,7 @@ def test_whole_turns_of_a_joint_that_turns_on_are_turns_of_the_crank():
 
 
 def test_joint_that_oscillates_is_compared_modulo_a_turn():
-    inverse = load('four_bar').driven_by('rocker_joint', 1)
+    inverse = load('four_bar').driven_by('rocker_joint', branch=1)
     assert inverse.position(1.2 + 3 * tau).joints[0] == pytest.approx(
         inverse.position(1.2).joints[0], abs=1e-13
     )
@@ -237,7 +240,7 @@ def test_limits_cut_branches():
 
 def test_iterated_linkage_is_inverted_along_its_branch():
     closure = load('class_3')
-    inverse = closure.driven_by('platform_joint', 1)
+    inverse = closure.driven_by('platform_joint', branch=1)
     y = 0.5 * (inverse.branch.low + inverse.branch.high)
     position = inverse.position(y)
     again = closure.position(position.joints[0])
@@ -255,7 +258,7 @@ def test_coordinate_of_a_traced_point_is_an_input():
     closure = load('jansen_leg')
     for branch, crank in closure.cranks('foot.y', -0.08):
         assert closure.position(crank).points['foot'].imag == pytest.approx(-0.08, abs=1e-15)
-        inverse = closure.driven_by('foot.y', branch)
+        inverse = closure.driven_by('foot.y', branch=branch)
         position = inverse.position(-0.08)
         velocity = inverse.velocity(position, 0.1)
         acceleration = inverse.acceleration(position, velocity, 0.2)
@@ -270,7 +273,7 @@ def test_coordinate_of_a_traced_point_is_an_input():
 
 
 def test_many_states_are_those_of_single_calls():
-    inverse = load('four_bar').driven_by('rocker_joint', 1)
+    inverse = load('four_bar').driven_by('rocker_joint', branch=1)
     values = np.linspace(0.5, 2.5, 40)
     batch = inverse.solve(values, rates=2.0, accelerations=0.5)
     for k, y in enumerate(values.tolist()):
@@ -284,7 +287,7 @@ def test_many_states_are_those_of_single_calls():
 
 
 def test_inverse_is_pickled_with_its_branch():
-    inverse = load('four_bar').driven_by('rocker_joint', 2)
+    inverse = load('four_bar').driven_by('rocker_joint', branch=2)
     position = inverse.position(1.5)
     again = pickle.loads(pickle.dumps((inverse, position)))
     assert again[0].position(1.5).joints == position.joints
@@ -298,15 +301,57 @@ def test_inverse_is_pickled_with_its_branch():
         ('four_bar', ('crank_joint',), 'crank_joint: is an input'),
         ('four_bar', ('rocker_joint',), '2 branches; name a branch, or a crank near it'),
         ('four_bar', ('rocker_joint', 3), 'branch 3: rocker_joint has none of this number'),
-        ('five_bar', ('left_joint',), 'left_joint: there are 2 inputs'),
+        ('five_bar', ('left_elbow',), 'left_elbow: 1 for 2 inputs; name 2 different joints'),
         ('peaucellier', ('P.x',), 'P.x: does not move with the input'),
     ],
 )
 def test_what_cannot_be_asked_is_one_line(name, arguments, line):
+    closure = load(name)
     with pytest.raises(DefinitionError) as error:
-        load(name).driven_by(*arguments)
+        closure.driven_by(*arguments[:1], branch=dict(enumerate(arguments)).get(1))
     assert line in str(error.value)
     assert '\n' not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ('name', 'joints'),
+    [
+        ('five_bar', ('left_elbow', 'right_elbow')),
+        ('five_bar', ('left_crank_joint', 'left_elbow')),
+        ('five_bar', ('right_elbow', 'right_crank_joint')),
+    ],
+)
+def test_several_inputs_are_exchanged_in_the_same_assembly(name, joints):
+    closure = load(name)
+    other = closure.driven_by(*joints)
+    assert other.input_names == joints
+    assert {*other.joint_names} == {*closure.input_names, *closure.joint_names} - {*joints}
+    for inputs in ((pi / 3, pi / 3), (1.1, 1.0), (1.2, 1.3)):
+        position = closure.position(*inputs)
+        velocity = closure.velocity(position, 0.3, -0.2)
+        known = dict(zip(closure.joint_names, position.joints, strict=True))
+        known |= dict(zip(closure.input_names, inputs, strict=True))
+        rates = dict(zip(closure.joint_names, velocity.joints, strict=True))
+        rates |= dict(zip(closure.input_names, (0.3, -0.2), strict=True))
+        found = other.position(*(known[joint] for joint in joints))
+        moving = other.velocity(found, *(rates[joint] for joint in joints))
+        for joint in other.joint_names:
+            assert remainder(found[joint] - known[joint], tau) == pytest.approx(0.0, abs=1e-9)
+            assert moving[joint] == pytest.approx(rates[joint], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ('joints', 'line'),
+    [
+        (('left_elbow', 'left_elbow'), 'name 2 different joints'),
+        (('left_elbow', 'right_elbo'), "did you mean 'right_elbow'?"),
+        (('left_elbow', 'right_elbow', 'left_crank_joint'), '3 for 2 inputs'),
+    ],
+)
+def test_joints_that_cannot_be_exchanged_are_one_line(joints, line):
+    with pytest.raises(DefinitionError) as error:
+        load('five_bar').driven_by(*joints)
+    assert line in str(error.value)
 
 
 def test_nothing_is_imported_that_was_not_asked_for():

@@ -66,7 +66,7 @@ def test_points_are_turned_with_what_they_have(relay, given):
             assert acceleration['rocker_joint'] == pytest.approx(given[2], rel=1e-12)
 
 
-END = load('four_bar').driven_by('rocker_joint', 1).branch.high
+END = load('four_bar').driven_by('rocker_joint', branch=1).branch.high
 
 
 @pytest.mark.parametrize(
