@@ -68,7 +68,7 @@ COMMANDS = {
     'urdf': 'write a linkage or a scene as URDF, for robot_state_publisher and RViz',
     'mjcf': 'write a linkage or a scene as MJCF, for MuJoCo, with its closed loops',
     'import': 'make a linkage file of a URDF and the pins that close it',
-    'synthesize': 'design a four-bar: from pairs of angles, a function, a curve or poses',
+    'synthesize': 'design a four-bar: from pairs of angles, a function, a curve, poses, its swing',
     'completion': 'print the completion script of a shell: bash, zsh or fish',
 }
 """Each subcommand, usually also the name of its module in this folder, and its description."""

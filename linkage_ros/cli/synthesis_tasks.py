@@ -86,6 +86,7 @@ def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
         '--function': typed.function,
         '--path': typed.path or typed.point,
         '--pose': typed.pose,
+        '--swing': typed.swing is not None or typed.time_ratio is not None,
     }
     named = [option for option, value in tasks.items() if value]
     if len(named) != 1:
@@ -94,7 +95,13 @@ def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
             'stand for two tasks' if named else 'is not said',
             f'name one of {listed(tasks)}',
         )
-    work = {'--pair': _pairs, '--function': _function, '--path': _path, '--pose': _motion}
+    work = {
+        '--pair': _pairs,
+        '--function': _function,
+        '--path': _path,
+        '--pose': _motion,
+        '--swing': _dead_centres,
+    }
     return work[named[0]](typed, search)
 
 
@@ -299,6 +306,21 @@ def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
             [('points off', f'{one.rms:.4g} m rms, {one.greatest:.4g} m at most')],
         )
         for one in paths.found or paths.refused
+    ]
+
+
+def _dead_centres(typed: argparse.Namespace, search: Search) -> list[Answer]:
+    from linkage_ros.synthesis.dead_centres import crank_rockers, DeadCentreTask
+
+    for name in ('swing', 'time_ratio'):
+        if getattr(typed, name) is None:
+            option = f'--{name.replace("_", "-")}'
+            raise LinkageError('--swing and --time-ratio', f'{option} is missing', f'add {option}')
+    task = DeadCentreTask(typed.angles.read(typed.swing), typed.time_ratio, typed.ground)
+    offset = f'{degrees(task.offset):.6g}° more than half a turn for the longer stroke'
+    return [
+        Answer('dead centres', design, assess(design), [('crank', offset)])
+        for design in crank_rockers(task, search.keep)
     ]
 
 

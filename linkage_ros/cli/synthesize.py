@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Design a four-bar: from pairs of angles, a function, a traced curve or poses of the coupler.
+Design a four-bar: from pairs of angles, a function, a traced curve, poses or dead centres.
 
 Angles are typed and shown in degrees, or in radians with --radians; lengths in metres.
 """
@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 from math import inf
 from pathlib import Path
 from shlex import quote
@@ -228,6 +229,14 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         metavar='CRANK',
         help="the crank's angle at each point",
     )
+    rocker = parser.add_argument_group('the dead centres of a crank-rocker')
+    rocker.add_argument('--swing', type=float, metavar='ANGLE', help='of the rocker')
+    rocker.add_argument(
+        '--time-ratio',
+        type=_ratio,
+        metavar='RATIO',
+        help='longer stroke to shorter one, as 10/9 or 1.2',
+    )
     motion = parser.add_argument_group('poses of the coupler')
     motion.add_argument(
         '--pose',
@@ -246,6 +255,14 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
             metavar=('X', 'Y'),
             help=f"in the {frame}'s frame; twice: crank's and rocker's",
         )
+
+
+def _ratio(text: str) -> float:
+    """Read a number, or a fraction such as 10/9."""
+    try:
+        return float(Fraction(text))
+    except (ValueError, ZeroDivisionError, OverflowError):
+        raise argparse.ArgumentTypeError(f'{text!r} is no ratio; write 10/9 or 1.2') from None
 
 
 def _add_freedoms(parser: argparse.ArgumentParser) -> None:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice, product
 from math import sin
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, did_you_mean, listed
 from linkage_ros.kinematics.checks import check
@@ -104,7 +104,8 @@ def exchange_inputs(
         exchanged = replace(exchanged, pose=Pose(start, points))
     sides = assembly_sides(structure)
     for words in islice(product(*sides.values()), _MOST):
-        found = replace(exchanged, assembly=dict(zip(sides, words, strict=True)))
+        assembly: Any = dict(zip(sides, words, strict=True))
+        found = replace(exchanged, assembly=assembly)
         again = rebuild(found).position(*(values[name] for name in names))
         if again.joints and all(
             abs(sin(0.5 * (again[name] - values[name]))) < _SAME
