@@ -91,7 +91,11 @@ TESTS: dict[str, Sequence[str]] = {
     'bag/salvage': ('bag/test_salvage.py', *BAG),
     'node/diagnostics': ('node', 'report'),
 }
-"""Modules, and the tests beside them, the closest first; those that start nodes are left out."""
+"""
+Modules, and the tests beside them, the closest first.
+
+Tests that are slow or start nodes are left out: what only these see counts as alive.
+"""
 
 COMPARED = {
     ast.Lt: '<=', ast.LtE: '<', ast.Gt: '>=', ast.GtE: '>', ast.Eq: '!=', ast.NotEq: '==',
@@ -208,7 +212,8 @@ def try_mutant(mutant: Mutant) -> Fate:
 
 def first_failure(root: Path, tests: Sequence[str]) -> str:
     """Return the test that fails first; '' if all pass, or do not end."""
-    command = [sys.executable, '-m', 'pytest', '-q', '-x', '-m', 'not ros and not alone']
+    marks = 'not ros and not alone and not slow'
+    command = [sys.executable, '-m', 'pytest', '-q', '-x', '-m', marks]
     command += ['-o', f'timeout={LONGEST_TEST:g}']
     with subprocess.Popen(
         [*command, '-p', 'no:cacheprovider', *tests],
