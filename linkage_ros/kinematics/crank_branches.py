@@ -537,7 +537,9 @@ class Inverse(NamedTuple):
         found = []
         for branch in self.branches:
             values = [value]
-            if self.output.turning and not branch.rise:
+            if branch.rise:  # Poses may repeat after several turns of the output.
+                values = [value + tau * k for k in range(round(branch.rise / tau))]
+            elif self.output.turning:
                 # A branch may span several turns.
                 lowest, highest = branch.low - branch.slack, branch.high + branch.slack
                 turns = range(ceil((lowest - value) / tau), floor((highest - value) / tau) + 1)

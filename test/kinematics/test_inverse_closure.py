@@ -34,6 +34,8 @@ from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
 
+from .linkages import four_bar_linkage
+
 U = 2.0**-53
 STATES = int(os.environ.get('LINKAGE_STATES', '100'))
 """States on each branch; 10⁶ in all take LINKAGE_STATES=6000."""
@@ -252,6 +254,18 @@ def test_iterated_linkage_is_inverted_along_its_branch():
     assert velocity.joints[0] == pytest.approx((one - other) / (2 * step), rel=1e-6)
     bend = (one + other - 2 * position.joints[0]) / step**2
     assert acceleration.joints[0] == pytest.approx(bend, rel=1e-4)
+
+
+@pytest.mark.parametrize('lengths', [(3.0, 2.0, 4.0, 1.0), (1.0, 2.0, 3.0, 4.0)])
+def test_branches_are_of_both_turns_where_two_turns_repeat(lengths):
+    """One change point only: a turn of the crank ends in the other assembly."""
+    closure = Closure(four_bar_linkage(lengths, 'left'))
+    for joint in closure.joint_names:
+        branches = closure.branches(joint)
+        assert sum(one.most - one.least for one in branches) == pytest.approx(2.0 * tau)
+        for crank in (0.3, 2.0, 5.0, 0.3 + tau, 2.0 + tau, 5.0 + tau):
+            found = [x for _, x in closure.cranks(joint, closure.position(crank)[joint])]
+            assert min(abs(remainder(x - crank, 2.0 * tau)) for x in found) < 1e-9
 
 
 def test_coordinate_of_a_traced_point_is_an_input():
