@@ -210,7 +210,8 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
         )
     if not given.ratio or not isfinite(given.ratio) or not isfinite(given.offset):
         raise DefinitionError(
-            f'{key}.ratio', f'{given.ratio:g}, offset {given.offset:g}',
+            f'{key}.ratio',
+            f'{given.ratio:g}, offset {given.offset:g}',
             'write finite numbers, and a ratio other than 0',
         )
     joint = linkage.joints[name]

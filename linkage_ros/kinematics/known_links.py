@@ -231,10 +231,10 @@ class KnownLinks:
         unit = self.scale if slides else 1.0
         ratio = given.ratio * (1.0 if turning else self.scale) / unit
         step = Following(one, other, sign * constant, sign * ratio, given.offset / unit)
-        known = self.turns_with.get(one), self.turns_with.get(other)
-        if known[0] is not None and known[1] is not None:
+        turns, back = self.turns_with.get(one), self.turns_with.get(other)
+        if turns is not None and back is not None:
             # The turns of a sum of inputs are known.
-            with_input = tuple(step.ratio * (p - q) for p, q in zip(*known, strict=True))
+            with_input = tuple(step.ratio * (p - q) for p, q in zip(turns, back, strict=True))
             self.turns_with[self.coordinate_count] = with_input
             self.ratio_turns = lcm(self.ratio_turns, 0 if slides else whole_turns(with_input[0]))
         elif turning and (slides or not given.ratio.is_integer()):

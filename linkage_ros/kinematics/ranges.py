@@ -278,7 +278,7 @@ def _turning_points(
     """Yield the values between samples at which a margin may cross zero and return."""
     for i in range(1, len(values) - 1):
         before, here, after = margins[i - 1], margins[i], margins[i + 1]
-        if 0.0 < here <= min(before, after):
+        if 0.0 < here <= min(before, after) and here < inf:
             yield golden(margin, values[i - 1], values[i + 1])[1]
         elif 0.0 > here >= max(before, after):
             yield golden(lambda x: -margin(x), values[i - 1], values[i + 1])[1]
