@@ -154,13 +154,7 @@ def assur_groups(linkage: Linkage) -> Structure:
 
     A DefinitionError is raised if a link is free, over-constrained, or not joined to the ground.
     """
-    links: dict[str, Mapping[str, Point]] = dict(linkage.links)
-    blocks: dict[str, str] = {}
-    for name, slider in linkage.sliders.items():
-        blocks[name] = slider.block or f'{_BLOCK}{name}'
-        if not slider.block:
-            links[blocks[name]] = {slider.point: (0.0, 0.0)}
-    joints = tuple(_joints(linkage, links, blocks))
+    links, blocks, joints = _parts(linkage)
     _check_connected(linkage, links, joints)
     search = _Search(linkage, links, blocks, joints)
     structure = Structure(links, blocks, tuple(search.groups()), joints, len(linkage.ratios))
@@ -174,6 +168,25 @@ def assur_groups(linkage: Linkage) -> Structure:
             else f'take away a link{", a ratio" if linkage.ratios else ""} or a pin',
         )
     return structure
+
+
+def degrees_of_freedom(linkage: Linkage) -> int:
+    """Return the degrees of freedom by Grübler's count, with the inputs free."""
+    links, blocks, joints = _parts(linkage)
+    return Structure(links, blocks, (), joints, len(linkage.ratios)).freedom
+
+
+def _parts(
+    linkage: Linkage,
+) -> tuple[dict[str, Mapping[str, Point]], dict[str, str], tuple[Joint, ...]]:
+    """Return the links with the blocks of slots, the links that slide, and the joints."""
+    links: dict[str, Mapping[str, Point]] = dict(linkage.links)
+    blocks: dict[str, str] = {}
+    for name, slider in linkage.sliders.items():
+        blocks[name] = slider.block or f'{_BLOCK}{name}'
+        if not slider.block:
+            links[blocks[name]] = {slider.point: (0.0, 0.0)}
+    return links, blocks, tuple(_joints(linkage, links, blocks))
 
 
 def _joints(

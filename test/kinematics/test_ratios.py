@@ -23,7 +23,7 @@ from os import environ
 from random import Random
 from typing import Any
 
-from linkage_ros import Closure
+from linkage_ros import Closure, load
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.linkage import (
     Input,
@@ -339,6 +339,19 @@ def test_limits_of_a_joint_that_follows() -> None:
     joints = dict(linkage.joints) | {'theta5': RevoluteJoint('ground', 'link5', Limits(-0.5, 0.2))}
     (interval,) = Closure(replace(linkage, joints=joints)).input_ranges
     assert interval[:2] == pytest.approx((-0.2, 0.5), rel=1e-14)
+
+
+def test_gripper_of_the_gallery_is_symmetric() -> None:
+    """The right finger follows the motor of the left one: each is the other one's mirror."""
+    closure = load('gripper')
+    for k in range(8):
+        position = closure.position(0.1 * k)
+        assert position['right_knuckle_joint'] == -0.1 * k
+        points = closure.points(position)
+        left, right = (points[f'{side}_finger', f'{side}_pad'] for side in ('left', 'right'))
+        assert abs(right + left.conjugate()) < 1e-16
+        arm = complex(-0.0344, -0.0492) * rect(1.0, 0.1 * k)
+        assert abs(left - (complex(-0.030, -0.055) + arm + complex(0.0219, -0.045))) < 1e-16
 
 
 WRONG: list[tuple[str, str, dict[str, Ratio], str]] = [
