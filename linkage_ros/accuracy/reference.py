@@ -84,7 +84,8 @@ class Reference:
     def __init__(self, linkage: Linkage, digits: int = DIGITS, guard: int = _GUARD) -> None:
         if linkage.ratios:
             raise LinkageError(
-                'ratios', f'has {listed(linkage.ratios)}, which the reference does not know',
+                'ratios',
+                f'has {listed(linkage.ratios)}, which the reference does not know',
                 'measure the linkage without them, each joint as an input',
             )
         self._linkage = linkage

@@ -287,7 +287,9 @@ class _Search:
         one, other = self._ends(index)
         kind = 'input' if index < len(self._linkage.inputs) else 'ratio'
         key = f'{"ratios" if kind == "ratio" else kind}.{self._linkage.driven[index].joint}'
-        return DefinitionError(key, f'{one!r} and {other!r} {how}', f'leave one of the {kind}s out')
+        return DefinitionError(
+            key, f'{one!r} and {other!r} {how}', f'leave one of the {kind}s out'
+        )
 
     def _start_following(self) -> list[int]:
         """Merge the bodies anew if ratios have become known; return these."""

@@ -98,6 +98,8 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
 
     """
     groups = assur_groups(linkage).groups
+    # Where a side changes at change points, it is that at the pose.
+    linkage = replace(linkage, pose=Pose(inputs, {}))
     if any(isinstance(group, Iterated) for group in groups):
         linkage = replace(linkage, pose=Pose(inputs, _points(linkage, poses)))
     keys = [_key(each) for each in groups if isinstance(each, Dyad) and each.kind in _SIDED]
@@ -118,8 +120,10 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
         raise DefinitionError('assembly', f'no way to close it leads to the pose {where}', _REMEDY)
     if len(candidates) > 1 and candidates[1][0] < least + _SAME:
         raise DefinitionError('assembly', f'two ways to close it meet {where}', _REMEDY)
-    if closure.linkage.pose is None and not _near(usual_inputs(closure), inputs):
-        return replace(closure.linkage, pose=Pose(inputs, {}))
+    if closure.linkage.pose == Pose(inputs, {}):
+        bare = Closure(replace(closure.linkage, pose=None))
+        if _near(usual_inputs(bare), inputs) and _off(bare, inputs, poses) <= _FOUND:
+            return bare.linkage
     return closure.linkage
 
 
