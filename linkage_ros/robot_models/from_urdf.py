@@ -235,8 +235,8 @@ class _Import:
             raise self._error(
                 '',
                 'closes no loop',
-                'name what meets: --close FRAME=FRAME or LINK.x,y,z=LINK.x,y,z; or call the '
-                'frames PIN_on_LINK',
+                'name frames that meet: --close FRAME=FRAME, or call them PIN_on_LINK; or places: '
+                '--close LINK.x,y,z=LINK.x,y,z',
             )
         self._planar: Planar = lay_flat(urdf, self._loops)
         self._pose = dict.fromkeys(moving, 0.0) | dict(urdf.start) | dict(at)

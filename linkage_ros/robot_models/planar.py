@@ -80,12 +80,12 @@ def find_closings(
             raise FileError(
                 urdf.file, f'--close {"=".join(pair)}', 'names one link twice', 'name two'
             )
-        closings.append(Closing(pair[0], pair))
+        closings.append(Closing(_PLACE.sub(r'\1_end', pair[0]), pair))
     return closings, alone
 
 
 _NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
-_PLACE = re.compile(rf'(.+)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
+_PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
 
 
 def with_places(urdf: UrdfFile, asked: Sequence[tuple[str, str]]) -> UrdfFile:
