@@ -93,6 +93,10 @@ def check(linkage: Linkage) -> None:
 def _check_points(linkage: Linkage) -> None:
     # A slider joins links without a shared point, so such a link may have a single point.
     sliding = {name for s in linkage.sliders.values() for name in (s.block, s.along)}
+    if linkage.ratios:
+        # A gear may have its pin alone.
+        geared = (*linkage.inputs, *(linkage.joints.get(name) for name in linkage.ratios))
+        sliding |= {getattr(joint, end, '') for joint in geared for end in ('parent', 'child')}
     for name, points in linkage.links.items():
         # A single pivot is enough for the ground: its frame does not turn.
         if len(points) < 2 and not (points and (name in sliding or name == GROUND)):
