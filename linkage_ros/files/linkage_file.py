@@ -43,7 +43,7 @@ from linkage_ros.kinematics.linkage import (
     Slider,
 )
 from linkage_ros.kinematics.sides import assembly_sides, undrawn
-from linkage_ros.kinematics.sweep_analysis import check_closes, check_limits
+from linkage_ros.kinematics.sweep_analysis import check_closes, check_limits, check_turns
 from linkage_ros.kinematics.topology import assur_groups
 from linkage_ros.resources import linkage_names, named_file
 
@@ -358,6 +358,7 @@ def closable(content: Section, linkage: Linkage, name: str, shorthand: str = '')
     try:
         closure = Closure(linkage, name)
         check_closes(closure)
+        check_turns(closure)
         check_limits(closure)
     except DefinitionError as error:
         where = error.where

@@ -150,6 +150,17 @@ def equations(
     return errors, rows
 
 
+def meshed(constraints: Sequence[Constraint], off: Sequence[float], part: float) -> bool:
+    """Return whether the residuals of ratios are off by less than a part of their periods."""
+    row = 0
+    for constraint in constraints:
+        period = constraint.period if isinstance(constraint, Geared) else 0.0
+        if period and not off[row] < part * period:
+            return False
+        row += 2 if isinstance(constraint, Meeting) else 1
+    return True
+
+
 def spread(
     constraints: Sequence[Constraint],
     unknowns: Array,

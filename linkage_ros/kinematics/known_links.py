@@ -39,7 +39,6 @@ from linkage_ros.kinematics.linkage import (
 from linkage_ros.kinematics.step import FixedPoint, Following, PointOnLink, PointOnRail, Step
 from linkage_ros.kinematics.topology import followed_links, Joint, Structure
 
-
 _MOST_TEETH = 1000
 _ROUNDED = 1e-13
 """A ratio of teeth, both at most this number, and its relative error as a decimal number."""
@@ -216,11 +215,12 @@ class KnownLinks:
             return 1 + index
         if index not in self._followers:
             name, ratio = tuple(self._linkage.ratios.items())[index - count]
-            self._follow(ratio, slides=isinstance(self._linkage.joints[name], SlideJoint))
+            self._follow(name, ratio)
             self._followers[index] = self.new_coordinates(1)
         return self._followers[index]
 
-    def _follow(self, given: Ratio, *, slides: bool) -> None:
+    def _follow(self, name: str, given: Ratio) -> None:
+        slides = isinstance(self._linkage.joints[name], SlideJoint)
         number = self._number_of(given.of)
         if number >= 0 and self.drives(number):
             turning = not self._linkage.driven[number].slider
@@ -230,7 +230,7 @@ class KnownLinks:
             one, other, sign, constant = self.term(self._linkage.joints[given.of])
         unit = self.scale if slides else 1.0
         ratio = given.ratio * (1.0 if turning else self.scale) / unit
-        step = Following(one, other, sign * constant, sign * ratio, given.offset / unit)
+        step = Following(name, one, other, sign * constant, sign * ratio, given.offset / unit)
         turns, back = self.turns_with.get(one), self.turns_with.get(other)
         if turns is not None and back is not None:
             # The turns of a sum of inputs are known.

@@ -205,6 +205,7 @@ class Following:
     taken within half a turn of ``middle``; otherwise it is infinite.
     """
 
+    joint: str  # Its name
     one: int
     other: int
     constant: float

@@ -35,7 +35,7 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
-from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics.sweep_analysis import check_turns, InputSweep
 from mpmath import mp, mpf
 import numpy as np
 import pytest
@@ -220,34 +220,43 @@ def follow(lengths: Any, given: Ratio, start: list[float], low: float, high: flo
     return x.tolist()
 
 
+def posed_five_bar(
+    lengths: Any, ratio: float, theta: float, geared: float
+) -> tuple[Closure, Ratio, list[float]] | None:
+    """Return a five-bar whose coupler turns against the crank as link 5 does, by a ratio."""
+    ground, a, b, c, d = lengths
+    pin_a, pin_c = rect(a, theta), ground + rect(d, geared)
+    met = meeting(pin_c, pin_a, c, b, 1)
+    if met is None:
+        return None
+    pin_b = complex(met)
+    theta3, theta4 = phase(pin_b - pin_a), phase(pin_b - pin_c)
+    given = Ratio('theta5', ratio, theta3 - theta - ratio * geared)
+    places = {'B': (pin_b.real, pin_b.imag), 'C': (pin_c.real, pin_c.imag)}
+    linkage = geared_five_bar(lengths, given, '', pose=Pose((theta,), places))
+    joints = dict(linkage.joints) | {'alpha': RevoluteJoint('link2', 'link3')}
+    closure = Closure(replace(linkage, joints=joints, ratios={'alpha': given}))
+    return closure, given, [geared, theta3, theta4]
+
+
 def test_random_gears_on_moving_links() -> None:
-    """The coupler turns against the crank as link 5 does against the ground: no dyad covers it."""
+    """No dyad covers them; positions and rates."""
     random = Random(34)
     compared = 0
     for _ in range(max(8, STATES // 10)):
-        ground, a, b, c, d = lengths = tuple(random.uniform(0.5, 1.0) for _ in range(5))
+        lengths = tuple(random.uniform(0.5, 1.0) for _ in range(5))
         theta, geared = random.uniform(-1, 1), random.uniform(0.5, 2.5)
-        pin_a, pin_c = rect(a, theta), ground + rect(d, geared)
-        pin_b = meeting(pin_c, pin_a, c, b, 1)
-        if pin_b is None:
+        closed = posed_five_bar(lengths, random.choice([-1.0, 2.0, -0.5, 1.25]), theta, geared)
+        if closed is None:
             continue
-        pin_b = complex(pin_b)
-        theta3, theta4 = phase(pin_b - pin_a), phase(pin_b - pin_c)
-        ratio = random.choice([-1.0, 2.0, -0.5, 1.25])
-        given = Ratio('theta5', ratio, theta3 - theta - ratio * geared)
-        places = {'B': (pin_b.real, pin_b.imag), 'C': (pin_c.real, pin_c.imag)}
-        linkage = geared_five_bar(lengths, given, '', pose=Pose((theta,), places))
-        joints = dict(linkage.joints) | {'alpha': RevoluteJoint('link2', 'link3')}
-        closure = Closure(replace(linkage, joints=joints, ratios={'alpha': given}))
-
-        assert closure.posed(theta).joints[:3] == pytest.approx((geared, theta3, theta4), abs=1e-9)
+        closure, given, angles = closed
+        assert closure.posed(theta).joints[:3] == pytest.approx(angles, abs=1e-9)
         (interval,) = closure.closing_ranges
         end = theta + 0.7 * (min(interval.highest, theta + 1.5) - theta)
         position = closure.position(end)
         if not position.status.has_rates:
             continue
-        right = follow(lengths, given, [geared, theta3, theta4], theta, end)
-        assert same_angles(position.joints[:3], right, 1e-9)
+        assert same_angles(position.joints[:3], follow(lengths, given, angles, theta, end), 1e-9)
         step = 1e-5
         velocity = closure.velocity(position, 1.0)
         fore, back = (closure.position(end + h).joints for h in (step, -step))
@@ -255,6 +264,25 @@ def test_random_gears_on_moving_links() -> None:
         assert list(velocity.joints) == pytest.approx(slopes, rel=1e-4, abs=1e-4)
         compared += 1
     assert compared >= 4
+
+
+@pytest.mark.parametrize(
+    ('ratio', 'seed'), [(1.25, 3), (1.25, 8), (-2.0, 4), (0.5, 5), (17 / 43, 6), (-2 / 3, 7)]
+)
+def test_gears_on_moving_links_over_whole_turns(ratio: float, seed: int) -> None:
+    """Teeth keep their mesh turn after turn, against a loop that is followed in small steps."""
+    random = Random(seed)
+    for _ in range(200):
+        lengths = (1.0, random.uniform(0.05, 0.2), *(random.uniform(0.4, 1.5) for _ in range(3)))
+        theta = random.uniform(-1, 1)
+        closed = posed_five_bar(lengths, ratio, theta, random.uniform(0.5, 2.5))
+        if closed and closed[0].closing_ranges and closed[0].closing_ranges[0].whole:
+            break
+    closure, given, angles = closed
+    for part in range(12):
+        begin, end = (theta + (part + more) * tau / 4 for more in (0, 1))
+        angles = follow(lengths, given, angles, begin, end)
+        assert same_angles(closure.position(end).joints[:3], angles, 1e-9), part
 
 
 @pytest.mark.parametrize('ratio', [1.0, -1.5, 0.37, -2.0])
@@ -288,6 +316,26 @@ def test_turns_of_a_joint_solved_before_are_those_of_its_limits() -> None:
     found = [closure.position(0.01 * k).joints for k in range(700)]
     assert min(one[0] for one in found) < pi - 0.1 or max(one[0] for one in found) > pi + 0.1
     assert max(abs(p[1] - q[1]) for p, q in pairwise(found)) < 0.02
+
+
+@pytest.mark.parametrize('ratio', [0.5, -1.5])
+def test_joint_whose_turns_are_not_known(ratio: float) -> None:
+    """A rocker that swings through 180° without limits, and one that turns fully: refused."""
+    swinging = two_four_bars(Ratio('rocker_joint', ratio))
+    points = dict(swinging.links['ground']) | {'D': (0.0, 0.08)}
+    swinging = replace(swinging, links=dict(swinging.links) | {'ground': points})
+    turning = two_four_bars(Ratio('rocker_joint', ratio))
+    links = dict(turning.links)
+    links['ground'] = dict(links['ground']) | {'D': (0.01, 0.0)}  # a drag link
+    links['coupler'] = {'A': (0.0, 0.0), 'B': (0.04, 0.0)}
+    links['rocker'] = {'D': (0.0, 0.0), 'B': (0.035, 0.0)}
+    turning = replace(turning, links=links)
+    for linkage in (swinging, turning):
+        with pytest.raises(DefinitionError, match='its turns are not known') as caught:
+            check_turns(Closure(linkage))
+        assert caught.value.where == 'ratios.gear_joint.of'
+        whole = replace(linkage, ratios={'gear_joint': Ratio('rocker_joint', 2.0)})
+        check_turns(Closure(whole))
 
 
 def test_rack_and_pinion() -> None:
