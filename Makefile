@@ -24,6 +24,8 @@ unexport ROS_SECURITY_ENABLE ROS_SECURITY_STRATEGY ROS_SECURITY_KEYSTORE
 unexport ROS_SECURITY_ENCLAVE_OVERRIDE
 # With this one leaked, the rclpy wheels believe that their library path is set already.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+# With this one, every process of a test would compile every module anew.
+unexport PYTHONDONTWRITEBYTECODE
 # With these, pip or Python would look outside of the environment made here.
 unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_DEPS MYPYPATH
 unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLUDE_NEWER

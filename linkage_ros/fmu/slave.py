@@ -174,18 +174,9 @@ class SceneSlave(GuardedSlave):
                 setter=partial(setattr, self, '_seed'),
             )
         )
-        for number, (name, unit, text) in enumerate(self._scene.inputs):
-            self._add(
-                Float64(
-                    name,
-                    causality=Fmi3Causality.input,
-                    variability=Fmi3Variability.continuous,
-                    unit=unit,
-                    description=text,
-                    getter=partial(self._inputs.__getitem__, number),
-                    setter=partial(self._inputs.__setitem__, number),
-                )
-            )
+        self._declare_numbers(
+            self._scene.inputs, self._inputs, Fmi3Causality.input, Fmi3Variability.continuous
+        )
         for outputs in self._scene.outputs:
             self._declare_outputs(outputs)
         for motor in self._scene.motors:
@@ -229,16 +220,24 @@ class SceneSlave(GuardedSlave):
         )
         self.type_definitions['Status'] = _status_type()
 
-    def _declare_numbers(self, variables: Sequence[Variable], values: Sequence[float]) -> None:
+    def _declare_numbers(
+        self,
+        variables: Sequence[Variable],
+        values: list[float],
+        causality: Fmi3Causality = Fmi3Causality.output,
+        variability: Fmi3Variability = Fmi3Variability.discrete,
+    ) -> None:
+        settable = causality is Fmi3Causality.input
         for number, (name, unit, text) in enumerate(variables):
             self._add(
                 Float64(
                     name,
-                    causality=Fmi3Causality.output,
-                    variability=Fmi3Variability.discrete,
+                    causality=causality,
+                    variability=variability,
                     unit=unit,
                     description=text,
                     getter=partial(values.__getitem__, number),
+                    setter=partial(values.__setitem__, number) if settable else None,
                 )
             )
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from linkage_ros.cli.main import main
 import pytest
 
-SIZES = [5e-324, 1e-320, 1e-200, 1e-155, 1e-150, 1e-100, 1e-40, 1e-28, 1e-20, 1e-15, 1e-9, 1e9]
+SIZES = [5e-324, 1e-200, 1e-155, 1e-150, 1e-28, 1e-15, 1e9]
 """From the smallest double to the largest coordinate of a file."""
 
 _JOINTS = {
@@ -139,8 +139,8 @@ def test_a_length_of_any_size_is_computed_or_refused_in_one_line(
     assert not all(refused)
 
 
-@pytest.mark.parametrize('size', [1e-150, 1e-28, 1e-15, 1e9])
-@pytest.mark.parametrize('kind', ['a four-bar', 'a yoke', 'its offset', 'its crank and ground'])
+@pytest.mark.parametrize('size', [1e-150, 1e-15])
+@pytest.mark.parametrize('kind', ['a four-bar', 'a yoke', 'its offset'])
 def test_a_length_of_any_size_is_drawn(
     kind: str, size: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
