@@ -65,7 +65,8 @@ def hand(random: Random, multiplier: float, offset: float, axis: str) -> tuple[s
 
 def imported(text: str, places: list[str], **options: object) -> ImportedLinkage:
     close = list(zip(places[::2], places[1::2], strict=True))
-    return from_urdf(read_urdf(text.encode(), 'h.urdf'), close, ['left_joint'], **options)  # type: ignore[arg-type]
+    urdf_file = read_urdf(text.encode(), 'h.urdf')
+    return from_urdf(urdf_file, close, ['left_joint'], **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize('axis', ['0 0 1', '0 0 -1'])
@@ -154,7 +155,7 @@ def test_urdf_there_and_back(name: str) -> None:
 
 @pytest.mark.parametrize('name', SHAPES)
 def test_engine_keeps_the_ratio(name: str) -> None:
-    """MuJoCo starts closed, and still has the ratio when its servo has moved the input."""
+    """The engine starts closed, and still has the ratio when its servo has moved the input."""
     mujoco = pytest.importorskip('mujoco')
     closure = Closure(SHAPES[name]())
     model = mujoco.MjModel.from_xml_string(mjcf('r', [Part(closure)]).decode())
