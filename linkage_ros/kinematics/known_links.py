@@ -25,7 +25,7 @@ from cmath import phase, rect
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import frexp, hypot, lcm, ldexp, tau
+from math import frexp, hypot, lcm, ldexp
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.linkage import (
@@ -240,7 +240,7 @@ class KnownLinks:
         elif turning and (slides or not given.ratio.is_integer()):
             limits = self._linkage.joints[given.of].limits
             middle = 0.5 * (limits.low + limits.high) if limits.bounded else 0.0
-            step = replace(step, period=tau, middle=middle)
+            step = replace(step, middle=middle)
         self.add(step)
 
     def _number_of(self, joint: str) -> int:

@@ -25,10 +25,9 @@ coordinates that the steps append. Lengths are in the unit of the closure's scal
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
 from typing import Any, NamedTuple, Protocol
 
-from linkage_ros.kinematics.arithmetic import facing, remainder
+from linkage_ros.kinematics.arithmetic import atan2, cos, facing, sin
 from linkage_ros.kinematics.status import Status
 
 
@@ -201,8 +200,8 @@ class Following:
     """
     The value of a joint that follows another: ratio·(x[one] − x[other] + constant) + offset.
 
-    Where the turns of the other joint matter and are not known, ``period`` is a turn, and it is
-    taken within half a turn of ``middle``; otherwise it is infinite.
+    Where the turns of the other joint matter and are not known, it is taken within half a turn of
+    ``middle``; otherwise that is None.
     """
 
     joint: str  # Its name
@@ -211,15 +210,16 @@ class Following:
     constant: float
     ratio: float
     offset: float
-    period: float = inf
-    middle: float = 0.0
+    middle: float | None = None
 
     def close(self, known: State) -> Pose:
         """Append the value."""
         x = known.coordinates
         followed = x[self.one] - x[self.other] + self.constant
-        if self.period < inf:
-            followed = self.middle + remainder(followed - self.middle, self.period)
+        if self.middle is not None:
+            # Not `remainder`, which JavaScript does not have.
+            off = followed - self.middle
+            followed = self.middle + atan2(sin(off), cos(off))
         x.append(self.ratio * followed + self.offset)
         return PLACED
 

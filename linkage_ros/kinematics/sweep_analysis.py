@@ -574,7 +574,7 @@ def check_closes(closure: LoopClosure) -> None:
 def check_turns(closure: LoopClosure) -> None:
     """Refuse a ratio of an angle that leaves the half turns in which its turns are known."""
     for step in closure.steps:
-        if not isinstance(step, Following) or step.period == inf:
+        if not isinstance(step, Following) or step.middle is None:
             continue
         for interval in closure.closing_ranges:
             found = [closure.posed(value) for value in samples(interval)]
