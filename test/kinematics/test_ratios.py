@@ -378,7 +378,7 @@ def test_ranges_are_those_of_a_scan(ratio: Fraction) -> None:
     turns = ratio.denominator
     ranges = closure.input_ranges
     assert all(one.turns == turns for one in ranges)
-    count = 2000 * turns
+    count = 500 * turns
     with mp.workdps(20):
         for k in range(count):
             value = turns * tau * (k + 0.37) / count
