@@ -49,7 +49,7 @@ from linkage_ros.kinematics.equations import (
     Constraint,
     derivative,
     equations,
-    meshed,
+    is_meshed,
     spread,
 )
 from linkage_ros.kinematics.step import State
@@ -164,7 +164,7 @@ class Continuation:
         unknowns = node.place[:-1]
         still = State([0.0] * len(known[0]), [0j] * len(known[1]))
         slopes = np.array(equations(self.constraints, unknowns.tolist(), known)[1])
-        if not meshed(self.constraints, (np.abs(slopes) @ away).tolist(), 0.25):
+        if not is_meshed(self.constraints, (np.abs(slopes) @ away).tolist(), 0.25):
             return False
         try:
             inverse = np.linalg.inv(slopes)
@@ -330,7 +330,7 @@ class Continuation:
             if system is None:
                 return None
             errors, slopes = system
-            if last == inf and not meshed(self.constraints, np.abs(errors).tolist(), _TOOTH):
+            if last == inf and not is_meshed(self.constraints, np.abs(errors).tolist(), _TOOTH):
                 return None
             right = np.append(-errors, goal - float(row @ place))
             try:

@@ -28,7 +28,7 @@ from math import hypot, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import facing, remainder, vector
-from linkage_ros.kinematics.known_links import whole_turns
+from linkage_ros.kinematics.known_links import count_turns
 from linkage_ros.kinematics.linkage import Linkage, Ratio, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.step import State
 from linkage_ros.kinematics.topology import Joint
@@ -150,7 +150,7 @@ def equations(
     return errors, rows
 
 
-def meshed(constraints: Sequence[Constraint], off: Sequence[float], part: float) -> bool:
+def is_meshed(constraints: Sequence[Constraint], off: Sequence[float], part: float) -> bool:
     """Return whether the residuals of ratios are off by less than a part of their periods."""
     row = 0
     for constraint in constraints:
@@ -432,14 +432,14 @@ class Constraints:
 
     def _add_drives(self) -> None:
         for i, given in enumerate(self._linkage.driven):
-            if not self._planner.drives(i):
+            if not self._planner.has_drive(i):
                 continue
             if given.slider in self.slides:
                 line = self.slides[given.slider]
-                self.all.append(line._replace(slide=self._planner.drive(i)))
+                self.all.append(line._replace(slide=self._planner.drive_coordinate(i)))
             elif given.child in self._bodies or given.parent in self._bodies:
                 child, parent = (self._facing(end, 0.0) for end in (given.child, given.parent))
-                self.all.append(Parallel(child, parent, 0.0, self._planner.drive(i)))
+                self.all.append(Parallel(child, parent, 0.0, self._planner.drive_coordinate(i)))
 
     def _add_ratio(self, name: str, given: Ratio) -> None:
         joints = self._linkage.joints[name], self._linkage.joints[given.of]
@@ -448,7 +448,7 @@ class Constraints:
         unit = self._planner.scale if slides[0] else 1.0
         ratio = given.ratio * (self._planner.scale if slides[1] else 1.0) / unit
         # Without the turns of its links, an angle determines the other one modulo this.
-        turns = whole_turns(given.ratio)
+        turns = count_turns(given.ratio)
         period = tau if slides[1] else abs(ratio) * tau if slides[0] else tau / max(turns, 1)
         if all(slides) or not turns:
             period = 0.0

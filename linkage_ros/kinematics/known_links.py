@@ -37,7 +37,7 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
 )
 from linkage_ros.kinematics.step import FixedPoint, Following, PointOnLink, PointOnRail, Step
-from linkage_ros.kinematics.topology import followed_links, Joint, Structure
+from linkage_ros.kinematics.topology import find_followed_links, Joint, Structure
 
 _MOST_TEETH = 1000
 _ROUNDED = 1e-13
@@ -197,18 +197,18 @@ class KnownLinks:
         self.coordinate_count += count
         return self.coordinate_count - count
 
-    def drives(self, index: int) -> bool:
+    def has_drive(self, index: int) -> bool:
         """Return whether the value of a driven joint is known: an input, or one that follows."""
         count = len(self._linkage.inputs)
         if index < count:
             return True
         of = tuple(self._linkage.ratios.values())[index - count].of
         number = self._number_of(of)
-        return (number >= 0 and self.drives(number)) or (
-            followed_links(self._linkage, self.blocks, of) <= {*self.angles}
+        return (number >= 0 and self.has_drive(number)) or (
+            find_followed_links(self._linkage, self.blocks, of) <= {*self.angles}
         )
 
-    def drive(self, index: int) -> int:
+    def drive_coordinate(self, index: int) -> int:
         """Return the coordinate of a driven joint; add the step of one that follows another."""
         count = len(self._linkage.inputs)
         if index < count:
@@ -222,9 +222,9 @@ class KnownLinks:
     def _follow(self, name: str, given: Ratio) -> None:
         slides = isinstance(self._linkage.joints[name], SlideJoint)
         number = self._number_of(given.of)
-        if number >= 0 and self.drives(number):
+        if number >= 0 and self.has_drive(number):
             turning = not self._linkage.driven[number].slider
-            one, other, sign, constant = self.drive(number), 0, 1.0, 0.0
+            one, other, sign, constant = self.drive_coordinate(number), 0, 1.0, 0.0
         else:
             turning = isinstance(self._linkage.joints[given.of], RevoluteJoint)
             one, other, sign, constant = self.term(self._linkage.joints[given.of])
@@ -236,7 +236,7 @@ class KnownLinks:
             # The turns of a sum of inputs are known.
             with_input = tuple(step.ratio * (p - q) for p, q in zip(turns, back, strict=True))
             self.turns_with[self.coordinate_count] = with_input
-            self.ratio_turns = lcm(self.ratio_turns, 0 if slides else whole_turns(with_input[0]))
+            self.ratio_turns = lcm(self.ratio_turns, 0 if slides else count_turns(with_input[0]))
         elif turning and (slides or not given.ratio.is_integer()):
             limits = self._linkage.joints[given.of].limits
             middle = 0.5 * (limits.low + limits.high) if limits.bounded else 0.0
@@ -309,7 +309,7 @@ class KnownLinks:
         return min(shared, default=None)
 
 
-def whole_turns(ratio: float) -> int:
+def count_turns(ratio: float) -> int:
     """Return the whole turns after which an angle that follows another repeats; 0 if never."""
     near = Fraction(ratio).limit_denominator(_MOST_TEETH)
     return near.denominator if abs(near - Fraction(ratio)) <= _ROUNDED * abs(ratio) else 0

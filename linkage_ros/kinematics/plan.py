@@ -154,7 +154,7 @@ class SolutionPlan(KnownLinks):
             )
 
     def _drive(self, driven: Driven) -> None:
-        joint, index = driven.joint, self.drive(driven.index)
+        joint, index = driven.joint, self.drive_coordinate(driven.index)
         angle = self.angles[joint.to]
         if joint.kind == 'R':
             sign = 1.0 if self._driven[driven.index].child == joint.link else -1.0
@@ -358,9 +358,12 @@ class SolutionPlan(KnownLinks):
         ways: dict[str, tuple[DrivenOffset, ...]] = {start: ()}
         while end not in ways:
             for i, given in enumerate(self._driven):
-                for one, other in self._ends(i) if self.drives(i) else ():
+                for one, other in self._ends(i) if self.has_drive(i) else ():
                     if one in ways and other not in ways:
-                        ways[other] = (*ways[one], self._carry(self.drive(i), given, one, other))
+                        ways[other] = (
+                            *ways[one],
+                            self._carry(self.drive_coordinate(i), given, one, other),
+                        )
         return ways[end]
 
     def _ends(self, index: int) -> tuple[tuple[str, str], tuple[str, str]]:

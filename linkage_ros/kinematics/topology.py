@@ -170,7 +170,7 @@ def assur_groups(linkage: Linkage) -> Structure:
     return structure
 
 
-def degrees_of_freedom(linkage: Linkage) -> int:
+def count_freedom(linkage: Linkage) -> int:
     """Return the degrees of freedom by Grübler's count, with the inputs free."""
     links, blocks, joints = _parts(linkage)
     return Structure(links, blocks, (), joints, len(linkage.ratios)).freedom
@@ -237,7 +237,7 @@ class _Search:
         self._drives = tuple(self._driven_joint(given, blocks) for given in linkage.driven)
         # Of the ratios those whose other joint is not known yet; and that joint.
         self._waiting = {
-            index: (ratio.of, followed_links(linkage, blocks, ratio.of))
+            index: (ratio.of, find_followed_links(linkage, blocks, ratio.of))
             for index, ratio in enumerate(linkage.ratios.values(), len(linkage.inputs))
         }
         self._bodies: list[tuple[str, ...]] = []
@@ -494,7 +494,7 @@ class _Search:
         return 3 * len(bodies) - 2 * joints - len(self._solved_with(bodies))
 
 
-def followed_links(linkage: Linkage, blocks: Mapping[str, str], joint: str) -> frozenset[str]:
+def find_followed_links(linkage: Linkage, blocks: Mapping[str, str], joint: str) -> frozenset[str]:
     """Return the links of a joint that another one follows; of an input none."""
     if joint in (given.joint for given in linkage.inputs):
         return frozenset()

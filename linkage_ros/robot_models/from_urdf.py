@@ -38,13 +38,13 @@ from linkage_ros.kinematics.linkage import (
     Side,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.kinematics.topology import assur_groups, degrees_of_freedom, Dyad, Iterated
+from linkage_ros.kinematics.topology import assur_groups, count_freedom, Dyad, Iterated
 from linkage_ros.robot_models.planar import (
+    add_places,
     find_closings,
     find_loops,
     lay_flat,
     Planar,
-    with_places,
 )
 from linkage_ros.robot_models.urdf_file import MOVING, UrdfFile
 from linkage_ros.robot_models.urdf_topology import urdf_topology, UrdfTopology
@@ -217,7 +217,7 @@ class _Import:
         inputs: Sequence[str],
         at: Mapping[str, float],
     ) -> None:
-        self._urdf = urdf = with_places(urdf, close)
+        self._urdf = urdf = add_places(urdf, close)
         self._closings, alone = find_closings(urdf, close)
         moving = [joint.name for joint in urdf.joints.values() if joint.kind in MOVING]
         for option, names in (('--input', inputs), ('--at', at)):
@@ -303,7 +303,7 @@ class _Import:
             if joint.mimics in joints and joint.name in linkage.joints
         }
         names = sorted(ratios, key=lambda name: not ends(name) & ends(ratios[name].of))
-        wanted = degrees_of_freedom(linkage) - len(linkage.inputs)
+        wanted = count_freedom(linkage) - len(linkage.inputs)
         for chosen in islice(combinations(names, max(0, min(wanted, len(names)))), _MOST_TRIED):
             with_ratios = replace(linkage, ratios={name: ratios[name] for name in chosen})
             try:

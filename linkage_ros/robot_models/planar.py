@@ -88,7 +88,7 @@ _NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 _PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
 
 
-def with_places(urdf: UrdfFile, asked: Sequence[tuple[str, str]]) -> UrdfFile:
+def add_places(urdf: UrdfFile, asked: Sequence[tuple[str, str]]) -> UrdfFile:
     """Return the robot with a frame at each asked place, LINK.x,y,z, which bears its name."""
     links, joints = dict(urdf.links), dict(urdf.joints)
     for name in (name for pair in asked for name in pair):
