@@ -284,23 +284,25 @@ def test_whatever_the_force_it_stays_between_its_stops(
 # Forces over time: a mass of 1 on a line, under the table of a force.
 
 
-def pushed(rows, friction=0.0, calls=None):
+def pushed(rows, friction=0.0, slope=0.0, calls=None):
     """Return the terms of a mass of 1 on a line under a force over time; ``calls`` counts."""
 
     def terms(value):
         if calls is not None:
             calls.append(value)
-        return Terms(1.0, 0.0, 0.0, 0.0, friction, laws=(LawTerm(1.0, value, 1.0),))
+        return Terms(1.0, 0.0, slope, 0.0, friction, laws=(LawTerm(1.0, value, 1.0),))
 
     return terms, (Table('time', tuple(rows)),)
 
 
 @pytest.mark.parametrize('steps', [1, 3, 150])
+@pytest.mark.parametrize('slope', [0.0, 3.0])
 @pytest.mark.parametrize('friction', [0.0, 2.0])
 @pytest.mark.parametrize('side', [1.0, -1.0], ids=['upper stop', 'lower stop'])
-def test_it_rests_at_a_stop_until_the_load_draws_it_away(side, friction, steps):
-    # 5 N into the stop until 0.05 s, then 100 N/s away from it.
-    terms, laws = pushed([(0.05, 5.0 * side), (0.15, -5.0 * side)], friction)
+def test_it_rests_at_a_stop_until_the_load_draws_it_away(side, friction, slope, steps):
+    # 5 N into the stop until 0.05 s, then 100 N/s away from it, beside a weight.
+    rows = [(0.05, slope + 5.0 * side), (0.15, slope - 5.0 * side)]
+    terms, laws = pushed(rows, friction, slope)
     stops = (-inf, 0.0) if side > 0.0 else (0.0, inf)
     mass = OneFreedom(terms, STEP['rk4'], stops, laws=laws)
     motion, seconds = mass.at(0.0, 0.0), 0.15 / steps

@@ -40,7 +40,7 @@ from linkage_ros.kinematics.sweep_analysis import (
 from mpmath import mp, mpf
 import pytest
 
-from .linkages import four_bar_linkage, inverted_slider_crank_linkage
+from .linkages import class_3_linkage, four_bar_linkage, inverted_slider_crank_linkage
 from .reference import four_bar, inverted_slider_crank, UNIT_ROUNDOFF
 from .test_gallery import closure_of as shipped
 
@@ -138,6 +138,34 @@ def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name):
         status = closure.position(phi).status
         assert (status is not Status.OPEN) == inside
         assert inside == (four_bar(*lengths, phi, 1).gap <= 0)
+
+
+@pytest.mark.parametrize('reach', [0.66, 0.68, 0.7])
+def test_a_dyad_behind_an_iterated_group_ends_the_range(reach):
+    """Its pin is a pin of a platform on three arms, whose branch closes farther."""
+    platform = class_3_linkage()
+    linkage = replace(
+        platform,
+        links={
+            **platform.links,
+            'ground': {**platform.links['ground'], 'G': (1.6, 1.4)},
+            'rod': {'P2': (0.0, 0.0), 'Q': (reach, 0.0)},
+            'rocker': {'G': (0.0, 0.0), 'Q': (0.3, 0.0)},
+        },
+        assembly={'Q': 'left'},
+    )
+    (alone,), ranges = Closure(platform).input_ranges, Closure(linkage).input_ranges
+    closure, at_platform = Closure(linkage), Closure(platform)
+    count = 0
+    for number in range(1, 200):
+        crank = alone.lowest + (alone.highest - alone.lowest) * number / 200
+        position = at_platform.position(crank)
+        far = abs(position.points['P2'] - complex(1.6, 1.4))
+        reached = reach - 0.3 <= far <= reach + 0.3
+        count += reached
+        assert any(one.lowest <= crank <= one.highest for one in ranges) == reached, crank
+        assert closure.position(crank).status.has_pose == reached
+    assert 10 < count < 190
 
 
 @pytest.mark.parametrize(
