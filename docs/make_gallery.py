@@ -191,7 +191,8 @@ def _sequence(closure: Closure) -> str:
     for number, group in enumerate(closure.structure.groups):
         kind, links, how, assembly = describe_group(closure, number, sides)
         if isinstance(group, Driven):
-            steps.append(f'input {closure.linkage.inputs[group.index].joint}')
+            driven = closure.linkage.driven[group.index].joint
+            steps.append(f'{kind} {driven}')
         else:
             beside = assembly if how == 'closed form' else how
             steps.append(f'{kind} {links} ({beside})')

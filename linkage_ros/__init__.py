@@ -86,7 +86,9 @@ _HOMES = {
     'linkage_ros.kinematics.batch': 'Batch',
     'linkage_ros.kinematics.closure': 'Closure',
     'linkage_ros.kinematics.inverse_closure': 'InverseClosure',
-    'linkage_ros.kinematics.linkage': 'Input Limits Linkage Mass RevoluteJoint SlideJoint Slider',
+    'linkage_ros.kinematics.linkage': (
+        'Input Limits Linkage Mass Ratio RevoluteJoint SlideJoint Slider'
+    ),
     'linkage_ros.kinematics.results': 'Acceleration InputRange Position Velocity',
     'linkage_ros.kinematics.status': 'Status',
     'linkage_ros.messages.joint_state': 'JointStateReader Rejection',

@@ -40,6 +40,7 @@ from linkage_ros.kinematics.linkage import (
     Limits as Limits,
     Linkage as Linkage,
     Mass as Mass,
+    Ratio as Ratio,
     RevoluteJoint as RevoluteJoint,
     SlideJoint as SlideJoint,
     Slider as Slider,

@@ -43,6 +43,7 @@ from cmath import rect
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from linkage_ros.errors import LinkageError, listed
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
 from linkage_ros.kinematics.results import Position
@@ -81,6 +82,12 @@ class Reference:
     """A linkage to be solved to a number of digits, with guard digits to compute with at first."""
 
     def __init__(self, linkage: Linkage, digits: int = DIGITS, guard: int = _GUARD) -> None:
+        if linkage.ratios:
+            raise LinkageError(
+                'ratios',
+                f'has {listed(linkage.ratios)}, which the reference does not know',
+                'measure the linkage without them, each joint as an input',
+            )
         self._linkage = linkage
         self._closure = Closure(linkage)
         self._digits, self._guard = digits, guard

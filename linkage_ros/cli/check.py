@@ -308,9 +308,12 @@ def describe_group(
     """Return kind, links, solution method and assembly of a group; sides as `sides_at`."""
     group: Group = closure.structure.groups[number]
     if isinstance(group, Driven):
-        given = closure.linkage.inputs[group.index]
+        given = closure.linkage.driven[group.index]
         place = f'{"pin" if group.joint.kind == "R" else "slider"} {group.joint.name}'
-        return 'input', group.joint.link, f'{given.joint}, {place} on {group.joint.to}', ''
+        ratio = closure.linkage.ratios.get(given.joint)
+        follows = f' follows {ratio.of} by {ratio.ratio:g}' if ratio else ''
+        kind = 'ratio' if ratio else 'input'
+        return kind, group.joint.link, f'{given.joint}{follows}, {place} on {group.joint.to}', ''
     steps = [
         step
         for step, owner in zip(closure.steps, closure.step_groups, strict=True)

@@ -54,7 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_pair,
         default=[],
         metavar='FRAME=FRAME',
-        help='links of the URDF whose origins meet in a pin; once for each pin',
+        help='links of the URDF whose origins meet in a pin, or places on them, LINK.x,y,z in '
+        'metres; once for each pin',
     )
     parser.add_argument(
         '--input', action='append', default=[], metavar='JOINT', help='joint that is driven'
@@ -97,7 +98,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     text = linkage_text(made.linkage, [f'Imported from {file.name} by linkage import.'])
     read_linkage(parse_yaml(text.encode(), f'{file}, as a linkage'))
     for part in made.left_out:
-        print(f'left out: {part}, which belongs to no loop', file=sys.stderr)
+        print(f'left out: {part}', file=sys.stderr)
     write_or_print(text.encode(), arguments.output)
     return 0
 

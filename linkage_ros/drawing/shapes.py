@@ -23,8 +23,8 @@ plates if they have three points that are not collinear.
 from __future__ import annotations
 
 from cmath import phase, rect
-from collections.abc import Iterable, Mapping, Sequence
-from math import ceil, pi, tau
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import asin, ceil, pi, tau
 from typing import Literal, NamedTuple
 
 from linkage_ros.kinematics.closure import Closure
@@ -43,6 +43,9 @@ _FLAT = 1e-6
 """Largest distance of collinear points from their line, relative to its length."""
 
 _ARC = pi / 8.0
+
+_PULLEYS = 0.6
+"""Sum of the radii of two pulleys, relative to the distance of their pins."""
 
 _MOST_STROKES = 200
 """Strokes of a hatched line: a rail may be a thousand times as long as the links."""
@@ -138,6 +141,7 @@ def carried_shapes(
     for name, slider in linkage.sliders.items():
         if name not in cylinders:
             drawn.append((structure.blocks[name], _block(pose, name, slider)))
+    drawn += _pitch_circles(pose)
     pins = {
         point: (link, Circle('pin', point, place, 0.55 * size))
         for (link, point), place in pose.points.items()
@@ -228,6 +232,41 @@ def rounded(corners: Sequence[complex], radius: float) -> tuple[complex, ...]:
         steps = max(1, ceil(turn / _ARC - 1e-9))
         outline += [corner + rect(radius, coming + turn * j / steps) for j in range(steps + 1)]
     return tuple(outline)
+
+
+def _pitch_circles(pose: _Pose) -> Iterator[tuple[str, Shape]]:
+    """Yield the pitch circles of gears, and belts on pulleys: ratios of pins on a common link."""
+    driven = {given.joint: given for given in pose.closure.linkage.driven}
+    for name, ratio in pose.closure.linkage.ratios.items():
+        joints = [driven[name], driven.get(ratio.of) or pose.closure.linkage.joints[ratio.of]]
+        ends = [(getattr(j, 'parent', ''), getattr(j, 'child', '')) for j in joints]
+        carrier = next((link for link in ends[0] if link and link in ends[1]), '')
+        if not carrier:
+            continue
+        links = pose.closure.structure.links
+        turning = [child if parent == carrier else parent for parent, child in ends]
+        pins = [sorted({*links[link]} & {*links[carrier]}) for link in turning]
+        if not all(pins) or turning[0] == turning[1]:
+            continue
+        one, other = (pose.points[carrier, shared[0]] for shared in pins)
+        apart, size = other - one, abs(ratio.ratio)
+        same = (ends[0][0] == carrier) == (ends[1][0] == carrier)
+        meshes = (ratio.ratio < 0.0) == same
+        radius = abs(apart) * (1.0 if meshes else _PULLEYS) / (1.0 + size)
+        radii = radius, size * radius
+        if not radius:
+            continue
+        for link, centre, r in zip(turning, (one, other), radii, strict=True):
+            places = [centre + rect(r, pose.angles[link] + k * _ARC / 2.0) for k in range(33)]
+            for k, place in enumerate(places[1:]):
+                yield link, Segment('rail', name, places[k], place)
+            yield link, Segment('rail', name, centre, places[0])
+        if not meshes:
+            lean = asin((radii[0] - radii[1]) / abs(apart))
+            for side in (1.0, -1.0):
+                across = rect(1.0, phase(apart) + side * (0.5 * pi - lean))
+                ends_of_belt = one + radii[0] * across, other + radii[1] * across
+                yield carrier, Segment('rail', name, *ends_of_belt)
 
 
 def _layer(parts: Sequence[Shape]) -> int:

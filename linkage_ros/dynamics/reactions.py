@@ -41,6 +41,7 @@ from math import isfinite
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.mechanics import Mechanics, resistance, Rubbing, sense, stretched
+from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.arithmetic import called, facing, is_found, vector
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
@@ -260,11 +261,23 @@ class Reactions:
         joint's ``link``; if a slider has the name of a pin, ``slider/link`` with the link that it
         slides along.
 
+    Raises
+    ------
+    DefinitionError
+        If joints follow others by ratios.
+
     """
 
     def __init__(self, mechanics: Mechanics) -> None:
         closure = mechanics.closure
         linkage, structure = closure.linkage, closure.structure
+        if linkage.ratios:
+            raise DefinitionError(
+                'effects',
+                f'forces in pins are not known with ratios ({listed(linkage.ratios)}): the force '
+                'between teeth, on a belt or a rack, is not computed',
+                'leave out pin forces, clearance, compliance, and friction by coefficient',
+            )
         self._mechanics = mechanics
         self._scale = closure.scale
         self.joints = structure.joints

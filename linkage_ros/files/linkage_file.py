@@ -37,12 +37,13 @@ from linkage_ros.kinematics.linkage import (
     Linkage,
     Mass,
     Pose,
+    Ratio,
     RevoluteJoint,
     SlideJoint,
     Slider,
 )
 from linkage_ros.kinematics.sides import assembly_sides, undrawn
-from linkage_ros.kinematics.sweep_analysis import check_closes, check_limits
+from linkage_ros.kinematics.sweep_analysis import check_closes, check_limits, check_turns
 from linkage_ros.kinematics.topology import assur_groups
 from linkage_ros.resources import linkage_names, named_file
 
@@ -54,6 +55,7 @@ _KEYS = (
     'assembly',
     'sliders',
     'joints',
+    'ratios',
     'traced',
     'pose',
     'masses',
@@ -210,6 +212,7 @@ def _linkage(content: Section, publish_inputs: bool) -> Linkage:
         tuple(content.texts('traced')),
         _pose(content.section('pose'), inputs) if 'pose' in content else None,
         _masses(content.section('masses', required=False), tuple(points)),
+        _ratios(content.section('ratios', required=False), inputs, published),
     )
 
 
@@ -302,6 +305,30 @@ def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
     return masses
 
 
+def _ratios(
+    content: Section,
+    inputs: Sequence[Input],
+    joints: Mapping[str, RevoluteJoint | SlideJoint],
+) -> dict[str, Ratio]:
+    units = {name: joint.unit for name, joint in joints.items()}
+    units |= {given.joint: given.unit for given in inputs}
+    _bound(content, content, '', _MOST_LINKS)
+    ratios = {}
+    for name in content:
+        one = content.section(name)
+        of = one.text('of', expected='an input or a published joint, which this one follows')
+        unit = units.get(name, 'rad')
+        # In the file's units of length: metres for a radian, or radians for a metre.
+        ratio = one.number('ratio', 1.0, least=-FARTHEST, most=FARTHEST)
+        ratio = one.units.read(ratio, unit if unit == 'm' else '')
+        if units.get(of) == 'm':
+            ratio /= one.units.read(1.0, 'm')
+        offset = one.number('offset', 0.0, least=-FARTHEST, most=FARTHEST, unit=unit)
+        ratios[name] = Ratio(of, ratio, offset)
+        one.finish()
+    return ratios
+
+
 def _slider(content: Section) -> Slider:
     block = content.text('block', '')
     slider = Slider(
@@ -331,6 +358,7 @@ def closable(content: Section, linkage: Linkage, name: str, shorthand: str = '')
     try:
         closure = Closure(linkage, name)
         check_closes(closure)
+        check_turns(closure)
         check_limits(closure)
     except DefinitionError as error:
         where = error.where

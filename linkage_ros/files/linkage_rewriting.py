@@ -47,6 +47,8 @@ _UNITS = {
     'angle': 'rad',
     'limits': 'rad',
     'velocity': 'rad/s',
+    'ratio': '',
+    'offset': 'rad',
 }
 """Units of the numbers below a key; those of slides are not changed by edits."""
 

@@ -45,6 +45,7 @@ from linkage_ros.kinematics.linkage import (
     Limits,
     Linkage,
     Pose,
+    Ratio,
     RevoluteJoint,
     SlideJoint,
     Slider,
@@ -106,7 +107,7 @@ def number_text(value: float) -> str:
     return f'{mantissa}.0e{exponent}' if e and '.' not in mantissa else written
 
 
-_IN_ROWS = ('links', 'sliders', 'joints', 'masses')
+_IN_ROWS = ('links', 'sliders', 'joints', 'ratios', 'masses')
 """Keys whose parts have a line each, even if short."""
 
 
@@ -123,6 +124,7 @@ def content_of(linkage: Linkage) -> dict[str, Content]:
         'assembly': dict(linkage.assembly),
         'pose': _pose(linkage.pose),
         'joints': {name: _joint(joint) for name, joint in linkage.joints.items()},
+        'ratios': {name: _ratio(ratio) for name, ratio in linkage.ratios.items()},
         'traced': [*linkage.traced],
         'masses': {
             link: {'mass': mass.mass, 'center': [*mass.center], 'inertia': mass.inertia}
@@ -158,6 +160,11 @@ def _joint(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
     if isinstance(joint, SlideJoint):
         return {'slider': joint.slider, **limits}
     return {'parent': joint.parent, 'child': joint.child, **limits}
+
+
+def _ratio(given: Ratio) -> dict[str, Content]:
+    offset: dict[str, Content] = {'offset': given.offset} if given.offset else {}
+    return {'of': given.of, 'ratio': given.ratio, **offset}
 
 
 def _limits(limits: Limits) -> dict[str, Content]:

@@ -44,7 +44,14 @@ from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.built_once import BUILD_LOCK
-from linkage_ros.kinematics.equations import Array, Constraint, derivative, equations, spread
+from linkage_ros.kinematics.equations import (
+    Array,
+    Constraint,
+    derivative,
+    equations,
+    is_meshed,
+    spread,
+)
 from linkage_ros.kinematics.step import State
 import numpy as np
 
@@ -66,6 +73,10 @@ _STRAIGHT = 0.25
 
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 """Largest residual of a constraint at a solution, relative to the size of the coordinates."""
+
+_TOOTH = 1.0 / 16.0
+"""Largest residual of a ratio at the start of a step, relative to its period; a step that is twice
+as long is off by four times as much, and so is refused before it could reach the next tooth."""
 
 KnownAt = Callable[[float], State | None]
 """State of the links solved before, at an input; None where they do not close."""
@@ -152,8 +163,11 @@ class Continuation:
             return False
         unknowns = node.place[:-1]
         still = State([0.0] * len(known[0]), [0j] * len(known[1]))
+        slopes = np.array(equations(self.constraints, unknowns.tolist(), known)[1])
+        if not is_meshed(self.constraints, (np.abs(slopes) @ away).tolist(), 0.25):
+            return False
         try:
-            inverse = np.linalg.inv(equations(self.constraints, unknowns.tolist(), known)[1])
+            inverse = np.linalg.inv(slopes)
         except np.linalg.LinAlgError:
             return False
         change = spread(self.constraints, unknowns, known, away, still)
@@ -316,6 +330,8 @@ class Continuation:
             if system is None:
                 return None
             errors, slopes = system
+            if last == inf and not is_meshed(self.constraints, np.abs(errors).tolist(), _TOOTH):
+                return None
             right = np.append(-errors, goal - float(row @ place))
             try:
                 step = np.linalg.solve(np.vstack([slopes, row]), right)

@@ -70,6 +70,8 @@ def check(linkage: Linkage) -> None:
                 _check_link(linkage, f'joints.{name}.{end}', getattr(joint, end))
         else:
             _check_slider_name(linkage, f'joints.{name}.slider', joint.slider)
+    for name in linkage.ratios:
+        _check_ratio(linkage, name)
     _check_all_limits(linkage)
     points = {point for carried in linkage.links.values() for point in carried}
     for point in (*linkage.traced, *(linkage.pose.points if linkage.pose else ())):
@@ -91,6 +93,10 @@ def check(linkage: Linkage) -> None:
 def _check_points(linkage: Linkage) -> None:
     # A slider joins links without a shared point, so such a link may have a single point.
     sliding = {name for s in linkage.sliders.values() for name in (s.block, s.along)}
+    if linkage.ratios:
+        # A gear may have its pin alone.
+        geared = (*linkage.inputs, *(linkage.joints.get(name) for name in linkage.ratios))
+        sliding |= {getattr(joint, end, '') for joint in geared for end in ('parent', 'child')}
     for name, points in linkage.links.items():
         # A single pivot is enough for the ground: its frame does not turn.
         if len(points) < 2 and not (points and (name in sliding or name == GROUND)):
@@ -177,6 +183,51 @@ def _check_input(linkage: Linkage, given: Input) -> None:
             f'no point is named both on {given.parent!r} and on {given.child!r}',
             f'name the pin about which {given.joint!r} turns on both',
         )
+
+
+def _check_ratio(linkage: Linkage, name: str) -> None:
+    """Refuse a joint that cannot follow the other one."""
+    key, given, inputs = f'ratios.{name}', linkage.ratios[name], linkage.inputs
+    names = [one.joint for one in inputs]
+    if name in names:
+        raise DefinitionError(
+            key, f'{quoted(name)} is an input, which follows no joint', 'leave one of the two out'
+        )
+    if name not in linkage.joints:
+        free = sorted({*linkage.joints} - {*names})
+        raise DefinitionError(
+            key,
+            f'{quoted(name)} is not a published joint',
+            _one_of(free) if free else 'publish it: name it under joints',
+        )
+    if given.of not in (*names, *linkage.joints):
+        choices = {*names, *linkage.joints} - {name}
+        raise DefinitionError(
+            f'{key}.of', f'{quoted(given.of)} is no joint of this linkage', _one_of(choices)
+        )
+    chain = [name]
+    while chain[-1] in linkage.ratios and chain[-1] not in chain[:-1]:
+        chain.append(linkage.ratios[chain[-1]].of)
+    if chain[-1] in chain[:-1]:
+        raise DefinitionError(
+            f'{key}.of', f'{" follows ".join(chain)}', 'let one of them follow an input'
+        )
+    if not given.ratio or not isfinite(given.ratio) or not isfinite(given.offset):
+        raise DefinitionError(
+            f'{key}.ratio',
+            f'{given.ratio:g}, offset {given.offset:g}',
+            'write finite numbers, and a ratio other than 0',
+        )
+    joint = linkage.joints[name]
+    if isinstance(joint, RevoluteJoint):
+        one, other = linkage.links[joint.parent], linkage.links[joint.child]
+        if joint.parent == joint.child or not set(one) & set(other):
+            raise DefinitionError(
+                key,
+                f'{quoted(joint.parent)} and {quoted(joint.child)} have no common pin about '
+                'which it could turn',
+                'name a joint of two links that share a pin, or of a slider',
+            )
 
 
 def _check_all_limits(linkage: Linkage) -> None:

@@ -136,6 +136,8 @@ class Closure:
         self.angles, self.slides = planner.angles, planner.slides
         self.turns_with = planner.turns_with
         """For each coordinate that is a sum of inputs, how often each input is in it."""
+        self.ratio_turns = planner.ratio_turns
+        """Whole turns of a single input after which its ratios repeat; 0 if they never do."""
         self._terms = tuple(self._term(joint) for joint in linkage.joints.values())
         self._rate_terms = tuple((i, j, factor) for i, j, factor, _ in self._terms)
         self._point_index = {
@@ -710,9 +712,7 @@ class Closure:
         return joints
 
     def _term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
-        """Return a published joint as factor·(x[i] − x[j]) + constant."""
-        if isinstance(joint, SlideJoint):
-            slide = self.slides[joint.slider]
-            return slide.coordinate, 0, slide.sign * self.scale, slide.constant * self.scale
-        child, parent = self.angles[joint.child], self.angles[joint.parent]
-        return child.coordinate, parent.coordinate, 1.0, child.constant - parent.constant
+        """Return a published joint as factor·(x[i] − x[j]) + constant, in [rad] or [m]."""
+        i, j, factor, constant = self._known.term(joint)
+        unit = self.scale if isinstance(joint, SlideJoint) else 1.0
+        return i, j, factor * unit, constant * unit

@@ -23,12 +23,13 @@ derivative by time for given rates and accelerations.
 from __future__ import annotations
 
 from cmath import phase
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import hypot, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import facing, remainder, vector
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.known_links import count_turns
+from linkage_ros.kinematics.linkage import Linkage, Ratio, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.step import State
 from linkage_ros.kinematics.topology import Joint
 import numpy as np
@@ -81,7 +82,15 @@ class OnLine(NamedTuple):
     slide: int = 0
 
 
-Constraint = Meeting | Parallel | OnLine
+class Geared(NamedTuple):
+    """A sum of factors times angles or slides, and a constant, is a multiple of the period."""
+
+    terms: tuple[tuple[float, Facing | OnLine], ...]
+    constant: float
+    period: float  # Infinite if the sum is 0
+
+
+Constraint = Meeting | Parallel | OnLine | Geared
 
 
 def equations(
@@ -117,11 +126,39 @@ def equations(
                 if end_facing.body >= 0:
                     row[3 * end_facing.body] += sign
             rows.append(row)
+        elif isinstance(constraint, Geared):
+            total, row = constraint.constant, [0.0] * n
+            for factor, of in constraint.terms:
+                if isinstance(of, Facing):
+                    total += factor * _angle(of, unknowns, x)
+                    slopes = {3 * of.body: 1.0 + 0j} if of.body >= 0 else {}
+                else:
+                    place, slopes = _line_slopes(of, unknowns, known)
+                    total += factor * place.real
+                for column, slope in slopes.items():
+                    row[column] += factor * slope.real
+            errors.append(remainder(total, constraint.period) if constraint.period else total)
+            rows.append(row)
         else:
-            error, row = _line_equation(constraint, unknowns, known, n)
-            errors.append(error)
+            place, slopes = _line_slopes(constraint, unknowns, known)
+            row = [0.0] * n
+            for column, slope in slopes.items():
+                row[column] = slope.real if constraint.slide else slope.imag
+            driven = constraint.slide
+            errors.append(place.real - x[driven] if driven else place.imag)
             rows.append(row)
     return errors, rows
+
+
+def is_meshed(constraints: Sequence[Constraint], off: Sequence[float], part: float) -> bool:
+    """Return whether the residuals of ratios are off by less than a part of their periods."""
+    row = 0
+    for constraint in constraints:
+        period = constraint.period if isinstance(constraint, Geared) else 0.0
+        if period and not off[row] < part * period:
+            return False
+        row += 2 if isinstance(constraint, Meeting) else 1
+    return True
 
 
 def spread(
@@ -161,6 +198,14 @@ def spread(
             rows += [across, along]
         elif isinstance(constraint, Parallel):
             rows.append([0.0] * n)
+        elif isinstance(constraint, Geared):
+            row = np.zeros(n)
+            for factor, of in constraint.terms:
+                if isinstance(of, OnLine):
+                    row += abs(factor) * np.array(
+                        _line_spread(of, values, known, ways, known_moved)
+                    )
+            rows.append(row.tolist())
         else:
             rows.append(_line_spread(constraint, values, known, ways, known_moved))
     return np.array(rows)
@@ -213,6 +258,21 @@ def derivative(
             one, other = (_turn(f, values, state) for f in (constraint.one, constraint.other))
             driven = state.coordinates[constraint.turn] if constraint.turn else 0.0
             derivatives.append(one - other - driven)
+        elif isinstance(constraint, Geared):
+            state = speeds if changes is None else changes
+            values = rates if changes is None else accelerations
+            given = unknowns, known, speeds, rates, changes, accelerations
+            derivatives.append(
+                sum(
+                    factor
+                    * (
+                        _turn(of, values, state)
+                        if isinstance(of, Facing)
+                        else line_motion(of, *given)[order].real
+                    )
+                    for factor, of in constraint.terms
+                )
+            )
         else:
             moved = line_motion(
                 constraint, unknowns, known, speeds, rates, changes, accelerations
@@ -249,9 +309,10 @@ def along(line: OnLine, known: State, unknowns: Any) -> complex:
     return (point - through) * facing(-_angle(line.line, unknowns, known.coordinates))
 
 
-def _line_equation(
-    line: OnLine, unknowns: Sequence[float], known: State, n: int
-) -> tuple[float, list[float]]:
+def _line_slopes(
+    line: OnLine, unknowns: Sequence[float], known: State
+) -> tuple[complex, dict[int, complex]]:
+    """Return a point in the frame of its line, and its derivatives by the unknowns."""
     back = facing(-_angle(line.line, unknowns, known.coordinates))
     place = along(line, known, unknowns)
     columns: dict[int, complex] = {}
@@ -264,11 +325,7 @@ def _line_equation(
     if line.line.body >= 0:
         k = 3 * line.line.body
         columns[k] = columns.get(k, 0j) - 1j * place
-    row = [0.0] * n
-    for column, slope in columns.items():
-        row[column] = slope.real if line.slide else slope.imag
-    error = place.real - known.coordinates[line.slide] if line.slide else place.imag
-    return error, row
+    return place, columns
 
 
 def _point_motion(
@@ -330,6 +387,8 @@ class Constraints:
         The links of the group.
     planner
         Gives and places the links solved before the group.
+    ratios
+        The joints whose ratios are solved with the group.
 
     """
 
@@ -339,6 +398,7 @@ class Constraints:
         joints: Sequence[Joint],
         links: Sequence[str],
         planner: KnownLinks,
+        ratios: Sequence[str] = (),
     ) -> None:
         self._linkage = linkage
         self._planner = planner
@@ -351,6 +411,8 @@ class Constraints:
         for joint in joints:
             self._add_joint(joint)
         self._add_drives()
+        for name in ratios:
+            self._add_ratio(name, linkage.ratios[name])
 
     def _add_joint(self, joint: Joint) -> None:
         if joint.kind == 'R':
@@ -369,12 +431,41 @@ class Constraints:
         self.all.append(self.slides[joint.name])
 
     def _add_drives(self) -> None:
-        for i, given in enumerate(self._linkage.inputs, 1):
+        for i, given in enumerate(self._linkage.driven):
+            if not self._planner.has_drive(i):
+                continue
             if given.slider in self.slides:
-                self.all.append(self.slides[given.slider]._replace(slide=i))
+                line = self.slides[given.slider]
+                self.all.append(line._replace(slide=self._planner.drive_coordinate(i)))
             elif given.child in self._bodies or given.parent in self._bodies:
                 child, parent = (self._facing(end, 0.0) for end in (given.child, given.parent))
-                self.all.append(Parallel(child, parent, 0.0, i))
+                self.all.append(Parallel(child, parent, 0.0, self._planner.drive_coordinate(i)))
+
+    def _add_ratio(self, name: str, given: Ratio) -> None:
+        joints = self._linkage.joints[name], self._linkage.joints[given.of]
+        slides = [isinstance(joint, SlideJoint) for joint in joints]
+        # The constraint is in the unit of the joint that follows.
+        unit = self._planner.scale if slides[0] else 1.0
+        ratio = given.ratio * (self._planner.scale if slides[1] else 1.0) / unit
+        # Without the turns of its links, an angle determines the other one modulo this.
+        turns = count_turns(given.ratio)
+        period = tau if slides[1] else abs(ratio) * tau if slides[0] else tau / max(turns, 1)
+        if all(slides) or not turns:
+            period = 0.0
+        terms = (*self._terms(joints[0], 1.0), *self._terms(joints[1], -ratio))
+        self.all.append(Geared(terms, -given.offset / unit, period))
+
+    def _terms(
+        self, joint: RevoluteJoint | SlideJoint, factor: float
+    ) -> Iterator[tuple[float, Facing | OnLine]]:
+        if isinstance(joint, RevoluteJoint):
+            yield factor, self._facing(joint.child, 0.0)
+            yield -factor, self._facing(joint.parent, 0.0)
+        elif joint.slider in self.slides:
+            yield factor, self.slides[joint.slider]
+        else:
+            coordinate, _, sign, constant = self._planner.term(joint)
+            yield factor * sign, Facing(-1, coordinate, sign * constant)
 
     def _end(self, link: str, name: str) -> End:
         points = self._planner.points[link]

@@ -23,13 +23,25 @@ from __future__ import annotations
 
 from cmath import phase, rect
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from math import frexp, hypot, ldexp
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import frexp, hypot, lcm, ldexp
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
-from linkage_ros.kinematics.step import FixedPoint, PointOnLink, PointOnRail, Step
-from linkage_ros.kinematics.topology import Joint, Structure
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Linkage,
+    Point,
+    Ratio,
+    RevoluteJoint,
+    SlideJoint,
+)
+from linkage_ros.kinematics.step import FixedPoint, Following, PointOnLink, PointOnRail, Step
+from linkage_ros.kinematics.topology import find_followed_links, Joint, Structure
+
+_MOST_TEETH = 1000
+_ROUNDED = 1e-13
+"""A ratio of teeth, both at most this number, and its relative error as a decimal number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +147,10 @@ class KnownLinks:
         self.turns_with = {
             k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)
         }
+        # The coordinates of the joints that follow others, by number among `Linkage.driven`, and
+        # the whole turns of a single input after which they repeat; 0 if they never do.
+        self._followers: dict[int, int] = {}
+        self.ratio_turns = 1
         self.pin_count = 0
         self._pins: dict[tuple[str, complex], int] = {}
 
@@ -180,6 +196,65 @@ class KnownLinks:
     def new_coordinates(self, count: int) -> int:
         self.coordinate_count += count
         return self.coordinate_count - count
+
+    def has_drive(self, index: int) -> bool:
+        """Return whether the value of a driven joint is known: an input, or one that follows."""
+        count = len(self._linkage.inputs)
+        if index < count:
+            return True
+        of = tuple(self._linkage.ratios.values())[index - count].of
+        number = self._number_of(of)
+        return (number >= 0 and self.has_drive(number)) or (
+            find_followed_links(self._linkage, self.blocks, of) <= {*self.angles}
+        )
+
+    def drive_coordinate(self, index: int) -> int:
+        """Return the coordinate of a driven joint; add the step of one that follows another."""
+        count = len(self._linkage.inputs)
+        if index < count:
+            return 1 + index
+        if index not in self._followers:
+            name, ratio = tuple(self._linkage.ratios.items())[index - count]
+            self._follow(name, ratio)
+            self._followers[index] = self.new_coordinates(1)
+        return self._followers[index]
+
+    def _follow(self, name: str, given: Ratio) -> None:
+        slides = isinstance(self._linkage.joints[name], SlideJoint)
+        number = self._number_of(given.of)
+        if number >= 0 and self.has_drive(number):
+            turning = not self._linkage.driven[number].slider
+            one, other, sign, constant = self.drive_coordinate(number), 0, 1.0, 0.0
+        else:
+            turning = isinstance(self._linkage.joints[given.of], RevoluteJoint)
+            one, other, sign, constant = self.term(self._linkage.joints[given.of])
+        unit = self.scale if slides else 1.0
+        ratio = given.ratio * (1.0 if turning else self.scale) / unit
+        step = Following(name, one, other, sign * constant, sign * ratio, given.offset / unit)
+        turns, back = self.turns_with.get(one), self.turns_with.get(other)
+        if turns is not None and back is not None:
+            # The turns of a sum of inputs are known.
+            with_input = tuple(step.ratio * (p - q) for p, q in zip(turns, back, strict=True))
+            self.turns_with[self.coordinate_count] = with_input
+            self.ratio_turns = lcm(self.ratio_turns, 0 if slides else count_turns(with_input[0]))
+        elif turning and (slides or not given.ratio.is_integer()):
+            limits = self._linkage.joints[given.of].limits
+            middle = 0.5 * (limits.low + limits.high) if limits.bounded else 0.0
+            step = replace(step, middle=middle)
+        self.add(step)
+
+    def _number_of(self, joint: str) -> int:
+        """Return the number of a joint among `Linkage.driven`; -1 if it is not driven."""
+        names = [given.joint for given in self._linkage.driven]
+        return names.index(joint) if joint in names else -1
+
+    def term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
+        """Return a known joint as factor·(x[i] − x[j]) + constant, in the unit of the lengths."""
+        if isinstance(joint, SlideJoint):
+            slide = self.slides[joint.slider]
+            return slide.coordinate, 0, slide.sign, slide.constant
+        child, parent = self.angles[joint.child], self.angles[joint.parent]
+        return child.coordinate, parent.coordinate, 1.0, child.constant - parent.constant
 
     def pin_to(self, link: str, joint: Joint) -> None:
         """Hold a link by a known pin."""
@@ -232,6 +307,12 @@ class KnownLinks:
             return None
         shared = set(self.points[one]) & set(self.points[other]) - set(apart)
         return min(shared, default=None)
+
+
+def count_turns(ratio: float) -> int:
+    """Return the whole turns after which an angle that follows another repeats; 0 if never."""
+    near = Fraction(ratio).limit_denominator(_MOST_TEETH)
+    return near.denominator if abs(near - Fraction(ratio)) <= _ROUNDED * abs(ratio) else 0
 
 
 def _scale(links: Iterable[Mapping[str, Point]]) -> float:

@@ -148,6 +148,27 @@ class SlideJoint:
 
 
 @dataclass(frozen=True, slots=True)
+class Ratio:
+    """
+    How a joint follows another, as by gears, a belt or a rack: ratio·``of`` + offset.
+
+    Attributes
+    ----------
+    of
+        Name of the other joint: an input, or a published joint.
+    ratio
+        In [rad] or [m] of the joint for a [rad] or [m] of the other.
+    offset
+        Value of the joint where the other is at 0, in [rad] or [m].
+
+    """
+
+    of: str
+    ratio: float
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Pose:
     """
     The linkage as drawn, at some inputs; what it names tells the assembly.
@@ -218,6 +239,8 @@ class Linkage:
         The linkage as drawn at its start; it tells the assembly, if `assembly` does not.
     masses
         Masses by link name; given only for forces, and then for every link that moves.
+    ratios
+        By the name of a published joint, how it follows another joint.
     nominal
         The linkage without deviations, if this one has some: the assembly, and the change points
         that it passes, are those of the nominal one.
@@ -232,7 +255,19 @@ class Linkage:
     traced: tuple[str, ...] = ()
     pose: Pose | None = None
     masses: Mapping[str, Mass] = field(default_factory=dict)
+    ratios: Mapping[str, Ratio] = field(default_factory=dict)
     nominal: Linkage | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def driven(self) -> tuple[Input, ...]:
+        """Return the inputs, then the joints that follow others, as if they were inputs."""
+        joints = ((name, self.joints[name]) for name in self.ratios)
+        return self.inputs + tuple(
+            Input(name, slider=joint.slider)
+            if isinstance(joint, SlideJoint)
+            else Input(name, joint.parent, joint.child)
+            for name, joint in joints
+        )
 
     @property
     def limits(self) -> dict[str, Limits]:

@@ -100,6 +100,7 @@ class SolutionPlan(KnownLinks):
             nominal = SolutionPlan(linkage.nominal, assur_groups(linkage.nominal))
             self._nominal = {one.name: nominal.two_sided(one) for one in nominal.two_ways}
         self._missing: dict[str, str] = {}
+        self._driven = linkage.driven
         for self.group, group in enumerate(structure.groups):
             if isinstance(group, Driven):
                 self._drive(group)
@@ -153,17 +154,17 @@ class SolutionPlan(KnownLinks):
             )
 
     def _drive(self, driven: Driven) -> None:
-        joint, index = driven.joint, 1 + driven.index
+        joint, index = driven.joint, self.drive_coordinate(driven.index)
         angle = self.angles[joint.to]
         if joint.kind == 'R':
-            sign = 1.0 if self._linkage.inputs[driven.index].child == joint.link else -1.0
+            sign = 1.0 if self._driven[driven.index].child == joint.link else -1.0
             coordinate = index
             if angle.coordinate or sign < 0.0:
                 self.add(RelativeAngle(angle.coordinate, index, sign))
                 coordinate = self.new_coordinates(1)
                 before = self.turns_with.get(angle.coordinate)
-                if before is not None:
-                    with_input = self.turns_with[index]
+                with_input = self.turns_with.get(index)
+                if before is not None and with_input is not None:
                     self.turns_with[coordinate] = tuple(
                         one + sign * other for one, other in zip(before, with_input, strict=True)
                     )
@@ -339,7 +340,7 @@ class SolutionPlan(KnownLinks):
         from linkage_ros.kinematics.newton_group import iteration  # local import: likewise
 
         joints = self._structure.joints_of(group)
-        constraints = Constraints(self._linkage, joints, group.links, self)
+        constraints = Constraints(self._linkage, joints, group.links, self, group.ratios)
         slides = constraints.slides
         step = iteration(self._linkage, group.links, constraints, self, tuple(self.steps))
         self.add(step)
@@ -356,14 +357,17 @@ class SolutionPlan(KnownLinks):
         """Return the transformations from one link of a body to another, by its driven joints."""
         ways: dict[str, tuple[DrivenOffset, ...]] = {start: ()}
         while end not in ways:
-            for i, given in enumerate(self._linkage.inputs):
-                for one, other in self._ends(i):
+            for i, given in enumerate(self._driven):
+                for one, other in self._ends(i) if self.has_drive(i) else ():
                     if one in ways and other not in ways:
-                        ways[other] = (*ways[one], self._carry(1 + i, given, one, other))
+                        ways[other] = (
+                            *ways[one],
+                            self._carry(self.drive_coordinate(i), given, one, other),
+                        )
         return ways[end]
 
     def _ends(self, index: int) -> tuple[tuple[str, str], tuple[str, str]]:
-        given = self._linkage.inputs[index]
+        given = self._driven[index]
         one, other = given.parent, given.child
         if given.slider:
             one, other = self._linkage.sliders[given.slider].along, self.blocks[given.slider]

@@ -89,6 +89,8 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
             InputRange(low, high, False, (low > -far, high < far))
             for low, high in _searched(closure, -far, far, 4 * _SAMPLES)
         )
+    if closure.ratio_turns != 1:
+        return tuple(_in_turns(closure, closure.ratio_turns))
     intervals = [(-pi, pi)]
     exact = True
     for step in closure.steps:
@@ -107,6 +109,21 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
         if end - start >= tau:
             intervals = through_the_end(intervals, start, end)
     return tuple(InputRange(low, high) for low, high in intervals)
+
+
+def _in_turns(closure: LoopClosure, turns: int) -> Iterator[InputRange]:
+    """Yield the ranges of an angle whose poses repeat after so many turns, or never (0)."""
+    limits = closure.linkage.inputs[0].limits
+    far = (turns or _COPIES) * pi
+    low, high = -far, far
+    if not turns and limits.low > -inf and limits.high < inf:
+        low, high = limits.low, limits.high
+    parts = _searched(closure, low, high, _SAMPLES * ceil((high - low) / tau))
+    if turns:
+        parts = through_the_end(parts, low, high, turns * tau)
+    for begin, end in parts:
+        ends = (True, True) if turns else (begin > low, end < high)
+        yield InputRange(begin, end, True, ends, turns)
 
 
 def through_the_end(
@@ -133,7 +150,8 @@ def whole_turns(closure: LoopClosure) -> int:
     """Return the number of whole turns after which poses repeat; 0 if each turn differs."""
     if len(closure.linkage.inputs) > 1:
         return 0 if iterated(closure) else 1
-    return lcm(*(branch.interval.period if branch else 1 for branch in _branches(closure)))
+    periods = (branch.interval.period if branch else 1 for branch in _branches(closure))
+    return lcm(closure.ratio_turns, *periods)
 
 
 def _branches(closure: LoopClosure) -> list[Branch | None]:
@@ -260,7 +278,7 @@ def _turning_points(
     """Yield the values between samples at which a margin may cross zero and return."""
     for i in range(1, len(values) - 1):
         before, here, after = margins[i - 1], margins[i], margins[i + 1]
-        if 0.0 < here <= min(before, after):
+        if 0.0 < here <= min(before, after) and here < inf:
             yield golden(margin, values[i - 1], values[i + 1])[1]
         elif 0.0 > here >= max(before, after):
             yield golden(lambda x: -margin(x), values[i - 1], values[i + 1])[1]

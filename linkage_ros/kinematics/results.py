@@ -156,6 +156,7 @@ class LoopClosure(Protocol):
     step_groups: tuple[int, ...]
     turning: tuple[bool, ...]
     turns_with: Any
+    ratio_turns: int
     bounds: Any
 
     def known(self, *inputs: float) -> State: ...

@@ -78,7 +78,8 @@ def away(closure: LoopClosure, value: float, place: float) -> float:
         if not interval.whole and place in interval[:2]:
             period = interval.turns * tau
             return remainder(value - place, period) if period else value - place
-    return remainder(value - place, tau)
+    period = closure.ratio_turns * tau
+    return remainder(value - place, period) if period else value - place
 
 
 def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
@@ -125,7 +126,7 @@ def _within(closure: LoopClosure, value: float) -> float:
 def _turned_by_input(closure: LoopClosure, step: Any) -> list[float] | None:
     """Return the singular angles of a dyad as inputs, if the input turns its outer pins' links."""
     part = getattr(step, 'diagonal', None) or getattr(step, 'rail', step)
-    if not hasattr(part, 'singular_angles'):
+    if not hasattr(part, 'singular_angles') or closure.linkage.ratios:
         return None
     first, second = part.arms[:2]
     turns = closure.turns_with

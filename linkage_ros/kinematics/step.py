@@ -27,7 +27,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-from linkage_ros.kinematics.arithmetic import facing
+from linkage_ros.kinematics.arithmetic import atan2, cos, facing, sin
 from linkage_ros.kinematics.status import Status
 
 
@@ -193,3 +193,45 @@ class RelativeAngle:
     def _append(self, state: State) -> None:
         values = state.coordinates
         values.append(values[self.arm] + self.sign * values[self.turn])
+
+
+@dataclass(frozen=True, slots=True)
+class Following:
+    """
+    The value of a joint that follows another: ratio·(x[one] − x[other] + constant) + offset.
+
+    Where the turns of the other joint matter and are not known, it is taken within half a turn of
+    ``middle``; otherwise that is None.
+    """
+
+    joint: str  # Its name
+    one: int
+    other: int
+    constant: float
+    ratio: float
+    offset: float
+    middle: float | None = None
+
+    def close(self, known: State) -> Pose:
+        """Append the value."""
+        x = known.coordinates
+        followed = x[self.one] - x[self.other] + self.constant
+        if self.middle is not None:
+            # Not `remainder`, which JavaScript does not have.
+            off = followed - self.middle
+            followed = self.middle + atan2(sin(off), cos(off))
+        x.append(self.ratio * followed + self.offset)
+        return PLACED
+
+    def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
+        """Append its rate."""
+        self._append(speeds.coordinates)
+
+    def accelerations(
+        self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
+    ) -> None:
+        """Append its acceleration."""
+        self._append(changes.coordinates)
+
+    def _append(self, values: list[float]) -> None:
+        values.append(self.ratio * (values[self.one] - values[self.other]))

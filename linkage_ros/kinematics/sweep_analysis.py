@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import product
+from itertools import pairwise, product
 from math import cos, inf, isfinite, nan, pi, remainder, tau
 from typing import NamedTuple
 
@@ -39,7 +39,7 @@ from linkage_ros.kinematics.ranges import (
 )
 from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import PLACED, Pose, State
+from linkage_ros.kinematics.step import Following, PLACED, Pose, State
 from linkage_ros.kinematics.topology import Driven, Dyad, links_of
 
 # The pose of one step of a solution, from the steps that it starts from and no others.
@@ -569,6 +569,26 @@ def check_closes(closure: LoopClosure) -> None:
         f'{nearest.gap:.3g} m or more',
         'the longest link of a loop must be shorter than its others together',
     )
+
+
+def check_turns(closure: LoopClosure) -> None:
+    """Refuse a ratio of an angle that leaves the half turns in which its turns are known."""
+    for step in closure.steps:
+        if not isinstance(step, Following) or step.middle is None:
+            continue
+        for interval in closure.closing_ranges:
+            found = [closure.posed(value) for value in samples(interval)]
+            states = [one.state.coordinates for one in found if one.status.has_pose]
+            followed = [x[step.one] - x[step.other] + step.constant - step.middle for x in states]
+            turned = [remainder(value, tau) for value in followed]
+            if any(abs(one - other) > pi for one, other in pairwise(turned)):
+                of = closure.linkage.ratios[step.joint].of
+                raise DefinitionError(
+                    f'ratios.{step.joint}.of',
+                    f'{quoted(of)} passes {step.middle + pi:.4g} rad, where its turns are not '
+                    'known, and the ratio is no whole number',
+                    f'write limits for {quoted(of)}, whose middle is that of its swing',
+                )
 
 
 def check_limits(closure: LoopClosure) -> None:

@@ -23,12 +23,19 @@ bodies with as many unknowns as constraints is solved by iteration.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
 from linkage_ros.errors import DefinitionError, listed
-from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage, Point
+from linkage_ros.kinematics.linkage import (
+    carriers,
+    GROUND,
+    Input,
+    Linkage,
+    Point,
+    RevoluteJoint,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +55,11 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """An input that places ``joint.link`` once ``joint.to`` is known; ``index`` is its number."""
+    """
+    A driven joint that places ``joint.link`` once ``joint.to`` is known.
+
+    ``index`` is its number among `Linkage.driven`: an input, or a joint that follows another.
+    """
 
     joint: Joint
     index: int
@@ -72,6 +83,7 @@ class Iterated:
     """Links that no dyad covers; their joints are those among them and to the known part."""
 
     links: tuple[str, ...]
+    ratios: tuple[str, ...] = ()  # The joints whose ratios are solved with them
 
 
 Group = Driven | Dyad | Iterated
@@ -86,11 +98,12 @@ class Structure:
     blocks: Mapping[str, str]  # For each slider the link that slides
     groups: tuple[Group, ...]  # The groups in the order in which they are solved
     joints: tuple[Joint, ...]  # All joints; a pin of three links is two
+    ratios: int = 0  # Number of joints that follow others
 
     @property
     def freedom(self) -> int:
         """Degrees of freedom by Grübler's count, with the inputs free."""
-        return 3 * (len(self.links) - 1) - 2 * len(self.joints)
+        return 3 * (len(self.links) - 1) - 2 * len(self.joints) - self.ratios
 
     def joints_of(self, group: Iterated) -> tuple[Joint, ...]:
         """
@@ -141,16 +154,10 @@ def assur_groups(linkage: Linkage) -> Structure:
 
     A DefinitionError is raised if a link is free, over-constrained, or not joined to the ground.
     """
-    links: dict[str, Mapping[str, Point]] = dict(linkage.links)
-    blocks: dict[str, str] = {}
-    for name, slider in linkage.sliders.items():
-        blocks[name] = slider.block or f'{_BLOCK}{name}'
-        if not slider.block:
-            links[blocks[name]] = {slider.point: (0.0, 0.0)}
-    joints = tuple(_joints(linkage, links, blocks))
+    links, blocks, joints = _parts(linkage)
     _check_connected(linkage, links, joints)
     search = _Search(linkage, links, blocks, joints)
-    structure = Structure(links, blocks, tuple(search.groups()), joints)
+    structure = Structure(links, blocks, tuple(search.groups()), joints, len(linkage.ratios))
     freedom, inputs = structure.freedom, len(linkage.inputs)
     if freedom != inputs:
         raise DefinitionError(
@@ -158,9 +165,28 @@ def assur_groups(linkage: Linkage) -> Structure:
             f'{freedom} degree(s) of freedom and {inputs} input(s)',
             (_same_pin(linkage) or 'add an input, a link or a pin')
             if freedom > inputs
-            else 'take away a link or a pin',
+            else f'take away a link{", a ratio" if linkage.ratios else ""} or a pin',
         )
     return structure
+
+
+def count_freedom(linkage: Linkage) -> int:
+    """Return the degrees of freedom by Grübler's count, with the inputs free."""
+    links, blocks, joints = _parts(linkage)
+    return Structure(links, blocks, (), joints, len(linkage.ratios)).freedom
+
+
+def _parts(
+    linkage: Linkage,
+) -> tuple[dict[str, Mapping[str, Point]], dict[str, str], tuple[Joint, ...]]:
+    """Return the links with the blocks of slots, the links that slide, and the joints."""
+    links: dict[str, Mapping[str, Point]] = dict(linkage.links)
+    blocks: dict[str, str] = {}
+    for name, slider in linkage.sliders.items():
+        blocks[name] = slider.block or f'{_BLOCK}{name}'
+        if not slider.block:
+            links[blocks[name]] = {slider.point: (0.0, 0.0)}
+    return links, blocks, tuple(_joints(linkage, links, blocks))
 
 
 def _joints(
@@ -208,13 +234,28 @@ class _Search:
         self._sliders = {j.name: j for j in joints if j.kind == 'P'}
         self._rank = {GROUND: 0}
         self._order = {link: i for i, link in enumerate(links)}
-        self._drives = tuple(self._driven_joint(i, blocks) for i in range(len(linkage.inputs)))
-        self._bodies = self._merged()
+        self._drives = tuple(self._driven_joint(given, blocks) for given in linkage.driven)
+        # Of the ratios those whose other joint is not known yet; and that joint.
+        self._waiting = {
+            index: (ratio.of, find_followed_links(linkage, blocks, ratio.of))
+            for index, ratio in enumerate(linkage.ratios.values(), len(linkage.inputs))
+        }
+        self._bodies: list[tuple[str, ...]] = []
+        self._start_following()
 
     def groups(self) -> Iterator[Group]:
         """Yield group after group until all links are known."""
         yield from self._learn(GROUND)
-        while unknown := [body for body in self._bodies if body[0] not in self._rank]:
+        while True:
+            for index in self._start_following():
+                known = [end for end in self._ends(index) if end in self._rank]
+                if len(known) == 2:
+                    raise self._held(index, 'are joined without it')
+                if known:
+                    yield from self._learn(known[0])
+            unknown = [body for body in self._bodies if body[0] not in self._rank]
+            if not unknown:
+                break
             dyad = self._next_dyad(unknown)
             if dyad is not None:
                 yield dyad
@@ -222,29 +263,71 @@ class _Search:
                     yield from self._learn(outer.link)
                 continue
             chosen = self._smallest_group(unknown)
-            yield Iterated(tuple(link for body in chosen for link in body))
+            ratios = self._solved_with(chosen)
+            for index in ratios:
+                del self._waiting[index]
+            names = tuple(self._linkage.driven[index].joint for index in ratios)
+            yield Iterated(tuple(link for body in chosen for link in body), names)
             for body in chosen:
                 for link in body:
                     self._rank[link] = len(self._rank)
 
-    def _driven_joint(self, index: int, blocks: Mapping[str, str]) -> Joint:
-        given = self._linkage.inputs[index]
+    def _driven_joint(self, given: Input, blocks: Mapping[str, str]) -> Joint:
         if given.slider:
             return self._sliders[given.slider]
         (pin,) = set(self._links[given.parent]) & set(self._links[given.child])
         return Joint('R', pin, given.child, given.parent)
 
+    def _ends(self, index: int) -> tuple[str, str]:
+        drive = self._drives[index]
+        return drive.link, drive.to
+
+    def _held(self, index: int, how: str) -> DefinitionError:
+        """Return the error for a driven joint whose two links are held already."""
+        one, other = self._ends(index)
+        kind = 'input' if index < len(self._linkage.inputs) else 'ratio'
+        key = f'{"ratios" if kind == "ratio" else kind}.{self._linkage.driven[index].joint}'
+        return DefinitionError(
+            key, f'{one!r} and {other!r} {how}', f'leave one of the {kind}s out'
+        )
+
+    def _start_following(self) -> list[int]:
+        """Merge the bodies anew if ratios have become known; return these."""
+        found: list[int] = []
+        while True:
+            names = {self._linkage.driven[index].joint for index in self._waiting}
+            new = [
+                index
+                for index, (of, links) in self._waiting.items()
+                if links <= {*self._rank} or (of in self._linkage.ratios and of not in names)
+            ]
+            if not new:
+                break
+            for index in new:
+                del self._waiting[index]
+            found += new
+        if found or not self._bodies:
+            self._bodies = self._merged()
+        return found
+
+    def _solved_with(self, bodies: Collection[tuple[str, ...]]) -> list[int]:
+        """Return the ratios that wait and whose two joints are known with these bodies."""
+        known = {*self._rank, *(link for body in bodies for link in body)}
+        return [
+            index
+            for index, (_, links) in self._waiting.items()
+            if links <= known and known.issuperset(self._ends(index))
+        ]
+
     def _merged(self) -> list[tuple[str, ...]]:
         """Return the bodies; links that driven joints hold together are one."""
         body_of: dict[str, tuple[str, ...]] = {link: (link,) for link in self._links}
         for index, drive in enumerate(self._drives):
+            if index in self._waiting:
+                continue
             one, other = body_of[drive.link], body_of[drive.to]
             if one == other:
-                raise DefinitionError(
-                    f'input.{self._linkage.inputs[index].joint}',
-                    f'{drive.link!r} and {drive.to!r} are held by other inputs already',
-                    'leave one of the inputs out',
-                )
+                raise self._held(index, 'are held by other driven joints already')
             both = tuple(sorted(one + other, key=self._order.__getitem__))
             for link in both:
                 body_of[link] = both
@@ -260,7 +343,7 @@ class _Search:
             for index, drive in enumerate(self._drives):
                 ends = (drive.link, drive.to)
                 known = [end for end in ends if end in self._rank]
-                if drive.link in body and len(known) == 1:
+                if index not in self._waiting and drive.link in body and len(known) == 1:
                     (new,) = set(ends) - set(known)
                     yield Driven(Joint(drive.kind, drive.name, new, known[0]), index)
                     self._rank[new] = len(self._rank)
@@ -408,7 +491,17 @@ class _Search:
                 else:
                     pins.setdefault(joint.name, set()).update((one, other))
         joints += sum(len(carriers) - 1 for carriers in pins.values())
-        return 3 * len(bodies) - 2 * joints
+        return 3 * len(bodies) - 2 * joints - len(self._solved_with(bodies))
+
+
+def find_followed_links(linkage: Linkage, blocks: Mapping[str, str], joint: str) -> frozenset[str]:
+    """Return the links of a joint that another one follows; of an input none."""
+    if joint in (given.joint for given in linkage.inputs):
+        return frozenset()
+    of = linkage.joints[joint]
+    if isinstance(of, RevoluteJoint):
+        return frozenset((of.parent, of.child))
+    return frozenset((linkage.sliders[of.slider].along, blocks[of.slider]))
 
 
 def _same_pin(linkage: Linkage) -> str:

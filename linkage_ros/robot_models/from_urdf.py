@@ -19,7 +19,7 @@ from __future__ import annotations
 from cmath import rect
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import combinations, islice, product
 from math import hypot, inf, pi, remainder, tau
 from typing import NamedTuple
 
@@ -33,12 +33,19 @@ from linkage_ros.kinematics.linkage import (
     NO_LIMITS,
     Point,
     Pose,
+    Ratio,
     RevoluteJoint,
     Side,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.kinematics.topology import assur_groups, Dyad, Iterated
-from linkage_ros.robot_models.planar import find_closings, find_loops, lay_flat, Planar
+from linkage_ros.kinematics.topology import assur_groups, count_freedom, Dyad, Iterated
+from linkage_ros.robot_models.planar import (
+    add_places,
+    find_closings,
+    find_loops,
+    lay_flat,
+    Planar,
+)
 from linkage_ros.robot_models.urdf_file import MOVING, UrdfFile
 from linkage_ros.robot_models.urdf_topology import urdf_topology, UrdfTopology
 
@@ -59,6 +66,9 @@ _MANY = 10
 
 _FOUND = 0.05
 """Maximum angle between the links of a pose and those of the closed linkage, in [rad]."""
+
+_MOST_TRIED = 200
+"""Most choices of mimics that are tried as ratios."""
 
 _SAME = 1e-6
 """Two assemblies are the same if poses and inputs differ by less than this, in [rad]."""
@@ -88,6 +98,8 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
 
     """
     groups = assur_groups(linkage).groups
+    # Where a side changes at change points, it is that at the pose.
+    linkage = replace(linkage, pose=Pose(inputs, {}))
     if any(isinstance(group, Iterated) for group in groups):
         linkage = replace(linkage, pose=Pose(inputs, _points(linkage, poses)))
     keys = [_key(each) for each in groups if isinstance(each, Dyad) and each.kind in _SIDED]
@@ -108,8 +120,10 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
         raise DefinitionError('assembly', f'no way to close it leads to the pose {where}', _REMEDY)
     if len(candidates) > 1 and candidates[1][0] < least + _SAME:
         raise DefinitionError('assembly', f'two ways to close it meet {where}', _REMEDY)
-    if closure.linkage.pose is None and not _near(usual_inputs(closure), inputs):
-        return replace(closure.linkage, pose=Pose(inputs, {}))
+    if closure.linkage.pose == Pose(inputs, {}):
+        bare = Closure(replace(closure.linkage, pose=None))
+        if _near(usual_inputs(bare), inputs) and _off(bare, inputs, poses) <= _FOUND:
+            return bare.linkage
     return closure.linkage
 
 
@@ -203,7 +217,7 @@ class _Import:
         inputs: Sequence[str],
         at: Mapping[str, float],
     ) -> None:
-        self._urdf = urdf
+        self._urdf = urdf = add_places(urdf, close)
         self._closings, alone = find_closings(urdf, close)
         moving = [joint.name for joint in urdf.joints.values() if joint.kind in MOVING]
         for option, names in (('--input', inputs), ('--at', at)):
@@ -216,11 +230,13 @@ class _Import:
                     )
         self._inputs = tuple(inputs) or urdf.inputs
         self._loops = find_loops(urdf, self._closings, self._inputs)
-        if not self._closings or not self._loops.joints:
+        followed = [joint.mimics for joint in urdf.joints.values() if joint.mimics]
+        if not self._loops.joints or not (self._closings or {*followed} & {*self._inputs}):
             raise self._error(
                 '',
                 'closes no loop',
-                'name frames that meet: --close FRAME=FRAME, or call them PIN_on_LINK',
+                'name frames that meet: --close FRAME=FRAME, or call them PIN_on_LINK; or places: '
+                '--close LINK.x,y,z=LINK.x,y,z',
             )
         self._planar: Planar = lay_flat(urdf, self._loops)
         self._pose = dict.fromkeys(moving, 0.0) | dict(urdf.start) | dict(at)
@@ -258,13 +274,45 @@ class _Import:
             )
         frames = self._frames()
         self._check_met(frames)
+        linkage, ignored = self._with_ratios(linkage)
         given = tuple(self._pose[each.joint] for each in linkage.inputs)
         poses = {link: frames[body] for link, body in made.bodies.items()}
         try:
             linkage = assembled(linkage, given, poses, self._where())
         except DefinitionError as error:
             raise self._error(error.where, error.reason, error.remedy) from None
-        return ImportedLinkage(linkage, self._loops.left_out)
+        left_out = [f'{part}, which belongs to no loop' for part in self._loops.left_out]
+        return ImportedLinkage(linkage, (*left_out, *ignored))
+
+    def _with_ratios(self, linkage: Linkage) -> tuple[Linkage, list[str]]:
+        """
+        Return the linkage with as many mimics as ratios as it needs, and the others in words.
+
+        Loops move some joints as their mimics say, at least roughly: these are not needed. Those
+        that turn against the link that the followed joint turns against, as gears do, come first.
+        """
+        joints = self._skeleton.joints
+
+        def ends(name: str) -> set[str]:
+            joint = joints.get(name)
+            return {joint.parent, joint.child} if isinstance(joint, RevoluteJoint) else set()
+
+        ratios = {
+            joint.name: Ratio(joint.mimics, joint.multiplier, joint.offset)
+            for joint in self._planar.joints
+            if joint.mimics in joints and joint.name in linkage.joints
+        }
+        names = sorted(ratios, key=lambda name: not ends(name) & ends(ratios[name].of))
+        wanted = count_freedom(linkage) - len(linkage.inputs)
+        for chosen in islice(combinations(names, max(0, min(wanted, len(names)))), _MOST_TRIED):
+            with_ratios = replace(linkage, ratios={name: ratios[name] for name in chosen})
+            try:
+                assur_groups(with_ratios)
+            except DefinitionError:
+                continue
+            others = [name for name in names if name not in chosen]
+            return with_ratios, [f'mimic of {name}: the loops move it' for name in others]
+        return linkage, []
 
     def _input(self, name: str) -> Input:
         joint = self._skeleton.joints.get(name)

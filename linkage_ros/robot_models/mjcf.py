@@ -110,7 +110,7 @@ def physical_tree(closure: Closure) -> PhysicalTree:
 def _edges(closure: Closure) -> Iterator[_Edge]:
     """Yield pins between any two links, and sliders; those to keep in the tree rank first."""
     linkage, links = closure.linkage, closure.structure.links
-    driven = {frozenset((given.parent, given.child)) for given in linkage.inputs}
+    driven = {frozenset((given.parent, given.child)) for given in linkage.driven}
     for name, slider in linkage.sliders.items():
         is_input = any(given.slider == name for given in linkage.inputs)
         ends = (slider.along, closure.structure.blocks[name])
@@ -472,6 +472,20 @@ def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> No
         ends = {'site1': bodies.site(one, point), 'site2': bodies.site(other, point)}
         name = f'{ends["site1"]} = {ends["site2"]}'
         ET.SubElement(sections['equality'], 'connect', {'name': name, **ends})
+    for name, ratio in linkage.ratios.items():
+        if not {name, ratio.of} <= {*bodies.joints}:
+            raise PartError(
+                0,
+                f'ratios.{name}',
+                'one of its two joints is cut, or lies between links without a common pin',
+                'publish the joint at a pin of the tree',
+            )
+        one, other = (bodies.joints[joint].get('name', '') for joint in (name, ratio.of))
+        # The engine counts both from the pose as written, in which the ratio holds.
+        coefficients = numbers(0.0, ratio.ratio, 0.0, 0.0, 0.0)
+        ET.SubElement(
+            sections['equality'], 'joint', joint1=one, joint2=other, polycoef=coefficients
+        )
     for spring in part.loads.springs if part.loads else ():
         tendon = ET.SubElement(
             sections['tendon'],

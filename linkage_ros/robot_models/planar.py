@@ -25,11 +25,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import cos, sin
+import re
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import did_you_mean, FileError, listed, quoted
-from linkage_ros.kinematics.linkage import Mass
-from linkage_ros.robot_models.urdf_file import MOVING, UrdfFile, UrdfJoint
+from linkage_ros.kinematics.linkage import Mass, NO_LIMITS
+from linkage_ros.robot_models.urdf_file import MOVING, UrdfFile, UrdfJoint, UrdfLink
 import numpy as np
 
 # The pins that close the loops of a URDF, as requested or by frames named PIN_on_LINK, and the
@@ -79,8 +80,30 @@ def find_closings(
             raise FileError(
                 urdf.file, f'--close {"=".join(pair)}', 'names one link twice', 'name two'
             )
-        closings.append(Closing(pair[0], pair))
+        closings.append(Closing(_PLACE.sub(r'\1_end', pair[0]), pair))
     return closings, alone
+
+
+_NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
+_PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
+
+
+def add_places(urdf: UrdfFile, asked: Sequence[tuple[str, str]]) -> UrdfFile:
+    """Return the robot with a frame at each asked place, LINK.x,y,z, which bears its name."""
+    links, joints = dict(urdf.links), dict(urdf.joints)
+    for name in (name for pair in asked for name in pair):
+        found = _PLACE.fullmatch(name)
+        if name in links or not found or found[1] not in links:
+            continue
+        x, y, z = map(float, found.groups()[1:])
+        links[name] = UrdfLink(None, False, ())
+        joints[name] = UrdfJoint(
+            name, 'fixed', found[1], name, (x, y, z), _ZERO, _ZERO, '', 1.0, 0.0, NO_LIMITS
+        )
+    return urdf._replace(links=links, joints=joints)
+
+
+_ZERO = (0.0, 0.0, 0.0)
 
 
 class Loops(NamedTuple):
@@ -108,7 +131,10 @@ def find_loops(urdf: UrdfFile, closings: Sequence[Closing], inputs: Sequence[str
     while len(bodies) > 1:
         for body in bodies:
             held = [edge for edge in edges if body in edge[:2]]
-            if len(held) < 2 and not any(edge[2] in inputs for edge in held):
+            if len(held) < 2 and not any(
+                edge[2] in inputs or (edge[2] and urdf.joints[edge[2]].mimics in inputs)
+                for edge in held
+            ):
                 break
         else:
             break

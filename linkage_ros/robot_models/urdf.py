@@ -33,8 +33,10 @@ from linkage_ros.kinematics.linkage import (
     carriers,
     GROUND,
     Limits,
+    Linkage,
     Mass,
     NO_LIMITS,
+    Ratio,
     RevoluteJoint,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
@@ -291,11 +293,25 @@ def _write(robot: ET.Element, model: _Model) -> None:
     ranges = {names.own(name): span for name, span in model.spans.items()}
     given = {names.own(name): limits for name, limits in linkage.limits.items()}
     computed: dict[str, dict[str, str]] = {}
+    followed = {names.own(name): of for name, of in _following(linkage, names)}
     for joint in model.tree.joints:
         of = joint.mimics or joint.name
         limits = given.get(of, NO_LIMITS)
-        computed[of] = _joint(robot, joint, ranges.get(of), limits, model.part.wrapped)
+        mimic = followed.get(of, Ratio(of, 1.0) if joint.mimics else None)
+        computed[of] = _joint(robot, joint, ranges.get(of), limits, model.part.wrapped, mimic)
     _start(robot, model, computed)
+
+
+def _following(linkage: Linkage, names: PrefixedNames) -> Iterator[tuple[str, Ratio]]:
+    """Yield the joints that follow an input, perhaps by others, with its name in the model."""
+    for name, given in linkage.ratios.items():
+        of, ratio, offset = given.of, given.ratio, given.offset
+        while of in linkage.ratios:
+            before = linkage.ratios[of]
+            of, offset = before.of, offset + ratio * before.offset
+            ratio *= before.ratio
+        if of in (driven.joint for driven in linkage.inputs):
+            yield name, Ratio(names.own(of), ratio, offset)
 
 
 def _inertial(link: ET.Element, mass: Mass, origin: complex) -> None:
@@ -327,7 +343,12 @@ def _visuals(link: ET.Element, name: str, body: Body, origin: complex) -> None:
 
 
 def _joint(
-    robot: ET.Element, joint: TreeJoint, span: Span | None, limits: Limits, wrapped: bool = False
+    robot: ET.Element,
+    joint: TreeJoint,
+    span: Span | None,
+    limits: Limits,
+    wrapped: bool = False,
+    mimic: Ratio | None = None,
 ) -> dict[str, str]:
     """Write a joint; return the limits that were made up because the linkage has none."""
     kind: str = joint.kind
@@ -362,8 +383,9 @@ def _joint(
         key: number(given if isfinite(given) else ours) for key, (given, ours) in known.items()
     }
     ET.SubElement(element, 'limit', written)
-    if joint.mimics:
-        ET.SubElement(element, 'mimic', joint=joint.mimics, multiplier='1', offset='0')
+    if mimic:
+        multiplier, offset = number(mimic.ratio), number(mimic.offset)
+        ET.SubElement(element, 'mimic', joint=mimic.of, multiplier=multiplier, offset=offset)
     return {key: written[key] for key, (given, _) in known.items() if not isfinite(given)}
 
 

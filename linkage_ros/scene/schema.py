@@ -423,6 +423,7 @@ def _keys() -> dict[str, Schema]:
             **named('What is published, in this order, by name.', _joint()),
             'minProperties': 1,
         },
+        'ratios': named('Joints that follow others: gears, belts, racks, mimic.', _ratio()),
         'traced': {
             'description': 'Points whose paths are drawn.',
             'type': 'array',
@@ -486,6 +487,26 @@ def _input() -> Schema:
         'then': {'minItems': 1, 'items': one},
         'else': one,
     }
+
+
+def _ratio() -> Schema:
+    return mapping(
+        'A published joint, as ratio · other joint + offset.',
+        {
+            'of': _text('the joint that it follows: an input, or a published joint'),
+            'ratio': _number(
+                'how far it moves, in rad or units of length, where the other one moves by 1',
+                least=-FARTHEST,
+                most=FARTHEST,
+            )
+            | {'default': 1},
+            'offset': _number(
+                'its value where the other one is at 0', 'rad or m', least=-FARTHEST, most=FARTHEST
+            )
+            | {'default': 0},
+        },
+        required=('of',),
+    )
 
 
 def _joint() -> Schema:

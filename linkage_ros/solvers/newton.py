@@ -63,7 +63,7 @@ from linkage_ros.kinematics.step import (
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import Dyad, Iterated
 from linkage_ros.solvers.loops import LoopFinder, Loops, Vector
-from linkage_ros.solvers.solver import Solver
+from linkage_ros.solvers.solver import refuse_ratios, Solver
 
 _PER_TURN = 256
 _MOST = 2**16
@@ -424,6 +424,7 @@ class NewtonClosure(Solver):
     by_steps = False
 
     def __init__(self, linkage: Linkage, tolerance: float, warm: bool | None = None) -> None:
+        refuse_ratios(linkage, 'newton')
         super().__init__(Closure(linkage))
         self.tolerance = tolerance
         self.exact_states = 0  # Number of states that the closed form has solved so far

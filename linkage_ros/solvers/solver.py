@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.doubles import to_doubles
@@ -40,6 +41,7 @@ from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Batch
+    from linkage_ros.kinematics.linkage import Linkage
     from numpy.typing import ArrayLike
 
 
@@ -152,6 +154,16 @@ class Solver(Closure):
 
     def singularity_margin(self, position: Position) -> SingularityMargin:
         return self.closed.singularity_margin(self.exact(position))
+
+
+def refuse_ratios(linkage: Linkage, solver: str) -> None:
+    """Refuse a linkage with ratios, which other solvers than the closed form do not close."""
+    if linkage.ratios:
+        raise DefinitionError(
+            f'solver.{solver}',
+            f'does not know ratios, such as that of {next(iter(linkage.ratios))!r}',
+            'write solver: closed_form',
+        )
 
 
 def _rows(values: Any, driven: int, count: int) -> list[list[float]]:

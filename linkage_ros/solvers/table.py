@@ -49,7 +49,7 @@ from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.kinematics.sweep_analysis import InputSweep
-from linkage_ros.solvers.solver import Solver
+from linkage_ros.solvers.solver import refuse_ratios, Solver
 import numpy as np
 
 if TYPE_CHECKING:
@@ -155,6 +155,7 @@ class TableClosure(Solver):
         span: tuple[float, float] | None = None,
     ) -> None:
         begun = perf_counter()
+        refuse_ratios(linkage, 'table')
         super().__init__(Closure(linkage))
         self._request = (linkage, tolerance, knots, order, span)
         if len(linkage.inputs) > 1:

@@ -57,6 +57,7 @@ SAID = {
     'elliptic_trammel': ['RRP dyad', 'slide of driven_slot [m]', '0.12 m', 'ahead of X'],
     'excavator_bucket': ['cylinder_tube + cylinder_rod', '0.682846 m', '1.32285 m'],
     'five_bar': ['degrees of freedom  2', 'it depends on every input'],
+    'gripper': ['right_knuckle_joint follows left_knuckle_joint by -1', 'parallelogram'],
     'four_bar': ['crank-rocker', 'GCRR', 'toggles             none', 'pin B left of A→O4'],
     'hoeken': ['crank-rocker', '23.07°'],
     'inverted_slider_crank': ['RPR dyad', 'everywhere', 'pin C ahead of B'],

@@ -42,11 +42,11 @@ NOT_RUN = {
     'needs Gazebo': 1,
     'needs PlotJuggler': 1,
     'needs RViz': 1,
-    'needs a ROS installation': 17,
+    'needs a ROS installation': 18,
     'needs a second machine': 1,
     'needs a demo that runs in another terminal': 1,
     'needs the ros2 command line': 1,
-    'opens a browser': 2,
+    'opens a browser': 3,
     'the importer is another program': 1,
 }
 """Number of blocks that are not run, by reason."""

@@ -105,7 +105,7 @@ def test_a_copy_gives_the_same_bits(name, used, way):
     assert motion(other, position) == expected
     assert motion(closure, other.position(*inputs_of(closure))) == expected
     if closure.bounds:
-        assert other.position(0.6).status is Status.LIMITED
+        assert other.position(0.9).status is Status.LIMITED
 
 
 @pytest.mark.parametrize('way', COPIES)

@@ -46,6 +46,7 @@ KINDS = {
     'excavator_bucket': 'RRR RRR',
     'five_bar': 'RRR',
     'four_bar': 'RRR',
+    'gripper': 'RRR RRR',
     'hoeken': 'RRR',
     'inverted_slider_crank': 'RPR',
     'jansen_leg': 'RRR RRR RRR',

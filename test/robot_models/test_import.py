@@ -20,6 +20,9 @@ from math import cos, hypot, remainder, sin, tau
 
 from linkage_ros.cli.main import main
 from linkage_ros.errors import FileError
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.linkage_text import linkage_text
+from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
 from linkage_ros.robot_models.from_urdf import from_urdf
@@ -107,7 +110,10 @@ def test_a_gripper_on_an_arm():
     """Its joints close the pin in the URDF itself, walked by yourdfpy, all over the range."""
     made = gripper()
     closure = Closure(made.linkage)
-    assert made.left_out == ('link base',)
+    assert made.left_out == (
+        'link base, which belongs to no loop',
+        'mimic of finger_joint: the loops move it',
+    )
     assert set(made.linkage.joints) == {'bar_joint', 'finger_joint'}
     model = Walked(GRIPPER.replace('<mimic joint="motor_joint" multiplier="0.8"/>', '').encode())
     start = closure.position(0.0).joints
@@ -195,9 +201,16 @@ def test_a_start_in_which_two_assemblies_meet():
 
 
 def test_a_start_that_is_closed_says_the_side():
-    """Left between 0 and π, and what it goes on as beyond: the parallelogram; else its twin."""
-    assert folded(1.0, 1.0).linkage.assembly == {'rod_end': 'left'}
-    assert folded(-1.0, -1.0).linkage.assembly == {'rod_end': 'left'}
+    """Of a parallelogram it is the side at the start, and its links stay parallel from there."""
+    for turned in (1.0, -1.0, 2.5):
+        linkage = folded(turned, turned).linkage
+        again = read_linkage(parse_yaml(linkage_text(linkage, []).encode(), 'again'))
+        for value in (-0.4, 0.0, 0.3, 9.0):
+            joints = Closure(again).position(value).joints
+            assert all(
+                abs(remainder(p - q, tau)) < 1e-12
+                for p, q in zip(joints, (-value, value), strict=True)
+            )
 
 
 def robot(*parts):
@@ -358,7 +371,10 @@ class TestCommand:
         assert main(typed) == 0
         out, err = capsys.readouterr()
         assert out.startswith('# Imported from g.urdf by linkage import.\nlinks:\n  ground:')
-        assert err == 'left out: link base, which belongs to no loop\n'
+        assert err == (
+            'left out: link base, which belongs to no loop\n'
+            'left out: mimic of finger_joint: the loops move it\n'
+        )
 
     @pytest.mark.parametrize(
         ('typed', 'message'),

@@ -58,8 +58,9 @@ def joint_value(model, state, name):
 
 def opened(model, state):
     """Return the farthest that cut pins are apart, in [m]."""
-    ends = zip(model.eq_obj1id, model.eq_obj2id, strict=True)
-    return max(float(np.linalg.norm(state.site_xpos[a] - state.site_xpos[b])) for a, b in ends)
+    ends = zip(model.eq_obj1id, model.eq_obj2id, model.eq_type, strict=True)
+    pins = [(a, b) for a, b, kind in ends if kind == mujoco.mjtEq.mjEQ_CONNECT]
+    return max(float(np.linalg.norm(state.site_xpos[a] - state.site_xpos[b])) for a, b in pins)
 
 
 def off(model, state, closure):

@@ -310,6 +310,9 @@ def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(fil
         cranks.append(crank.angles[0])
     if file.stem == 'five_bar':
         assert scene.members[0].drive == ('topic', TopicParameters())
+    elif file.stem == 'gripper':  # its motor has limits, and starts at the pose
+        assert cranks[0] == 0.25
+        assert [min(cranks), max(cranks)] == pytest.approx([0.0, 0.74], abs=1e-6)
     elif ends is None:
         assert scene.members[0].drive == ('constant_rate', ConstantRateParameters(1.0, SIXTY))
         assert cranks[0] == SIXTY

@@ -26,7 +26,11 @@ from mpmath import mp, mpf
 from ..kinematics.linkages import four_bar_linkage
 from ..kinematics.reference import four_bar, turned
 
-GALLERY = sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
+GALLERY = [
+    file
+    for file in sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
+    if file.stem != 'gripper'  # other solvers refuse ratios
+]
 Lengths = tuple[float, float, float, float]
 CRANK_ROCKER: Lengths = (0.04, 0.12, 0.08, 0.1)
 

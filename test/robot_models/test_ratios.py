@@ -1,0 +1,176 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Ratios in robot models: mimic of a URDF, there and back, and joint equalities of MuJoCo."""
+
+from math import hypot, remainder, tau
+from random import Random
+
+from linkage_ros.errors import FileError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Ratio
+from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
+from linkage_ros.robot_models.from_urdf import from_urdf, ImportedLinkage
+from linkage_ros.robot_models.mjcf import mjcf
+from linkage_ros.robot_models.part import Part
+from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.urdf_file import read_urdf
+import numpy as np
+import pytest
+
+from .test_import import joint, weighed
+from .walked import Walked
+from ..kinematics.test_ratios import geared_five_bar, rack_and_pinion
+from ..support.scenes import closure_of, LINKAGES
+
+MOTOR = '<mimic joint="left_joint" multiplier="{}" offset="{}"/>'
+
+
+def hand(random: Random, multiplier: float, offset: float, axis: str) -> tuple[str, list[str]]:
+    """Return a URDF of two four-bar fingers, closed with the joints at 0, and where they close."""
+    parts = ['<link name="base"/>']
+    places = []
+    for side, sign in (('left', -1.0), ('right', 1.0)):
+        knuckle, inner = sign * random.uniform(0.03, 0.05), sign * random.uniform(0.01, 0.02)
+        a = sign * random.uniform(0.01, 0.03), -random.uniform(0.04, 0.06)
+        b = sign * random.uniform(0.0, 0.02), -random.uniform(0.05, 0.07)
+        parts += [f'<link name="{side}"/><link name="{side}_in"/><link name="{side}_tip"/>']
+        mimic = MOTOR.format(multiplier, offset) if side == 'right' else ''
+        turned = axis if side == 'right' else '0 0 1'
+        # The right knuckle stands at its offset where the motor is at 0.
+        rpy = f'0 0 {-offset if axis == "0 0 1" else offset}' if side == 'right' else '0 0 0'
+        parts += [
+            joint(f'{side}_joint', 'base', side, f'{knuckle} 0 0', rpy, axis=turned, more=mimic),
+            joint(f'{side}_in_joint', 'base', f'{side}_in', f'{inner} 0 0', axis='0 0 1'),
+            joint(f'{side}_tip_joint', side, f'{side}_tip', f'{a[0]} {a[1]} 0', axis='0 0 1'),
+        ]
+        along = knuckle + a[0], a[1]
+        there = inner + b[0] - along[0], b[1] - along[1]
+        places.append(f'{side}_tip.{there[0]},{there[1]},0')
+        places.append(f'{side}_in.{b[0]},{b[1]},0')
+    return f'<robot name="hand">{"".join(parts)}</robot>', places
+
+
+def imported(text: str, places: list[str], **options: object) -> ImportedLinkage:
+    close = list(zip(places[::2], places[1::2], strict=True))
+    urdf_file = read_urdf(text.encode(), 'h.urdf')
+    return from_urdf(urdf_file, close, ['left_joint'], **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize('axis', ['0 0 1', '0 0 -1'])
+@pytest.mark.parametrize(('multiplier', 'offset'), [(-1.0, 0.0), (1.0, 0.2), (0.5, -0.3)])
+def test_mimic_becomes_a_ratio(multiplier: float, offset: float, axis: str) -> None:
+    """Places on links close the loops, as yourdfpy walks them; the joint goes as mimic says."""
+    random = Random(f'{multiplier} {offset} {axis}')
+    for _ in range(3):
+        text, places = hand(random, multiplier, offset, axis)
+        made = imported(text, places, at={'right_joint': offset})
+        assert made.left_out == ()
+        assert made.linkage.ratios == {'right_joint': Ratio('left_joint', multiplier, offset)}
+        closure = Closure(made.linkage)
+        walked = Walked(text.replace(MOTOR.format(multiplier, offset), '').encode())
+        for motor in (-0.05, 0.0, 0.04):
+            joints = closure.position(motor).joints
+            values = dict(zip(closure.joint_names, joints, strict=True)) | {'left_joint': motor}
+            wanted = multiplier * motor + offset
+            assert abs(remainder(values['right_joint'] - wanted, tau)) < 1e-12
+            walked.model.update_cfg(values)
+            for one, other in zip(places[::2], places[1::2], strict=True):
+                ends = []
+                for place in (one, other):
+                    link, numbers = place.split('.', 1)
+                    at = np.array([*map(float, numbers.split(',')), 1.0])
+                    ends.append((walked.model.get_transform(link, 'base') @ at)[:3])
+                assert hypot(*(ends[0] - ends[1])) < 1e-12
+
+
+def test_mimics_that_the_loops_move_are_named() -> None:
+    """Of two mimics one is needed; that of gears on the base comes first."""
+    text, places = hand(Random(1), -1.0, 0.0, '0 0 1')
+    text = text.replace(
+        '</joint><joint name="right_tip_joint"',
+        f'{MOTOR.format(0.9, 0.0)}</joint><joint name="right_tip_joint"',
+    )
+    made = imported(text, places)
+    assert set(made.linkage.ratios) == {'right_joint'}
+    assert made.left_out == ('mimic of right_in_joint: the loops move it',)
+
+
+def test_mimic_alone_needs_no_loop() -> None:
+    """A rack on a pinion."""
+    mimic = '<mimic joint="pinion_joint" multiplier="0.012" offset="0.001"/>'
+    text = (
+        '<robot name="r"><link name="base"/><link name="pinion"/>'
+        + weighed('rack', 0.1)
+        + joint('pinion_joint', 'base', 'pinion', '0 0 0', axis='0 0 1')
+        + joint('rack_joint', 'base', 'rack', '0 0.012 0', '', 'prismatic', '1 0 0', mimic)
+        + '</robot>'
+    ).replace('rpy=""', '')
+    made = from_urdf(read_urdf(text.encode(), 'r.urdf'), [], ['pinion_joint'])
+    assert Closure(made.linkage).position(2.0)['rack_joint'] == pytest.approx(0.025, rel=1e-15)
+
+
+def test_place_on_no_link_is_refused() -> None:
+    """One line says which links there are."""
+    text, places = hand(Random(1), -1.0, 0.0, '0 0 1')
+    with pytest.raises(FileError, match='there is no link'):
+        imported(text, [places[0].replace('left_tip', 'left_top'), *places[1:]])
+
+
+SHAPES = {
+    'geared five-bar': lambda: geared_five_bar(
+        (6.0, 1.0, 7.0, 9.0, 4.0), Ratio('theta2', 2.0, 0.5)
+    ),
+    'rack': lambda: rack_and_pinion(0.012),
+    'gripper': lambda: closure_of((LINKAGES / 'gripper.yaml').read_bytes()).linkage,
+}
+
+
+@pytest.mark.parametrize('name', SHAPES)
+def test_urdf_there_and_back(name: str) -> None:
+    """The ratio is a mimic, and the joints come back the same."""
+    closure = Closure(SHAPES[name]())
+    data = urdf('r', [Part(closure)])
+    again = Closure(from_urdf(read_urdf(data, 'r.urdf')).linkage)
+    assert again.linkage.ratios == closure.linkage.ratios
+    for interval in InputSweep(closure).ranges:
+        for value in samples(interval, 24)[1:-1]:
+            here, there = closure.position(value), again.position(value)
+            for joint_name, turns in zip(closure.joint_names, closure.turning, strict=True):
+                off = there[joint_name] - here[joint_name]
+                assert abs(remainder(off, tau) if turns else off) < 1e-11
+
+
+@pytest.mark.parametrize('name', SHAPES)
+def test_engine_keeps_the_ratio(name: str) -> None:
+    """The engine starts closed, and still has the ratio when its servo has moved the input."""
+    mujoco = pytest.importorskip('mujoco')
+    closure = Closure(SHAPES[name]())
+    model = mujoco.MjModel.from_xml_string(mjcf('r', [Part(closure)]).decode())
+    state = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, state, model.key('start').id)
+
+    def value(joint_name: str) -> float:
+        return float(state.qpos[model.joint(joint_name).qposadr[0]])
+
+    ((follower, given),) = closure.linkage.ratios.items()
+    state.ctrl[0] += 0.1
+    begun = value(given.of)
+    for steps in (0, 2000):
+        for _ in range(steps):
+            mujoco.mj_step(model, state)
+        off = value(follower) - given.ratio * value(given.of) - given.offset
+        assert abs(remainder(off, tau)) < 2e-3
+    assert value(given.of) - begun == pytest.approx(0.1, abs=0.02)
