@@ -18,7 +18,7 @@ from cmath import phase, rect
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
-from math import inf, pi, radians, sin, tau
+from math import inf, pi, radians, remainder, sin, tau
 from os import environ
 from random import Random
 from typing import Any
@@ -450,3 +450,21 @@ def test_ratio_that_a_linkage_does_not_need() -> None:
         ratios = {'gear_joint': Ratio('rocker_joint', 1.0), name: Ratio(of, 1.0)}
         with pytest.raises(DefinitionError):
             Closure(replace(linkage, ratios=ratios))
+
+
+@pytest.mark.parametrize('ratio', [2.0, 0.5, -1.0, 1.5])
+@pytest.mark.parametrize('name', ['theta3', 'theta4'])
+def test_cranks_of_a_joint_are_those_of_a_scan_turn_after_turn(ratio: float, name: str) -> None:
+    """Norton's five-bar from the other end; with a ratio of halves it repeats after two turns."""
+    closure = Closure(geared_five_bar((6.0, 1.0, 7.0, 9.0, 4.0), Ratio('theta2', ratio, 0.5236)))
+    (interval,) = closure.input_ranges
+    ends = np.linspace(interval.lowest, interval.highest, 3000)
+    batch = closure.solve(ends)
+    scanned = batch.positions[closure.joint_names.index(name)]
+    for wanted in np.linspace(-3.0, 3.0, 13):
+        cranks = [crank for _, crank in closure.cranks(name, wanted)]
+        for crank in cranks:
+            assert remainder(closure.position(crank)[name] - wanted, tau) == pytest.approx(0.0)
+        off = np.remainder(scanned - wanted + pi, tau) - pi
+        crossed = (off[:-1] * off[1:] < 0.0) & (np.abs(off[:-1] - off[1:]) < 1.0)
+        assert len(cranks) == np.count_nonzero(crossed)

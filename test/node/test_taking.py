@@ -202,6 +202,7 @@ def test_what_is_too_old_when_it_arrives_is_counted_as_stale(kind):
     assert rig.counts()[0] == len(messages)
     assert bool(rig.published) == bool(c.used)
     assert ('stale' in rig.loop.samples) == bool(c.stale)
+    assert ('without the crank' in rig.loop.samples) == bool(c.ignored)
     if 'differs' in kind:
         assert c.stale_age == 100_000 * MS
 
