@@ -42,7 +42,7 @@ from .reference import ANGLE, four_bar, Quantity, RATE, TOGGLE, turned, Worst
 from .samples import FOUR_BARS, four_bars, FourBarCase
 
 COUNT = 200
-ACCELERATED = 60
+ACCELERATED = 30
 ACCELERATION = 4.0
 """Limit for accelerations in units of u·κ; of 12,700 loops of all families the worst had 2.3."""
 
