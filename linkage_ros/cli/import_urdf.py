@@ -16,7 +16,8 @@
 """
 Make a linkage file of a URDF and the pins that close its loops.
 
-Frames that are called PIN_on_LINK, as ``linkage urdf`` writes them, close by themselves.
+Frames that are called PIN_on_LINK, as ``linkage urdf`` writes them, close by themselves, and so do
+pins that the tags ``loop_joint`` and ``loop_constraint`` of simulators name.
 """
 
 from __future__ import annotations

@@ -188,7 +188,7 @@ def from_urdf(
     urdf
         The robot.
     close
-        Pairs of links whose origins coincide, beside those that frame names define.
+        Pairs of links whose origins coincide, beside those that frame names and loop tags define.
     inputs
         Names of driven joints; by default those that the file names.
     at
@@ -217,6 +217,7 @@ class _Import:
         inputs: Sequence[str],
         at: Mapping[str, float],
     ) -> None:
+        close = (*urdf.closings, *close)
         self._urdf = urdf = add_places(urdf, close)
         self._closings, alone = find_closings(urdf, close)
         moving = [joint.name for joint in urdf.joints.values() if joint.kind in MOVING]
@@ -234,7 +235,7 @@ class _Import:
         if not self._loops.joints or not (self._closings or {*followed} & {*self._inputs}):
             raise self._error(
                 '',
-                'closes no loop',
+                'closes no loop' + (f'; not read: {listed(urdf.unread)}' if urdf.unread else ''),
                 'name frames that meet: --close FRAME=FRAME, or call them PIN_on_LINK; or places: '
                 '--close LINK.x,y,z=LINK.x,y,z',
             )
@@ -282,7 +283,8 @@ class _Import:
         except DefinitionError as error:
             raise self._error(error.where, error.reason, error.remedy) from None
         left_out = [f'{part}, which belongs to no loop' for part in self._loops.left_out]
-        return ImportedLinkage(linkage, (*left_out, *ignored))
+        unread = [f'{tag}: close loops by --close' for tag in self._urdf.unread]
+        return ImportedLinkage(linkage, (*left_out, *ignored, *unread))
 
     def _with_ratios(self, linkage: Linkage) -> tuple[Linkage, list[str]]:
         """

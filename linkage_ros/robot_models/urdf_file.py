@@ -81,10 +81,27 @@ class UrdfFile(NamedTuple):
     inputs: tuple[str, ...]  # Names of driven joints, if ``linkage urdf`` wrote the file
     # Values of joints in a pose in which all loops close, if ``linkage urdf`` wrote the file.
     start: Mapping[str, float]
+    # Places that meet, LINK.x,y,z, as tags say by which simulators close loops.
+    closings: tuple[tuple[str, str], ...]
+    unread: tuple[str, ...]  # Tags that may close loops and are not read, in words
 
 
 _KINDS = (*MOVING, 'fixed', 'floating', 'planar')
 _FARTHEST = 1e9
+
+_LOOP_TAGS = {
+    'loop_joint': (('link1', 'link1'), ('link2', 'link2')),
+    'loop_constraint': (('parent', 'parent_origin'), ('child', 'child_origin')),
+}
+"""Tags outside of URDF that close loops: for both ends the tags with ``link`` and ``xyz``."""
+
+_PINS = ('', 'revolute', 'continuous', 'spherical')
+"""Types of a loop joint that are a pin in the plane; without a type it is one."""
+
+_USUAL_TAGS = (
+    'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
+    *_LOOP_TAGS,
+)  # fmt: skip
 
 
 def read_urdf(data: bytes, file: str) -> UrdfFile:
@@ -139,7 +156,31 @@ class _Reader:
             tuple(joints),
             tuple(each.get('name', '') for each in said if each.tag == 'input'),
             {each.get('name', ''): self._value(each, 'value', 'linkage_start') for each in said},
+            self._closings(root, links),
+            tuple(_unread(root)),
         )
+
+    def _closings(
+        self, root: ET.Element, links: Mapping[str, UrdfLink]
+    ) -> tuple[tuple[str, str], ...]:
+        """Return the pairs of places that loop tags join; a pair that two tags name, once."""
+        found: dict[frozenset[str], tuple[str, str]] = {}
+        for element in root:
+            if element.tag in _LOOP_TAGS and element.get('type', '') in _PINS:
+                where = f'{element.tag} {element.get("name", "")}'.rstrip()
+                one, other = (
+                    self._place(element, link, place, where, links)
+                    for link, place in _LOOP_TAGS[element.tag]
+                )
+                found.setdefault(frozenset((one, other)), (one, other))
+        return tuple(found.values())
+
+    def _place(
+        self, element: ET.Element, link: str, place: str, where: str, links: Mapping[str, UrdfLink]
+    ) -> str:
+        name = self._end(element, link, where, links)
+        xyz = self._vector(element.find(place), 'xyz', where, '0 0 0')
+        return f'{name}.{",".join(map(repr, xyz))}'
 
     def _error(self, key: str, reason: str, remedy: str) -> FileError:
         return FileError(self._file, key, reason, remedy)
@@ -327,6 +368,18 @@ def _made_up(joint: ET.Element) -> Mapping[str, str] | None:
     """Return the limits of a joint that ``linkage urdf`` made up; None if it noted none."""
     computed = joint.find('computed')
     return None if computed is None else computed.attrib
+
+
+def _unread(root: ET.Element) -> Iterator[str]:
+    """Yield the tags that may close loops and are not read, in words."""
+    for joint in root.findall('gazebo/joint'):
+        ends = f'{joint.findtext("parent", "")} and {joint.findtext("child", "")}'
+        yield f'joint {joint.get("name", "")} of <gazebo>, between {ends}'
+    for element in root:
+        if element.tag in _LOOP_TAGS and element.get('type', '') not in _PINS:
+            yield f'<{element.tag}> {element.get("name", "")}, which is no pin'
+        elif isinstance(element.tag, str) and element.tag not in _USUAL_TAGS:
+            yield f'<{element.tag}>'
 
 
 def _below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJoint]:

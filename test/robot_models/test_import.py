@@ -15,7 +15,7 @@
 
 """URDFs of others, with the pins that close them, as linkages; and those that are none."""
 
-from cmath import rect
+from cmath import phase, rect
 from math import cos, hypot, remainder, sin, tau
 
 from linkage_ros.cli.main import main
@@ -219,9 +219,96 @@ def robot(*parts):
 
 LINK = '<link name="{}"/>'.format
 CLOSED = [('a', 'b')]
+
+# A four-bar whose loop is closed by the tags of simulators; ground 150, 100, 200, 150 mm.
+TREE = ''.join(map(LINK, ('base', 'crank', 'coupler', 'rocker'))) + ''.join(
+    joint(f'{child}_joint', parent, child, f'{x} 0 0', axis='0 0 1')
+    for parent, child, x in (
+        ('base', 'crank', 0), ('crank', 'coupler', 0.1), ('base', 'rocker', 0.15),
+    )
+)  # fmt: skip
+PLACES = ('coupler.0.2,0,0', 'rocker.0.15,0,0')
+LOOP_JOINT = (
+    '<loop_joint name="pin" type="{}"><link1 link="coupler" xyz="0.2 0 0" rpy="0 0 0"/>'
+    '<link2 link="rocker" xyz="0.15 0 0" rpy="0 0 0"/></loop_joint>'
+)
+LOOP_CONSTRAINT = (
+    '<loop_constraint name="pin"><parent link="rocker"/><parent_origin xyz="0.15 0 0"/>'
+    '<child link="coupler"/><child_origin xyz="0.2 0 0"/></loop_constraint>'
+)
+SDF_JOINT = (
+    '<gazebo><joint name="pin" type="revolute"><parent>rocker</parent><child>coupler</child>'
+    '<pose>0.2 0 0 0 0 0</pose></joint></gazebo>'
+)
+
+
+def closed_values(crank):
+    """Return the joints' values where the pins of coupler and rocker meet, by circles."""
+    start = rect(0.1, crank)
+    across = 0.15 - start
+    along = (abs(across) ** 2 + 0.2**2 - 0.15**2) / (2 * abs(across))
+    pin = start + across / abs(across) * complex(along, (0.2**2 - along**2) ** 0.5)
+    coupler, rocker = phase(pin - start), phase(pin - 0.15)
+    return {'crank_joint': crank, 'coupler_joint': coupler - crank, 'rocker_joint': rocker}
+
+
+@pytest.mark.parametrize(
+    'tags',
+    [
+        LOOP_JOINT.format('revolute'),
+        LOOP_JOINT.format('spherical'),
+        LOOP_CONSTRAINT,
+        LOOP_JOINT.format('revolute') + LOOP_CONSTRAINT,
+    ],
+    ids=['loop_joint', 'spherical', 'loop_constraint', 'one pin by both'],
+)
+def test_loop_tags_close_as_places_do(tags):
+    at = closed_values(0.5)
+    asked = from_urdf(read_urdf(robot(TREE).encode(), 'r'), [PLACES], ['crank_joint'], at)
+    found = from_urdf(read_urdf(robot(TREE, tags).encode(), 'r'), (), ['crank_joint'], at)
+    assert found.left_out == ()
+    for crank in (0.5, 1.1, 2.0):
+        joints = Closure(found.linkage).position(crank)
+        assert joints.joints == Closure(asked.linkage).position(crank).joints
+        assert joints['rocker_joint'] == pytest.approx(closed_values(crank)['rocker_joint'])
+
+
+UNREAD = {
+    SDF_JOINT: 'joint pin of <gazebo>, between rocker and coupler',
+    LOOP_JOINT.format('prismatic'): '<loop_joint> pin, which is no pin',
+    '<constraint type="ball"/>': '<constraint>',
+}
+
+
+@pytest.mark.parametrize('tags', UNREAD)
+def test_tags_that_are_not_read_are_named(tags):
+    urdf = read_urdf(robot(TREE, tags).encode(), 'r')
+    made = from_urdf(urdf, [PLACES], ['crank_joint'], closed_values(0.5))
+    assert made.left_out == (f'{UNREAD[tags]}: close loops by --close',)
+    with pytest.raises(FileError, match=f'closes no loop; not read: {UNREAD[tags]}; name'):
+        from_urdf(urdf, (), ['crank_joint'])
+
+
+def test_usual_tags_are_no_loops():
+    tags = '<material name="m"/><transmission name="t"/><gazebo reference="crank"/><!-- -->'
+    made = from_urdf(
+        read_urdf(robot(TREE, tags, LOOP_CONSTRAINT).encode(), 'r'), (), ['crank_joint'],
+        closed_values(0.5),
+    )  # fmt: skip
+    assert made.left_out == ()
+
+
 A_B = LINK('base') + LINK('a') + LINK('b')
 FLAT = joint('j', 'base', 'a', '0 0 0', axis='0 0 1')
 BAD = {
+    'a loop tag of no link': (
+        robot(TREE, LOOP_CONSTRAINT.replace('"coupler"', '"rod"')),
+        "x.urdf: loop_constraint pin: its child 'rod' is no link; name a link",
+    ),
+    'a loop tag without a place': (
+        robot(TREE, LOOP_CONSTRAINT.replace('0.2 0 0', '0.2')),
+        "x.urdf: loop_constraint pin: xyz='0.2' is not 3 finite numbers; correct it",
+    ),
     'no XML': ('<robot', 'x.urdf:1: is no XML (unclosed token: line 1, column 0); name a URDF'),
     'another file': ('<sdf/>', 'x.urdf: holds <sdf>, not <robot>; name a URDF file'),
     'xacro': (
