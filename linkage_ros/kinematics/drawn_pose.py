@@ -207,17 +207,15 @@ def _closed(
     found = [_Assembly(State([0.0, *inputs], []))]
     both = len(ways) <= _MOST_EXPLORED
     numbers = {one.step: number for number, one in enumerate(ways)}
+    closed: Sequence[_Target] = ()
     for step, way in enumerate(plan.steps):
         if step not in numbers:
             found = [one for one in found if way.close(one.state).status.has_pose]
             continue
+        # Steps behind a dyad have placed the other links of its bodies, which inputs hold.
+        found = [one.seen(closed) for one in found]
         number = numbers[step]
-        found = [
-            other.seen(groups[number])
-            for one in found
-            for other in one.on_both_sides(way)
-            if both or other.is_written(ways)
-        ]
+        closed = groups[number]
         if len(found) > _MOST_KEPT:
             found.sort(key=lambda one: one.square)
             if found[_MOST_KEPT].square <= _CLEARLY * _CLEARLY * found[0].square:
@@ -226,7 +224,13 @@ def _closed(
                     'pose', f'does not tell the sides of {names}', 'name a point of each'
                 )
             del found[_MOST_KEPT:]
-    return found
+        found = [
+            other
+            for one in found
+            for other in one.on_both_sides(way)
+            if both or other.is_written(ways)
+        ]
+    return [one.seen(closed) for one in found]
 
 
 def _is_nearer(one: _Assembly, other: _Assembly, drawn: Sequence[complex], size: float) -> bool:

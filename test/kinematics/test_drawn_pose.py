@@ -501,3 +501,37 @@ def test_many_states_at_once_are_those_of_one_next_to_a_change_point(name):
         if position.status.has_rates:
             velocity = closure.velocity(position, 1.0)
             assert velocity.joints == pytest.approx(batch.velocities[:, k], rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize('side', ['left', 'right'])
+@pytest.mark.parametrize('drawn', ['P', 'A', 'left', 'left_rod'])
+def test_links_that_inputs_hold_to_one_another_are_drawn_too(side, drawn):
+    """A five-bar that its elbows drive: each half is one body, whose second link comes behind."""
+    arms = {
+        f'{name}{part}': ends
+        for name, foot, elbow in (('left', 'O', 'A'), ('right', 'E', 'B'))
+        for part, ends in (
+            ('', {foot: (0.0, 0.0), elbow: (0.05, 0.0)}),
+            ('_rod', {elbow: (0.0, 0.0), 'P': (0.09, 0.0)}),
+        )
+    }
+    linkage = Linkage(
+        {'ground': {'O': (0.0, 0.0), 'E': (0.1, 0.0)}, **arms},
+        tuple(Input(f'{name}_elbow', name, f'{name}_rod') for name in ('left', 'right')),
+        {'P': side},
+        {'q': RevoluteJoint('ground', 'left')},
+        {},
+    )
+    inputs = (-1.2, 1.2)
+    told = Closure(replace(linkage, pose=Pose(inputs, {})))
+    position = told.position(*inputs)
+    places = told.points(position)
+    points, angles = {}, {}
+    if drawn in arms:
+        ends = [places[drawn, point] for point in arms[drawn]]
+        angles[drawn] = phase(ends[1] - ends[0]) + 0.1
+    else:
+        at = places['left_rod', drawn] + 0.005
+        points[drawn] = at.real, at.imag
+    found = Closure(replace(linkage, assembly={}, pose=Pose(inputs, points, angles)))
+    assert found.position(*inputs).joints == position.joints
