@@ -195,10 +195,14 @@ COMMANDS = {
     'accuracy': [_FILE, '--quick', '--only', 'effects,dynamics', '-o', 'page'],
     'replay': ['bag', '--scene', _FILE],
     'run': [_FILE, '--plain', '--seconds', '0.1', '--runs', 'runs'],
+    'relay': [_FILE, '--joint', 'rocker_joint', '--seconds', '0.1'],
 }
 """Arguments of each command."""
 
-_SCENE = ('view', 'fmu', 'scene', 'simulate', 'cost', 'urdf', 'mjcf', 'accuracy', 'replay', 'run')
+_SCENE = (
+    'view', 'fmu', 'scene', 'simulate', 'cost', 'urdf', 'mjcf', 'accuracy', 'replay', 'run',
+    'relay',
+)  # fmt: skip
 _TABLES = {
     'pairs': b'crank,rocker\n0,0\n30,17\n60,38\n',
     'path': b'0.1;0.2\n0.15;0.25\n0.2;0.2\n0.15;0.1\n0.12;0.1\n',
@@ -278,7 +282,8 @@ def _try(originals: dict[str, dict[str, bytes]], seed: str) -> tuple[str, str]:
         case _:
             command, arguments = 'synthesize', ['synthesize', f'--{name}', _FILE]
             arguments += ['--candidates', '200']
-    code, errors = _node(arguments) if command == 'run' else in_process(arguments, _SECONDS)[:2]
+    starts_node = command in ('run', 'relay')
+    code, errors = _node(arguments) if starts_node else in_process(arguments, _SECONDS)[:2]
     for folder in ('page', 'runs'):
         rmtree(folder, ignore_errors=True)
     fault = fault_of(command, code, errors)
