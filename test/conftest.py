@@ -16,6 +16,7 @@
 """For all tests: how Hypothesis judges examples, a browser, and which files run first."""
 
 from collections.abc import Iterator
+import gc
 from math import inf
 from typing import Any
 
@@ -47,3 +48,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the files with slow tests first: xdist hands out files in this order, one a worker."""
     slow = {item.path for item in items if item.get_closest_marker('slow')}
     items.sort(key=lambda item: item.path not in slow)
+
+
+def pytest_collection_finish() -> None:
+    """Leave the thousands of tests out of garbage collections: these took a fifth of the time."""
+    gc.collect()
+    gc.freeze()
