@@ -32,7 +32,7 @@ from statistics import median
 from time import perf_counter_ns
 from typing import NamedTuple
 
-from linkage_ros.drives.dependent_samples import sampled_branch
+from linkage_ros.drives.dependent_samples import sampled_inverse
 from linkage_ros.effects.dispatch import bringing, dependencies, in_order, module_of
 from linkage_ros.effects.stage import EFFECTS, FORCE_EFFECTS
 from linkage_ros.errors import FileError
@@ -75,7 +75,7 @@ def _paths(line: LinkagePipeline) -> list[Path]:
     closure, joint = line.closure, line.member.dependent
     speed = tau * _CRANK_RATE
     if joint:
-        branch = sampled_branch(closure, joint, line.member.drive[1].branch)
+        branch = sampled_inverse(closure, joint, line.member.drive[1].branch).branch
         return [_swing(0.5 * (branch.low + branch.high), 0.4 * (branch.high - branch.low), speed)]
     centers = usual_inputs(closure)
     if len(centers) > 1:

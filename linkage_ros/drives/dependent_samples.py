@@ -26,11 +26,12 @@ from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Reje
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.crank_branches import CrankBranch
+    from linkage_ros.kinematics.inverse_closure import InverseClosure
 
 
-def sampled_branch(closure: Closure, joint: str, number: int) -> CrankBranch:
+def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure:
     """
-    Return the branch of a joint on which the crank is; 0 stands for the only one.
+    Return the closure that a joint drives, on the branch of a number; 0 stands for the only one.
 
     Raises
     ------
@@ -41,7 +42,7 @@ def sampled_branch(closure: Closure, joint: str, number: int) -> CrankBranch:
     # Another solver has no branches of its own.
     closed: Closure = getattr(closure, 'closed', closure)
     try:
-        return closed.driven_by(joint, branch=number or None).branch
+        return closed.driven_by(joint, branch=number or None)
     except DefinitionError as error:
         key = 'drive.topic.branch' if number else 'drive.topic.joint'
         raise DefinitionError(key, f'{error.where}: {error.reason}', error.remedy) from None

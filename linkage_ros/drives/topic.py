@@ -112,11 +112,11 @@ def reader(parameters: TopicParameters, context: Context) -> Reader:
     if parameters.joint:
         from linkage_ros.drives.dependent_samples import (  # local import: few scenes name a joint
             DependentSampleReader,
-            sampled_branch,
+            sampled_inverse,
         )
 
-        branch = sampled_branch(context.closure, parameters.joint, parameters.branch)
-        return DependentSampleReader(branch, context.prefix + parameters.joint).read
+        inverse = sampled_inverse(context.closure, parameters.joint, parameters.branch)
+        return DependentSampleReader(inverse.branch, context.prefix + parameters.joint).read
     return JointStateReader(context.inputs_in_messages).read
 
 

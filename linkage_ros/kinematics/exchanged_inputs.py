@@ -24,7 +24,7 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, did_you_mean, listed
 from linkage_ros.kinematics.checks import check
-from linkage_ros.kinematics.linkage import Input, Linkage, Pose, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.linkage import Input, Linkage, Pose, RevoluteJoint
 from linkage_ros.kinematics.sides import assembly_sides
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import assur_groups, Iterated
@@ -65,21 +65,14 @@ def exchange_inputs(
         joint = linkage.joints.get(name)
         if name in driven:
             inputs.append(driven[name])
-        elif isinstance(joint, RevoluteJoint):
-            inputs.append(Input(name, joint.parent, joint.child, limits=joint.limits))
-        elif isinstance(joint, SlideJoint):
-            inputs.append(Input(name, slider=joint.slider, limits=joint.limits))
+        elif joint is not None:
+            inputs.append(Input.from_joint(name, joint))
         else:
             known = [*linkage.joints, *driven]
             remedy = did_you_mean(name, known, f'name one of {listed(known)}')
             raise DefinitionError(name, 'is neither a published joint nor an input', remedy)
     # The inputs as joints, and the other joints.
-    joints: dict[str, RevoluteJoint | SlideJoint] = {
-        given.joint: SlideJoint(given.slider, given.limits)
-        if given.slider
-        else RevoluteJoint(given.parent, given.child, given.limits)
-        for given in linkage.inputs
-    }
+    joints = {given.joint: given.as_joint() for given in linkage.inputs}
     joints = {
         name: joint for name, joint in (joints | dict(linkage.joints)).items() if name not in names
     }

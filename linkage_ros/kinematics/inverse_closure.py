@@ -35,7 +35,7 @@ from linkage_ros.kinematics.compiling.trace import Motion
 from linkage_ros.kinematics.crank_branches import CrankBranch, Inverse, Output
 from linkage_ros.kinematics.doubles import to_doubles
 from linkage_ros.kinematics.limits import Bounds
-from linkage_ros.kinematics.linkage import Input, Pose, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.linkage import Input, Pose
 from linkage_ros.kinematics.results import (
     Acceleration,
     InputRange,
@@ -88,11 +88,7 @@ class InverseClosure(Closure):
     def __init__(self, closed: Closure, inverse: Inverse, branch: CrankBranch) -> None:
         output = inverse.output
         (crank,) = closed.linkage.inputs
-        joints: dict[str, RevoluteJoint | SlideJoint] = {
-            crank.joint: SlideJoint(crank.slider, crank.limits)
-            if crank.slider
-            else RevoluteJoint(crank.parent, crank.child, crank.limits)
-        }
+        joints = {crank.joint: crank.as_joint()}
         others = [name for name in closed.joint_names if name not in (output.name, crank.joint)]
         joints |= {name: closed.linkage.joints[name] for name in others}
         self.closed, self.inverse, self.branch = closed, inverse, branch
@@ -298,11 +294,8 @@ class InverseClosure(Closure):
 
 
 def _as_input(output: Output) -> Input:
-    joint = output.joint
-    if isinstance(joint, RevoluteJoint):
-        return Input(output.name, joint.parent, joint.child, limits=joint.limits)
-    if isinstance(joint, SlideJoint):
-        return Input(output.name, slider=joint.slider, limits=joint.limits)
+    if output.joint is not None:
+        return Input.from_joint(output.name, output.joint)
     return Input(output.name, slider=output.name)  # It slides, though along no line of a link.
 
 

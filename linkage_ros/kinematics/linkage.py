@@ -125,6 +125,19 @@ class Input:
         """Return the unit of its value."""
         return 'm' if self.slider else 'rad'
 
+    @classmethod
+    def from_joint(cls, name: str, joint: RevoluteJoint | SlideJoint) -> Input:
+        """Return a published joint as an input."""
+        if isinstance(joint, SlideJoint):
+            return cls(name, slider=joint.slider, limits=joint.limits)
+        return cls(name, joint.parent, joint.child, limits=joint.limits)
+
+    def as_joint(self) -> RevoluteJoint | SlideJoint:
+        """Return it as a published joint."""
+        if self.slider:
+            return SlideJoint(self.slider, self.limits)
+        return RevoluteJoint(self.parent, self.child, self.limits)
+
 
 @dataclass(frozen=True, slots=True)
 class RevoluteJoint:
@@ -261,13 +274,8 @@ class Linkage:
     @property
     def driven(self) -> tuple[Input, ...]:
         """Return the inputs, then the joints that follow others, as if they were inputs."""
-        joints = ((name, self.joints[name]) for name in self.ratios)
-        return self.inputs + tuple(
-            Input(name, slider=joint.slider)
-            if isinstance(joint, SlideJoint)
-            else Input(name, joint.parent, joint.child)
-            for name, joint in joints
-        )
+        followers = (Input.from_joint(name, self.joints[name]) for name in self.ratios)
+        return (*self.inputs, *followers)
 
     @property
     def limits(self) -> dict[str, Limits]:

@@ -35,7 +35,7 @@ from time import monotonic
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from linkage_ros.drives.dependent_samples import sampled_branch
+from linkage_ros.drives.dependent_samples import sampled_inverse
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.inverse_closure import InverseClosure
 from linkage_ros.kinematics.status import Status
@@ -77,8 +77,7 @@ class CommandRelay:
         for member in scene.members:
             if member.dependent:
                 number = member.drive[1].branch
-                branch = sampled_branch(member.closure, member.dependent, number)
-                inverse = member.closure.driven_by(member.dependent, branch=branch.number)
+                inverse = sampled_inverse(member.closure, member.dependent, number)
                 self._inverses[member.sampled[0]] = inverse, member.inputs[0]
         if not self._inverses:
             raise DefinitionError(

@@ -26,7 +26,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from linkage_ros.bag.reader import Bag
-from linkage_ros.drives.dependent_samples import crank_of, sampled_branch
+from linkage_ros.drives.dependent_samples import crank_of, sampled_inverse
 from linkage_ros.errors import BagError
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
@@ -56,7 +56,9 @@ class Crank:
         self._columns = list(columns)
         of = line.member.drive[1]
         self._carried = bool(of.carry_forward)
-        self._branch = sampled_branch(line.closure, of.joint, of.branch) if of.joint else None
+        self._branch = None
+        if of.joint:
+            self._branch = sampled_inverse(line.closure, of.joint, of.branch).branch
         width = len(columns)
         self._number = np.array([-1])
         self._stamp = np.zeros(1, np.int64)
