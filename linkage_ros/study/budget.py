@@ -1,0 +1,110 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Where the error of the published joints comes from, and what each digit of it costs.
+
+A source of error is a knob with settings: the step of the drive, the rate of the ticks, the solver.
+Each setting has an error, measured against the exact solution of the scene, and a price, measured
+on this machine. One setting is the scene's own. Modules that measure fill these types; the text,
+the JSON, the page and the picture only read them.
+
+All errors are in one unit: angles in [rad]; slides in parts of the linkage's size, which are the
+angles that they seem from that distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from linkage_ros.measuring import Spread
+
+
+class JointError(NamedTuple):
+    """How far the published joints are from the exact ones over a run, in [rad]."""
+
+    rms: float  # Root mean square over the ticks of the worst joint
+    worst: float  # Greatest of all joints and ticks
+
+
+class Price(NamedTuple):
+    """What a setting costs a tick."""
+
+    tick: Spread  # Processor time that it takes of a tick, in [µs]: median and quartiles
+    rate: float  # Ticks per second
+
+    @property
+    def core(self) -> float:
+        """Return the share of a processor core, 0 to 1."""
+        return self.tick.middle * 1e-6 * self.rate
+
+    @property
+    def is_noise(self) -> bool:
+        """Return whether the time is smaller than its spread, so that it says nothing."""
+        return abs(self.tick.middle) <= self.tick.high - self.tick.low
+
+
+class Setting(NamedTuple):
+    """One setting of a knob."""
+
+    label: str  # For tables and pictures: 'rk4, 1 ms', '1 kHz, held', 'float32'
+    error: JointError
+    price: Price | None  # None if it costs no time of a tick
+    # Keys of the scene with their values, as `--set` takes them. Empty for the scene's own
+    # setting; None for a comparison that no scene can ask for, such as single precision.
+    changes: Sequence[tuple[str, object]] | None = ()
+    advice: str = ''  # What a user does where no key of the scene does it: 'carry forward by …'
+
+    @property
+    def line(self) -> str:
+        """Return what a user writes: 'drive.torque.step: 0.0005'."""
+        return ', '.join(f'{key}: {value}' for key, value in self.changes or ()) or self.advice
+
+
+class Knob(NamedTuple):
+    """A source of error, with the settings that were measured."""
+
+    name: str  # 'step of the drive', 'age in use', 'age of the command', 'solving'
+    settings: Sequence[Setting]
+    chosen: int  # Index of the scene's own setting
+    after: float | None = None  # For an error that grows: the time that it was taken after, in [s]
+    # Whether the scene asks for the difference: an effect or a fault, which is no error.
+    is_deliberate: bool = False
+    note: str = ''  # A sentence for the last column where there is no other setting
+
+    @property
+    def own(self) -> Setting:
+        """Return the scene's own setting."""
+        return self.settings[self.chosen]
+
+
+class Loss(NamedTuple):
+    """What recording costs, and what it may lose."""
+
+    seconds: float  # Longest time of a run that a crash loses, in [s]
+    price: Price
+
+
+class Budget(NamedTuple):
+    """All that was measured of a scene."""
+
+    scene: str  # Name
+    rate: float  # Ticks per second
+    tick: Price  # The whole tick
+    knobs: Sequence[Knob]  # Errors and deliberate differences, each sorted by size
+    recording: Loss | None
+    machine: Sequence[tuple[str, str]]  # Day, machine and versions: names and values
+    left_out: Sequence[str] = ()  # What `--quick` or the scene left out, a sentence each
