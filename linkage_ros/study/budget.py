@@ -16,7 +16,7 @@
 """
 Where the error of the published joints comes from, and what each digit of it costs.
 
-A source of error is a knob with settings: the step of the drive, the rate of the ticks, the solver.
+A source of error is a knob with settings, such as the step of the drive or the rate of the ticks.
 Each setting has an error, measured against the exact solution of the scene, and a price, measured
 on this machine. One setting is the scene's own. Modules that measure fill these types; the text,
 the JSON, the page and the picture only read them.
@@ -62,7 +62,10 @@ class Setting(NamedTuple):
 
     label: str  # For tables and pictures: 'rk4, 1 ms', '1 kHz, held', 'float32'
     error: JointError
-    price: Price | None  # None if it costs no time of a tick
+    # Of the scene's own setting: what it takes of the tick. Of another: what it adds to the tick
+    # of the scene as it is, less than 0 where it saves; its rate is the one it asks for. None if
+    # it costs no time of a tick.
+    price: Price | None
     # Keys of the scene with their values, as `--set` takes them. Empty for the scene's own
     # setting; None for a comparison that no scene can ask for, such as single precision.
     changes: Sequence[tuple[str, object]] | None = ()
@@ -108,3 +111,9 @@ class Budget(NamedTuple):
     recording: Loss | None
     machine: Sequence[tuple[str, str]]  # Day, machine and versions: names and values
     left_out: Sequence[str] = ()  # What `--quick` or the scene left out, a sentence each
+
+    def core_of(self, knob: Knob, setting: Setting) -> float:
+        """Return the share of a core that the whole scene takes with a setting, 0 to 1."""
+        if setting is knob.own or setting.price is None:
+            return self.tick.core
+        return (self.tick.tick.middle + setting.price.tick.middle) * 1e-6 * setting.price.rate
