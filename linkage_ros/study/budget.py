@@ -56,6 +56,11 @@ class Price(NamedTuple):
         """Return whether the time is smaller than its spread, so that it says nothing."""
         return abs(self.tick.middle) <= self.tick.high - self.tick.low
 
+    def negated(self) -> Price:
+        """Return the price of the other way round: what is saved instead of added."""
+        low, middle, high = self.tick
+        return self._replace(tick=Spread(-high, -middle, -low))
+
 
 class Setting(NamedTuple):
     """One setting of a knob."""
@@ -95,10 +100,12 @@ class Knob(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """What recording costs, and what it may lose."""
+    """What recording costs, and what it may lose, with one setting."""
 
+    line: str  # What a user writes: 'record.flush_period: 0.2'
     seconds: float  # Longest time of a run that a crash loses, in [s]
     price: Price
+    dropped: int  # Messages that found no room before the disk was ready
 
 
 class Budget(NamedTuple):
@@ -108,7 +115,7 @@ class Budget(NamedTuple):
     rate: float  # Ticks per second
     tick: Price  # The whole tick
     knobs: Sequence[Knob]  # Errors and deliberate differences, each sorted by size
-    recording: Loss | None
+    recording: Sequence[Loss]  # The scene's own setting, then others; empty if it records nothing
     machine: Sequence[tuple[str, str]]  # Day, machine and versions: names and values
     left_out: Sequence[str] = ()  # What `--quick` or the scene left out, a sentence each
 
