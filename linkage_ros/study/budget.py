@@ -79,7 +79,13 @@ class Setting(NamedTuple):
     @property
     def line(self) -> str:
         """Return what a user writes: 'drive.torque.step: 0.0005'."""
-        return ', '.join(f'{key}: {value}' for key, value in self.changes or ()) or self.advice
+        return ', '.join(_line(*each) for each in self.changes or ()) or self.advice
+
+
+def _line(key: str, value: object) -> str:
+    if isinstance(value, float):
+        value = f'{value:.9f}'.rstrip('0').rstrip('.')  # YAML takes 1e-05 for a text
+    return f'{key}: {value}'
 
 
 class Knob(NamedTuple):
