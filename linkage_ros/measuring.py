@@ -116,7 +116,7 @@ def in_turn(
         Returns the time, in [s]; by default the processor time of the thread.
 
     """
-    clock = clock or _thread_clock()
+    clock = clock or thread_clock()
     repeats, block_time = [], 0.0
     for run, _ in contenders:
         run()
@@ -147,7 +147,7 @@ def in_turn(
     return [spread_of(found) for found in times]
 
 
-def _thread_clock() -> Callable[[], float]:
+def thread_clock() -> Callable[[], float]:
     """Return the clock of this thread's processor time; if it is too coarse, the wall clock."""
     begun, first = perf_counter(), thread_time()
     while thread_time() == first:

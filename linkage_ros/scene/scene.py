@@ -36,6 +36,9 @@ What makes files of a bag, and the least that it may be where it is not 0.
 Each file begins with the scene, the linkages and the types, and costs the disk some ten waits.
 """
 
+LEAST_FLUSH_PERIOD = 0.05
+"""Least flush period, in [s]."""
+
 LEASTS: Mapping[str, float] = {**SPLITS, 'snapshot_seconds': 0.1}
 """Least value of a setting that may also be 0, for never."""
 
@@ -53,7 +56,7 @@ class StorageParameters(Storage):
         'what a power cut may cost: the disk is waited for a little more often',
         _DEFAULT.flush_period,
         unit='s',
-        least=0.05,
+        least=LEAST_FLUSH_PERIOD,
         most=60.0,
     )
     split_bytes: int = whole(

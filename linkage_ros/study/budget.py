@@ -16,7 +16,7 @@
 """
 Where the error of the published joints comes from, and what each digit of it costs.
 
-A source of error is a knob with settings: the step of the drive, the rate of the ticks, the solver.
+A source of error is a knob with settings, such as the step of the drive or the rate of the ticks.
 Each setting has an error, measured against the exact solution of the scene, and a price, measured
 on this machine. One setting is the scene's own. Modules that measure fill these types; the text,
 the JSON, the page and the picture only read them.
@@ -56,13 +56,21 @@ class Price(NamedTuple):
         """Return whether the time is smaller than its spread, so that it says nothing."""
         return abs(self.tick.middle) <= self.tick.high - self.tick.low
 
+    def negated(self) -> Price:
+        """Return the price of the other way round: what is saved instead of added."""
+        low, middle, high = self.tick
+        return self._replace(tick=Spread(-high, -middle, -low))
+
 
 class Setting(NamedTuple):
     """One setting of a knob."""
 
     label: str  # For tables and pictures: 'rk4, 1 ms', '1 kHz, held', 'float32'
     error: JointError
-    price: Price | None  # None if it costs no time of a tick
+    # Of the scene's own setting: what it takes of the tick. Of another: what it adds to the tick
+    # of the scene as it is, less than 0 where it saves; its rate is the one it asks for. None if
+    # it costs no time of a tick.
+    price: Price | None
     # Keys of the scene with their values, as `--set` takes them. Empty for the scene's own
     # setting; None for a comparison that no scene can ask for, such as single precision.
     changes: Sequence[tuple[str, object]] | None = ()
@@ -71,7 +79,13 @@ class Setting(NamedTuple):
     @property
     def line(self) -> str:
         """Return what a user writes: 'drive.torque.step: 0.0005'."""
-        return ', '.join(f'{key}: {value}' for key, value in self.changes or ()) or self.advice
+        return ', '.join(_line(*each) for each in self.changes or ()) or self.advice
+
+
+def _line(key: str, value: object) -> str:
+    if isinstance(value, float):
+        value = f'{value:.9f}'.rstrip('0').rstrip('.')  # YAML takes 1e-05 for a text
+    return f'{key}: {value}'
 
 
 class Knob(NamedTuple):
@@ -92,10 +106,12 @@ class Knob(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """What recording costs, and what it may lose."""
+    """What recording costs, and what it may lose, with one setting."""
 
+    line: str  # What a user writes: 'record.flush_period: 0.2'
     seconds: float  # Longest time of a run that a crash loses, in [s]
     price: Price
+    dropped: int  # Messages that found no room before the disk was ready
 
 
 class Budget(NamedTuple):
@@ -105,6 +121,12 @@ class Budget(NamedTuple):
     rate: float  # Ticks per second
     tick: Price  # The whole tick
     knobs: Sequence[Knob]  # Errors and deliberate differences, each sorted by size
-    recording: Loss | None
+    recording: Sequence[Loss]  # The scene's own setting, then others; empty if it records nothing
     machine: Sequence[tuple[str, str]]  # Day, machine and versions: names and values
     left_out: Sequence[str] = ()  # What `--quick` or the scene left out, a sentence each
+
+    def core_of(self, knob: Knob, setting: Setting) -> float:
+        """Return the share of a core that the whole scene takes with a setting, 0 to 1."""
+        if setting is knob.own or setting.price is None:
+            return self.tick.core
+        return (self.tick.tick.middle + setting.price.tick.middle) * 1e-6 * setting.price.rate

@@ -1,0 +1,340 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What a tick of a scene costs, and what a changed setting adds to it.
+
+Scenes take turns in one process, a block of ticks each, in an order that changes. A difference is
+taken from block to block, over the same simulated time; a price is the median of each round, of
+which the quartiles are told. Times are processor time of the thread, with garbage collection off
+as in the node. Nothing is published: what the middleware takes for a message is the same for
+every setting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+import gc
+from itertools import islice
+import json
+from math import cos, sin, tau
+from random import Random
+from statistics import median
+from time import perf_counter
+
+from linkage_ros.drives.dependent_samples import sampled_inverse
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
+from linkage_ros.measuring import Progress, Spread, spread_of, thread_clock
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.scene import Scene
+from linkage_ros.study.budget import Knob, Price
+
+USUAL_RATE = 1000.0
+"""Ticks per second of a scene that ticks with its samples."""
+
+_BEGIN = 1_000_000_000
+_CRANK_RATE = 1.0
+"""Turns, or oscillations, of the crank per second."""
+
+_BLOCK = 100
+"""Ticks of a block: enough to warm the caches, few compared with a drift of the machine."""
+
+_SLOW_BLOCK = 20
+"""Fewest ticks of a block, of a scene that ticks more slowly than those it is compared with."""
+
+_ROUNDS = 16
+_LAP = 10.0
+"""Simulated time after which a scene starts again, in [s]: a torque may have it run away."""
+
+Feed = Callable[[Scene, Pipeline], Iterator[tuple[int, bytes]]]
+"""Yields times in [ns], each with a crank message, or b'' if no drive listens to a topic."""
+
+Change = tuple[str, object]
+"""A dotted key of the scene with its value."""
+
+
+def change_scene(scene: Scene, changes: Sequence[Change]) -> Scene:
+    """Return a scene with changed keys, as ``--set`` sets them; FileError where it refuses."""
+    if not changes:
+        return scene
+    settings = [f'{key}={json.dumps(value)}' for key, value in changes]
+    return parse_scene(
+        scene.name,
+        scene.name,
+        scene.files,
+        scene.folder,
+        seed=scene.seed,
+        trust_effects=True,
+        settings=settings,
+    )
+
+
+def turn_crank(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
+    """Yield times and messages: each input turns, or oscillates within the range it closes in."""
+    period = 1e9 / (scene.rate or USUAL_RATE)
+    names = [name for member in scene.members for name in member.sampled]
+    write = JointStateWriter(names).write
+    paths = [path for line in pipeline.lines for path in _paths(line)] if pipeline.topic else []
+    count = 0
+    while True:
+        now = _BEGIN + round(count * period)
+        message = b''
+        if pipeline.topic:
+            seconds = (now - _BEGIN) * 1e-9
+            values, rates = zip(*[path(seconds) for path in paths], strict=True)
+            message = write(now, values, rates, (0.0,) * len(names))
+        yield now, message
+        count += 1
+
+
+Path = Callable[[float], tuple[float, float]]
+
+
+def _paths(line: LinkagePipeline) -> list[Path]:
+    """Return for each input its value and rate at a time in [s]: a rotation or an oscillation."""
+    closure, joint = line.closure, line.member.dependent
+    speed = tau * _CRANK_RATE
+    if joint:
+        branch = sampled_inverse(closure, joint, line.member.drive[1].branch).branch
+        return [_swing(0.5 * (branch.low + branch.high), 0.4 * (branch.high - branch.low), speed)]
+    centers = usual_inputs(closure)
+    if len(centers) > 1:
+        sizes = [0.01 * closure.scale if i.slider else 0.01 for i in closure.linkage.inputs]
+        return [_swing(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
+    widest = InputSweep(closure).widest_range
+    if widest is None or widest.whole:
+        return [lambda seconds: (speed * seconds, speed)]
+    middle, width = 0.5 * (widest.lowest + widest.highest), widest.highest - widest.lowest
+    return [_swing(middle, 0.4 * width, speed)]
+
+
+def _swing(center: float, amplitude: float, speed: float) -> Path:
+    return lambda seconds: (
+        center + amplitude * sin(speed * seconds),
+        amplitude * speed * cos(speed * seconds),
+    )
+
+
+class TimedScene:
+    """A scene that ticks block by block, over laps of the same simulated time."""
+
+    def __init__(self, scene: Scene, feed: Feed) -> None:
+        self.scene, self.rate = scene, scene.rate or USUAL_RATE
+        self.block = _BLOCK
+        self.published = 0
+        self._feed = feed
+        self._closures: Sequence[Closure] | None = None
+        self._begin_lap()
+
+    def _begin_lap(self) -> None:
+        self._pipeline = Pipeline(self.scene, self._closures)
+        # The first solution of an iterated linkage may take a second.
+        self._closures = self._pipeline.closures
+        blocks = max(1, round(_LAP * self.rate / self.block))
+        self._fed = islice(self._feed(self.scene, self._pipeline), blocks * self.block)
+
+    def time_block(self, clock: Callable[[], float]) -> float:
+        """Tick a block, each tick after its message; return the mean time of a tick, in [µs]."""
+        block = list(islice(self._fed, self.block))
+        if len(block) < self.block:
+            self._begin_lap()
+            block = list(islice(self._fed, self.block))
+        pipeline = self._pipeline
+        offer, tick, injection = pipeline.offer, pipeline.tick, pipeline.injection
+        published = 0
+        begun = clock()
+        for now, message in block:
+            if injection is not None:
+                injection.advance(now)
+                now = injection.clock(now)  # noqa: PLW2901 (a clock fault changes the tick's time)
+            if message:
+                offer(message, now)
+            if tick(now).message:
+                published += 1
+        taken = clock() - begun
+        self.published += published
+        return taken * 1e6 / len(block)
+
+
+Rounds = list[list[float]]
+
+
+def time_ticks(
+    scenes: Sequence[Scene],
+    seconds: float,
+    feed: Feed = turn_crank,
+    progress: Progress = lambda _: None,
+) -> list[Rounds]:
+    """
+    Return for each scene the times of a tick in [µs], of each block in each round.
+
+    Parameters
+    ----------
+    scenes
+        The scenes, which take turns.
+    seconds
+        Approximate duration of all.
+    feed
+        Times and crank messages of a scene.
+    progress
+        Called now and then with the fraction that is done.
+
+    Raises
+    ------
+    FileError
+        If parts of a scene cannot be combined.
+    LinkageError
+        If a scene publishes nothing.
+
+    """
+    timed = [TimedScene(scene, feed) for scene in scenes]
+    # Blocks of the same simulated time, so that motions that differ are compared where they are
+    # the same.
+    rates = [one.rate for one in timed]
+    span = max(_BLOCK / max(rates), _SLOW_BLOCK / min(rates))
+    for one in timed:
+        one.block = round(span * one.rate)
+    clock, shuffle = thread_clock(), Random(0).shuffle
+    order = list(range(len(timed)))
+    rounds: list[Rounds] = [[] for _ in timed]
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        begun = perf_counter()
+        for _ in range(2):  # The first block compiles and warms
+            begun = perf_counter()
+            for one in timed:
+                one.time_block(clock)
+        once = perf_counter() - begun
+        blocks = max(1, round(seconds / (_ROUNDS * once)))
+        for done in range(_ROUNDS):
+            times: list[list[float]] = [[] for _ in timed]
+            for _ in range(blocks):
+                # A scene behind a slow one finds cold caches: the order changes.
+                shuffle(order)
+                for index in order:
+                    times[index].append(timed[index].time_block(clock))
+                progress((done + len(times[0]) / blocks) / _ROUNDS)
+            for found, blocks_of_scene in zip(rounds, times, strict=True):
+                found.append(blocks_of_scene)
+            if collecting:
+                gc.collect(0)
+    finally:
+        if collecting:
+            gc.enable()
+    for one in timed:
+        if not one.published:
+            raise LinkageError(
+                one.scene.name,
+                'publishes nothing: there is nothing to measure',
+                'see that the linkage closes where the drive brings it',
+            )
+    return rounds
+
+
+def tick_price(scene: Scene, seconds: float = 0.5, feed: Feed = turn_crank) -> Price:
+    """Return what a whole tick of a scene costs, with its crank message; see `time_ticks`."""
+    (rounds,) = time_ticks([scene], seconds, feed)
+    return Price(spread_of([median(blocks) for blocks in rounds]), scene.rate or USUAL_RATE)
+
+
+def price_scenes(
+    scene: Scene,
+    others: Sequence[Scene],
+    seconds: float,
+    feed: Feed = turn_crank,
+    progress: Progress = lambda _: None,
+) -> list[Price]:
+    """Return what ticks of other scenes cost more than those of a scene; see `time_ticks`."""
+    own, *changed = time_ticks([scene, *others], seconds, feed, progress)
+    return [
+        Price(subtract_times(times, own), other.rate or USUAL_RATE)
+        for times, other in zip(changed, others, strict=True)
+    ]
+
+
+def subtract_times(rounds: Rounds, others: Rounds) -> Spread:
+    """Return how much longer one takes than the other; both were measured in turns."""
+    return spread_of(
+        [
+            median(one - other for one, other in zip(*blocks, strict=True))
+            for blocks in zip(rounds, others, strict=True)
+        ]
+    )
+
+
+def price_changes(
+    scene: Scene,
+    changes: Sequence[Sequence[Change]],
+    seconds: float,
+    feed: Feed = turn_crank,
+    progress: Progress = lambda _: None,
+) -> list[Price]:
+    """Return what each change of keys adds to a tick of the scene as it is."""
+    return price_scenes(
+        scene, [change_scene(scene, each) for each in changes], seconds, feed, progress
+    )
+
+
+def add_prices(
+    scene: Scene,
+    knobs: Sequence[Knob],
+    seconds: float,
+    feed: Feed = turn_crank,
+    progress: Progress = lambda _: None,
+) -> list[Knob]:
+    """
+    Return the knobs with the prices of all settings that a scene can ask for.
+
+    A setting other than the scene's own gets what it adds to a tick. The scene's own setting
+    keeps its price. Settings without keys, and those that have a price, stay as they are.
+    """
+    asked = {
+        (row, column): tuple(setting.changes)
+        for row, knob in enumerate(knobs)
+        for column, setting in enumerate(knob.settings)
+        if setting.changes and setting.price is None and column != knob.chosen
+    }
+    # Two knobs may ask for the same keys, such as a rate.
+    different = list(dict.fromkeys(asked.values()))
+    prices = dict(
+        zip(different, price_changes(scene, different, seconds, feed, progress), strict=True)
+    )
+    return [
+        knob._replace(
+            settings=tuple(
+                setting._replace(price=prices[asked[row, column]])
+                if (row, column) in asked
+                else setting
+                for column, setting in enumerate(knob.settings)
+            )
+        )
+        for row, knob in enumerate(knobs)
+    ]
+
+
+def part_price(
+    scene: Scene,
+    without: Scene,
+    seconds: float,
+    feed: Feed = turn_crank,
+    progress: Progress = lambda _: None,
+) -> Price:
+    """Return what a part of a scene takes of its tick: the scene less the scene without it."""
+    return price_scenes(without, [scene], seconds, feed, progress)[0]
