@@ -28,18 +28,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
-from math import inf, pi
+from math import inf
 from time import monotonic
 from typing import Any
 
 from linkage_ros.drives.torque import TorqueParameters
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.errors import DefinitionError, LinkageError
+from linkage_ros.errors import DefinitionError
 from linkage_ros.measuring import Progress
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.study.budget import JointError, Knob, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
-from linkage_ros.study.scene_motion import built, Crank, cranks_at, MemberMotion
+from linkage_ros.study.scene_motion import built, Crank, cranks_at, MemberMotion, refuse_horizon
 import numpy as np
 
 NAME = 'step of the drive'
@@ -48,9 +48,6 @@ _TICKS = 500
 """Ticks at which joints are compared, at most."""
 
 _FACTORS = (4.0, 2.0, 1.0, 0.5, 0.25)
-_BEYOND = 0.5 * pi
-"""A step over more than this, in [rad], follows no motion: the input runs away."""
-
 _LONGEST, _SHORTEST = 0.1, 1e-6
 """Bounds of a step, in [s]."""
 
@@ -98,13 +95,12 @@ def measure_drive_step(
     use: TorqueParameters = motion.member.drive[1]
     ticks = tick_times(rate, horizon, _TICKS)
     own = cranks_at(motion, ticks)
-    _check_bounded(own, ticks, use.step, horizon)
     taken = monotonic() - begun
-    exact, doubt = exact_cranks(motion, ticks, horizon)
+    exact, doubt = exact_cranks(motion, ticks)
     joints, _ = joints_at(motion.closure, exact)
     floor = doubt or JointError(0.0, 0.0)
     settings = [
-        Setting(_label(use.method, use.step), _error(motion, own, joints, floor)),
+        Setting(_label(use.method, use.step), _error(motion, own, joints, floor), None),
     ]
     left_out: list[str] = []
     wanted = list(_settings(use, quick))
@@ -141,7 +137,7 @@ def tick_times(rate: float, horizon: float, most: int) -> list[int]:
 
 
 def exact_cranks(
-    motion: MemberMotion, times: Sequence[int], horizon: float
+    motion: MemberMotion, times: Sequence[int]
 ) -> tuple[list[Crank | None], JointError | None]:
     """
     Return the exact motion at some times, in [ns], and its own error.
@@ -160,14 +156,14 @@ def exact_cranks(
         )
         part = 3.0
     else:
-        one, other = (_integrated(motion, times, horizon, factor) for factor in (1.0, 10.0))
+        one, other = (_integrated(motion, times, factor) for factor in (1.0, 10.0))
         part = 6.0
     doubt = error_of([_apart(motion, other, joints_at(motion.closure, one)[0])])
     return one, doubt and JointError(doubt.rms / part, doubt.worst / part)
 
 
 def _integrated(
-    motion: MemberMotion, times: Sequence[int], horizon: float, factor: float
+    motion: MemberMotion, times: Sequence[int], factor: float
 ) -> list[Crank | None]:
     from linkage_ros.study import exact_drive  # local import: scipy is optional
 
@@ -189,27 +185,8 @@ def _integrated(
             drive.motion, acting, seconds, exact_drive.TOLERANCE * factor
         )
     except exact_drive.NoMotionError as error:
-        raise _no_motion(error.time, horizon, 'its exact motion ends') from None
+        raise refuse_horizon(error.time, 'its exact motion ends') from None
     return [((value,), (rate,)) for value, rate in found]
-
-
-def _no_motion(time: float, horizon: float, why: str) -> LinkageError:
-    return LinkageError(
-        '--horizon',
-        f'{horizon:g} s are too long: after {time:.3g} s {why}',
-        f'take less: --horizon {0.5 * time:.2g}',
-    )
-
-
-def _check_bounded(
-    cranks: Sequence[Crank | None], times: Sequence[int], step: float, horizon: float
-) -> None:
-    """Refuse a motion that is too fast for its step."""
-    for crank, time in zip(cranks, times, strict=True):
-        if crank is not None and not abs(crank[1][0]) * step <= _BEYOND:
-            passed = abs(crank[1][0]) * step
-            why = f'the input runs away: it passes {passed:.2g} rad in a step'
-            raise _no_motion(time * 1e-9, horizon, why)
 
 
 def _apart(motion: MemberMotion, cranks: Sequence[Crank | None], exact: Any) -> Any:

@@ -36,7 +36,7 @@ from linkage_ros.drives import topic as topic_drive
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.drives.torque import TorqueDrive
 from linkage_ros.dynamics.motion import LARGEST
-from linkage_ros.errors import BagError, listed
+from linkage_ros.errors import BagError, LinkageError, listed
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.messages.joint_state import EffortCommand, JointStateReader, Rejection
@@ -66,6 +66,9 @@ So a crank that turns passes through all its poses, some 1.6 turns a second at m
 
 _SELDOM = NANOSECONDS // 5
 """Longest time between two looks at a torque drive, in [ns]."""
+
+_BEYOND = 0.5 * pi
+"""A step over more than this, in [rad], follows no motion: the input runs away."""
 
 _STANDS = 1e-9
 """Motions smaller than this, in [rad] or [m], are none."""
@@ -330,6 +333,11 @@ def cranks_at(
     **changes
         Parameters of a torque drive that differ from the scene's: its method, or its step.
 
+    Raises
+    ------
+    LinkageError
+        The input runs away before the last time.
+
     """
     if motion.path is not None:
         return [motion.path(time) for time in times]
@@ -347,9 +355,27 @@ def cranks_at(
                 drive.offer(EffortCommand(0, effort), BEGIN + arrival)
                 number += 1
             crank = drive.state(BEGIN + stop)
+            _check_bounded(crank, stop, changes.get('step', motion.member.drive[1].step))
         passed = time
         found.append((crank.angles, crank.rates))
     return found
+
+
+def refuse_horizon(time: float, why: str) -> LinkageError:
+    """Return the error of a motion that has no end at the horizon; the time is in [s]."""
+    return LinkageError(
+        '--horizon',
+        f'lies beyond the motion: after {time:.3g} s {why}',
+        f'take less: --horizon {0.5 * time:.2g}',
+    )
+
+
+def _check_bounded(crank: CrankState, time: int, step: float) -> None:
+    """Refuse a rate that is too fast for the step."""
+    passed = abs(crank.rates[0]) * step
+    if not passed <= _BEYOND:
+        why = f'the input runs away and passes {passed:.2g} rad in a step'
+        raise refuse_horizon(time * 1e-9, why)
 
 
 def moves(motion: MemberMotion, horizon: float) -> bool:
