@@ -36,10 +36,16 @@ from linkage_ros.drives.torque import TorqueParameters
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.errors import DefinitionError
 from linkage_ros.measuring import Progress
-from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.study.budget import JointError, Knob, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
-from linkage_ros.study.scene_motion import built, Crank, cranks_at, MemberMotion, refuse_horizon
+from linkage_ros.study.scene_motion import (
+    built,
+    Crank,
+    cranks_at,
+    MemberMotion,
+    refuse_horizon,
+    tick_times,
+)
 import numpy as np
 
 NAME = 'step of the drive'
@@ -127,13 +133,6 @@ def measure_drive_step(
 
 _EVALUATIONS = {'semi_implicit_euler': 1.0, 'rk4': 4.0, 'gauss_legendre': 14.0}
 """Evaluations of the equation of motion in a step, about."""
-
-
-def tick_times(rate: float, horizon: float, most: int) -> list[int]:
-    """Return the times of some ticks up to the horizon, in [ns], the last one too."""
-    count = max(1, int(horizon * rate * (1.0 + 1e-12)))
-    chosen = sorted({round(count * k / most) for k in range(1, most + 1)} - {0})
-    return [round(number * NANOSECONDS / rate) for number in chosen]
 
 
 def exact_cranks(

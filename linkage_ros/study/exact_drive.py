@@ -18,7 +18,7 @@ The exact motion of a torque drive, by another integrator than the drive's.
 
 The forces are those of the scene's own equation of motion. What integrates them is scipy's DOP853
 (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993,
-II.5) at a tolerance of 1e-12, from one jump of a force to the next: it begins anew where a command
+II.5) at a tolerance of 1e-13, from one jump of a force to the next: it begins anew where a command
 comes, where a rate with friction becomes 0, at an impact, and where motor and crank meet or part.
 
 At rest with friction the mechanism stays until the force passes what friction holds. An impact on
@@ -39,7 +39,7 @@ import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-TOLERANCE = 1e-12
+TOLERANCE = 1e-13
 
 _TINY = 1e-200
 """A rate that has a direction and no size."""

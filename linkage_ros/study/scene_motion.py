@@ -158,8 +158,10 @@ def _motion(
     drive, parameters = member.drive
     if drive == 'torque':
         return _commanded(motion, line, like, bag, horizon)
-    if drive == 'bag' and parameters.pace == 'recorded':
-        return _recorded(motion, read_bag(parameters.file), parameters.topic)
+    if drive == 'bag':
+        opened = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
+        fast = scene.rate if parameters.pace == 'fast' else 0.0
+        return _recorded(motion, opened, parameters.topic, fast)
     if drive != 'topic':
         return motion._replace(path=_path_of(line))
     if bag is not None:
@@ -219,9 +221,19 @@ class _Sample(NamedTuple):
     rates: tuple[float, ...]
 
 
-def _recorded(motion: MemberMotion, bag: Bag, topic: str) -> MemberMotion:
-    """Return the motion through the samples of a bag: cubics by their values and rates."""
+def _recorded(motion: MemberMotion, bag: Bag, topic: str, pace: float = 0.0) -> MemberMotion:
+    """
+    Return the motion through the samples of a bag: cubics by their values and rates.
+
+    With a ``pace``, in [Hz], each tick takes one sample, whatever its time.
+    """
     samples = _samples_of(motion, bag, topic)
+    if pace:
+        scale = 1e-9 * pace * (samples[-1].stamp - samples[0].stamp) / (len(samples) - 1)
+        samples = [
+            _Sample(*[round(k * 1e9 / pace)] * 2, each.values, tuple(scale * w for w in each.rates))
+            for k, each in enumerate(samples)
+        ]
     stamps = [sample.stamp - samples[0].stamp for sample in samples]
     gap = motion.member.drive[1].max_age
 
@@ -238,12 +250,15 @@ def _recorded(motion: MemberMotion, bag: Bag, topic: str) -> MemberMotion:
         found = [_cubic(part, length, *four) for four in ends]
         return tuple(value for value, _ in found), tuple(rate for _, rate in found)
 
+    note = f'the crank moves as recorded in {bag.path.name}'
+    if pace:
+        return motion._replace(path=path, note=note)
     return motion._replace(
         path=path,
         samples=[(sample.stamp - samples[0].stamp, sample.arrival - samples[0].stamp)
                  for sample in samples],
         sample_rate=(len(stamps) - 1) * 1e9 / stamps[-1],
-        note=f'the crank moves as recorded in {bag.path.name}',
+        note=note,
     )  # fmt: skip
 
 
@@ -359,6 +374,19 @@ def cranks_at(
         passed = time
         found.append((crank.angles, crank.rates))
     return found
+
+
+def tick_times(rate: float, horizon: float, most: int) -> list[int]:
+    """Return the times of some ticks up to the horizon, in [ns], the last one too."""
+    count = max(1, int(horizon * rate * (1.0 + 1e-12)))
+    chosen = sorted({round(count * k / most) for k in range(1, most + 1)} - {0})
+    return [round(number * NANOSECONDS / rate) for number in chosen]
+
+
+def scene_key(member: SceneLinkage, key: str) -> str:
+    """Return where a key of a linkage stands in its scene: in its own entry, or for all."""
+    own = member.name and key in member.content
+    return f'linkages.{member.name}.{key}' if own else key
 
 
 def refuse_horizon(time: float, why: str) -> LinkageError:

@@ -1,0 +1,291 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The errors that age makes: of a state until it is used, and of a command until it acts.
+
+A listener who holds a state uses it until the next one comes: up to a period old. One who carries
+it forward adds its rates times its age. The error is taken at nodes of Gauss within periods that
+are spread over the motion, which gives its mean square, and at the end of the period, which gives
+the worst. A state is used in the process that has made it: what a network adds is not in it.
+
+The samples of a crank come at their own rate, apart from the ticks. What the drive makes of them
+is computed by the drive itself, from exact samples in several phases to the ticks, or from those
+of a bag as they came.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
+from typing import Any
+
+from linkage_ros.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.errors import LinkageError
+from linkage_ros.messages.joint_state import CrankSample
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
+from linkage_ros.scene.scene import Scene
+from linkage_ros.study.budget import JointError, Knob, Setting
+from linkage_ros.study.joint_errors import distances, error_of, joints_at
+from linkage_ros.study.scene_motion import (
+    BEGIN,
+    Crank,
+    cranks_at,
+    MemberMotion,
+    scene_key,
+    tick_times,
+    USUAL_RATE,
+)
+import numpy as np
+
+IN_USE, OF_COMMAND = 'age in use', 'age of the command'
+
+CARRY = 'carry forward by the published rates'
+
+_PERIODS = 300
+"""Periods at which a state is used, at most."""
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+_PARTS = (*(0.5 + 0.5 * _NODES), 1.0)
+"""Ages of a state when it is used, in periods."""
+
+_FACTORS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+_QUICK_FACTORS = (0.2, 0.5, 1.0, 2.0, 5.0)
+
+_TICKS = 1000
+_PHASES = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
+"""Ages of a sample when a tick takes it that came just after another, in periods of the samples."""
+
+_BEFORE = 20
+"""Samples before the newest one that a drive gets, for its differences."""
+
+
+def measure_age_in_use(
+    scene: Scene, motions: Sequence[MemberMotion], horizon: float, *, quick: bool = False
+) -> Knob:
+    """
+    Return the errors of rates of ticks, for a listener who holds and one who carries forward.
+
+    Raises
+    ------
+    LinkageError
+        The loops close at no state of the motion.
+
+    """
+    by_sample = not scene.rate
+    rate = scene.rate or max(each.sample_rate for each in motions) or USUAL_RATE
+    settings: list[Setting] = []
+    for factor in _QUICK_FACTORS if quick else _FACTORS:
+        ticks = rate * factor
+        if not LOWEST_RATE <= ticks <= HIGHEST_RATE:
+            continue
+        changes: list[tuple[str, object]] = []
+        advice = ''
+        if factor != 1.0:
+            changes = [] if by_sample else [('rate', _plain(ticks))]
+            advice = f'publish the crank at {ticks:g} Hz' if by_sample else ''
+        held, carried = errors_in_use(motions, ticks, horizon)
+        settings.append(Setting(f'{_hertz(ticks)}, held', held, None, changes, advice))
+        rates = [(key, {}) for key in _rates_missing(scene)]
+        advice = ', '.join(each for each in (advice, CARRY) if each)
+        label = f'{_hertz(ticks)}, carried forward'
+        settings.append(Setting(label, carried, None, [*changes, *rates], advice))
+    own = f'{_hertz(rate)}, held'
+    chosen = next(k for k, setting in enumerate(settings) if setting.label == own)
+    settings[chosen] = settings[chosen]._replace(changes=())
+    return Knob(IN_USE, settings, chosen)
+
+
+def errors_in_use(
+    motions: Sequence[MemberMotion], rate: float, horizon: float
+) -> tuple[JointError, JointError]:
+    """Return the error of a state when it is used: held, and carried forward by its rates."""
+    period = 1e9 / rate
+    count = max(1, int(horizon * rate) - 1)
+    numbers = sorted({round(count * k / _PERIODS) for k in range(_PERIODS + 1)})
+    starts = [round(number * period) for number in numbers]
+    times = [[start + round(part * period) for part in (0.0, *_PARTS)] for start in starts]
+    held, carried = [], []
+    for motion in motions:
+        cranks = cranks_at(motion, [*chain(*times)])
+        joints, rates = joints_at(motion.closure, cranks)
+        shape = len(joints), len(starts), 1 + len(_PARTS)
+        joints, rates = joints.reshape(shape), rates.reshape(shape)
+        first, rate_then = joints[:, :, :1], rates[:, :, :1]
+        ages = np.array(_PARTS) * period * 1e-9
+        exact = joints[:, :, 1:]
+        held.append(distances(motion.closure, first + 0.0 * exact, exact))
+        carried.append(distances(motion.closure, first + rate_then * ages, exact))
+    return _over_periods(held), _over_periods(carried)
+
+
+def _over_periods(apart: Sequence[Any]) -> JointError:
+    """Return the error of distances (periods, parts), by the weights of the nodes."""
+    worst = np.fmax.reduce([np.asarray(each) for each in apart])
+    worst = worst[np.isfinite(worst).all(axis=1)]
+    if not len(worst):
+        raise LinkageError(
+            'scene',
+            'its loops close at no state of its motion',
+            'see linkage check for where they close, and change the drive',
+        )
+    squares = (worst[:, :-1] ** 2) @ (0.5 * _WEIGHTS)
+    return JointError(float(np.sqrt(squares.mean())), float(worst.max()))
+
+
+def measure_age_of_command(
+    motion: MemberMotion, scene: Scene, horizon: float, *, quick: bool = False
+) -> Knob | None:
+    """Return the errors of the samples' rate and use; None if ticks take them as they come."""
+    name, use = motion.member.drive
+    if not motion.sample_rate or (not scene.rate and not motion.samples):
+        return None
+    key = f'{scene_key(motion.member, "drive")}.{name}'
+    if not isinstance(use, TopicParameters):
+        use = TopicParameters(
+            carry_forward=use.carry_forward, max_age=use.max_age, stamp=use.stamp
+        )
+    joints = _Samples(motion, scene.rate or motion.sample_rate, horizon)
+
+    def measured(
+        changes: dict[str, object], factor: float = 1.0, advice: str = '', label: str = ''
+    ) -> Setting | None:
+        used = replace(use, **changes)
+        error = joints.error(used, factor)
+        if error is None:
+            return None
+        return Setting(
+            label or f'{_hertz(motion.sample_rate * factor)}, {_use_of(used)}',
+            error,
+            None,
+            [(f'{key}.{one}', value) for one, value in changes.items()],
+            advice,
+        )
+
+    own = measured({})
+    if own is None:
+        return None
+    settings: list[Setting | None] = [own]
+    settings.append(measured({'carry_forward': not use.carry_forward}))
+    if name == 'topic' and use.acceleration == 'zero':
+        differenced = {} if use.carry_forward else {'carry_forward': True}
+        settings.append(measured({'acceleration': 'differenced', **differenced}))
+    if motion.samples:
+        settings.append(measured({}, 0.0, 'bring the samples without a delay', 'without delay'))
+    else:
+        for factor in (0.5, 2.0, 5.0) if not quick else (0.5, 2.0):
+            advice = f'publish the crank at {motion.sample_rate * factor:g} Hz'
+            settings.append(measured({}, factor, advice))
+    return Knob(OF_COMMAND, [each for each in settings if each], 0, note=motion.note)
+
+
+class _Samples:
+    """Ticks of a linkage, and the samples that come to them."""
+
+    def __init__(self, motion: MemberMotion, rate: float, horizon: float) -> None:
+        self._motion = motion
+        self._ticks = tick_times(rate, horizon, _TICKS)
+        self._horizon = round(horizon * NANOSECONDS)
+        self._exact, _ = joints_at(motion.closure, cranks_at(motion, self._ticks))
+
+    def error(self, use: TopicParameters, factor: float) -> JointError | None:
+        """Return the error of a use, with so many times the samples; 0 for samples at once."""
+        cranks: list[Crank | None] = []
+        if self._motion.samples:
+            cranks = self._used(use, self._recorded(factor > 0.0), self._ticks)
+            return error_of([self._apart(cranks, slice(None))])
+        apart = []
+        for number, phase in enumerate(_PHASES):
+            chosen = slice(number, None, len(_PHASES))
+            ticks = self._ticks[chosen]
+            cranks = self._used(use, self._exact_samples(factor, phase, ticks), ticks)
+            apart.append(self._apart(cranks, chosen))
+        return error_of([np.concatenate(apart)])
+
+    def _apart(self, cranks: Sequence[Crank | None], chosen: slice) -> Any:
+        closure = self._motion.closure
+        return distances(closure, joints_at(closure, cranks)[0], self._exact[:, chosen])
+
+    def _recorded(self, delayed: bool) -> Callable[[int], Iterator[tuple[int, int]]]:
+        """Return for a tick the samples of a bag that have come: stamps and arrivals."""
+        samples = [(stamp, come if delayed else stamp) for stamp, come in self._motion.samples]
+        arrivals = [come for _, come in samples]
+
+        def before(tick: int) -> Iterator[tuple[int, int]]:
+            end = bisect_right(arrivals, tick)
+            begin = max(0, end - _BEFORE)
+            yield from samples[begin:end]
+
+        return before
+
+    def _exact_samples(
+        self, factor: float, phase: float, _ticks: Sequence[int]
+    ) -> Callable[[int], Iterator[tuple[int, int]]]:
+        """Return for a tick the samples before it, the newest a part of a period old."""
+        period = 1e9 / (self._motion.sample_rate * factor)
+
+        def before(tick: int) -> Iterator[tuple[int, int]]:
+            for number in range(_BEFORE - 1, -1, -1):
+                stamp = tick - round((phase + number) * period)
+                if stamp >= 0:
+                    yield stamp, stamp
+
+        return before
+
+    def _used(
+        self,
+        use: TopicParameters,
+        before: Callable[[int], Iterator[tuple[int, int]]],
+        ticks: Sequence[int],
+    ) -> list[Crank | None]:
+        """Return what a drive makes of the samples at each tick."""
+        inputs = self._motion.closure.linkage.inputs
+        found: list[Crank | None] = []
+        for tick in ticks:
+            drive = TopicDrive(use, True, inputs)
+            for stamp, come in before(tick):
+                crank = cranks_at(self._motion, [stamp])[0]
+                if crank is not None:
+                    drive.offer(CrankSample(BEGIN + stamp, *crank), BEGIN + come)
+            state = drive.state(BEGIN + tick)
+            found.append(None if state is None else (state.angles, state.rates))
+        return found
+
+
+def _rates_missing(scene: Scene) -> list[str]:
+    """Return the keys of the effects that publish rates, where they are missing."""
+    missing = {
+        scene_key(member, 'effects')
+        for member in scene.members
+        if not {'velocity', 'acceleration'} & set(member.effects)
+    }
+    return [f'{key}.velocity' for key in sorted(missing)]
+
+
+def _use_of(use: TopicParameters) -> str:
+    if not use.carry_forward:
+        return 'held'
+    return 'carried forward' + (' with its acceleration' if use.acceleration != 'zero' else '')
+
+
+def _hertz(rate: float) -> str:
+    return f'{rate / 1000.0:.4g} kHz' if rate >= 1000.0 else f'{rate:.4g} Hz'
+
+
+def _plain(rate: float) -> float | int:
+    return round(rate) if float(rate).is_integer() else rate
