@@ -16,7 +16,7 @@
 """
 Verified reference: balls that are proved to contain a linkage's joints, rates and accelerations.
 
-This second reference shares only the linkage with the first. The unknowns are the position p of
+It shares only the linkage with the closed form. The unknowns are the position p of
 each link's frame and its direction u as a vector, but no angles and no slides. So all constraints
 are of second degree at most::
 
@@ -40,7 +40,6 @@ from math import frexp
 from typing import Any, NamedTuple
 
 from flint import acb, arb, arb_mat, ctx
-from linkage_ros.accuracy.reference import SingularError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
 
@@ -55,6 +54,10 @@ Form = list[tuple[int, Any]]
 
 Term = tuple[tuple[Any, Any, Any], int, int]
 """A factor with its first and second time derivative, and the numbers of two unknowns."""
+
+
+class SingularError(Exception):
+    """At a toggle or a change point there is nothing to prove."""
 
 
 class Proof(NamedTuple):
@@ -72,7 +75,7 @@ def prove(
     accelerations: Sequence[float] | None = None,
 ) -> Proof:
     """
-    Return a verified state near the closure's own; for the rates see `Reference.solve`.
+    Return a verified state near the closure's own; without rates, the inputs move at 1.
 
     A SingularError says that nothing can be proved, at a toggle or a change point, a ValueError
     that the linkage does not close.
@@ -89,6 +92,19 @@ def prove(
     finally:
         ctx.prec = before
     raise SingularError(f'{tuple(inputs)}: nothing is proved')
+
+
+def solve(linkage: Linkage, inputs: Sequence[float], bits: int) -> tuple[Any, ...]:
+    """Return the joints at a precision in bits, by Newton's method and without a proof."""
+    before, ctx.prec = ctx.prec, bits
+    try:
+        equations = _Equations(linkage, [(value, 1.0, 0.0) for value in inputs])
+        found = _converged(equations, equations.start(Closure(linkage), inputs))
+        if found is None:
+            raise SingularError(f'{tuple(inputs)}: nothing converges')
+        return equations.joints(found)
+    finally:
+        ctx.prec = before
 
 
 class _Equations:
@@ -175,16 +191,16 @@ class _Equations:
             except ZeroDivisionError:
                 raise SingularError('the balls hold a singular matrix') from None
             motion[-1] = [arb(0), *solved.entries()]
-        return Proof(
-            *(
-                tuple(
-                    self._turn(joint, motion[: k + 1])
-                    if isinstance(joint, RevoluteJoint)
-                    else _value(self._slides[joint.slider], motion[: k + 1]) * self.scale
-                    for joint in self._linkage.joints.values()
-                )
-                for k in range(3)
-            )
+        ends = (1, 2, 3)
+        return Proof(*(self.joints(*motion[:end]) for end in ends))
+
+    def joints(self, *motion: Sequence[Any]) -> tuple[Any, ...]:
+        """Return the published joints; with derivatives of the unknowns, the last of them."""
+        return tuple(
+            self._turn(joint, motion)
+            if isinstance(joint, RevoluteJoint)
+            else _value(self._slides[joint.slider], motion) * self.scale
+            for joint in self._linkage.joints.values()
         )
 
     def _turn(self, joint: RevoluteJoint, motion: Sequence[Sequence[Any]]) -> Any:
@@ -225,15 +241,26 @@ class _Equations:
         return [(k, acb(z)), (k + 1, acb(0, 1) * z)]
 
 
-def _proved(equations: _Equations, start: list[Any]) -> list[Any] | None:
-    """Return balls that hold exactly one solution, or None."""
-    x = start
+def _converged(equations: _Equations, start: list[Any]) -> list[Any] | None:
+    """Return the unknowns to the present precision, or None where their matrix is singular."""
+    x, enough = start, max(2.0 ** (-2 * _RADIUS), 2.0 ** (8 - ctx.prec))
     try:
         for _ in range(12):
             step = equations.slopes(x).solve(arb_mat([[v] for v in equations.values([x])]))
             x = [arb(1), *((a - b).mid() for a, b in zip(x[1:], step.entries(), strict=True))]
-            if max(float(abs(one).mid()) for one in step.entries()) < 2.0 ** (-2 * _RADIUS):
+            if max(float(abs(one).mid()) for one in step.entries()) < enough:
                 break
+    except ZeroDivisionError:
+        return None
+    return x
+
+
+def _proved(equations: _Equations, start: list[Any]) -> list[Any] | None:
+    """Return balls that hold exactly one solution, or None."""
+    x = _converged(equations, start)
+    if x is None:
+        return None
+    try:
         inverse = equations.slopes(x).inv().mid()
     except ZeroDivisionError:
         return None

@@ -38,12 +38,11 @@ near = 2√(ad)·sin(φ/2) and far = 2√(ad)·cos(φ/2), s² = (d − a)² + ne
 
 from __future__ import annotations
 
-from cmath import phase, rect
+from cmath import phase
 from collections.abc import Callable, Sequence
 from math import atan2, cos, sin, sqrt
 from typing import Any, NamedTuple
 
-from linkage_ros.accuracy.methods import ACCELERATION, Joints, Method, Motion, RATE
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
@@ -72,24 +71,6 @@ class PlainFourBar(NamedTuple):
     def joints(self, directions: Sequence[Any]) -> tuple[Any, ...]:
         """Return the published joints for directions measured from the line of the ground."""
         return tuple(directions[i] - directions[j] + constant for i, j, constant in self.terms)
-
-    def changes(self, directions: Sequence[Any]) -> tuple[Any, ...]:
-        """Return the derivatives of the published joints for those of the directions."""
-        return tuple(directions[i] - directions[j] for i, j, _ in self.terms)
-
-    def closed_at(self, theta: float) -> tuple[float, float]:
-        """
-        Return the directions of coupler and rocker at one of the crank, all in [rad].
-
-        By the textbook: good enough to tell a peer once which of the two assemblies is meant.
-        """
-        crank_pin = rect(self.a, theta)
-        across = self.d - crank_pin
-        s = abs(across)
-        along = 0.5 * (s + (self.b - self.c) * (self.b + self.c) / s)
-        aside = self.side * sqrt(max(self.b * self.b - along * along, 0.0))
-        coupler = complex(along, aside) * (across / s)
-        return phase(coupler), phase(crank_pin + coupler - self.d)
 
 
 def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
@@ -138,18 +119,16 @@ def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     )
 
 
-TEXTBOOK = 'textbook form'
+Solve = Callable[..., Sequence[Any]]
+"""Takes the inputs of a state; returns the published joints, or nothing where it has no answer."""
 
 
-def textbook(linkage: Linkage) -> Method | None:
-    """Return it, of a four-bar."""
-    shape = plain_four_bar(linkage)
-    if shape is None:
-        return None
+def solve_by_textbook(shape: PlainFourBar) -> Solve:
+    """Return the textbook form of a four-bar."""
     a, b, c, d, sign, turn, offset, _ = shape
     joints = shape.joints
 
-    def position(angle: float) -> Joints:
+    def position(angle: float) -> Sequence[Any]:
         theta = turn * angle + offset
         ax, ay = a * cos(theta), a * sin(theta)
         try:
@@ -163,95 +142,40 @@ def textbook(linkage: Linkage) -> Method | None:
         bx = k1 + k2 * by
         return joints((0.0, theta, atan2(by - ay, bx - ax), atan2(by, bx - d)))
 
-    return Method(TEXTBOOK, '', position)
+    return position
 
-
-SINGLE_PRECISION = 'closed form, float32'
 
 _Single = np.float32
 
 
-def single_precision(linkage: Linkage) -> Method | None:
-    """Return it, of a four-bar."""
-    shape = plain_four_bar(linkage)
-    if shape is None:
-        return None
-    solve = _solver(shape)
-
-    def position(angle: float) -> Joints:
-        found: Joints = solve(_Single(angle), 0)[0]
-        return found
-
-    def motion(angle: float) -> Motion:
-        joints, rates, accelerations = solve(_Single(angle), 2)
-        return joints, rates, accelerations
-
-    def batch(inputs: Sequence[Any], derivatives: int) -> Sequence[Any]:
-        (angles,) = inputs
-        found = solve(angles.astype(_Single), derivatives)
-        return [np.stack([np.broadcast_to(row, angles.shape) for row in rows]) for rows in found]
-
-    return Method(SINGLE_PRECISION, '', position, motion, batch)
-
-
-def _solver(shape: PlainFourBar) -> Any:
+def solve_in_single_precision(shape: PlainFourBar) -> Solve:
+    """Return the closed form of a four-bar in numbers of 32 bits."""
     a, b, c, d = shape[:4]
-    one, half, sign = _Single(1.0), _Single(0.5), _Single(shape.side)
+    half, sign = _Single(0.5), _Single(shape.side)
     turn, offset = _Single(shape.turn), _Single(shape.offset)
-    twice_a, apart, apart_square = _Single(2.0 * a), _Single(d - a), _Single((d - a) ** 2)
+    twice_a, apart = _Single(2.0 * a), _Single(d - a)
     root = _Single(2.0 * sqrt(a * d))
     fold = _Single((abs(d - a) - abs(b - c)) * (abs(d - a) + abs(b - c)))
     stretch = _Single((b + c - a - d) * (a + b + c + d))
-    difference, lengths = _Single((b - c) * (b + c)), _Single((d - a) * (d + a))
-    more, less = (
-        _Single((b - c) * (b + c) + (d - a) ** 2),
-        _Single((b - c) * (b + c) - (d - a) ** 2),
-    )
-    along = _Single(a * (d - a))
-    rate, acceleration = turn * _Single(RATE), turn * _Single(ACCELERATION)
+    more, less = (_Single((b - c) * (b + c) + way * (d - a) ** 2) for way in (1.0, -1.0))
     terms = [(i, j, _Single(constant)) for i, j, constant in shape.terms]
     zero = _Single(0.0)
 
-    def solve(angle: Any, derivatives: int) -> list[tuple[Any, ...]]:
-        phi = turn * angle + offset
+    def position(angle: float) -> Sequence[Any]:
+        phi = turn * _Single(angle) + offset
         halved = half * phi
         sine, cosine = np.sin(halved), np.cos(halved)
         near, far = root * sine, root * cosine
         near_square, far_square = near * near, far * far
-        square = apart_square + near_square
         # At a change point the root is signed with the half angle. A negative rest is rounding
         # where the loop closes; without this a toggle is refused.
         inner = np.sqrt(np.maximum(fold + near_square, zero)) if fold else near
         outer = np.sqrt(np.maximum(stretch + far_square, zero)) if stretch else far
         cross = sign * inner * outer
         direction = np.arctan2(-twice_a * sine * cosine, apart + twice_a * sine * sine)
-        plus, minus = more + near_square, less - near_square
-        coupler = direction + np.arctan2(cross, plus)
-        rocker = direction + np.arctan2(cross, minus)
+        coupler = direction + np.arctan2(cross, more + near_square)
+        rocker = direction + np.arctan2(cross, less - near_square)
         lines = (zero, phi, coupler, rocker)
-        found = [tuple(lines[i] - lines[j] + constant for i, j, constant in terms)]
-        if not derivatives:
-            return found
-        with np.errstate(all='ignore'):
-            p, q = (along - half * near_square) / square, half * near * far / square
-            cot_beta, cot_gamma = plus / cross, minus / cross
-            lines = (zero, one, q * cot_gamma - p, q * cot_beta - p)
-            swept = [line * rate for line in lines]
-            found.append(tuple(swept[i] - swept[j] for i, j, _ in terms))
-            if derivatives < 2:
-                return found
-            bend = fold * (far / inner) * (far / inner)
-            bend -= stretch * (near / outer) * (near / outer)
-            bend = _Single(0.25) * bend / square
-            swirl = q * (lengths / square) - _Single(2.0) * q * (q * (difference / cross))
-            whirl = rate * rate
-            pulled = (
-                zero,
-                acceleration,
-                acceleration * lines[2] + whirl * (swirl + cot_gamma * bend),
-                acceleration * lines[3] + whirl * (swirl + cot_beta * bend),
-            )
-            found.append(tuple(pulled[i] - pulled[j] for i, j, _ in terms))
-        return found
+        return tuple(lines[i] - lines[j] + constant for i, j, constant in terms)
 
-    return solve
+    return position
