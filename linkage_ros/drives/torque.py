@@ -487,14 +487,8 @@ class TorqueDrive(Drive):
             if isfinite(effort):
                 return Rejection.EFFORT_TOO_LARGE
             return Rejection.EFFORT_NOT_FINITE
-        if not -self._most <= effort <= self._most:
-            effort = copysign(self._most, effort)
-            self.saturated += 1
-        acting = (self._mechanism, effort, 0.0)
-        if self._motor:
-            if self._quantum:
-                effort = round(effort / self._quantum) * self._quantum
-            acting = self._motor.driven(self._mechanism, effort)
+        self.saturated += not -self._most <= effort <= self._most
+        acting = self.acting(effort)
         self.stamp = now
         if self._delay:
             self._waiting.append((now + self._delay, acting))
@@ -507,6 +501,23 @@ class TorqueDrive(Drive):
         self._acting = acting
         self._until = now + self.max_age
         return None
+
+    def acting(self, effort: float | None) -> tuple[Any, float, float]:
+        """Return mechanism, force on its input and brake under a command; None: without one."""
+        if effort is None:
+            return self._idle
+        if not -self._most <= effort <= self._most:
+            effort = copysign(self._most, effort)
+        if self._motor is None:
+            return self._mechanism, effort, 0.0
+        if self._quantum:
+            effort = round(effort / self._quantum) * self._quantum
+        return self._motor.driven(self._mechanism, effort)
+
+    @property
+    def motion(self) -> Any:
+        """Return the state of the mechanism at the last boundary of a step."""
+        return self._motion
 
     def load(self, held: HeldWrench, wrench: PlanarWrench, now: int) -> None:
         """Let a wrench act on its link from a time on, in [ns]."""

@@ -1,0 +1,242 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The error that the step of a torque drive makes, for its methods and steps.
+
+The drive runs as in the node, with the same commands at the same times, and its joints at the
+ticks are compared with the exact ones. These come from `linkage_ros.study.exact_drive`, and their
+own error from a second run at ten times the tolerance: it falls as the power 7/8 of the tolerance
+at least, so a sixth of the difference is no less than the error of the first. Where scipy is not
+installed or a winding adds a state, the exact motion is that of the drive itself at a sixteenth of
+its step; its own error is a third of the difference from an eighth, as for a method of order 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from math import inf, pi
+from time import monotonic
+from typing import Any
+
+from linkage_ros.drives.torque import TorqueParameters
+from linkage_ros.dynamics.integrators import METHODS
+from linkage_ros.errors import DefinitionError, LinkageError
+from linkage_ros.measuring import Progress
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.study.budget import JointError, Knob, Setting
+from linkage_ros.study.joint_errors import distances, error_of, joints_at
+from linkage_ros.study.scene_motion import built, Crank, cranks_at, MemberMotion
+import numpy as np
+
+NAME = 'step of the drive'
+
+_TICKS = 500
+"""Ticks at which joints are compared, at most."""
+
+_FACTORS = (4.0, 2.0, 1.0, 0.5, 0.25)
+_BEYOND = 0.5 * pi
+"""A step over more than this, in [rad], follows no motion: the input runs away."""
+
+_LONGEST, _SHORTEST = 0.1, 1e-6
+"""Bounds of a step, in [s]."""
+
+_UNSURE = 1e-3
+"""Where the exact motion itself is known no better than this, in [rad], it cannot be foretold."""
+
+
+def measure_drive_step(
+    motion: MemberMotion,
+    rate: float,
+    horizon: float,
+    *,
+    key: str = 'drive.torque',
+    quick: bool = False,
+    seconds: float = inf,
+    progress: Progress = lambda _: None,
+) -> tuple[Knob, list[str]]:
+    """
+    Return the errors of methods and steps, and what was left out for lack of time.
+
+    Parameters
+    ----------
+    motion
+        What the linkage of a torque drive does.
+    rate
+        Ticks per second.
+    horizon
+        How long it runs, in [s].
+    key
+        Key of the drive in the scene.
+    quick
+        Whether to measure a few settings only.
+    seconds
+        Time that the measurement may take, in [s].
+    progress
+        Called with the fraction that is done.
+
+    Raises
+    ------
+    LinkageError
+        The input runs away, or stops at a toggle, before the horizon.
+
+    """
+    begun = monotonic()
+    use: TorqueParameters = motion.member.drive[1]
+    ticks = tick_times(rate, horizon, _TICKS)
+    own = cranks_at(motion, ticks)
+    _check_bounded(own, ticks, use.step, horizon)
+    taken = monotonic() - begun
+    exact, doubt = exact_cranks(motion, ticks, horizon)
+    joints, _ = joints_at(motion.closure, exact)
+    floor = doubt or JointError(0.0, 0.0)
+    settings = [
+        Setting(_label(use.method, use.step), _error(motion, own, joints, floor)),
+    ]
+    left_out: list[str] = []
+    wanted = list(_settings(use, quick))
+    for number, (method, step) in enumerate(wanted):
+        progress((number + 1) / (len(wanted) + 1))
+        work = taken * _EVALUATIONS[method] / _EVALUATIONS[use.method] * use.step / step
+        if monotonic() - begun + work > seconds:
+            left_out.append(f'{_label(method, step)} would take {work:.0f} s')
+            continue
+        try:
+            other = cranks_at(motion, ticks, method=method, step=step)
+        except DefinitionError:
+            continue  # The scene refuses a step that is too long for its forces.
+        changes = [(f'{key}.method', method)] if method != use.method else []
+        changes += [(f'{key}.step', step)] if step != use.step else []
+        error = _error(motion, other, joints, floor)
+        settings.append(Setting(_label(method, step), error, None, changes))
+    progress(1.0)
+    note = motion.note
+    if floor.worst > _UNSURE:
+        note += f'; two motions that are nearly equal part: this one is known to {floor.worst:.1g}'
+    return Knob(NAME, settings, 0, horizon, note=note), left_out
+
+
+_EVALUATIONS = {'semi_implicit_euler': 1.0, 'rk4': 4.0, 'gauss_legendre': 14.0}
+"""Evaluations of the equation of motion in a step, about."""
+
+
+def tick_times(rate: float, horizon: float, most: int) -> list[int]:
+    """Return the times of some ticks up to the horizon, in [ns], the last one too."""
+    count = max(1, int(horizon * rate * (1.0 + 1e-12)))
+    chosen = sorted({round(count * k / most) for k in range(1, most + 1)} - {0})
+    return [round(number * NANOSECONDS / rate) for number in chosen]
+
+
+def exact_cranks(
+    motion: MemberMotion, times: Sequence[int], horizon: float
+) -> tuple[list[Crank | None], JointError | None]:
+    """
+    Return the exact motion at some times, in [ns], and its own error.
+
+    Raises
+    ------
+    LinkageError
+        The motion ends before the last time.
+
+    """
+    use: TorqueParameters = motion.member.drive[1]
+    wound = use.motor is not None and use.motor.inductance > 0.0
+    if wound or find_spec('scipy') is None:
+        one, other = (
+            cranks_at(motion, times, step=max(_SHORTEST, use.step / n)) for n in (16, 8)
+        )
+        part = 3.0
+    else:
+        one, other = (_integrated(motion, times, horizon, factor) for factor in (1.0, 10.0))
+        part = 6.0
+    doubt = error_of([_apart(motion, other, joints_at(motion.closure, one)[0])])
+    return one, doubt and JointError(doubt.rms / part, doubt.worst / part)
+
+
+def _integrated(
+    motion: MemberMotion, times: Sequence[int], horizon: float, factor: float
+) -> list[Crank | None]:
+    from linkage_ros.study import exact_drive  # local import: scipy is optional
+
+    drive = built(motion)
+    use: TorqueParameters = motion.member.drive[1]
+    delay = use.motor.delay if use.motor else 0.0
+    changes: list[tuple[float, float | None]] = [(0.0, None)]
+    for command in motion.commands:
+        at = command.time * 1e-9 + delay
+        if len(changes) > 1 and at > changes[-1][0] + use.timeout:
+            changes.append((changes[-1][0] + use.timeout, None))
+        changes.append((at, command.effort))
+    if motion.commands:
+        changes.append((changes[-1][0] + use.timeout, None))
+    acting = [exact_drive.Acting(at, *drive.acting(effort)) for at, effort in changes]
+    seconds = [time * 1e-9 for time in times]
+    try:
+        found = exact_drive.exact_motion(
+            drive.motion, acting, seconds, exact_drive.TOLERANCE * factor
+        )
+    except exact_drive.NoMotionError as error:
+        raise _no_motion(error.time, horizon, 'its exact motion ends') from None
+    return [((value,), (rate,)) for value, rate in found]
+
+
+def _no_motion(time: float, horizon: float, why: str) -> LinkageError:
+    return LinkageError(
+        '--horizon',
+        f'{horizon:g} s are too long: after {time:.3g} s {why}',
+        f'take less: --horizon {0.5 * time:.2g}',
+    )
+
+
+def _check_bounded(
+    cranks: Sequence[Crank | None], times: Sequence[int], step: float, horizon: float
+) -> None:
+    """Refuse a motion that is too fast for its step."""
+    for crank, time in zip(cranks, times, strict=True):
+        if crank is not None and not abs(crank[1][0]) * step <= _BEYOND:
+            passed = abs(crank[1][0]) * step
+            why = f'the input runs away: it passes {passed:.2g} rad in a step'
+            raise _no_motion(time * 1e-9, horizon, why)
+
+
+def _apart(motion: MemberMotion, cranks: Sequence[Crank | None], exact: Any) -> Any:
+    return distances(motion.closure, joints_at(motion.closure, cranks)[0], exact)
+
+
+def _error(
+    motion: MemberMotion, cranks: Sequence[Crank | None], exact: Any, floor: JointError
+) -> JointError:
+    """Return the error of a run, no less than what the exact motion is known to."""
+    error = error_of([_apart(motion, cranks, exact)])
+    if error is None:
+        return JointError(np.nan, np.nan)
+    return JointError(max(error.rms, floor.rms), max(error.worst, floor.worst))
+
+
+def _settings(use: TorqueParameters, quick: bool) -> Iterator[tuple[str, float]]:
+    """Yield other methods and steps, those that tell most first."""
+    own = [(use.method, use.step * factor) for factor in (2.0, 0.5)]
+    others = [(method, use.step) for method in METHODS if method != use.method]
+    yield from (s for s in (*own, *others) if _SHORTEST <= s[1] <= _LONGEST)
+    if quick:
+        return
+    rest = [(method, use.step * factor) for method in METHODS for factor in _FACTORS]
+    known = {*own, *others, (use.method, use.step)}
+    yield from (s for s in rest if s not in known and _SHORTEST <= s[1] <= _LONGEST)
+
+
+def _label(method: str, step: float) -> str:
+    return f'{method}, {1e3 * step:g} ms'

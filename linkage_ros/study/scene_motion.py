@@ -1,0 +1,413 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The motion that a scene makes: its inputs at any time, and the joints that belong to them.
+
+A drive that computes its crank is asked itself. A `topic` drive has no motion of its own: it is
+said what its crank does, by a sine or by the samples of a bag. To a `torque` drive commands come:
+those of a bag, or a sine of effort; without either it moves by its start, weight and loads alone.
+
+Whatever noise, delay or fault the scene adds is no part of its motion: that is asked for.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import cos, pi, sin, tau
+from typing import Any, NamedTuple
+
+from linkage_ros.bag.reader import Bag, read_bag
+from linkage_ros.drives import topic as topic_drive
+from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.drives.torque import TorqueDrive
+from linkage_ros.dynamics.motion import LARGEST
+from linkage_ros.errors import BagError, listed
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
+from linkage_ros.messages.joint_state import EffortCommand, JointStateReader, Rejection
+from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
+from linkage_ros.scene.scene import Scene, SceneLinkage
+
+BEGIN = NANOSECONDS
+"""Time of the first tick, in [ns]."""
+
+SINE = 'sine'
+"""What ``like`` is for a sine; anything else is the path of a bag."""
+
+USUAL_RATE = 1000.0
+"""Samples of a crank per second, where the scene ticks once for each."""
+
+COMMAND_PERIOD = 0.02
+"""Longest time between two commands of a torque drive, in [s]."""
+
+_FREQUENCY, _AMPLITUDE, _PART = 0.5, pi, 0.4
+"""
+Of the sine of a crank, in [Hz] and [rad]; for a limited one, as a fraction of its range.
+
+So a crank that turns passes through all its poses, some 1.6 turns a second at most.
+"""
+
+_SELDOM = NANOSECONDS // 5
+"""Longest time between two looks at a torque drive, in [ns]."""
+
+_STANDS = 1e-9
+"""Motions smaller than this, in [rad] or [m], are none."""
+
+Crank = tuple[tuple[float, ...], tuple[float, ...]]
+"""Values and rates of the inputs."""
+
+Path = Callable[[int], Crank | None]
+"""Values and rates of the inputs at a time since the first tick, in [ns]."""
+
+
+class Command(NamedTuple):
+    """A command of a torque drive, in the unit that it takes."""
+
+    time: int  # Arrival after the first tick, in [ns]
+    effort: float
+
+
+class MemberMotion(NamedTuple):
+    """What one linkage of a scene does."""
+
+    member: SceneLinkage
+    closure: Closure  # The closed form of its linkage, with the deviations of its parts
+    context: Context
+    path: Path | None  # Its inputs at any time; None for a torque drive
+    commands: Sequence[Command] = ()
+    # When the samples of a topic drive are taken and when they come, after the first tick, in
+    # [ns]; () if they come at the rate of `sample_rate`, at once.
+    samples: Sequence[tuple[int, int]] = ()
+    sample_rate: float = 0.0  # Samples of a topic drive per second; 0 for other drives
+    note: str = ''  # What is assumed of it, in a sentence; '' for nothing
+
+
+def motions_of(scene: Scene, like: str | None, horizon: float) -> list[MemberMotion]:
+    """
+    Return what the linkages of a scene do.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    like
+        `SINE`, or the path of a bag with the samples or commands; None for the scene's own.
+    horizon
+        How long it is looked at, in [s].
+
+    Raises
+    ------
+    LinkageError
+        A topic drive has no motion; a bag cannot be read or has no samples.
+
+    """
+    scene = without_deliberate(scene)
+    pipeline = Pipeline(scene)
+    bag = None if like in (None, SINE) else read_bag(str(like))
+    return [_motion(scene, line, like, bag, horizon) for line in pipeline.lines]
+
+
+def without_deliberate(scene: Scene) -> Scene:
+    """Return a scene without recording, faults and what its sensors and wear change."""
+    kept = ('velocity', 'friction', 'tolerance')
+    members = tuple(
+        replace(member, effects={k: v for k, v in member.effects.items() if k in kept})
+        for member in scene.members
+    )
+    members = tuple(
+        member
+        if member.drive[0] == 'torque'
+        else replace(
+            member,
+            loads=None,
+            effects={k: v for k, v in member.effects.items() if k != 'friction'},
+        )
+        for member in members
+    )
+    return replace(scene, members=members, faults={}, record=None)
+
+
+def _motion(
+    scene: Scene, line: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
+) -> MemberMotion:
+    member, context = line.member, line.context
+    closure = line.closure
+    if type(closure) is not Closure:
+        closure = Closure(closure.linkage)
+    motion = MemberMotion(member, closure, context, None)
+    drive, parameters = member.drive
+    if drive == 'torque':
+        return _commanded(motion, line, like, bag, horizon)
+    if drive == 'bag' and parameters.pace == 'recorded':
+        return _recorded(motion, read_bag(parameters.file), parameters.topic)
+    if drive != 'topic':
+        return motion._replace(path=_path_of(line))
+    if bag is not None:
+        return _recorded(motion, bag, '')
+    if like is None:
+        raise member.content.error(
+            'drive',
+            'topic has no motion of its own',
+            'say what its crank does: --like sine, or --like BAG with its samples',
+        )
+    return motion._replace(
+        path=_sines(closure),
+        sample_rate=scene.rate or USUAL_RATE,
+        note=f'the crank moves by a sine of {_FREQUENCY:g} Hz',
+    )
+
+
+def _path_of(line: LinkagePipeline) -> Path:
+    """Return the path of a drive that computes its crank as a function of the time."""
+    drive = line.drive
+    drive.state(BEGIN)
+
+    def path(time: int) -> Crank | None:
+        crank: CrankState | None = drive.state(BEGIN + time)
+        return None if crank is None else (crank.angles, crank.rates)
+
+    return path
+
+
+def _sines(closure: Closure) -> Path:
+    """Return sines of all inputs, within the range where the loops close."""
+    speed = tau * _FREQUENCY
+    centers = usual_inputs(closure)
+    sizes = [0.01 * (closure.scale if each.slider else 1.0) for each in closure.linkage.inputs]
+    if len(centers) == 1:
+        widest = InputSweep(closure).widest_range
+        assert widest is not None, 'reading the file has proved that it closes somewhere'
+        sizes = [_AMPLITUDE]
+        if not widest.whole:
+            centers = (0.5 * (widest.lowest + widest.highest),)
+            sizes = [min(_AMPLITUDE, _PART * (widest.highest - widest.lowest))]
+
+    def path(time: int) -> Crank:
+        s, c = sin(speed * time * 1e-9), cos(speed * time * 1e-9)
+        values = tuple(at + size * s for at, size in zip(centers, sizes, strict=True))
+        return values, tuple(size * speed * c for size in sizes)
+
+    return path
+
+
+class _Sample(NamedTuple):
+    """A good sample of a crank, with its stamp and arrival, in [ns]."""
+
+    stamp: int
+    arrival: int
+    values: tuple[float, ...]
+    rates: tuple[float, ...]
+
+
+def _recorded(motion: MemberMotion, bag: Bag, topic: str) -> MemberMotion:
+    """Return the motion through the samples of a bag: cubics by their values and rates."""
+    samples = _samples_of(motion, bag, topic)
+    stamps = [sample.stamp - samples[0].stamp for sample in samples]
+    gap = motion.member.drive[1].max_age
+
+    def path(time: int) -> Crank | None:
+        number = bisect_right(stamps, time) - 1
+        if number < 0 or number + 1 >= len(stamps):
+            return None
+        one, other = samples[number], samples[number + 1]
+        length = (other.stamp - one.stamp) * 1e-9
+        if length > gap:
+            return None
+        part = (time - stamps[number]) * 1e-9 / length
+        ends = zip(one.values, one.rates, other.values, other.rates, strict=True)
+        found = [_cubic(part, length, *four) for four in ends]
+        return tuple(value for value, _ in found), tuple(rate for _, rate in found)
+
+    return motion._replace(
+        path=path,
+        samples=[(sample.stamp - samples[0].stamp, sample.arrival - samples[0].stamp)
+                 for sample in samples],
+        sample_rate=(len(stamps) - 1) * 1e9 / stamps[-1],
+        note=f'the crank moves as recorded in {bag.path.name}',
+    )  # fmt: skip
+
+
+def _samples_of(motion: MemberMotion, bag: Bag, topic: str) -> list[_Sample]:
+    """Return the good samples of the topic that has most of them."""
+    name, use = motion.member.drive
+    read: Any = JointStateReader(motion.context.inputs_in_messages).read
+    if name == 'topic':
+        read = topic_drive.reader(use, motion.context)
+    else:
+        use = topic_drive.TopicParameters(max_age=use.max_age)
+    of_type = {each.name for each in bag.topics if each.type == JOINT_STATE}
+    received: dict[str, list[tuple[int, Any]]] = {}
+    for heard, log_time, _, data in bag.messages():
+        if heard in of_type and (heard == topic or not topic):
+            sample = read(data)
+            if not isinstance(sample, Rejection):
+                received.setdefault(heard, []).append((log_time, sample))
+    most = max(received.values(), key=len, default=[])
+    drive = topic_drive.TopicDrive(use, True, motion.closure.linkage.inputs)
+    found: list[_Sample] = []
+    for log_time, sample in sorted(most, key=lambda one: one[0]):
+        if drive.offer(sample, log_time) is None and drive.sample is not None:
+            stamp, values, rates, _ = drive.sample
+            if not found or stamp > found[-1].stamp:
+                found.append(_Sample(stamp, log_time, values, rates))
+    if len(found) < 2:
+        names = listed(motion.context.inputs_in_messages)
+        raise BagError(
+            bag.path, f'holds no motion of {names}', 'name a bag with samples of the crank'
+        )
+    return found
+
+
+def _cubic(
+    part: float, length: float, begin: float, start: float, end: float, stop: float
+) -> tuple[float, float]:
+    """Return value and rate of the cubic through two values and rates, at a part of its length."""
+    s, rest = part, 1.0 - part
+    value = begin + (end - begin) * s * s * (3.0 - 2.0 * s)
+    value += length * s * rest * (start * rest - stop * s)
+    rate = 6.0 * s * rest * (end - begin) / length
+    rate += start * rest * (1.0 - 3.0 * s) + stop * s * (3.0 * s - 2.0)
+    return value, rate
+
+
+def _commanded(
+    motion: MemberMotion, line: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
+) -> MemberMotion:
+    """Return the motion of a torque drive, with the commands that come to it."""
+    if bag is not None:
+        return motion._replace(
+            commands=_recorded_commands(bag, line, horizon),
+            note=f'commands come as recorded in {bag.path.name}',
+        )
+    if like is None and moves(motion, horizon):
+        return motion._replace(note='no command comes')
+    effort = _usual_effort(motion, line)
+    timeout = motion.member.drive[1].timeout
+    period = round(min(COMMAND_PERIOD, 0.5 * timeout) * NANOSECONDS)
+    commands = [
+        Command(time, effort * sin(0.5 * tau * time * 1e-9))
+        for time in range(period, round(horizon * NANOSECONDS), period)
+    ]
+    unit = {'effort': 'N·m', 'current': 'A', 'voltage': 'V'}
+    motor = motion.member.drive[1].motor
+    kind = motor.command if motor else 'effort'
+    sized = f'{effort:.3g} {"N" if kind == "effort" and motion.closure.linkage.inputs[0].slider else unit[kind]}'
+    note = f'commands come as a sine of 0.5 Hz and {sized}, {1e9 / period:g} times a second'
+    if like is None:
+        note += ', since nothing moves without'
+    return motion._replace(commands=commands, note=note)
+
+
+def cranks_at(
+    motion: MemberMotion, times: Sequence[int], **changes: Any
+) -> list[Crank | None]:
+    """
+    Return the crank at some times since the first tick, in [ns] and in order.
+
+    Parameters
+    ----------
+    motion
+        What the linkage does.
+    times
+        The times.
+    **changes
+        Parameters of a torque drive that differ from the scene's: its method, or its step.
+
+    """
+    if motion.path is not None:
+        return [motion.path(time) for time in times]
+    drive = built(motion, **changes)
+    commands, number = motion.commands, 0
+    passed = 0
+    drive.state(BEGIN)
+    found: list[Crank | None] = []
+    for time in times:
+        # A drive that is asked too seldom leaves time out.
+        stops = [*range(passed + _SELDOM, time, _SELDOM), time]
+        for stop in stops:
+            while number < len(commands) and commands[number].time <= stop:
+                arrival, effort = commands[number]
+                drive.offer(EffortCommand(0, effort), BEGIN + arrival)
+                number += 1
+            crank = drive.state(BEGIN + stop)
+        passed = time
+        found.append((crank.angles, crank.rates))
+    return found
+
+
+def moves(motion: MemberMotion, horizon: float) -> bool:
+    """Return whether a torque drive moves without commands."""
+    looks = [round(horizon * NANOSECONDS * k / 100) for k in range(101)]
+    values = [crank[0][0] for crank in cranks_at(motion, looks) if crank]
+    return max(values) - min(values) > _STANDS
+
+
+def built(motion: MemberMotion, **changes: Any) -> TorqueDrive:
+    """Return the torque drive at its start, with other parameters."""
+    from linkage_ros.drives import torque  # local import: only with forces
+
+    return torque.build(replace(motion.member.drive[1], **changes), motion.context)
+
+
+def _usual_effort(motion: MemberMotion, line: LinkagePipeline) -> float:
+    """Return the amplitude of the commands: they pass friction and a fifth of the weight."""
+    equation = motion.context.mechanics.equation
+    drive = built(motion)
+    start = motion.member.drive[1].start
+    low, high = (min(max(end, start - tau), start + tau) for end in drive.acting(None)[0].stops)
+    found = [terms for k in range(90) if (terms := equation(low + (high - low) * k / 90.0))]
+    least = min(terms.inertia for terms in found)
+    rubbing = max(terms.coulomb + terms.breakaway for terms in found)
+    weight = max(abs(terms.potential_slope) for terms in found)
+    unit = motion.closure.scale if motion.closure.linkage.inputs[0].slider else 1.0
+    effort = rubbing + 0.2 * weight + 2.0 * unit * least
+    motor = motion.member.drive[1].motor
+    if motor is None or motor.command == 'effort':
+        return effort
+    current = effort / (motor.torque_constant * motor.ratio * motor.efficiency)
+    if motor.command == 'current':
+        return current
+    return motor.resistance * current + motor.torque_constant * motor.ratio * unit
+
+
+def _recorded_commands(bag: Bag, line: LinkagePipeline, horizon: float) -> list[Command]:
+    """Return the commands of a bag, at the times of their recording."""
+    from linkage_ros.bag.run_events import raw_account  # local import: only with a bag
+    from linkage_ros.drives.torque import reader
+
+    read = reader(line.member.drive[1], line.context)
+    topic = raw_account(bag).get('crank_topic')
+    found: list[tuple[int, EffortCommand]] = []
+    for name, log_time, _, data in bag.messages():
+        if topic and name != topic:
+            continue
+        kinds = [each.type for each in bag.topics if each.name == name]
+        if kinds != [JOINT_STATE]:
+            continue
+        command = read(data)
+        if not isinstance(command, Rejection) and -LARGEST <= command.effort <= LARGEST:
+            found.append((log_time, command))
+    if not found:
+        raise BagError(bag.path, 'holds no command of the input', 'name another bag')
+    first = found[0][0]
+    until = round(horizon * NANOSECONDS)
+    return [
+        Command(time - first, command.effort) for time, command in found if time - first < until
+    ]
