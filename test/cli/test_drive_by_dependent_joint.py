@@ -25,11 +25,11 @@ from typing import Any
 
 from linkage_ros import FileError, load
 from linkage_ros.cli import replay, report
-from linkage_ros.study.prices import turn_crank
 from linkage_ros.fmu.stepped_scene import _Sender
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
+from linkage_ros.study.prices import turn_crank
 import pytest
 
 from .recorded import answer, JointStateWriter, MS, Recorded, scene_file, SECOND
