@@ -220,13 +220,13 @@ def time_ticks(
     collecting = gc.isenabled()
     gc.disable()
     try:
-        begun = perf_counter()
-        for _ in range(2):  # The first block compiles and warms
+        durations = []
+        for _ in range(3):  # The first block warms the caches
             begun = perf_counter()
             for one in timed:
                 one.time_block(clock)
-        once = perf_counter() - begun
-        blocks = max(1, round(seconds / (_ROUNDS * once)))
+            durations.append(perf_counter() - begun)
+        blocks = max(1, round(seconds / (_ROUNDS * min(durations))))
         for done in range(_ROUNDS):
             times: list[list[float]] = [[] for _ in timed]
             for _ in range(blocks):
