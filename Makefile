@@ -32,7 +32,7 @@ unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLU
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema reference cost effects docs lint format
+.PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema reference effects docs lint format
 .PHONY: test_nodes test_rest clean damage kills endurance disk attacks mutants accuracy_page report lock sbom compiled
 
 help:
@@ -43,7 +43,7 @@ help:
 	@echo 'make accuracy  test the kinematics on 11 million cases, then run topologies (35 min)'
 	@echo 'make topologies  test random linkages of every topology, into docs/accuracy (8 min)'
 	@echo 'make compiled  compare 100,000 states in C, Python and JavaScript with the plain steps (8 min)'
-	@echo 'make accuracy_page  measure the cost of accuracy, into docs/accuracy.md (9 min)'
+	@echo 'make accuracy_page  measure where errors come from, into docs/accuracy.md (8 min)'
 	@echo 'make synthesis compute docs/synthesis.md and its pictures'
 	@echo 'make round_trips  design 1.7 million linkages back from their own pairs of angles'
 	@echo 'make damage    truncate a bag at every byte, flip every bit, into docs/recordings (30 min)'
@@ -55,7 +55,6 @@ help:
 	@echo 'make gallery   draw the linkages that come with the package, and the moving pictures of the README'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
 	@echo 'make reference write the schemas, and the reference of files, parameters and commands'
-	@echo 'make cost      measure the cost of every effect, into docs/cost.md'
 	@echo 'make effects   draw the pictures of drives, effects and faults for docs/effects.md'
 	@echo 'make report    record a run, and take a picture of its report for docs/report.png'
 	@echo 'make docs      build the documentation site into build/docs'
@@ -211,9 +210,6 @@ schema: $(STAMP)
 
 reference: schema
 	@$(BIN)/python -m docs.make_reference
-
-cost: $(STAMP)
-	@$(BIN)/python -m docs.make_cost
 
 effects: $(STAMP)
 	@$(BIN)/python -m docs.make_effects

@@ -151,8 +151,8 @@ setup(
     package_data={
         NAME: ['py.typed', '*.pyi'],
         f'{NAME}.pages': ['*.css', '*.js'],
-        f'{NAME}.accuracy.page': ['*.css', '*.js'],
         f'{NAME}.report': ['*.css', '*.js'],
+        f'{NAME}.study': ['*.css', '*.js'],
         f'{NAME}.view': ['*.css', '*.js'],
     },
     data_files=[

@@ -71,10 +71,8 @@ html_theme = 'furo'
 html_title = f'linkage_ros {__version__}'
 html_copy_source = False
 html_show_sphinx = False
-html_static_path = ['website/static', '../linkage_ros/accuracy/page/field.js']
+html_static_path = ['website/static']
 html_css_files = ['site.css']
-# The field of accuracy.md, the same as on the pages of `linkage accuracy`.
-html_js_files = [('field.js', {'defer': 'defer'})]
 
 
 def setup(app: Any) -> dict[str, Any]:

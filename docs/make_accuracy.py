@@ -14,51 +14,200 @@
 
 
 """
-Measure the cost of accuracy for scenes that come with the package, for docs/accuracy.md.
+Measure where the error of three scenes comes from, for docs/accuracy.md and the README.
 
-A scene takes about two and a half minutes. Run it in the folder of the checkout, as `make
-accuracy_page` does: ``python -m docs.make_accuracy [SCENE …]``.
+A scene takes some two minutes, on a machine that does nothing else. Run it in the folder of the
+checkout, as `make accuracy_page` does: ``python -m docs.make_accuracy``.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 import sys
+from typing import NamedTuple
 
-from linkage_ros.accuracy import measure_accuracy, PARTS
-from linkage_ros.accuracy.page.files import write_markdown
-from linkage_ros.scene.load import load_scene
+from linkage_ros.effects.stage import NEEDS, PUBLISHED_WITH
+from linkage_ros.errors import listed
+from linkage_ros.measuring import describe_machine, Progress
+from linkage_ros.pages.markdown import filled, table_lines
+from linkage_ros.resources import shipped
+from linkage_ros.scene.load import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
+from linkage_ros.scene.scene import Scene
+from linkage_ros.study.budget import Budget
+from linkage_ros.study.budget_text import (
+    closing_lines,
+    error_text,
+    heads_of,
+    lead_lines,
+    price_text,
+    rows_of,
+)
+from linkage_ros.study.deliberate import compare_runs, leave_out
+from linkage_ros.study.measure import measure_budget, PARTS
+from linkage_ros.study.picture import budget_svg
+from linkage_ros.study.prices import price_scenes, tick_price, turn_crank
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'
-SCENES = DOCS.parent / 'config' / 'scenes'
+METHOD, EFFECTS = DOCS / 'accuracy/method.md', DOCS / 'accuracy/effects.md'
+FOUR_BAR = shipped('linkages/four_bar.yaml')
 
-SHOWN = ('demo', 'torque_crank', 'jansen_leg')
-"""Scenes with a measured crank, with a torque drive, and with several loops."""
+_MARK = 'measured'
+
+
+class Shown(NamedTuple):
+    """A scene of the page."""
+
+    scene: str
+    title: str
+    like: str | None = None  # What the crank of a topic drive does
+    horizon: float = 10.0  # [s]
+
+
+SHOWN = (
+    Shown('demo', 'A measured crank', like='sine'),
+    Shown('torque_crank', 'A torque bench'),
+    Shown('jansen_leg', 'A walking leg'),
+)
+
+EVERY_EFFECT = """
+linkage: four_bar
+publish_input: true
+rate: 1000
+loads: {gravity: [0, -9.81]}
+effects:
+  tolerance: {standard_deviation: 2.0e-5}
+  backlash: {play: 0.01}
+  velocity: {}
+  acceleration: {}
+  friction: {joints: {O2: {coulomb: 0.01}}}
+  effort: {}
+  pin_forces: {}
+  compliance: {links: {coupler: 1.0e+7}}
+  clearance: {pins: {B: 1.0e-4}}
+  jitter: {seconds: 1.0e-4}
+  bias: {joints: {rocker_joint: 0.01}}
+  noise: {joints: {rocker_joint: {white: 0.001, walk: 0.001, rate_white: 0.01}}}
+  measuring_range: {joints: {rocker_joint: {low: 1.0, high: 2.2}}}
+  encoder: {joints: {rocker_joint: {counts: 4096}}}
+  rate_limit: {rate: 500}
+  dropout: {probability: 0.1, burst: 3}
+  delay: {seconds: 0.002}
+  markers: {rate: 30}
+"""
+"""A scene with every effect, each on one joint, pin or link of the four-bar."""
 
 
 def main() -> int:
     """Measure and write."""
     parser = argparse.ArgumentParser('python -m docs.make_accuracy', description=__doc__)
-    parser.add_argument('scenes', nargs='*', default=SHOWN, help='names of shipped scenes')
     parser.add_argument('--quick', action='store_true', help='faster, to see the page only')
-    arguments = parser.parse_args()
-    results = []
-    for name in arguments.scenes:
-        scene = load_scene(SCENES / f'{name}.yaml')
-        printed: set[str] = set()
-
-        def progress(
-            part: str, share: float, name: str = name, printed: set[str] = printed
-        ) -> None:
-            if part not in printed:
-                printed.add(part)
-                sys.stderr.write(f'{name}: {part}\n')
-
-        results.append(measure_accuracy(scene, PARTS, arguments.quick, DOCS.parent, progress))
-    write_markdown(results, PAGE)
+    quick = parser.parse_args().quick
+    lines: list[str] = []
+    for shown in SHOWN:
+        scene = load_scene(shown.scene)
+        budget = measure_budget(
+            scene,
+            horizon=shown.horizon,
+            like=shown.like,
+            quick=quick,
+            parts=PARTS,
+            progress=_progress(shown.scene),
+        )
+        picture = METHOD.with_name(f'{shown.scene}.svg')
+        picture.write_text(budget_svg(budget), 'utf-8')
+        lines += _section(shown, budget, picture.name)
+    lines += hard_lines()
+    fill(PAGE, lines)
+    fill(METHOD, [f'- {name}: {value}' for name, value in describe_machine()])
+    fill(EFFECTS, effect_lines(quick=quick))
     return 0
+
+
+def _progress(name: str) -> Progress:
+    said: set[int] = set()
+
+    def report(share: float) -> None:
+        tenth = int(10.0 * share)
+        if tenth not in said:
+            said.add(tenth)
+            sys.stderr.write(f'{name}: {10 * tenth} %\n')
+
+    return report
+
+
+def fill(page: Path, lines: Sequence[str]) -> None:
+    """Write lines between the marks of a page."""
+    page.write_text(filled(page.read_text('utf-8'), _MARK, '\n'.join(lines)), 'utf-8')
+
+
+def _section(shown: Shown, budget: Budget, picture: str) -> Iterator[str]:
+    like = f' --like {shown.like}' if shown.like else ''
+    yield f'## {shown.title}'
+    yield ''
+    yield f'`linkage accuracy {shown.scene}{like}`:'
+    yield ''
+    yield from (f'> {escaped(line)}<br>' for line in lead_lines(budget))
+    yield ''
+    yield f'![Error against cost of {shown.scene}](accuracy/{picture})'
+    yield ''
+    yield from table(heads_of(budget), [row.cells() for row in rows_of(budget)])
+    yield ''
+    yield from (f'{escaped(line).capitalize()}.' for line in closing_lines(budget)[:1])
+    yield ''
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return a table of text as Markdown."""
+    return table_lines(
+        [head.lstrip('>') for head in heads],
+        [[escaped(cell) for cell in row] for row in rows],
+        [head.startswith('>') for head in heads],
+    )
+
+
+def escaped(text: str) -> str:
+    """Return a text in which nothing is markup."""
+    return text.replace('|', r'\|').replace('<', '&lt;').replace('*', r'\*')
+
+
+def effect_lines(*, quick: bool) -> Iterator[str]:
+    """Yield a table of each effect alone, on a scene without any."""
+    files = {SCENE_FILE: EVERY_EFFECT.encode(), LINKAGE_FILE: FOUR_BAR.read_bytes()}
+    scene = parse_scene('effects', 'effects', files)
+    (member,) = scene.members
+    names = [*member.effects]
+    # Friction acts on nothing without a force effect.
+    beside = {'friction': ('effort',)}
+    alone = [_only(scene, name, *beside.get(name, ())) for name in names]
+    without = [_only(scene, *beside.get(name, ())) for name in names]
+    bare = tick_price(_only(scene))
+    rows = []
+    for name, one, other in zip(names, alone, without, strict=True):
+        (price,) = price_scenes(other, [one], 0.2 if quick else 2.0)
+        (found,) = compare_runs(one, [other], turn_crank, 2000)
+        needed = [*NEEDS.get(name, ()), *PUBLISHED_WITH.get(name, ())]
+        rows.append(
+            (
+                name,
+                price_text(price),
+                error_text(found.error.rms) if found.error.worst else '–',
+                error_text(found.error.worst) if found.error.worst else '–',
+                listed(dict.fromkeys([*needed, *beside.get(name, ())])),
+            )
+        )
+    yield f'A tick without effects takes {price_text(bare)} µs.'
+    yield ''
+    heads = ('effect', '>adds to a tick [µs]', '>rms [rad]', '>worst [rad]', 'with')
+    yield from table(heads, rows)
+
+
+def _only(scene: Scene, *names: str) -> Scene:
+    """Return the scene with these of its effects only."""
+    (member,) = scene.members
+    return leave_out(scene, frozenset(member.effects).difference(names))
 
 
 if __name__ == '__main__':

@@ -13,97 +13,74 @@
 # limitations under the License.
 
 """
-Show what accuracy costs in time, on a scene and on this machine: twelve lines here, and a page.
+Say where the error of the published joints comes from, what each digit costs, what to write.
 
-The lines say how exactly the loops are solved and how fast; what to write into the scene for some
-accuracies, what a tick then costs and at which rate of ticks a subscriber notices; then what
-effects, steps of the torque drive and recording cost. The page has pictures, a field for the
-accuracy that you need, and all tables. Every error is one against a reference that is known to 50
-digits; every time is a median with its quartiles.
+The first lines answer; the table has a row for each source of error and for what the scene makes
+different on purpose, with its price and its next settings. A bag stands for its scene, moved as
+it was recorded. docs/accuracy/method.md says how it is measured.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 import json
 from pathlib import Path
-from textwrap import wrap
 from threading import Event
+from typing import NamedTuple
 
-from linkage_ros.accuracy import measure_accuracy, PARTS
-from linkage_ros.accuracy.page.files import check_folder, PAGE, write_page
-from linkage_ros.accuracy.page.numbers import number_text
-from linkage_ros.accuracy.results import replies, reply, Results
-from linkage_ros.cli.arguments import add_set, SCENE_HELP
-from linkage_ros.cli.terminal import progress
-from linkage_ros.errors import check_installed, did_you_mean, LinkageError, listed
+from linkage_ros.cli.arguments import add_output, add_set, bounded, LINKAGES, output
+from linkage_ros.cli.bag_reading import opened, scene_of
+from linkage_ros.cli.terminal import progress, show, Table
+from linkage_ros.errors import did_you_mean, LinkageError, listed
+from linkage_ros.files.file_access import atomic_write
 from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.scene import Scene
+from linkage_ros.study.budget import Budget, NeedAnswer
+from linkage_ros.study.budget_text import (
+    budget_json,
+    closing_lines,
+    heads_of,
+    lead_lines,
+    rows_of,
+)
+from linkage_ros.study.measure import measure_budget, PARTS
+from linkage_ros.study.need import answer_need, answers_of
+from linkage_ros.study.page import budget_html
+from linkage_ros.study.picture import budget_svg
+from linkage_ros.study.tuned_scene import tuned_scene
 
-EXAMPLE = 'linkage accuracy worn_press --quick'
-
-_WIDTH = 80
-"""Columns of the printed result."""
-
-_WANTED = (1e-2, 1e-4, 1e-8)
-"""Wanted accuracies in the printed result, in [rad]."""
-
-
-def print_results(results: Results) -> None:
-    """Print the headline, the answers for some accuracies, and the headline of each part."""
-    said = [results.headline]
-    answers = replies(results)
-    for wanted in _WANTED if answers else ():
-        answer = reply(answers, wanted)
-        cost = f'{number_text(wanted)} rad: {answer.tick} a tick'
-        said.append(f'{cost}; {answer.rate}; {answer.write}')
-    # The other headlines are in the first line, or in the answers.
-    said += [each.headline for each in results.parts if not (each.clause or each.rates)]
-    for text in said:
-        print('\n'.join(wrap(text, _WIDTH, subsequent_indent='  ')))
-
-
-def results_json(results: Results, page: Path) -> str:
-    """Return the same as JSON, with the three sentences of each part."""
-    parts = [
-        {'key': each.key, 'headline': each.headline, 'sentences': [*each.sentences]}
-        for each in results.parts
-    ]
-    answers = [each._asdict() for each in replies(results)]
-    said = {'scene': results.scene, 'headline': results.headline, 'machine': dict(results.machine)}
-    return json.dumps({**said, 'answers': answers, 'parts': parts, 'page': str(page)}, indent=2)
-
-
-_SHARES = {'solving': 60, 'ticking': 45, 'effects': 5, 'dynamics': 25, 'recording': 30}
-"""Approximate relative durations of the parts."""
-
-
-class _StoppedError(Exception):
-    """A stop was requested."""
-
-
-EXAMPLE = 'linkage accuracy demo --quick -o accuracy_demo'
+EXAMPLE = 'linkage accuracy jansen_leg --need 1e-3 --quick'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('scene', metavar='SCENE', help=SCENE_HELP)
+    parser.add_argument(
+        'scene',
+        metavar='SCENE',
+        help='scene file or linkage file, a name of linkage gallery, or a bag: its scene and '
+        'its motion',
+    )
     add_set(parser)
     parser.add_argument(
-        '-o',
-        '--output',
-        type=Path,
-        metavar='FOLDER',
-        help='where the page goes; nothing is overwritten (default: accuracy_SCENE)',
+        '--need',
+        type=bounded(1e-15, 10.0),
+        metavar='RAD',
+        help='say the cheapest settings with no more error than this, or what stands in the way',
+    )
+    add_output(parser, LINKAGES, 'the lines are printed; with it, the scene that meets --need')
+    parser.add_argument(
+        '--horizon',
+        type=bounded(0.1, 1000.0),
+        default=10.0,
+        metavar='S',
+        help='how long the motion is followed, in s; errors that grow are those at its end '
+        '(default: 10)',
     )
     parser.add_argument(
-        '--quick',
-        action='store_true',
-        help='in some 15 s, with fewer points and no other packages',
-    )
-    parser.add_argument(
-        '--json',
-        action='store_true',
-        help='print JSON: headline, answers, and the result of each part',
+        '--like',
+        metavar='sine|BAG',
+        help='what the crank of a topic drive does: a sine, or as a bag has it',
     )
     parser.add_argument(
         '--only',
@@ -111,39 +88,77 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='PARTS',
         help=f'parts to measure, separated by commas, of {listed(PARTS)}',
     )
+    parser.add_argument(
+        '--quick', action='store_true', help='take 20 s at most, and say what is left out'
+    )
+    parser.add_argument('--json', action='store_true', help='the same as JSON, in rad and µs')
+    parser.add_argument(
+        '--page',
+        type=output(('.html', '.htm')),
+        metavar='PAGE',
+        help='write a page for the browser, PAGE.html',
+    )
+    parser.add_argument(
+        '--picture',
+        type=output(('.svg',)),
+        metavar='PICTURE',
+        help='draw error against cost, PICTURE.svg',
+    )
+
+
+class _StoppedError(Exception):
+    """A stop was requested."""
+
+
+class _Source(NamedTuple):
+    """What is measured: a scene, and what its motion is like."""
+
+    scene: Scene
+    like: str | None
+    is_bag: bool
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Measure, print and write; return 1 if stopped."""
+    """Measure and answer; return 1 if stopped, or if nothing measured meets the need."""
     parts = _parts(arguments.only)
-    check_installed('mpmath')  # computes the reference
-    scene = load_scene(arguments.scene, arguments.set)
-    folder = arguments.output or Path(f'accuracy_{scene.name}')
-    check_folder(folder)
+    _check(arguments, parts)
+    scene, like, is_bag = _source(arguments, stop)
+    if is_bag and arguments.output:
+        raise LinkageError('-o', 'the scene is in a bag', 'write the lines into its file by hand')
     try:
-        with progress(f'accuracy of {scene.name}') as advance:
-            done = dict.fromkeys(parts, 0.0)
+        with progress(f'accuracy of {scene.name}, percent') as advance:
 
-            def report(name: str, share: float) -> None:
-                """Convert the progress of a part to the progress of the whole."""
+            def report(share: float) -> None:
                 if stop.is_set():
                     raise _StoppedError
-                done[name] = share
-                whole = sum(_SHARES[part] for part in done)
-                advance(round(sum(_SHARES[part] * done[part] for part in done)), whole)
+                advance(round(100.0 * share), 100)
 
-            results = measure_accuracy(
-                scene, parts, arguments.quick, folder.absolute().parent, report
+            budget = measure_budget(
+                scene,
+                horizon=arguments.horizon,
+                like=like,
+                quick=arguments.quick,
+                parts=parts,
+                progress=report,
             )
     except _StoppedError:
         return 1
-    write_page(results, folder)
+    answer = None if arguments.need is None else answer_need(budget, arguments.need)
+    _write(arguments, scene, budget, answer)
     if arguments.json:
-        print(results_json(results, folder / PAGE))
+        said = budget_json(budget)
+        if answer is not None:
+            said['need'] = {
+                'rad': arguments.need,
+                'is_met': answer.is_met,
+                'error': answer.error,
+                'write': dict(answer.changes),
+                'answer': answer.text,
+            }
+        print(json.dumps(said, indent=2, allow_nan=False))
     else:
-        print_results(results)
-        print(f'page      {folder / PAGE}')
-    return 0
+        _print(budget, answer)
+    return 0 if answer is None or answer.is_met else 1
 
 
 def _parts(text: str) -> list[str]:
@@ -153,3 +168,49 @@ def _parts(text: str) -> list[str]:
             remedy = did_you_mean(part, PARTS, f'known: {listed(PARTS)}')
             raise LinkageError(f'--only {part}', 'there is no such part', remedy)
     return parts
+
+
+def _check(arguments: argparse.Namespace, parts: Sequence[str]) -> None:
+    """Raise if options do not fit together, before anything is measured."""
+    if arguments.output and arguments.need is None:
+        raise LinkageError('-o', 'is the scene that meets a need', 'say it: --need 1e-3')
+    if arguments.need is not None and 'errors' not in parts:
+        raise LinkageError('--need', 'is for errors', f'write --only errors,{arguments.only}')
+
+
+def _source(arguments: argparse.Namespace, stop: Event) -> _Source:
+    """Return the scene of a file, or of a bag with its motion."""
+    path = Path(arguments.scene)
+    is_bag = path.suffix == '.mcap' or any(path.glob('*.mcap')) if path.exists() else False
+    if not is_bag:
+        return _Source(load_scene(arguments.scene, arguments.set), arguments.like, is_bag=False)
+    if arguments.like:
+        raise LinkageError('--like', 'the bag itself has the motion', 'leave one of them out')
+    scene = scene_of(opened(path, stop), trust_effects=False, settings=arguments.set)
+    return _Source(scene, arguments.scene, is_bag=True)
+
+
+def _write(
+    arguments: argparse.Namespace, scene: Scene, budget: Budget, answer: NeedAnswer | None
+) -> None:
+    """Write the files that were asked for."""
+    if arguments.output and answer is not None and answer.is_met:
+        folder = arguments.output.resolve().parent
+        text = tuned_scene(scene, arguments.scene, answer.changes, folder)
+        atomic_write(arguments.output, text)
+    if arguments.page:
+        atomic_write(arguments.page, budget_html(budget, answers_of(budget)).encode())
+    if arguments.picture:
+        svg = budget_svg(budget)
+        if not svg:
+            raise LinkageError('--picture', 'shows errors, and none were measured', 'leave it out')
+        atomic_write(arguments.picture, svg.encode())
+
+
+def _print(budget: Budget, answer: NeedAnswer | None) -> None:
+    if answer is not None:
+        print(answer.text)
+    print(*lead_lines(budget), sep='\n')
+    print()
+    show(Table('', heads_of(budget), [row.cells() for row in rows_of(budget)]))
+    print(*closing_lines(budget), sep='\n')

@@ -83,7 +83,7 @@ def add_force(parser: argparse._ActionsContainer) -> None:
 
 def refuse_existing(arguments: argparse.Namespace) -> None:
     """Raise if the user names something to write that exists, unless ``--force`` is given."""
-    for name in ('output', 'picture', 'draw'):
+    for name in ('output', 'picture', 'draw', 'page'):
         path = getattr(arguments, name, None)
         if isinstance(path, Path):
             check_new(path, force=getattr(arguments, 'force', False))

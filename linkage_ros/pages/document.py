@@ -49,6 +49,7 @@ def document(
     scripts: Parts,
     *,
     policy: str = POLICY,
+    has_plots: bool = True,
 ) -> str:
     """
     Return a page.
@@ -65,13 +66,16 @@ def document(
         Files of this page beside those of all pages, in their order.
     policy
         Content policy; a page with a server must be allowed to ask it.
+    has_plots
+        Whether its scripts draw with Plotly, which is then part of the page.
 
     Raises
     ------
     LinkageError
-        If plotly is not installed.
+        If plotly is needed and not installed.
 
     """
+    plotting = [f'<script>{_within_script(plotting_library())}</script>'] if has_plots else []
     return '\n'.join(
         [
             '<!doctype html>',
@@ -90,7 +94,7 @@ def document(
             '<button type="button" id="scheme" class="no-print" hidden></button>',
             _clean_lines('\n'.join(body)),
             f'<script type="application/json" id="data">{_json(data)}</script>',
-            f'<script>{_within_script(plotting_library())}</script>',
+            *plotting,
             f'<script>\n{_joined("page.js", scripts)}</script>',
             '</body>',
             '</html>',

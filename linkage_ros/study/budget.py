@@ -130,3 +130,12 @@ class Budget(NamedTuple):
         if setting is knob.own or setting.price is None:
             return self.tick.core
         return (self.tick.tick.middle + setting.price.tick.middle) * 1e-6 * setting.price.rate
+
+
+class NeedAnswer(NamedTuple):
+    """What meets a need, or what stands in the way."""
+
+    is_met: bool
+    error: float  # Sum of the worst errors with these settings, in [rad]
+    changes: Sequence[tuple[str, object]]  # Keys of the scene with their values
+    text: str  # What to write, what is off then and what it costs; or what stands in the way

@@ -41,6 +41,9 @@ COLUMNS = (
 )
 
 NOISE = 'within noise'
+_LEAST_TOLD = 1e-20
+"""Smaller errors mean nothing to a reader, in [rad]."""
+
 _SAME = 0.9
 """An error that is at least this part of another one is the same."""
 
@@ -51,6 +54,8 @@ def error_text(error: float) -> str:
         return '0'
     if not isfinite(error):
         return '∞'
+    if error < _LEAST_TOLD:
+        return f'below {error_text(_LEAST_TOLD)}'
     mantissa, exponent = f'{error:.1e}'.split('e')
     power = int(exponent)
     if -2 <= power < 4:

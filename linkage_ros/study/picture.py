@@ -211,8 +211,16 @@ class _Picture:
                 *self._draw_legend(),
                 *self._draw_axes(),
                 *self._draw_curves(),
-                *(_text(label.box.left, label.box.bottom - 3.0, label.text, fill=label.colour)
-                  for label in self.labels()),
+                *(
+                    _text(
+                        label.box.left,
+                        label.box.bottom - 3.0,
+                        label.text,
+                        fill=label.colour,
+                        more=' class="label"',
+                    )
+                    for label in self.labels()
+                ),
                 '</svg>\n',
             ]
         )  # fmt: skip
@@ -233,7 +241,9 @@ class _Picture:
         for value in _steps(self.x):
             x = self.x.place(value)
             yield _line(x, self.top, x, self.bottom, GHOST)
-            yield _text(x, self.bottom + 17.0, f'{100.0 * value:.3g}', anchor='middle')
+            text = f'{100.0 * value:.6g}'
+            if x + 0.5 * _LETTER * len(text) < WIDTH:
+                yield _text(x, self.bottom + 17.0, text, anchor='middle')
         yield _line(self.own, self.top, self.own, self.bottom, INK, 'stroke-dasharray="4 3"')
         yield (
             f'<rect x="{_LEFT:g}" y="{self.top:g}" width="{right - _LEFT:g}" '
@@ -359,7 +369,10 @@ def _line(x: float, y: float, right: float, bottom: float, colour: str, more: st
     )
 
 
-def _text(x: float, y: float, text: str, *, anchor: str = 'start', fill: str = INK) -> str:
+def _text(
+    x: float, y: float, text: str, *, anchor: str = 'start', fill: str = INK, more: str = ''
+) -> str:
     return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}">{escape(text)}</text>'
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}"{more}>'
+        f'{escape(text)}</text>'
     )

@@ -69,11 +69,15 @@ Change = tuple[str, object]
 """A dotted key of the scene with its value."""
 
 
+def settings_of(changes: Sequence[Change]) -> list[str]:
+    """Return changes as ``--set`` takes them."""
+    return [f'{key}={json.dumps(value)}' for key, value in changes]
+
+
 def change_scene(scene: Scene, changes: Sequence[Change]) -> Scene:
     """Return a scene with changed keys, as ``--set`` sets them; FileError where it refuses."""
     if not changes:
         return scene
-    settings = [f'{key}={json.dumps(value)}' for key, value in changes]
     return parse_scene(
         scene.name,
         scene.name,
@@ -81,7 +85,7 @@ def change_scene(scene: Scene, changes: Sequence[Change]) -> Scene:
         scene.folder,
         seed=scene.seed,
         trust_effects=True,
-        settings=settings,
+        settings=settings_of(changes),
     )
 
 
@@ -216,13 +220,13 @@ def time_ticks(
     collecting = gc.isenabled()
     gc.disable()
     try:
-        begun = perf_counter()
-        for _ in range(2):  # The first block compiles and warms
+        durations = []
+        for _ in range(3):  # The first block warms the caches
             begun = perf_counter()
             for one in timed:
                 one.time_block(clock)
-        once = perf_counter() - begun
-        blocks = max(1, round(seconds / (_ROUNDS * once)))
+            durations.append(perf_counter() - begun)
+        blocks = max(1, round(seconds / (_ROUNDS * min(durations))))
         for done in range(_ROUNDS):
             times: list[list[float]] = [[] for _ in timed]
             for _ in range(blocks):

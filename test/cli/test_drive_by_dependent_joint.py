@@ -25,11 +25,11 @@ from typing import Any
 
 from linkage_ros import FileError, load
 from linkage_ros.cli import replay, report
-from linkage_ros.cost import feed
 from linkage_ros.fmu.stepped_scene import _Sender
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
+from linkage_ros.study.prices import turn_crank
 import pytest
 
 from .recorded import answer, JointStateWriter, MS, Recorded, scene_file, SECOND
@@ -154,7 +154,7 @@ def test_cost_and_fmu_feed_the_dependent_joint() -> None:
     (line,) = pipeline.lines
     names = [variable.name for variable in _Sender(line).variables]
     assert names == ['crank_states.rocker_joint.position', 'crank_states.rocker_joint.velocity']
-    for now, message in islice(feed(scene_of(RATES + BY_ROCKER, FILE), pipeline), 50):
+    for now, message in islice(turn_crank(scene_of(RATES + BY_ROCKER, FILE), pipeline), 50):
         assert pipeline.offer(message, now) is None
         assert pipeline.tick(now).message
 

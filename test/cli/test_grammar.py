@@ -209,7 +209,7 @@ def test_numbers_of_things_and_defaults_are_told_in_one_way() -> None:
 def test_every_output_file_refuses_a_suffix_that_it_cannot_write(tmp_path: Path) -> None:
     written = {command: action for command, action in options() if action.dest == 'output'}
     folders = {command for command, action in written.items() if action.metavar == 'FOLDER'}
-    assert folders == {'accuracy', 'recover', 'replay'}
+    assert folders == {'recover', 'replay'}
     for command in written.keys() - folders:
         read = written[command].type
         assert callable(read)
@@ -377,7 +377,7 @@ def test_what_is_wrong_in_the_file_is_said_of_the_file(scene: Path) -> None:
         load_scene(scene, ['drive.sine.amplitude=0.3'])
 
 
-@pytest.mark.parametrize('command', ['run', 'scene', 'cost', 'accuracy', 'replay'])
+@pytest.mark.parametrize('command', ['run', 'scene', 'accuracy', 'replay'])
 def test_commands_with_a_scene_refuse_a_wrong_setting_in_a_line(
     folder: Path, command: str
 ) -> None:
@@ -388,7 +388,7 @@ def test_commands_with_a_scene_refuse_a_wrong_setting_in_a_line(
     assert answer.stderr.count('\n') == 1
 
 
-@pytest.mark.parametrize('typed', ['scene --list', 'scene --schema scene', 'cost --all'])
+@pytest.mark.parametrize('typed', ['scene --list', 'scene --schema scene'])
 def test_a_setting_without_a_scene_is_refused(tmp_path: Path, typed: str) -> None:
     answer = linkage(tmp_path, *typed.split(), '--set', 'rate=5')
     assert (answer.returncode, answer.stdout) == (2, '')
@@ -454,7 +454,7 @@ COMPLETED = {
     'linkage check jan': {'jansen_leg'},
     'linkage check m': {'mine.yaml', 'my_bag/'},
     'linkage scene worn': {'worn_press'},
-    'linkage cost --t': {'--ticks'},
+    'linkage accuracy --q': {'--quick'},
     'linkage solve four_bar --format ': {'table', 'csv', 'json'},
     'linkage solve four_bar --at ': set(),
     'linkage gallery jan': {'jansen_leg'},

@@ -49,8 +49,7 @@ READS = {
     'fmu': (['four.yaml', '-o', 'x.fmu'], PARSE),
     'scene': (['four.yaml'], PARSE),
     'simulate': (['four.yaml', '-o', 'x.csv'], PARSE),
-    'cost': (['four.yaml'], PARSE),
-    'accuracy': (['four.yaml', '-o', 'page'], PARSE),
+    'accuracy': (['four.yaml', '--page', 'page.html'], PARSE),
     'demo': ([], PARSE),
     'import': (['robot.urdf', '-o', 'x.yaml'], 'linkage_ros.cli.import_urdf:read_urdf'),
     'synthesize': (['--pairs', 'pairs.csv'], 'csv:reader'),
@@ -66,7 +65,6 @@ COMPUTE = (
     'urdf',
     'mjcf',
     'scene',
-    'cost',
     'accuracy',
 )
 

@@ -32,7 +32,7 @@ OF_LINKAGES = {
     'check': '', 'solve': '', 'draw': '-o x.svg', 'animate': '-o x.svg', 'compile': '-o x.c',
 }  # fmt: skip
 OF_SCENES = {
-    'scene': '', 'cost': '', 'simulate': '--seconds 1 -o x.csv', 'fmu': '-o x.fmu', 'urdf': '',
+    'scene': '', 'simulate': '--seconds 1 -o x.csv', 'fmu': '-o x.fmu', 'urdf': '',
     'mjcf': '', 'view': '-o x.html', 'accuracy': '--quick',
 }  # fmt: skip
 OF_BAGS = {

@@ -91,8 +91,7 @@ READS = {
     'fmu': ['fmu', '-o', 'x.fmu', 'FILE'],
     'scene': ['scene', 'FILE'],
     'simulate': ['simulate', '-o', 'x.csv', 'FILE'],
-    'cost': ['cost', 'FILE'],
-    'accuracy': ['accuracy', '-o', 'page', 'FILE'],
+    'accuracy': ['accuracy', 'FILE'],
     'run': ['run', 'FILE'],
     'import': ['import', 'FILE'],
     'synthesize': ['synthesize', '--pairs', 'FILE'],
@@ -149,7 +148,7 @@ NODE = 'from linkage_ros.node.linkage_node import main'
 NEED_BAGS = (
     ['run', 'x.yaml'], ['demo'], ['play', 'bag'], ['plot', 'bag'], ['info', 'bag'],
     ['report', 'bag'], ['export', 'bag', '-o', 'x.csv'], ['recover', 'bag'], ['replay', 'bag'],
-    ['cost', 'x.yaml'], ['scene', 'bag.yaml'], ['accuracy', 'x.yaml', '--only', 'recording'],
+    ['scene', 'bag.yaml'], ['accuracy', 'x.yaml', '--only', 'recording'],
 )  # fmt: skip
 
 

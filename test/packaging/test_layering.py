@@ -38,7 +38,7 @@ HEIGHTS = (
     ('pipeline',),
     ('replay', 'fmu'),
     ('simulation',),
-    ('cost', 'accuracy'),
+    ('study',),
     ('report',),
     ('view',),
     ('node', 'cli'),

@@ -77,7 +77,7 @@ def test_share_is_what_the_checkout_has(prefix, root):
     assert index.is_file()
 
 
-@pytest.mark.parametrize('room', ['pages', 'accuracy/page', 'report'])
+@pytest.mark.parametrize('room', ['pages', 'study', 'report'])
 def test_what_pages_are_made_with_is_there(prefix, root, room):
     packages = [folder for folder in prefix.rglob(f'linkage_ros/{room}') if folder.is_dir()]
     assert len(packages) == 1

@@ -33,7 +33,6 @@ from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.main import main
-from linkage_ros.cost import feed
 from linkage_ros.messages.single_values import text_message
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.run_recording import RunRecording
@@ -43,6 +42,7 @@ from linkage_ros.replay.replay import change_text
 from linkage_ros.replay.run_files import EXTRA
 from linkage_ros.replay.topic_description import message_type
 from linkage_ros.scene.load import load_scene
+from linkage_ros.study.prices import turn_crank
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -122,7 +122,7 @@ def run(folder: Path, text: str, linkage: str = 'four_bar') -> Path:
     )
 
     def pace(loop, stopping):
-        for number, (now, message) in enumerate(islice(feed(scene, pipeline), TICKS)):
+        for number, (now, message) in enumerate(islice(turn_crank(scene, pipeline), TICKS)):
             if message:
                 samples.append((message, {'source_timestamp': now - 137_000}))
             if number % 50 == 25:

@@ -1,0 +1,186 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What effects and faults make different, against closed forms of each."""
+
+from __future__ import annotations
+
+from itertools import islice
+from math import cos, hypot, sqrt, tau
+
+from linkage_ros.errors import FileError
+from linkage_ros.resources import shipped
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.scene import Scene
+from linkage_ros.study.deliberate import (
+    ALL_TOGETHER,
+    compare_runs,
+    measure_deliberate,
+    published_states,
+)
+from linkage_ros.study.prices import turn_crank
+import numpy as np
+import pytest
+
+RATE, TICKS = 1000.0, 2000
+FILE = shipped('linkages/four_bar.yaml').read_bytes()
+# Lengths of that file, in [m].
+CRANK, COUPLER, ROCKER, GROUND = 0.04, 0.12, 0.08, 0.1
+
+
+def scene_of(rest: str, drive: str = 'constant_rate: {rate: 6.283185307179586}') -> Scene:
+    text = f'linkage: x.yaml\nrate: {RATE:g}\ndrive: {{{drive}}}\n{rest}'
+    return parse_scene('x', 'x', {'scene.yaml': text.encode(), 'linkage.yaml': FILE})
+
+
+def rocker_of(crank: float) -> float:
+    """Return the angle of the rocker by the law of cosines, B on the left of A→O4."""
+    x, y = CRANK * cos(crank), CRANK * np.sin(crank)
+    to_pin = hypot(GROUND - x, y)
+    inner = np.arccos((ROCKER**2 + to_pin**2 - COUPLER**2) / (2.0 * ROCKER * to_pin))
+    return float(np.arctan2(y, x - GROUND) - inner)
+
+
+def rockers(times: object) -> np.ndarray:
+    return np.unwrap([rocker_of(tau * time) for time in np.asarray(times)])
+
+
+TIMES = np.arange(TICKS) / RATE
+
+
+def test_the_reference_is_what_is_published() -> None:
+    states = [
+        state['rocker_joint'] for _, state in published_states(scene_of(''), turn_crank, 100)
+    ]
+    assert states == pytest.approx(list(rockers(TIMES[:100])), abs=1e-12)
+
+
+def moments(apart: object) -> tuple[float, float]:
+    apart = np.abs(np.asarray(apart))
+    return float(np.sqrt(np.mean(apart**2))), float(np.max(apart))
+
+
+def held(every: int) -> tuple[float, float]:
+    """Return the error of a listener who holds each so many-th state."""
+    return moments(rockers(TIMES) - rockers(TIMES[np.arange(TICKS) // every * every]))
+
+
+def delayed(ticks: int) -> tuple[float, float]:
+    known = rockers(TIMES)
+    apart = np.concatenate([np.zeros(ticks), known[ticks:] - known[:-ticks]])
+    return moments(apart)
+
+
+QUANTUM = tau / 1000.0
+EXPECTED: dict[str, tuple[float, float]] = {
+    'bias: {joints: {rocker_joint: 0.01}}': (0.01, 0.01),
+    # It counts the steps that it has passed: an error between 0 and a step.
+    'encoder: {joints: {rocker_joint: {counts: 1000}}}': (QUANTUM / sqrt(3.0), QUANTUM),
+    'velocity: {}': (0.0, 0.0),
+    'acceleration: {}': (0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize('effect', EXPECTED)
+def test_an_effect_alone(effect: str) -> None:
+    (found,) = compare_runs(scene_of(f'effects: {{{effect}}}'), [scene_of('')], turn_crank, TICKS)
+    rms, worst = EXPECTED[effect]
+    assert found.error.rms == pytest.approx(rms, rel=0.1)
+    assert found.error.worst == pytest.approx(worst, rel=0.02)
+    assert found.silent == 0.0
+
+
+def test_a_state_that_is_withheld_is_old_for_who_holds_it() -> None:
+    one = scene_of('effects: {rate_limit: {rate: 100}}')
+    (found,) = compare_runs(one, [scene_of('')], turn_crank, TICKS)
+    # The coupler moves, too: the worst joint is meant.
+    assert found.error.worst >= held(10)[1] * (1.0 - 1e-9)
+    assert found.error.worst < 3.0 * held(10)[1]
+
+
+def test_lost_states_are_told() -> None:
+    one = scene_of('effects: {dropout: {probability: 0.3}}')
+    (found,) = compare_runs(one, [scene_of('')], turn_crank, TICKS)
+    assert found.silent == pytest.approx(0.3, abs=0.05)
+    assert found.error.worst > 0.0
+
+
+def test_a_delay_is_the_motion_within_it() -> None:
+    one = scene_of('publish_input: true\neffects: {delay: {seconds: 0.02}}')
+    (found,) = compare_runs(one, [scene_of('publish_input: true')], turn_crank, TICKS)
+    # The crank's own is exact, and any other joint's is no less than the rocker's.
+    assert found.error.worst >= tau * 0.02 * (1.0 - 1e-9)
+    assert found.error.worst >= delayed(20)[1] * (1.0 - 1e-9)
+
+
+def test_a_fault_shows_at_the_times_of_the_scene() -> None:
+    one = scene_of('faults: {f: {freeze: {}, at: [0.5], seconds: 0.25}}')
+    bare = scene_of('')
+    (found,) = compare_runs(one, [bare], turn_crank, TICKS)
+    states = [state for _, state in published_states(bare, turn_crank, TICKS)]
+    frozen = [
+        max(abs(states[tick][name] - states[499][name]) for name in states[tick])
+        if 500 <= tick < 750
+        else 0.0
+        for tick in range(TICKS)
+    ]
+    rms, worst = moments(frozen)
+    assert found.error.worst == pytest.approx(worst, rel=0.02)
+    assert found.error.rms == pytest.approx(rms, rel=0.02)
+
+
+def test_a_clock_that_jumps_back_does_not_end_the_run() -> None:
+    one = scene_of('faults: {f: {time_jump: {by: -0.3}, at: [0.5], seconds: 0.2}}')
+    ticks = list(islice(published_states(one, turn_crank, TICKS), TICKS))
+    assert len(ticks) == TICKS
+    assert all(is_new for is_new, _ in ticks)
+
+
+def test_rows_of_a_scene() -> None:
+    scene = scene_of(
+        'effects: {encoder: {joints: {rocker_joint: {counts: 1000}}}, velocity: {}, effort: {}}\n'
+        'loads: {gravity: [0, -9.81]}\n'
+        'faults: {f: {silence: {}}}\npublish_input: true\n'
+    )
+    knobs = measure_deliberate(scene, quick=True, horizon=0.2)
+    names = {knob.name for knob in knobs}
+    assert names == {'encoder', 'velocity', 'effort', 'fault f', ALL_TOGETHER}
+    assert knobs[0].name == 'encoder'
+    assert all(knob.is_deliberate and knob.own.price is not None for knob in knobs)
+    assert knobs[-1].name == ALL_TOGETHER
+    by_name = {knob.name: knob for knob in knobs}
+    assert by_name['effort'].own.error.worst == 0.0
+    assert 'only when it is called for' in by_name['fault f'].note
+    assert 'computed for effort' in by_name['velocity'].note
+    assert by_name['encoder'].after is None
+
+
+def test_a_torque_scene_says_after_which_time() -> None:
+    scene = scene_of(
+        'effects: {friction: {joints: {O2: {viscous: 1.0e-4}}}}\nloads: {gravity: [0, -9.81]}\n',
+        'torque: {start: 0.5}',
+    )
+    (friction,) = measure_deliberate(scene, quick=True, horizon=0.3)
+    assert friction.after == pytest.approx(0.3)
+    assert friction.own.error.worst > 0.0
+
+
+def test_a_scene_without_any_has_no_rows() -> None:
+    assert measure_deliberate(scene_of('')) == []
+
+
+def test_what_does_not_go_together_is_one_line() -> None:
+    with pytest.raises(FileError):
+        measure_deliberate(scene_of('effects: {friction: {joints: {O2: {coulomb: 1.0e-3}}}}\n'))

@@ -1,0 +1,200 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Prices: found in spite of drift and disturbances, and called noise where nothing is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import islice
+from random import Random
+
+from linkage_ros.errors import FileError, LinkageError
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.scene.scene import Scene
+from linkage_ros.study import prices
+from linkage_ros.study.budget import JointError, Knob, Setting
+from linkage_ros.study.prices import (
+    add_prices,
+    change_scene,
+    price_changes,
+    price_scenes,
+    tick_price,
+    TimedScene,
+    turn_crank,
+)
+import pytest
+
+DEMO = load_scene('demo')
+
+
+class FalseClock:
+    """A clock in [s] that ticks of scenes advance: by their cost, a common drift and noise."""
+
+    def __init__(self, costs: dict[str, float], drift: float, noise: float, seed: int) -> None:
+        self.now, self.costs = 0.0, costs
+        self.drift, self.noise, self.random = drift, noise, Random(seed)
+        self.blocks = 0
+
+    def take(self, name: str, ticks: int) -> None:
+        self.blocks += 1
+        cost = self.costs[name] + self.drift * self.blocks
+        cost += self.random.gauss(0.0, self.noise)
+        if self.random.random() < 0.02:  # the machine does something else
+            cost *= 20.0
+        self.now += cost * 1e-6 * ticks
+
+
+@pytest.fixture
+def false_clock(monkeypatch: pytest.MonkeyPatch) -> Callable[..., FalseClock]:
+    """Give a function that lets scenes cost what it is told, by the solver's clock."""
+
+    def install(costs: dict[str, float], drift: float, noise: float, seed: int) -> FalseClock:
+        clock = FalseClock(costs, drift, noise, seed)
+
+        def time_block(scene: TimedScene, read: Callable[[], float]) -> float:
+            begun = read()
+            clock.take(scene.scene.name, scene.block)
+            scene.published += 1
+            return (read() - begun) * 1e6 / scene.block
+
+        monkeypatch.setattr(TimedScene, 'time_block', time_block)
+        monkeypatch.setattr(prices, 'thread_clock', lambda: lambda: clock.now)
+        monkeypatch.setattr(prices, 'perf_counter', lambda: clock.now)
+        return clock
+
+    return install
+
+
+def named(name: str) -> Scene:
+    text = b'linkage: four_bar.yaml\nrate: 1000\n'
+    return parse_scene(
+        name, name, {'scene.yaml': text, 'linkage.yaml': DEMO.files['linkage.yaml']}
+    )
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_a_difference_is_found_beneath_drift_and_disturbances(
+    false_clock: Callable[..., FalseClock], seed: int
+) -> None:
+    random = Random(seed)
+    own = random.uniform(5.0, 80.0)
+    more = random.choice([-0.4, 0.1, 1.0, 30.0]) * own
+    # The clock goes up by a half on the way; noise is a twentieth of a tick.
+    false_clock({'own': own, 'other': own + more}, own * 1e-3, 0.05 * own, seed)
+    (price,) = price_scenes(named('own'), [named('other')], 2.0)
+    assert price.tick.middle == pytest.approx(more, abs=0.02 * (2.0 * own + more))
+    assert price.tick.low <= price.tick.middle <= price.tick.high
+    assert not price.is_noise
+
+
+def test_no_difference_is_noise_nearly_always(false_clock: Callable[..., FalseClock]) -> None:
+    noisy = 0
+    for seed in range(40):
+        false_clock({'own': 10.0, 'other': 10.0}, 0.01, 0.5, seed)
+        (price,) = price_scenes(named('own'), [named('other')], 1.0)
+        noisy += price.is_noise
+    assert noisy >= 38
+
+
+def test_blocks_of_scenes_that_tick_at_different_rates_take_the_same_simulated_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    blocks: list[tuple[float, int]] = []
+    real = TimedScene.time_block
+
+    def time_block(scene: TimedScene, clock: Callable[[], float]) -> float:
+        blocks.append((scene.rate, scene.block))
+        return real(scene, clock)
+
+    monkeypatch.setattr(TimedScene, 'time_block', time_block)
+    price_changes(DEMO, [[('rate', rate)] for rate in (50.0, 300.0, 2000.0)], 0.01)
+    assert len({round(block / rate, 6) for rate, block in blocks}) == 1
+    assert min(block for _, block in blocks) >= 20
+
+
+def test_a_lap_begins_again_where_it_began() -> None:
+    seen: list[int] = []
+
+    def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
+        for now, message in turn_crank(scene, pipeline):
+            seen.append(now)
+            yield now, message
+
+    timed = TimedScene(DEMO, feed)
+    for _ in range(250):
+        timed.time_block(lambda: 0.0)
+    lap = 10_000
+    assert seen[lap : lap + 1000] == seen[:1000]
+    assert timed.published == 25_000
+
+
+def test_a_change_is_what_set_does() -> None:
+    changes = [
+        ('rate', 250.0),
+        ('effects', {'noise': {'joints': {'rocker_joint': {'white': 1e-3}}}}),
+    ]
+    changed = change_scene(DEMO, changes)
+    typed = ['rate=250', 'effects={noise: {joints: {rocker_joint: {white: 0.001}}}}']
+    expected = load_scene('demo', typed)
+    assert (changed.rate, changed.seed) == (expected.rate, expected.seed)
+    assert changed.members[0].effects == expected.members[0].effects
+    with pytest.raises(FileError, match='rate: -1 is out of bounds'):
+        change_scene(DEMO, [('rate', -1)])
+
+
+def test_prices_are_added_where_a_scene_can_ask_for_them() -> None:
+    error = JointError(0.0, 0.0)
+    knob = Knob(
+        'age in use',
+        [
+            Setting('500 Hz', error, None, [('rate', 500.0)]),
+            Setting('own', error, None),
+            Setting('float32', error, None, None),
+            Setting('carried', error, None, (), 'carry it forward'),
+        ],
+        1,
+    )
+    (filled,) = add_prices(DEMO, [knob], 0.05)
+    half, own, single, carried = filled.settings
+    assert half.price is not None
+    assert half.price.rate == 500.0
+    assert (own.price, single.price, carried.price) == (None, None, None)
+    assert filled._replace(settings=knob.settings) == knob
+
+
+def test_a_scene_that_publishes_nothing_has_no_price() -> None:
+    late = change_scene(DEMO, [('drive.topic.max_age', 0.05)])
+
+    def feed(_scene: Scene, _pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
+        for count in range(10**9):
+            yield 10**9 + count * 10**6, b''
+
+    with pytest.raises(LinkageError, match='demo: publishes nothing: there is nothing to measure'):
+        tick_price(late, 0.01, feed)
+
+
+@pytest.mark.parametrize('name', ['demo', 'two_fingers', 'torque_crank', 'jansen_leg'])
+def test_a_crank_turns_or_swings_where_it_closes(name: str) -> None:
+    scene = load_scene(name)
+    pipeline = Pipeline(scene)
+    published = 0
+    for now, message in islice(turn_crank(scene, pipeline), 2000):
+        assert bool(message) == bool(pipeline.topic)
+        if message:
+            assert pipeline.offer(message, now) is None
+        published += bool(pipeline.tick(now).message)
+    assert published == 2000
