@@ -78,8 +78,9 @@ class Setting(NamedTuple):
 
     @property
     def line(self) -> str:
-        """Return what a user writes: 'drive.torque.step: 0.0005'."""
-        return ', '.join(_line(*each) for each in self.changes or ()) or self.advice
+        """Return what a user writes, and does: 'drive.torque.step: 0.0005'."""
+        written = [_line(*each) for each in self.changes or ()]
+        return ', '.join([*written, *([self.advice] if self.advice else [])])
 
 
 def _line(key: str, value: object) -> str:

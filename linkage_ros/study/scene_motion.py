@@ -26,7 +26,7 @@ Whatever noise, delay or fault the scene adds is no part of its motion: that is 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import cos, pi, sin, tau
 from typing import Any, NamedTuple
@@ -34,25 +34,28 @@ from typing import Any, NamedTuple
 from linkage_ros.bag.reader import Bag, read_bag
 from linkage_ros.drives import topic as topic_drive
 from linkage_ros.drives.drive import Context, CrankState
-from linkage_ros.drives.torque import TorqueDrive
+from linkage_ros.drives.torque import TOPIC as TORQUE_TOPIC, TorqueDrive
 from linkage_ros.dynamics.motion import LARGEST
 from linkage_ros.errors import BagError, LinkageError, listed
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.messages.joint_state import EffortCommand, JointStateReader, Rejection
+from linkage_ros.messages.joint_state import (
+    EffortCommand,
+    JointStateReader,
+    JointStateWriter,
+    Rejection,
+)
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
 from linkage_ros.scene.scene import Scene, SceneLinkage
+from linkage_ros.study.prices import Feed, turn_crank, USUAL_RATE
 
 BEGIN = NANOSECONDS
 """Time of the first tick, in [ns]."""
 
 SINE = 'sine'
 """What ``like`` is for a sine; anything else is the path of a bag."""
-
-USUAL_RATE = 1000.0
-"""Samples of a crank per second, where the scene ticks once for each."""
 
 COMMAND_PERIOD = 0.02
 """Longest time between two commands of a torque drive, in [s]."""
@@ -465,3 +468,63 @@ def _recorded_commands(bag: Bag, line: LinkagePipeline, horizon: float) -> list[
     return [
         Command(time - first, command.effort) for time, command in found if time - first < until
     ]
+
+
+def feed_of(motions: Sequence[MemberMotion]) -> Feed:
+    """Return the messages that make this motion, for a measurement of ticks."""
+    if not any(motion.sample_rate or motion.commands for motion in motions):
+        return turn_crank
+
+    def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
+        if pipeline.topic == TORQUE_TOPIC:
+            return _commands_and_ticks(scene, motions)
+        return _samples_and_ticks(scene, motions) if pipeline.topic else turn_crank(scene, pipeline)
+
+    return feed
+
+
+def _samples_and_ticks(
+    scene: Scene, motions: Sequence[MemberMotion]
+) -> Iterator[tuple[int, bytes]]:
+    """Yield ticks, each with a sample; the last one again and again after the end of a bag."""
+    driven = [each for each in motions if each.member.drive[0] == 'topic']
+    if any(each.member.dependent for each in driven):
+        yield from turn_crank(scene, Pipeline(scene))
+        return
+    write = JointStateWriter([name for each in driven for name in each.member.sampled]).write
+    period = 1e9 / (scene.rate or USUAL_RATE)
+    known: list[Crank] = [((0.0,) * len(e.member.sampled),) * 2 for e in driven]
+    number = 0
+    while True:
+        now = BEGIN + round(number * period)
+        found = [each.path(now - BEGIN) for each in driven if each.path]
+        known = [new or old for new, old in zip(found, known, strict=True)]
+        values = [value for crank in known for value in crank[0]]
+        rates = [rate for crank in known for rate in crank[1]]
+        yield now, write(now, values, rates, (0.0,) * len(values))
+        number += 1
+
+
+def _commands_and_ticks(
+    scene: Scene, motions: Sequence[MemberMotion]
+) -> Iterator[tuple[int, bytes]]:
+    """Yield ticks, with the commands that have come since the last one."""
+    driven = [each for each in motions if each.member.drive[0] == 'torque']
+    names = [name for each in driven for name in each.context.inputs_in_messages]
+    write = JointStateWriter(names).write
+    zeros = (0.0,) * len(names)
+    period = 1e9 / scene.rate
+    number, next_ones = 0, [0] * len(driven)
+    efforts = [0.0] * len(driven)
+    while True:
+        elapsed = round(number * period)
+        fresh = False
+        for k, each in enumerate(driven):
+            while next_ones[k] < len(each.commands) and (
+                each.commands[next_ones[k]].time <= elapsed
+            ):
+                efforts[k] = each.commands[next_ones[k]].effort
+                next_ones[k] += 1
+                fresh = True
+        yield BEGIN + elapsed, write(BEGIN, zeros, zeros, efforts) if fresh else b''
+        number += 1
