@@ -16,11 +16,12 @@
 """
 What a tick of a scene costs, and what a changed setting adds to it.
 
-Scenes take turns in one process, a block of ticks each, in an order that changes. A difference is
-taken from block to block, over the same simulated time; a price is the median of each round, of
-which the quartiles are told. Times are processor time of the thread, with garbage collection off
-as in the node. Nothing is published: what the middleware takes for a message is the same for
-every setting.
+Scenes take turns in one process, a block of ticks each, in an order that changes. All rounds begin
+at the start of the scenes and pass the same simulated time, so each block is measured once a
+round. A price is the mean of the blocks, each the median of the rounds; a difference is taken from
+block to block. Its spread are the quartiles of the rounds. Times are processor time of the thread,
+with garbage collection off as in the node. Nothing is published: what the middleware takes for a
+message is the same for every setting.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from itertools import islice
 import json
 from math import cos, sin, tau
 from random import Random
-from statistics import median
+from statistics import fmean, median
 from time import perf_counter
 
 from linkage_ros.drives.dependent_samples import sampled_inverse
@@ -58,9 +59,9 @@ _BLOCK = 100
 _SLOW_BLOCK = 20
 """Fewest ticks of a block, of a scene that ticks more slowly than those it is compared with."""
 
-_ROUNDS = 16
+_ROUNDS = 12
 _LAP = 10.0
-"""Simulated time after which a scene starts again, in [s]: a torque may have it run away."""
+"""Longest simulated time of a round, in [s]."""
 
 Feed = Callable[[Scene, Pipeline], Iterator[tuple[int, bytes]]]
 """Yields times in [ns], each with a crank message, or b'' if no drive listens to a topic."""
@@ -136,7 +137,7 @@ def _swing(center: float, amplitude: float, speed: float) -> Path:
 
 
 class TimedScene:
-    """A scene that ticks block by block, over laps of the same simulated time."""
+    """A scene that ticks block by block, and can begin again."""
 
     def __init__(self, scene: Scene, feed: Feed) -> None:
         self.scene, self.rate = scene, scene.rate or USUAL_RATE
@@ -144,21 +145,18 @@ class TimedScene:
         self.published = 0
         self._feed = feed
         self._closures: Sequence[Closure] | None = None
-        self._begin_lap()
+        self.begin()
 
-    def _begin_lap(self) -> None:
+    def begin(self) -> None:
+        """Go to the start of the scene."""
         self._pipeline = Pipeline(self.scene, self._closures)
         # The first solution of an iterated linkage may take a second.
         self._closures = self._pipeline.closures
-        blocks = max(1, round(_LAP * self.rate / self.block))
-        self._fed = islice(self._feed(self.scene, self._pipeline), blocks * self.block)
+        self._fed = self._feed(self.scene, self._pipeline)
 
     def time_block(self, clock: Callable[[], float]) -> float:
         """Tick a block, each tick after its message; return the mean time of a tick, in [µs]."""
         block = list(islice(self._fed, self.block))
-        if len(block) < self.block:
-            self._begin_lap()
-            block = list(islice(self._fed, self.block))
         pipeline = self._pipeline
         offer, tick, injection = pipeline.offer, pipeline.tick, pipeline.injection
         published = 0
@@ -226,19 +224,22 @@ def time_ticks(
             for one in timed:
                 one.time_block(clock)
             durations.append(perf_counter() - begun)
-        blocks = max(1, round(seconds / (_ROUNDS * min(durations))))
-        for done in range(_ROUNDS):
+        wanted = seconds / min(durations)
+        blocks = max(1, round(min(wanted / _ROUNDS, _LAP / span)))
+        count = max(_ROUNDS, round(wanted / blocks))
+        for done in range(count):
             times: list[list[float]] = [[] for _ in timed]
+            for one in timed:
+                one.begin()
             for _ in range(blocks):
                 # A scene behind a slow one finds cold caches: the order changes.
                 shuffle(order)
                 for index in order:
                     times[index].append(timed[index].time_block(clock))
-                progress((done + len(times[0]) / blocks) / _ROUNDS)
+                progress((done + len(times[0]) / blocks) / count)
             for found, blocks_of_scene in zip(rounds, times, strict=True):
                 found.append(blocks_of_scene)
-            if collecting:
-                gc.collect(0)
+            gc.collect(0)
     finally:
         if collecting:
             gc.enable()
@@ -255,7 +256,7 @@ def time_ticks(
 def tick_price(scene: Scene, seconds: float = 0.5, feed: Feed = turn_crank) -> Price:
     """Return what a whole tick of a scene costs, with its crank message; see `time_ticks`."""
     (rounds,) = time_ticks([scene], seconds, feed)
-    return Price(spread_of([median(blocks) for blocks in rounds]), scene.rate or USUAL_RATE)
+    return Price(_spread_of_rounds(rounds), scene.rate or USUAL_RATE)
 
 
 def price_scenes(
@@ -275,12 +276,34 @@ def price_scenes(
 
 def subtract_times(rounds: Rounds, others: Rounds) -> Spread:
     """Return how much longer one takes than the other; both were measured in turns."""
-    return spread_of(
+    return _spread_of_rounds(
         [
-            median(one - other for one, other in zip(*blocks, strict=True))
+            [one - other for one, other in zip(*blocks, strict=True)]
             for blocks in zip(rounds, others, strict=True)
         ]
     )
+
+
+def _spread_of_rounds(rounds: Rounds) -> Spread:
+    """Return the mean of the blocks, each the median of the rounds, with the rounds' quartiles."""
+    # A block that the machine has disturbed in one round does not count; one that is dear in every
+    # round does.
+    usual = [median(times) for times in zip(*rounds, strict=True)]
+    middle = fmean(usual)
+    low, _, high = spread_of(
+        [
+            middle + _mean_of_most([time - own for time, own in zip(blocks, usual, strict=True)])
+            for blocks in rounds
+        ]
+    )
+    return Spread(min(low, middle), middle, max(high, middle))
+
+
+def _mean_of_most(values: Sequence[float]) -> float:
+    """Return the mean without the lowest and the highest tenth."""
+    beyond = len(values) // 10
+    end = len(values) - beyond
+    return fmean(sorted(values)[beyond:end])
 
 
 def price_changes(

@@ -33,6 +33,7 @@ from linkage_ros.study.prices import (
     price_changes,
     price_scenes,
     tick_price,
+    time_ticks,
     TimedScene,
     turn_crank,
 )
@@ -64,6 +65,7 @@ def false_clock(monkeypatch: pytest.MonkeyPatch) -> Callable[..., FalseClock]:
 
     def install(costs: dict[str, float], drift: float, noise: float, seed: int) -> FalseClock:
         clock = FalseClock(costs, drift, noise, seed)
+        monkeypatch.setattr(TimedScene, 'begin', lambda _scene: None)
 
         def time_block(scene: TimedScene, read: Callable[[], float]) -> float:
             begun = read()
@@ -126,20 +128,47 @@ def test_blocks_of_scenes_that_tick_at_different_rates_take_the_same_simulated_t
     assert min(block for _, block in blocks) >= 20
 
 
-def test_a_lap_begins_again_where_it_began() -> None:
-    seen: list[int] = []
+def test_every_round_begins_where_the_scene_does() -> None:
+    begun: list[int] = []
 
     def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
-        for now, message in turn_crank(scene, pipeline):
-            seen.append(now)
+        for number, (now, message) in enumerate(turn_crank(scene, pipeline)):
+            if not number:
+                begun.append(now)
             yield now, message
 
-    timed = TimedScene(DEMO, feed)
-    for _ in range(250):
-        timed.time_block(lambda: 0.0)
-    lap = 10_000
-    assert seen[lap : lap + 1000] == seen[:1000]
-    assert timed.published == 25_000
+    (rounds,) = time_ticks([DEMO], 0.05, feed)
+    assert len(rounds) >= 12
+    assert len({len(blocks) for blocks in rounds}) == 1
+    assert len(begun) == len(rounds) + 1
+    assert len(set(begun)) == 1
+
+
+def test_a_part_of_the_motion_that_costs_more_counts_by_its_share(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = 0.0
+    places = {'own': 0, 'other': 0}
+
+    def begin(scene: TimedScene) -> None:
+        places[scene.scene.name] = 0
+
+    def time_block(scene: TimedScene, _clock: Callable[[], float]) -> float:
+        nonlocal now
+        # A fifth of the motion costs six times as much, as where friction holds and lets go.
+        name = scene.scene.name
+        places[name] += 1
+        cost = 60.0 if name == 'other' and places[name] % 5 == 0 else 10.0
+        now += cost * 1e-6 * scene.block
+        scene.published += 1
+        return cost
+
+    monkeypatch.setattr(TimedScene, 'begin', begin)
+    monkeypatch.setattr(TimedScene, 'time_block', time_block)
+    monkeypatch.setattr(prices, 'perf_counter', lambda: now)
+    (price,) = price_scenes(named('own'), [named('other')], 10.0)
+    assert price.tick.middle == pytest.approx(10.0, rel=0.05)
+    assert not price.is_noise
 
 
 def test_a_change_is_what_set_does() -> None:
