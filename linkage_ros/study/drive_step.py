@@ -150,9 +150,7 @@ def exact_cranks(
     use: TorqueParameters = motion.member.drive[1]
     wound = use.motor is not None and use.motor.inductance > 0.0
     if wound or find_spec('scipy') is None:
-        one, other = (
-            cranks_at(motion, times, step=max(_SHORTEST, use.step / n)) for n in (16, 8)
-        )
+        one, other = (cranks_at(motion, times, step=max(_SHORTEST, use.step / n)) for n in (16, 8))
         part = 3.0
     else:
         one, other = (_integrated(motion, times, factor) for factor in (1.0, 10.0))
@@ -161,9 +159,7 @@ def exact_cranks(
     return one, doubt and JointError(doubt.rms / part, doubt.worst / part)
 
 
-def _integrated(
-    motion: MemberMotion, times: Sequence[int], factor: float
-) -> list[Crank | None]:
+def _integrated(motion: MemberMotion, times: Sequence[int], factor: float) -> list[Crank | None]:
     from linkage_ros.study import exact_drive  # local import: scipy is optional
 
     drive = built(motion)

@@ -34,7 +34,6 @@ from math import copysign, inf, ulp
 from typing import Any, NamedTuple
 
 from linkage_ros.dynamics.motion import Motion, OneFreedom
-from linkage_ros.dynamics.two_masses import TwoMasses
 import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
@@ -313,8 +312,9 @@ class _Run:
             self._side = 0
 
         yield (
-            lambda t, y: self._pressing(acting, joined, t, float(y[0]), float(y[1])) + _PULL
-        ), part
+            (lambda t, y: self._pressing(acting, joined, t, float(y[0]), float(y[1])) + _PULL),
+            part,
+        )
 
     def _turning(self, sense: float, number: int) -> tuple[Margin, Callable[[], None]]:
         """Return the margin of a rate to 0, and what happens there."""

@@ -93,9 +93,7 @@ def measure_budget(
     knobs: list[Knob] = []
     left_out: list[str] = [_QUICK_LEFT_OUT] if quick else []
     if ERRORS in parts:
-        found, more = _measure_errors(
-            scene, motions, horizon, quick, feed, part_progress(ERRORS)
-        )
+        found, more = _measure_errors(scene, motions, horizon, quick, feed, part_progress(ERRORS))
         knobs += sorted(found, key=lambda knob: knob.own.error.worst, reverse=True)
         left_out += more
         done += _SHARES[ERRORS] / whole
@@ -172,9 +170,7 @@ def _measure_errors(
     progress(0.7)
     knobs = [_accepted(scene, knob) for knob in knobs]
     seconds = 3.0 if quick else 30.0
-    priced = add_prices(
-        scene, knobs, seconds, feed, lambda share: progress(0.7 + 0.3 * share)
-    )
+    priced = add_prices(scene, knobs, seconds, feed, lambda share: progress(0.7 + 0.3 * share))
     return priced, left_out
 
 

@@ -34,7 +34,8 @@ from typing import Any, NamedTuple
 from linkage_ros.bag.reader import Bag, read_bag
 from linkage_ros.drives import topic as topic_drive
 from linkage_ros.drives.drive import Context, CrankState
-from linkage_ros.drives.torque import TOPIC as TORQUE_TOPIC, TorqueDrive
+from linkage_ros.drives.torque import TOPIC as TORQUE_TOPIC
+from linkage_ros.drives.torque import TorqueDrive
 from linkage_ros.dynamics.motion import LARGEST
 from linkage_ros.errors import BagError, LinkageError, listed
 from linkage_ros.kinematics.closure import Closure
@@ -234,7 +235,9 @@ def _recorded(motion: MemberMotion, bag: Bag, topic: str, pace: float = 0.0) -> 
     if pace:
         scale = 1e-9 * pace * (samples[-1].stamp - samples[0].stamp) / (len(samples) - 1)
         samples = [
-            _Sample(*[round(k * 1e9 / pace)] * 2, each.values, tuple(scale * w for w in each.rates))
+            _Sample(
+                *[round(k * 1e9 / pace)] * 2, each.values, tuple(scale * w for w in each.rates)
+            )
             for k, each in enumerate(samples)
         ]
     stamps = [sample.stamp - samples[0].stamp for sample in samples]
@@ -336,9 +339,7 @@ def _commanded(
     return motion._replace(commands=commands, note=note)
 
 
-def cranks_at(
-    motion: MemberMotion, times: Sequence[int], **changes: Any
-) -> list[Crank | None]:
+def cranks_at(motion: MemberMotion, times: Sequence[int], **changes: Any) -> list[Crank | None]:
     """
     Return the crank at some times since the first tick, in [ns] and in order.
 
@@ -478,7 +479,9 @@ def feed_of(motions: Sequence[MemberMotion]) -> Feed:
     def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
         if pipeline.topic == TORQUE_TOPIC:
             return _commands_and_ticks(scene, motions)
-        return _samples_and_ticks(scene, motions) if pipeline.topic else turn_crank(scene, pipeline)
+        return (
+            _samples_and_ticks(scene, motions) if pipeline.topic else turn_crank(scene, pipeline)
+        )
 
     return feed
 

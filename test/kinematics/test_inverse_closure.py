@@ -25,12 +25,13 @@ import subprocess
 import sys
 
 from campaigns.inverse import errors_of, passes_of, random_four_bars
+from flint import arb
 from linkage_ros import Closure, DefinitionError, Limits, linkage_names, load
-from linkage_ros.accuracy.reference import Reference, SingularError
 from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.crank_branches import _pieces, CrankBranch
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.status import Status
+from linkage_ros.study.enclosure import prove, SingularError
 import numpy as np
 import pytest
 
@@ -79,7 +80,6 @@ def test_crank_is_as_exact_as_the_roundings_allow(name):
 def test_exact_crank_lies_within_the_bound(name):
     """The joint, to fifty digits, passes the wanted value within the bound about the crank."""
     closure = gallery(name)
-    reference = Reference(closure.linkage)
     for joint in outputs(closure)[-2:]:
         number = closure.joint_names.index(joint)
         for branch in closure.branches(joint):
@@ -93,11 +93,11 @@ def test_exact_crank_lies_within_the_bound(name):
                     if not branch.least < place < branch.most:
                         break  # The exact crank cannot be beyond the end.
                     try:
-                        at = reference.solve([place])
+                        at = prove(closure.linkage, [place])
                     except (SingularError, ValueError):
                         break
-                    off = at.joints[number] - y
-                    sides.append(off - tau * round(float(off) / tau) if branch.turning else off)
+                    off = float((at.joints[number] - arb(y)).mid())
+                    sides.append(off - tau * round(off / tau) if branch.turning else off)
                 assert len(sides) < 2 or sides[0] * sides[1] <= 0, (joint, share)
 
 
@@ -105,7 +105,6 @@ def test_exact_crank_lies_within_the_bound(name):
 def test_rates_of_the_crank_give_the_joint_its_rates(name):
     """The reference, driven by the crank's rates, moves the joint as was asked."""
     closure = gallery(name)
-    reference = Reference(closure.linkage)
     for joint in [*outputs(closure)[:2], outputs(closure)[-1]]:
         number = closure.joint_names.index(joint)
         for branch in closure.branches(joint):
@@ -114,8 +113,11 @@ def test_rates_of_the_crank_give_the_joint_its_rates(name):
                 position = inverse.position(branch.low + share * (branch.high - branch.low))
                 velocity = inverse.velocity(position, 0.7)
                 acceleration = inverse.acceleration(position, velocity, -1.3)
-                truth = reference.solve(
-                    [position.joints[0]], [velocity.joints[0]], [acceleration.joints[0]]
+                truth = prove(
+                    closure.linkage,
+                    [position.joints[0]],
+                    [velocity.joints[0]],
+                    [acceleration.joints[0]],
                 )
                 assert float(truth.rates[number]) == pytest.approx(0.7, rel=1e-11)
                 assert float(truth.accelerations[number]) == pytest.approx(-1.3, rel=1e-10)

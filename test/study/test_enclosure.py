@@ -1,0 +1,200 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The balls hold the truth: by algebra, by another's power series, by their own differences."""
+
+from math import pi
+from typing import Any
+
+from campaigns.accuracy.adversarial import four_bar
+from campaigns.accuracy.reference import Outcome
+from campaigns.accuracy.reference import Reference as Elsewhere
+from campaigns.accuracy.run import make
+from flint import ctx
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.resources import shipped
+from linkage_ros.study.enclosure import prove, SingularError, solve
+from mpmath import mp, mpf
+import pytest
+
+from ..kinematics import reference as algebra
+from ..kinematics.samples import four_bars
+
+FAMILIES = ('RRR', 'RRP', 'RPR', 'PRP', 'RPP', 'RRR-RRR-RRR', 'any three')
+
+
+def linkage_of(name: str) -> Linkage:
+    return read_linkage(read_yaml(shipped(f'linkages/{name}.yaml'))[0])
+
+
+def number_of(ball: Any) -> mpf:
+    """Return the middle of a ball to 90 digits."""
+    before, ctx.prec = ctx.prec, 512
+    try:
+        return mpf(ball.mid().str(90, radius=False))
+    finally:
+        ctx.prec = before
+
+
+def apart(ball: Any, value: Any, turning: bool) -> mpf:
+    """Return how far a value is from a narrow ball, to 90 digits; of angles, modulo 2π."""
+    with mp.workdps(90):
+        assert float(ball.rad()) <= 1e-40 * max(1.0, abs(float(value)))
+        difference = number_of(ball) - mp.mpf(value)
+        if turning:
+            difference -= 2 * mp.pi * mp.nint(difference / (2 * mp.pi))
+        return abs(difference)
+
+
+def coefficient(truth: Any, joint: int, order: int, turning: bool) -> mpf:
+    """Return a joint's derivative from its power series, whose lengths are scaled."""
+    with mp.workdps(90):
+        value = mpf(truth.joints[joint][order].mid().str(90, radius=False))
+        value *= (1, 1, 2)[order]
+        return value if turning else value * mpf(2) ** truth.motion.constants.exponent
+
+
+@pytest.mark.parametrize('family', FAMILIES)
+def test_random_linkages_of_every_dyad_are_as_the_campaign_has_them(family):
+    compared = 0
+    for index in range(3):
+        mechanism, angles, accelerations = make(7, family, index)
+        linkage = mechanism.linkage()
+        closure, elsewhere = Closure(linkage), Elsewhere(mechanism)
+        for phi, alpha in [*zip(angles, accelerations, strict=True)][::5]:
+            expected = elsewhere.solve(phi, alpha)
+            if expected.outcome is not Outcome.CLOSED or not closure.position(phi).joints:
+                continue
+            found = prove(linkage, [phi], [1.0], [alpha])
+            for joint, turning in enumerate(closure.turning):
+                for order in range(3):
+                    value = coefficient(expected, joint, order, turning)
+                    off = apart(found[order][joint], value, turning and not order)
+                    assert off <= 1e-45 * max(1, abs(value)), (index, phi, joint, order)
+                    compared += 1
+    assert compared > 30
+
+
+@pytest.mark.parametrize('family', ['any lengths', 'fold and stretch', 'crank along ground'])
+def test_four_bars_are_as_by_algebra(family):
+    compared = 0
+    for a, b, c, d, phi, side in four_bars(family, 100):
+        expected = algebra.four_bar(a, b, c, d, phi, side, digits=120)
+        linkage = four_bar((a, b, c, d), side).linkage()
+        if expected.gap > 0 or not Closure(linkage).position(phi).joints:
+            continue
+        try:
+            found = prove(linkage, [phi])
+        except SingularError:
+            # Within some 1e-12 of a toggle a double does not tell its two assemblies apart.
+            assert max(expected.coupler.condition, expected.rocker.condition) > 1e6
+            continue
+        for k, link in enumerate((expected.coupler, expected.rocker)):
+            assert apart(found.joints[k], link.value, turning=True) <= 1e-45
+        for k, rate in enumerate((expected.coupler_rate, expected.rocker_rate)):
+            assert apart(found.rates[k], rate.value, turning=False) <= 1e-45 * rate.condition
+        compared += 1
+    assert compared > 15
+
+
+def test_the_worked_inverted_slider_crank_to_twenty_digits():
+    # AB 15, A to D 25, D to C 10, crank at 60 degrees: r3 and θ3, as the sources' README has them.
+    linkage = Linkage(
+        links={
+            'ground': {'A': (0.0, 0.0), 'C': (25.0, 10.0)},
+            'crank': {'A': (0.0, 0.0), 'B': (15.0, 0.0)},
+            'rod': {'B': (0.0, 0.0)},
+        },
+        inputs=(Input('crank_joint', 'ground', 'crank'),),
+        assembly={'swivel': 'ahead'},
+        joints={'rod_joint': RevoluteJoint('ground', 'rod'), 'slide': SlideJoint('swivel')},
+        sliders={'swivel': Slider('C', 'rod', 'B', (1.0, 0.0))},
+    )
+    # A double is not quite 60 degrees: the rates there make up for the rest.
+    angle = pi / 3
+    found = prove(linkage, [angle])
+    with mp.workdps(60):
+        rest = mp.pi / 3 - mpf(angle)
+        rod, slide = (
+            number_of(joint) + rest * number_of(rate)
+            for joint, rate in zip(found.joints, found.rates, strict=True)
+        )
+        assert abs(slide - mpf('17.753658182601928364')) < 1e-18
+        assert abs(rod * 180 / mp.pi + mpf('9.6969819871210262071')) < 1e-18
+
+
+@pytest.mark.parametrize('distance', [1e-3, -1e-3, 1e-6, 1e-9, -1e-9, 1e-12])
+def test_a_parallelogram_next_to_its_change_point_turns_as_its_crank(distance):
+    found = prove(linkage_of('parallelogram'), [distance], [1.0], [0.5])
+    for order, value in enumerate((distance, 1.0, 0.5)):
+        rod, follower = found[order]
+        assert apart(rod, -value, turning=False) < 1e-40
+        assert apart(follower, value, turning=False) < 1e-40
+
+
+@pytest.mark.parametrize(
+    'name', ['class_3', 'five_bar', 'excavator_bucket', 'whitworth_quick_return']
+)
+def test_derivatives_are_those_of_its_positions(name):
+    linkage = linkage_of(name)
+    inputs = usual_inputs(Closure(linkage))
+    rates = [0.7 - 1.1 * k for k in range(len(inputs))]
+    accelerations = [0.3 + k for k in range(len(inputs))]
+    found = prove(linkage, inputs, rates, accelerations)
+    h = 2.0**-20
+
+    def at(time: float) -> Any:
+        moved = [
+            x + v * time + a * time**2 / 2
+            for x, v, a in zip(inputs, rates, accelerations, strict=True)
+        ]
+        return prove(
+            linkage, moved, [v + a * time for v, a in zip(rates, accelerations)], accelerations
+        )
+
+    before, after = at(-h), at(h)
+    with mp.workdps(90):
+        for k, joint in enumerate(found.joints):
+            ahead, behind = (
+                (number_of(end.joints[k]) - number_of(joint) + mp.pi) % (2 * mp.pi) - mp.pi
+                for end in (after, before)
+            )
+            # What is left is of the third derivative, and of the roundings of the inputs.
+            assert abs((ahead - behind) / (2 * h) - number_of(found.rates[k])) < 1e-8
+            swept = (number_of(after.rates[k]) - number_of(before.rates[k])) / (2 * h)
+            assert abs(swept - number_of(found.accelerations[k])) < 1e-7
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'scotch_yoke', 'class_3'])
+def test_thirty_digits_are_those_of_the_balls(name):
+    linkage = linkage_of(name)
+    inputs = usual_inputs(Closure(linkage))
+    for found, ball in zip(
+        solve(linkage, inputs, 104), prove(linkage, inputs).joints, strict=True
+    ):
+        assert abs(float((found - ball).mid())) < 1e-28
+
+
+def test_at_a_change_point_nothing_is_proved():
+    with pytest.raises(SingularError, match='nothing is proved'):
+        prove(linkage_of('parallelogram'), [0.0])
+
+
+def test_what_does_not_close_has_no_balls():
+    with pytest.raises(ValueError, match='open'):
+        prove(linkage_of('double_rocker'), [3.0])
