@@ -42,6 +42,7 @@ from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
 from linkage_ros.scene.scene import Scene
 from linkage_ros.study.budget import JointError, Knob, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
+from linkage_ros.study.prices import USUAL_RATE
 from linkage_ros.study.scene_motion import (
     BEGIN,
     Crank,
@@ -49,7 +50,6 @@ from linkage_ros.study.scene_motion import (
     MemberMotion,
     scene_key,
     tick_times,
-    USUAL_RATE,
 )
 import numpy as np
 
@@ -69,7 +69,7 @@ _QUICK_FACTORS = (0.2, 0.5, 1.0, 2.0, 5.0)
 
 _TICKS = 1000
 _PHASES = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
-"""Ages of a sample when a tick takes it that came just after another, in periods of the samples."""
+"""Ages of the newest sample at a tick, in periods of the samples."""
 
 _BEFORE = 20
 """Samples before the newest one that a drive gets, for its differences."""
@@ -101,7 +101,7 @@ def measure_age_in_use(
             advice = f'publish the crank at {ticks:g} Hz' if by_sample else ''
         held, carried = errors_in_use(motions, ticks, horizon)
         settings.append(Setting(f'{_hertz(ticks)}, held', held, None, changes, advice))
-        rates = [(key, {}) for key in _rates_missing(scene)]
+        rates: list[tuple[str, object]] = [(key, {}) for key in _rates_missing(scene)]
         advice = ', '.join(each for each in (advice, CARRY) if each)
         label = f'{_hertz(ticks)}, carried forward'
         settings.append(Setting(label, carried, None, [*changes, *rates], advice))
@@ -163,7 +163,7 @@ def measure_age_of_command(
     joints = _Samples(motion, scene.rate or motion.sample_rate, horizon)
 
     def measured(
-        changes: dict[str, object], factor: float = 1.0, advice: str = '', label: str = ''
+        changes: dict[str, Any], factor: float = 1.0, advice: str = '', label: str = ''
     ) -> Setting | None:
         used = replace(use, **changes)
         error = joints.error(used, factor)
