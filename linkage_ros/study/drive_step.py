@@ -218,7 +218,7 @@ def _error(
 
 def _settings(use: TorqueParameters, quick: bool) -> Iterator[tuple[str, float]]:
     """Yield other methods and steps, those that tell most first."""
-    own = [(use.method, use.step * factor) for factor in (2.0, 0.5)]
+    own = [(use.method, use.step * factor) for factor in (0.5, 2.0)]
     others = [(method, use.step) for method in METHODS if method != use.method]
     yield from (s for s in (*own, *others) if _SHORTEST <= s[1] <= _LONGEST)
     if quick:
