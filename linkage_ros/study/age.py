@@ -31,7 +31,6 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
 from typing import Any
 
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
@@ -42,6 +41,7 @@ from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
 from linkage_ros.scene.scene import Scene
 from linkage_ros.study.budget import JointError, Knob, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
+from linkage_ros.study.prices import USUAL_RATE
 from linkage_ros.study.scene_motion import (
     BEGIN,
     Crank,
@@ -49,7 +49,6 @@ from linkage_ros.study.scene_motion import (
     MemberMotion,
     scene_key,
     tick_times,
-    USUAL_RATE,
 )
 import numpy as np
 
@@ -69,7 +68,7 @@ _QUICK_FACTORS = (0.2, 0.5, 1.0, 2.0, 5.0)
 
 _TICKS = 1000
 _PHASES = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
-"""Ages of a sample when a tick takes it that came just after another, in periods of the samples."""
+"""Ages of the newest sample at a tick, in periods of the samples."""
 
 _BEFORE = 20
 """Samples before the newest one that a drive gets, for its differences."""
@@ -89,22 +88,21 @@ def measure_age_in_use(
     """
     by_sample = not scene.rate
     rate = scene.rate or max(each.sample_rate for each in motions) or USUAL_RATE
+    factors = _QUICK_FACTORS if quick else _FACTORS
+    rates = [rate * f for f in factors if LOWEST_RATE <= rate * f <= HIGHEST_RATE]
     settings: list[Setting] = []
-    for factor in _QUICK_FACTORS if quick else _FACTORS:
-        ticks = rate * factor
-        if not LOWEST_RATE <= ticks <= HIGHEST_RATE:
-            continue
+    for ticks, errors in zip(rates, errors_in_use(motions, rates, horizon), strict=True):
         changes: list[tuple[str, object]] = []
         advice = ''
-        if factor != 1.0:
+        if ticks != rate:
             changes = [] if by_sample else [('rate', _plain(ticks))]
             advice = f'publish the crank at {ticks:g} Hz' if by_sample else ''
-        held, carried = errors_in_use(motions, ticks, horizon)
+        held, carried = errors
         settings.append(Setting(f'{_hertz(ticks)}, held', held, None, changes, advice))
-        rates = [(key, {}) for key in _rates_missing(scene)]
+        fields: list[tuple[str, object]] = [(key, {}) for key in _rates_missing(scene)]
         advice = ', '.join(each for each in (advice, CARRY) if each)
         label = f'{_hertz(ticks)}, carried forward'
-        settings.append(Setting(label, carried, None, [*changes, *rates], advice))
+        settings.append(Setting(label, carried, None, [*changes, *fields], advice))
     own = f'{_hertz(rate)}, held'
     chosen = next(k for k, setting in enumerate(settings) if setting.label == own)
     settings[chosen] = settings[chosen]._replace(changes=())
@@ -112,26 +110,35 @@ def measure_age_in_use(
 
 
 def errors_in_use(
-    motions: Sequence[MemberMotion], rate: float, horizon: float
-) -> tuple[JointError, JointError]:
-    """Return the error of a state when it is used: held, and carried forward by its rates."""
-    period = 1e9 / rate
-    count = max(1, int(horizon * rate) - 1)
-    numbers = sorted({round(count * k / _PERIODS) for k in range(_PERIODS + 1)})
-    starts = [round(number * period) for number in numbers]
-    times = [[start + round(part * period) for part in (0.0, *_PARTS)] for start in starts]
-    held, carried = [], []
+    motions: Sequence[MemberMotion], rates: Sequence[float], horizon: float
+) -> list[tuple[JointError, JointError]]:
+    """Return for each rate the errors of a state in use: held, and carried by its rates."""
+    blocks = [_times_of_use(rate, horizon) for rate in rates]
+    # All in one run, since a drive that integrates takes time for it.
+    times = sorted({time for block in blocks for time in block.ravel().tolist()})
+    held: list[list[Any]] = [[] for _ in rates]
+    carried: list[list[Any]] = [[] for _ in rates]
     for motion in motions:
-        cranks = cranks_at(motion, [*chain(*times)])
-        joints, rates = joints_at(motion.closure, cranks)
-        shape = len(joints), len(starts), 1 + len(_PARTS)
-        joints, rates = joints.reshape(shape), rates.reshape(shape)
-        first, rate_then = joints[:, :, :1], rates[:, :, :1]
-        ages = np.array(_PARTS) * period * 1e-9
-        exact = joints[:, :, 1:]
-        held.append(distances(motion.closure, first + 0.0 * exact, exact))
-        carried.append(distances(motion.closure, first + rate_then * ages, exact))
-    return _over_periods(held), _over_periods(carried)
+        joints, speeds = joints_at(motion.closure, cranks_at(motion, times))
+        for number, (rate, block) in enumerate(zip(rates, blocks, strict=True)):
+            places = np.searchsorted(times, block)
+            exact = joints[:, places[:, 1:]]
+            first, speed = joints[:, places[:, :1]], speeds[:, places[:, :1]]
+            ahead = speed * (np.array(_PARTS) / rate)
+            held[number].append(distances(motion.closure, first + 0.0 * ahead, exact))
+            carried[number].append(distances(motion.closure, first + ahead, exact))
+    return [
+        (_over_periods(one), _over_periods(other))
+        for one, other in zip(held, carried, strict=True)
+    ]
+
+
+def _times_of_use(rate: float, horizon: float) -> Any:
+    """Return times of ticks, each with those of its use, in [ns] (ticks, 1 + parts)."""
+    count = max(1, int(horizon * rate) - 1)
+    numbers = np.unique(np.round(np.linspace(0, count, _PERIODS + 1)))
+    uses = numbers[:, None] + np.array((0.0, *_PARTS))
+    return np.round(uses * (NANOSECONDS / rate)).astype(int)
 
 
 def _over_periods(apart: Sequence[Any]) -> JointError:
@@ -163,7 +170,7 @@ def measure_age_of_command(
     joints = _Samples(motion, scene.rate or motion.sample_rate, horizon)
 
     def measured(
-        changes: dict[str, object], factor: float = 1.0, advice: str = '', label: str = ''
+        changes: dict[str, Any], factor: float = 1.0, advice: str = '', label: str = ''
     ) -> Setting | None:
         used = replace(use, **changes)
         error = joints.error(used, factor)

@@ -35,8 +35,9 @@ from typing import Any
 from linkage_ros.drives.torque import TorqueParameters
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.errors import DefinitionError
-from linkage_ros.measuring import Progress
-from linkage_ros.study.budget import JointError, Knob, Setting
+from linkage_ros.measuring import Contender, in_turn, Progress
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
 from linkage_ros.study.scene_motion import (
     built,
@@ -102,11 +103,12 @@ def measure_drive_step(
     ticks = tick_times(rate, horizon, _TICKS)
     own = cranks_at(motion, ticks)
     taken = monotonic() - begun
+    price = _price(motion, rate, horizon, 0.5 if quick else 2.0)
     exact, doubt = exact_cranks(motion, ticks)
     joints, _ = joints_at(motion.closure, exact)
     floor = doubt or JointError(0.0, 0.0)
     settings = [
-        Setting(_label(use.method, use.step), _error(motion, own, joints, floor), None),
+        Setting(_label(use.method, use.step), _error(motion, own, joints, floor), price),
     ]
     left_out: list[str] = []
     wanted = list(_settings(use, quick))
@@ -114,13 +116,15 @@ def measure_drive_step(
         progress((number + 1) / (len(wanted) + 1))
         work = taken * _EVALUATIONS[method] / _EVALUATIONS[use.method] * use.step / step
         if monotonic() - begun + work > seconds:
-            left_out.append(f'{_label(method, step)} would take {work:.0f} s')
+            left_out.append(_label(method, step))
             continue
         try:
             other = cranks_at(motion, ticks, method=method, step=step)
         except DefinitionError:
             continue  # The scene refuses a step that is too long for its forces.
-        changes = [(f'{key}.method', method)] if method != use.method else []
+        changes: list[tuple[str, object]] = (
+            [(f'{key}.method', method)] if method != use.method else []
+        )
         changes += [(f'{key}.step', step)] if step != use.step else []
         error = _error(motion, other, joints, floor)
         settings.append(Setting(_label(method, step), error, None, changes))
@@ -128,11 +132,25 @@ def measure_drive_step(
     note = motion.note
     if floor.worst > _UNSURE:
         note += f'; two motions that are nearly equal part: this one is known to {floor.worst:.1g}'
+    if left_out:
+        left_out = [f'for lack of time: {"; ".join(left_out)}']
     return Knob(NAME, settings, 0, horizon, note=note), left_out
 
 
 _EVALUATIONS = {'semi_implicit_euler': 1.0, 'rk4': 4.0, 'gauss_legendre': 14.0}
 """Evaluations of the equation of motion in a step, about."""
+
+
+def _price(motion: MemberMotion, rate: float, horizon: float, seconds: float) -> Price:
+    """Return what the drive takes of a tick, with its commands."""
+    period = NANOSECONDS / rate
+    ticks = [round(number * period) for number in range(1, max(2, int(min(horizon, 1.0) * rate)))]
+
+    def run() -> None:
+        cranks_at(motion, ticks)
+
+    (spread,) = in_turn([Contender(run, len(ticks))], seconds)
+    return Price(spread.scaled(1e6), rate)
 
 
 def exact_cranks(
@@ -200,7 +218,7 @@ def _error(
 
 def _settings(use: TorqueParameters, quick: bool) -> Iterator[tuple[str, float]]:
     """Yield other methods and steps, those that tell most first."""
-    own = [(use.method, use.step * factor) for factor in (2.0, 0.5)]
+    own = [(use.method, use.step * factor) for factor in (0.5, 2.0)]
     others = [(method, use.step) for method in METHODS if method != use.method]
     yield from (s for s in (*own, *others) if _SHORTEST <= s[1] <= _LONGEST)
     if quick:

@@ -58,7 +58,7 @@ BEGIN = NANOSECONDS
 SINE = 'sine'
 """What ``like`` is for a sine; anything else is the path of a bag."""
 
-COMMAND_PERIOD = 0.02
+COMMAND_PERIOD = 0.05
 """Longest time between two commands of a torque drive, in [s]."""
 
 _FREQUENCY, _AMPLITUDE, _PART = 0.5, pi, 0.4
@@ -235,10 +235,10 @@ def _recorded(motion: MemberMotion, bag: Bag, topic: str, pace: float = 0.0) -> 
     if pace:
         scale = 1e-9 * pace * (samples[-1].stamp - samples[0].stamp) / (len(samples) - 1)
         samples = [
-            _Sample(
-                *[round(k * 1e9 / pace)] * 2, each.values, tuple(scale * w for w in each.rates)
+            sample._replace(
+                stamp=round(k * 1e9 / pace), rates=tuple(scale * rate for rate in sample.rates)
             )
-            for k, each in enumerate(samples)
+            for k, sample in enumerate(samples)
         ]
     stamps = [sample.stamp - samples[0].stamp for sample in samples]
     gap = motion.member.drive[1].max_age
@@ -329,11 +329,11 @@ def _commanded(
         Command(time, effort * sin(0.5 * tau * time * 1e-9))
         for time in range(period, round(horizon * NANOSECONDS), period)
     ]
-    unit = {'effort': 'N·m', 'current': 'A', 'voltage': 'V'}
     motor = motion.member.drive[1].motor
-    kind = motor.command if motor else 'effort'
-    sized = f'{effort:.3g} {"N" if kind == "effort" and motion.closure.linkage.inputs[0].slider else unit[kind]}'
-    note = f'commands come as a sine of 0.5 Hz and {sized}, {1e9 / period:g} times a second'
+    slides = motion.closure.linkage.inputs[0].slider
+    units = {'effort': 'N' if slides else 'N·m', 'current': 'A', 'voltage': 'V'}
+    unit = units[motor.command if motor else 'effort']
+    note = f'commands are a sine of 0.5 Hz and {effort:.3g} {unit}, {1e9 / period:g} a second'
     if like is None:
         note += ', since nothing moves without'
     return motion._replace(commands=commands, note=note)

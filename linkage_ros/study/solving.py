@@ -315,7 +315,7 @@ def judge_hard_cases() -> Iterator[HardCase]:
         states, distances = near(closure)
         known, exact = exact_joints(linkage, states)
         # Next to a change point the other assembly is as near as the change point itself.
-        limits = [0.1 * distances[states.index(state)] for state in known]
+        limits = [0.1 * distances[states.index(tuple(state))] for state in known]
         far = limits if place == 'change point' else None
         for solver in (Solver(*_own(closure)), *comparisons(closure)):
             error, failed = judge(linkage, solver.solve, known, exact, far)

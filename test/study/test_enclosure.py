@@ -164,7 +164,10 @@ def test_derivatives_are_those_of_its_positions(name):
             for x, v, a in zip(inputs, rates, accelerations, strict=True)
         ]
         return prove(
-            linkage, moved, [v + a * time for v, a in zip(rates, accelerations)], accelerations
+            linkage,
+            moved,
+            [v + a * time for v, a in zip(rates, accelerations, strict=True)],
+            accelerations,
         )
 
     before, after = at(-h), at(h)
