@@ -84,7 +84,9 @@ class Setting(NamedTuple):
 
 
 def _line(key: str, value: object) -> str:
-    if isinstance(value, float):
+    if isinstance(value, bool):
+        value = 'true' if value else 'false'
+    elif isinstance(value, float):
         value = f'{value:.9f}'.rstrip('0').rstrip('.')  # YAML takes 1e-05 for a text
     return f'{key}: {value}'
 

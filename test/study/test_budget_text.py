@@ -213,5 +213,5 @@ def _check_json(budget: Budget) -> None:
 
 
 def test_a_line_is_yaml() -> None:
-    setting = Setting('x', JointError(0.0, 0.0), None, [('a.b', 1e-5), ('c', 500.0), ('d', 'rk4')])
-    assert setting.line == 'a.b: 0.00001, c: 500, d: rk4'
+    setting = Setting('x', JointError(0.0, 0.0), None, [('a.b', 1e-5), ('c', 500.0), ('d', False)])
+    assert setting.line == 'a.b: 0.00001, c: 500, d: false'
