@@ -24,7 +24,7 @@ from cmath import phase, rect
 from math import acos, copysign, inf, sin, sqrt
 
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues
+from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues, POSITION, RATE
 from linkage_ros.pipeline.pipeline import Pipeline
 from scipy.integrate import solve_ivp
 
@@ -49,7 +49,7 @@ def run_scene(scene, ticks, messages=()):
                 now,
                 *(
                     {name: v for (name, kind), v in numbers.items() if kind == wanted}
-                    for wanted in ('position', 'velocity')
+                    for wanted in (POSITION, RATE)
                 ),
             )
 
@@ -171,15 +171,12 @@ class FourBar:
         turns.terminal, turns.direction = True, -1.0
         solved = solve_ivp(
             lambda _, y: (y[1], self.acceleration(*y, effort, sense)), (now, end), state,
-            method='LSODA', rtol=1e-11, atol=1e-12, events=turns, t_eval=[*wanted, end],
+            method='LSODA', rtol=1e-11, atol=1e-12, events=turns, dense_output=True,
         )  # fmt: skip
-        values = solved.y[0][: len(wanted)].tolist()
+        stop = solved.t[-1]
+        values = [solved.sol(time)[0] for time in wanted if time <= stop]
         if solved.status == 1:
-            return (
-                solved.t_events[0][0],
-                [solved.y_events[0][0][0], 0.0],
-                [v for v, time in zip(values, solved.t, strict=False) if time in wanted],
-            )
+            return stop, [solved.y[0, -1], 0.0], values
         return end, solved.y[:, -1].tolist(), values
 
 
