@@ -48,6 +48,7 @@ from linkage_ros.study.deliberate import compare_runs, leave_out
 from linkage_ros.study.measure import measure_budget, PARTS
 from linkage_ros.study.picture import budget_svg
 from linkage_ros.study.prices import price_scenes, tick_price, turn_crank
+from linkage_ros.study.solving import DISTANCES, HardCase, judge_hard_cases
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'
@@ -69,7 +70,7 @@ class Shown(NamedTuple):
 SHOWN = (
     Shown('demo', 'A measured crank', like='sine'),
     Shown('torque_crank', 'A torque bench'),
-    Shown('jansen_leg', 'A walking leg'),
+    Shown('jansen_leg', 'A walking leg', like='sine'),
 )
 
 EVERY_EFFECT = """
@@ -157,6 +158,40 @@ def _section(shown: Shown, budget: Budget, picture: str) -> Iterator[str]:
     yield ''
     yield from (f'{escaped(line).capitalize()}.' for line in closing_lines(budget)[:1])
     yield ''
+
+
+def hard_lines() -> Iterator[str]:
+    """Yield who fails next to a toggle and at a change point."""
+    yield '## Hard cases'
+    yield ''
+    nearest, farthest = error_text(min(DISTANCES)), error_text(max(DISTANCES))
+    yield (
+        f'Poses {farthest} to {nearest} rad away from a toggle and a change point: the worst '
+        'error of those that each way to solve finds, and how many it misses, by no answer or by '
+        'that of another pose.'
+    )
+    yield ''
+    cases = [*judge_hard_cases()]
+    places = [*dict.fromkeys(case.place for case in cases)]
+    found = {(case.place, case.solver): case for case in cases}
+    rows = []
+    for solver in dict.fromkeys(case.solver for case in cases):
+        row = [solver]
+        for place in places:
+            case = found.get((place, solver))
+            row += (
+                ['–', '–'] if case is None else [_worst(case), f'{case.failed} of {case.states}']
+            )
+        rows.append(row)
+    missing = listed(dict.fromkeys(case.solver for case in cases if case.failed))
+    yield f'{missing or "nobody"} {"miss some" if missing else "misses any"}.'
+    yield ''
+    heads = [text for place in places for text in (f'>{place}, worst [rad]', '>missed')]
+    yield from table(['solving', *heads], rows)
+
+
+def _worst(case: HardCase) -> str:
+    return '–' if case.failed == case.states else error_text(case.worst)
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

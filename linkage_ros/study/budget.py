@@ -84,7 +84,9 @@ class Setting(NamedTuple):
 
 
 def _line(key: str, value: object) -> str:
-    if isinstance(value, float):
+    if isinstance(value, bool):
+        value = 'true' if value else 'false'
+    elif isinstance(value, float):
         value = f'{value:.9f}'.rstrip('0').rstrip('.')  # YAML takes 1e-05 for a text
     return f'{key}: {value}'
 
@@ -98,7 +100,9 @@ class Knob(NamedTuple):
     after: float | None = None  # For an error that grows: the time that it was taken after, in [s]
     # Whether the scene asks for the difference: an effect or a fault, which is no error.
     is_deliberate: bool = False
-    note: str = ''  # A sentence for the last column where there is no other setting
+    note: str = (
+        ''  # What is assumed or to be known, below the table; of effects in the last column
+    )
 
     @property
     def own(self) -> Setting:

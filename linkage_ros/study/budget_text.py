@@ -41,6 +41,10 @@ COLUMNS = (
 )
 
 NOISE = 'within noise'
+
+ALL_TOGETHER = 'all of them together'
+"""Name of what all effects and faults make different."""
+
 _LEAST_TOLD = 1e-20
 """Smaller errors mean nothing to a reader, in [rad]."""
 
@@ -114,27 +118,33 @@ class Neighbours(NamedTuple):
     """The settings beside the scene's own that a user can ask for; None where there is none."""
 
     cheaper: Setting | None  # The most exact of those that cost less
-    better: Setting | None  # The cheapest of those that are more exact
+    better: Setting | None  # Of the more exact ones the first that comes with more cost
 
 
 def neighbours_of(budget: Budget, knob: Knob) -> Neighbours:
     """Return the next cheaper and the next better setting of a knob."""
     own = knob.own
     others = [each for each in knob.settings if each is not own and each.line]
-
-    def cost(setting: Setting) -> float:
-        price = setting.price
-        # What is within noise costs the same.
-        if price is None or (price.is_noise and price.rate == budget.rate):
-            return budget.tick.core
-        return budget.core_of(knob, setting)
-
-    cheaper = [each for each in others if cost(each) < budget.tick.core]
+    cheaper = [each for each in others if _more_core(budget, knob, each) < 0.0]
     better = [each for each in others if each.error.worst < _SAME * own.error.worst]
     return Neighbours(
         min(cheaper, key=lambda each: each.error.worst, default=None),
-        min(better, key=lambda each: (cost(each), each.error.worst), default=None),
+        min(better, key=lambda each: _effort(budget, knob, each), default=None),
     )
+
+
+def _more_core(budget: Budget, knob: Knob, setting: Setting) -> float:
+    """Return what the scene takes of a core more with a setting; 0 within noise."""
+    price = setting.price
+    if price is None or (price.is_noise and price.rate == budget.rate):
+        return 0.0
+    return budget.core_of(knob, setting) - budget.tick.core
+
+
+def _effort(budget: Budget, knob: Knob, setting: Setting) -> tuple[float, int, float]:
+    """Return how much a more exact setting asks for: cost, then keys. That it saves is no gain."""
+    more = max(0.0, _more_core(budget, knob, setting))
+    return more, len(setting.changes or ()), setting.error.worst
 
 
 def error_knobs(budget: Budget) -> list[Knob]:
@@ -157,7 +167,7 @@ def lead_lines(budget: Budget) -> list[str]:
     asked = [
         f'{knob.name} {error_text(knob.own.error.worst)} rad'
         for knob in budget.knobs
-        if knob.is_deliberate and knob.own.error.worst
+        if knob.is_deliberate and knob.own.error.worst and knob.name != ALL_TOGETHER
     ]
     deliberate = any(knob.is_deliberate for knob in budget.knobs)
     if asked:
@@ -199,14 +209,14 @@ def _advice_line(budget: Budget, knob: Knob) -> str:
     for factor, words in ((0.1, 'a tenth'), (0.2, 'a fifth'), (0.5, 'half')):
         good = [each for each in others if rest + each.error.worst <= factor * total]
         if good:
-            best = min(good, key=lambda each: budget.core_of(knob, each))
+            best = min(good, key=lambda each: _effort(budget, knob, each))
             return f'less than {words} of it: {best.line} ({_cost_text(budget, knob, best)})'
     better = neighbours_of(budget, knob).better
     if better is not None:
         left = rest + better.error.worst
         cost = _cost_text(budget, knob, better)
         return f'{error_text(left)} rad are left with: {better.line} ({cost})'
-    return f'nothing that was measured makes it less{knob.note and f": {knob.note}"}'
+    return 'nothing that was measured makes it less'
 
 
 def _cost_text(budget: Budget, knob: Knob, setting: Setting) -> str:
@@ -267,7 +277,7 @@ def _error_row(budget: Budget, knob: Knob) -> Row:
         price_text(own.price),
         '–' if core is None else share_text(core),
         cheaper or '–',
-        better or knob.note or 'nothing is better',
+        better or 'nothing is better',
     )
 
 
@@ -333,7 +343,8 @@ def closing_lines(budget: Budget) -> list[str]:
     said = f'measured with a spread of {100.0 * spread:.0f} %'
     if prices:
         said += f'; {noisy} of {len(prices)} prices lie {NOISE} and are called so'
-    return [said, *(f'left out: {each}' for each in budget.left_out)]
+    notes = [f'{knob.name}: {knob.note}' for knob in error_knobs(budget) if knob.note]
+    return [said, *notes, *(f'left out: {each}' for each in budget.left_out)]
 
 
 def heads_of(budget: Budget) -> list[str]:

@@ -39,9 +39,8 @@ from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.verify import turning_joints
 from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.study.budget import JointError, Knob, Setting
+from linkage_ros.study.budget_text import ALL_TOGETHER
 from linkage_ros.study.prices import Feed, price_scenes, turn_crank, USUAL_RATE
-
-ALL_TOGETHER = 'all of them together'
 
 _MOST_TICKS, _MOST_TICKS_QUICK = 20_000, 2_000
 _SECONDS, _SECONDS_QUICK = 0.8, 0.2

@@ -48,6 +48,8 @@ _LEAST = 1e-18
 """Smaller errors are drawn on the lower edge: no double can have them."""
 
 _FAINT = '#6b7782'
+_HALO = 'stroke="#ffffff" stroke-width="3" paint-order="stroke"'
+"""So that no line of the grid runs through letters."""
 
 
 class Box(NamedTuple):
@@ -217,7 +219,7 @@ class _Picture:
                         label.box.bottom - 3.0,
                         label.text,
                         fill=label.colour,
-                        more=' class="label"',
+                        more=f' class="label" {_HALO}',
                     )
                     for label in self.labels()
                 ),

@@ -333,20 +333,19 @@ def add_prices(
     keeps its price. Settings without keys, and those that have a price, stay as they are.
     """
     asked = {
-        (row, column): tuple(setting.changes)
+        (row, column): setting.changes
         for row, knob in enumerate(knobs)
         for column, setting in enumerate(knob.settings)
         if setting.changes and setting.price is None and column != knob.chosen
     }
     # Two knobs may ask for the same keys, such as a rate.
-    different = list(dict.fromkeys(asked.values()))
-    prices = dict(
-        zip(different, price_changes(scene, different, seconds, feed, progress), strict=True)
-    )
+    different = {tuple(settings_of(changes)): changes for changes in asked.values()}
+    found = price_changes(scene, [*different.values()], seconds, feed, progress)
+    prices = dict(zip(different, found, strict=True))
     return [
         knob._replace(
             settings=tuple(
-                setting._replace(price=prices[asked[row, column]])
+                setting._replace(price=prices[tuple(settings_of(asked[row, column]))])
                 if (row, column) in asked
                 else setting
                 for column, setting in enumerate(knob.settings)

@@ -12,147 +12,177 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``linkage accuracy``: its output, its files and its errors."""
+
+"""``linkage accuracy``: its answer, its files, and what it refuses in one line."""
 
 from __future__ import annotations
 
 import argparse
-from importlib.util import find_spec
+from collections.abc import Callable
 import json
+from pathlib import Path
+import re
+from subprocess import CompletedProcess
 from threading import Event
+from typing import Any
 
-from linkage_ros.accuracy import PARTS
-from linkage_ros.accuracy.results import Choice, Part, Rate, Results
 from linkage_ros.cli import accuracy as command
-from linkage_ros.cli.accuracy import print_results
 from linkage_ros.errors import LinkageError
-from linkage_ros.measuring import Spread
-from linkage_ros.resources import shipped
+from linkage_ros.scene.load import load_scene
+from linkage_ros.study.budget import Budget
+from linkage_ros.study.measure import PARTS
 import pytest
 
-DEMO = str(shipped('scenes/demo.yaml'))
+from .recorded import Recorded, scene_file
+from ..study.shown_budget import BUDGET
 
 
-def run(*arguments, stop=None):
+def run(*arguments: str, stop: Event | None = None) -> int:
     """Run ``linkage accuracy`` in this process; return its exit code."""
     parser = argparse.ArgumentParser()
     command.add_arguments(parser)
     return command.run(parser.parse_args(arguments), stop or Event())
 
 
-def test_a_part_is_measured_printed_and_written(tmp_path, capfd):
-    folder = tmp_path / 'page'
-    assert run(DEMO, '--quick', '--only', 'effects', '-o', str(folder)) == 0
-    out = capfd.readouterr().out
-    headline, cost, page = out.splitlines()
-    assert headline == 'demo: measured.'
-    assert cost.startswith('A tick takes ')
-    assert page == f'page      {folder / "index.html"}'
-    assert {file.name for file in folder.iterdir()} == {'index.html', 'effects.csv'}
-    assert 'velocity' in (folder / 'effects.csv').read_text('utf-8')
+@pytest.fixture
+def by_hand(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Let the budget made by hand be what is measured; give what was asked for."""
+    asked: dict[str, Any] = {}
+
+    def measure(scene: Any, **options: Any) -> Budget:
+        asked.update(options, scene=scene)
+        options['progress'](1.0)
+        return BUDGET
+
+    monkeypatch.setattr(command, 'measure_budget', measure)
+    return asked
 
 
-def test_a_linkage_file_will_do(tmp_path):
-    folder = tmp_path / 'page'
-    file = str(shipped('linkages/slider_crank.yaml'))
-    assert run(file, '--quick', '--only', 'effects', '-o', str(folder)) == 0
-    assert (folder / 'index.html').is_file()
+def test_a_real_scene_is_answered_in_the_first_lines(capsys: Any) -> None:
+    file = 'slider_crank'
+    assert run(file, '--quick', '--only', 'errors', '--horizon', '0.5', '--need', '1e-4') in (0, 1)
+    answer, off, write, *table = capsys.readouterr().out.splitlines()
+    assert answer.startswith('for 1e-4 rad: ')
+    assert re.match(r'slider_crank: \S+ rad off at worst, by the age in use', off)
+    assert 'rad' in write or ' of it: ' in write
+    assert any(line.startswith('solving (closed form)') for line in table)
+
+
+def test_effects_alone_are_what_linkage_cost_was(capsys: Any) -> None:
+    assert run('worn_press', '--quick', '--only', 'effects', '--horizon', '0.2') == 0
+    said = capsys.readouterr().out
+    assert said.startswith('on purpose: ')
+    for effect in load_scene('worn_press').members[0].effects:
+        assert f'on purpose: {effect}' in said
+    assert 'the whole tick' in said
+
+
+def test_the_answer_comes_first(by_hand: Any, capsys: Any) -> None:
+    assert run('demo', '--like', 'sine', '--need', '5e-3', '--horizon', '3') == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith('for 5e-3 rad: drive.torque.')
+    assert lines[1].startswith('hil: 0.023 rad off at worst after 10 s')
+    assert (by_hand['like'], by_hand['horizon'], by_hand['quick']) == ('sine', 3.0, False)
+    assert [*by_hand['parts']] == [*PARTS]
+
+
+def test_a_need_that_nothing_meets_is_an_exit_code(by_hand: Any, capsys: Any) -> None:
+    assert run('demo', '--need', '1e-12') == 1
+    assert 'stands in the way' in capsys.readouterr().out.splitlines()[0]
+
+
+def test_the_tuned_scene_has_the_lines_of_the_answer(
+    by_hand: Any, tmp_path: Path, capsys: Any
+) -> None:
+    file = tmp_path / 'tuned.yaml'
+    assert run('torque_crank', '--need', '5e-3', '-o', str(file), '--json') == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said['need']['is_met']
+    tuned, own = load_scene(file), load_scene('torque_crank')
+    assert tuned.members[0].linkage == own.members[0].linkage
+    write = said['need']['write']
+    drive = tuned.members[0].drive[1]
+    assert drive.step == write['drive.torque.step'] != own.members[0].drive[1].step
+    assert drive.method == write['drive.torque.method']
+    assert tuned.rate == write.get('rate', own.rate)
+    assert tuned.members[0].effects == own.members[0].effects
+
+
+def test_a_page_and_a_picture_are_written(by_hand: Any, tmp_path: Path) -> None:
+    page, picture = tmp_path / 'x.html', tmp_path / 'x.svg'
+    assert run('demo', '--page', str(page), '--picture', str(picture)) == 0
+    assert page.read_text('utf-8').startswith('<!doctype html>')
+    assert picture.read_text('utf-8').startswith('<svg')
 
 
 @pytest.mark.parametrize(
     ('arguments', 'said'),
     [
-        (['--only', 'solvin'], "--only solvin: there is no such part; did you mean 'solving'?"),
+        (['--only', 'error'], "--only error: there is no such part; did you mean 'errors'?"),
         (['--only', 'x'], f'--only x: there is no such part; known: {", ".join(PARTS)}'),
-        (['-o', '.'], '.: exists already; name a new folder; nothing is overwritten'),
+        (['-o', 'x.yaml'], '-o: is the scene that meets a need; say it: --need 1e-3'),
+        (['--need', '1', '--only', 'effects'],
+         '--need: is for errors; write --only errors,effects'),
+    ],
+)  # fmt: skip
+def test_what_is_refused(arguments: list[str], said: str) -> None:
+    with pytest.raises(LinkageError) as caught:
+        run('demo', *arguments)
+    assert str(caught.value) == said
+
+
+SHORT_COUPLER = 'four_bar: {a: 0.12, b: 0.04, c: 0.08, d: 0.1}\n'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'said'),
+    [
+        (['demo'], r'drive: topic has no motion of its own; .*--like sine'),
+        (['stuck.yaml'], 'close at no state of its motion; see linkage check'),
+        (['nowhere.yaml'], r'nowhere.yaml: '),
+        (['demo', '--like', 'no_bag'], r'no_bag: '),
+        (['demo', '--horizon', '-1'], r'--horizon'),
+        (['demo', '--need', '0'], r'--need'),
+        (['demo', '--need', 'small'], r'--need'),
     ],
 )
-def test_what_is_refused(tmp_path, monkeypatch, arguments, said):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(LinkageError) as caught:
-        run(DEMO, *arguments)
-    assert str(caught.value) == said
-    assert not list(tmp_path.iterdir())
+def test_bad_input_is_one_line(
+    linkage: Callable[..., CompletedProcess[str]], tmp_path: Path, arguments: list[str], said: str
+) -> None:
+    (tmp_path / 'four.yaml').write_text(SHORT_COUPLER)
+    # The drive brings it where pin A is further from O4 than coupler and rocker reach.
+    (tmp_path / 'stuck.yaml').write_text(
+        'linkage: four.yaml\nrate: 100\ndrive: {sine: {mean: 3.14, amplitude: 1.0e-3, '
+        'frequency: 1.0}}\n'
+    )
+    answer = linkage('accuracy', *arguments, '--quick')
+    assert answer.returncode == 2, answer
+    (line,) = answer.stderr.splitlines()
+    assert line.startswith('linkage accuracy: ')
+    assert re.search(said, line), line
 
 
-def test_no_scene_is_one_line(linkage):
-    answer = linkage('accuracy', 'nowhere.yaml')
-    assert (answer.returncode, answer.stdout) == (2, '')
-    assert answer.stderr.startswith('linkage accuracy: nowhere.yaml: ')
-    assert answer.stderr.count('\n') == 1
-
-
-@pytest.mark.parametrize('missing', ['mpmath', 'plotly', 'matplotlib'])
-def test_what_is_not_installed_is_said_before_anything_is_measured(tmp_path, monkeypatch, missing):
-    def hidden(name, find=find_spec):
-        return None if name == missing else find(name)
-
-    monkeypatch.setattr('linkage_ros.errors.find_spec', hidden)
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(LinkageError) as caught:
-        run(DEMO)
-    assert str(caught.value) == f"{missing}: is not installed; pip install 'linkage_ros[report]'"
-
-
-def test_it_can_be_stopped_and_leaves_nothing(tmp_path, monkeypatch):
+def test_it_can_be_stopped_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     stop = Event()
     stop.set()
-    assert run(DEMO, stop=stop) == 1
+    assert run('slider_crank', '--quick', '--page', 'x.html', stop=stop) == 1
     assert not list(tmp_path.iterdir())
 
 
-def test_json_has_the_same_answer(tmp_path, capfd):
-    folder = tmp_path / 'page'
-    assert run(DEMO, '--quick', '--only', 'effects', '--json', '-o', str(folder)) == 0
-    said = json.loads(capfd.readouterr().out)
-    assert said['scene'] == 'demo'
-    assert said['headline'] == 'demo: measured.'
-    assert said['answers'] == []
-    assert [part['key'] for part in said['parts']] == ['effects']
-    assert said['parts'][0]['headline'].startswith('A tick takes ')
-    assert said['page'] == str(folder / 'index.html')
-
-
-# The lines of ``linkage accuracy`` on a terminal.
-
-
-def test_the_answer_is_at_most_twelve_lines_of_eighty_columns(capsys):
-    closed = Spread(0.5, 0.53, 0.55)
-    print_results(
-        Results(
-            'torque_crank',
-            [('cores', '2')],
-            [
-                Part(
-                    'solving', 'Solving the loop', 'Exact to 6e-16 rad in 0.53 µs.',
-                    clause='exact to 6e-16 rad in 0.53 µs; '
-                    'nothing cheaper is within 9 digits of it',
-                    choices=[Choice(6e-16, 'solver: closed_form # the default', closed, closed)],
-                ),
-                Part('ticking', 'Ticking', 'A headline.', rates=[
-                    Rate(2000.0, 5e-3, 'held'), Rate(2000.0, 2e-4, 'carried forward'),
-                ]),
-                Part('effects', 'Effects', 'A tick takes 53.2 µs; effort adds 52 µs.'),
-                Part('dynamics', 'Steps', 'rk4, 1 ms a step: 6e-08 rad off after 10 s.'),
-                Part('recording', 'Recording', 'Recording costs 6 µs a message.',
-                     clause='recording costs 6 µs a message and may lose 0.91 s in a crash'),
-            ],
-        )
-    )  # fmt: skip
-    lines = capsys.readouterr().out.splitlines()
-    assert lines == [
-        'torque_crank: exact to 6e-16 rad in 0.53 µs; nothing cheaper is within 9 digits',
-        '  of it; recording costs 6 µs a message and may lose 0.91 s in a crash.',
-        '0.01 rad: 0.53 µs (0.53 µs to solve) a tick; 2000 Hz carried forward, 2000 Hz',
-        '  held; solver: closed_form # the default',
-        '1e-4 rad: 0.53 µs (0.53 µs to solve) a tick; none: at 2000 Hz a state is 0.0002',
-        '  rad off when used; solver: closed_form # the default',
-        '1e-8 rad: 0.53 µs (0.53 µs to solve) a tick; none: at 2000 Hz a state is 0.0002',
-        '  rad off when used; solver: closed_form # the default',
-        'A tick takes 53.2 µs; effort adds 52 µs.',
-        'rk4, 1 ms a step: 6e-08 rad off after 10 s.',
-    ]
-    # The path of the page is one more.
-    assert len(lines) < 12
-    assert max(map(len, lines)) <= 80
+def test_a_bag_has_its_own_motion_and_rates(tmp_path: Path, capsys: Any) -> None:
+    source = scene_file(tmp_path, 'rate: 100\n')
+    Recorded(tmp_path / 'bag', source, lambda tick: {'crank_joint': (0.06 * tick, 6.0)}).run(200)
+    bag = str(tmp_path / 'bag')
+    assert run(bag, '--quick', '--only', 'errors', '--horizon', '1', '--json') == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said['rate'] == 100.0
+    (age,) = [each for each in said['sources'] if each['name'] == 'age in use']
+    # The crank turns by 0.06 rad in a period; no joint of this four-bar is faster than twice that.
+    assert 0.02 < age['settings'][age['chosen']]['worst'] < 0.12
+    with pytest.raises(LinkageError, match='-o: the scene is in a bag'):
+        run(bag, '--need', '1', '-o', str(tmp_path / 'x.yaml'))
+    with pytest.raises(LinkageError, match='--like: the bag itself has the motion'):
+        run(bag, '--like', 'sine')

@@ -24,12 +24,8 @@ from linkage_ros.errors import FileError
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import parse_scene
 from linkage_ros.scene.scene import Scene
-from linkage_ros.study.deliberate import (
-    ALL_TOGETHER,
-    compare_runs,
-    measure_deliberate,
-    published_states,
-)
+from linkage_ros.study.budget_text import ALL_TOGETHER
+from linkage_ros.study.deliberate import compare_runs, measure_deliberate, published_states
 from linkage_ros.study.prices import turn_crank
 import numpy as np
 import pytest

@@ -190,7 +190,7 @@ def test_prices_are_added_where_a_scene_can_ask_for_them() -> None:
     knob = Knob(
         'age in use',
         [
-            Setting('500 Hz', error, None, [('rate', 500.0)]),
+            Setting('500 Hz', error, None, [('rate', 500.0), ('effects.velocity', {})]),
             Setting('own', error, None),
             Setting('float32', error, None, None),
             Setting('carried', error, None, (), 'carry it forward'),
