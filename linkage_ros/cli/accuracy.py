@@ -50,7 +50,7 @@ from linkage_ros.study.page import budget_html
 from linkage_ros.study.picture import budget_svg
 from linkage_ros.study.tuned_scene import tuned_scene
 
-EXAMPLE = 'linkage accuracy jansen_leg --need 1e-3 --quick'
+EXAMPLE = 'linkage accuracy slider_crank --need 1e-3 --quick'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -95,14 +95,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--page',
         type=output(('.html', '.htm')),
-        metavar='PAGE',
-        help='write a page for the browser, PAGE.html',
+        metavar='OUTPUT',
+        help='write a page for the browser, OUTPUT.html',
     )
     parser.add_argument(
         '--picture',
         type=output(('.svg',)),
-        metavar='PICTURE',
-        help='draw error against cost, PICTURE.svg',
+        metavar='OUTPUT',
+        help='draw error against cost, OUTPUT.svg',
     )
 
 

@@ -43,6 +43,11 @@ WRITES = {
     'export': (['bag'], 'x.csv', False),
     'simulate': (['worn_press', '--seconds', '0.1'], 'x.csv', False),
     'synthesize': (['--pairs', 'pairs.csv'], 'x.yaml', False),
+    'accuracy': (
+        ['slider_crank', '--need', '5', '--quick', '--only', 'errors', '--horizon', '0.1'],
+        'x.yaml',
+        False,
+    ),
     'import': (['x.urdf', '--close', 'b=c'], 'new.yaml', False),
 }
 """Files; `FOLDERS` are bags."""

@@ -39,7 +39,7 @@ OF_BAGS = {
     'plot': '-o x.svg', 'info': '', 'report': '-o x.html', 'export': '-o x.csv', 'play': '',
     'replay': '',
 }  # fmt: skip
-WITH_BAGS_TOO = {'animate', 'view'}
+WITH_BAGS_TOO = {'accuracy', 'animate', 'view'}
 
 FILES = {
     'urdf': (b'<?xml version="1.0"?>\n<!-- by hand -->\n<robot name="r"/>\n', 'a URDF'),
