@@ -33,13 +33,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+from linkage_ros.drives import topic as topic_drive
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.errors import LinkageError
-from linkage_ros.messages.joint_state import CrankSample
+from linkage_ros.measuring import Contender, in_turn, Spread
+from linkage_ros.messages.joint_state import CrankSample, JointStateWriter
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
 from linkage_ros.scene.scene import Scene
-from linkage_ros.study.budget import JointError, Knob, Setting
+from linkage_ros.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
 from linkage_ros.study.prices import USUAL_RATE
 from linkage_ros.study.scene_motion import (
@@ -112,7 +113,15 @@ def measure_age_in_use(
 def errors_in_use(
     motions: Sequence[MemberMotion], rates: Sequence[float], horizon: float
 ) -> list[tuple[JointError, JointError]]:
-    """Return for each rate the errors of a state in use: held, and carried by its rates."""
+    """
+    Return for each rate the errors of a state in use: held, and carried by its rates.
+
+    Raises
+    ------
+    LinkageError
+        The loops close at no state of the motion.
+
+    """
     blocks = [_times_of_use(rate, horizon) for rate in rates]
     # All in one run, since a drive that integrates takes time for it.
     times = sorted({time for block in blocks for time in block.ravel().tolist()})
@@ -127,10 +136,17 @@ def errors_in_use(
             ahead = speed * (np.array(_PARTS) / rate)
             held[number].append(distances(motion.closure, first + 0.0 * ahead, exact))
             carried[number].append(distances(motion.closure, first + ahead, exact))
-    return [
-        (_over_periods(one), _over_periods(other))
-        for one, other in zip(held, carried, strict=True)
-    ]
+    found = []
+    for one, other in zip(held, carried, strict=True):
+        errors = _over_periods(one), _over_periods(other)
+        if errors[0] is None or errors[1] is None:
+            raise motions[0].member.content.error(
+                'drive',
+                'moves the linkage nowhere where its loops close',
+                'see linkage check for where they close',
+            )
+        found.append((errors[0], errors[1]))
+    return found
 
 
 def _times_of_use(rate: float, horizon: float) -> Any:
@@ -141,16 +157,12 @@ def _times_of_use(rate: float, horizon: float) -> Any:
     return np.round(uses * (NANOSECONDS / rate)).astype(int)
 
 
-def _over_periods(apart: Sequence[Any]) -> JointError:
-    """Return the error of distances (periods, parts), by the weights of the nodes."""
+def _over_periods(apart: Sequence[Any]) -> JointError | None:
+    """Return the error of distances (periods, parts) by the nodes; None if there are none."""
     worst = np.fmax.reduce([np.asarray(each) for each in apart])
     worst = worst[np.isfinite(worst).all(axis=1)]
     if not len(worst):
-        raise LinkageError(
-            'scene',
-            'its loops close at no state of its motion',
-            'see linkage check for where they close, and change the drive',
-        )
+        return None
     squares = (worst[:, :-1] ** 2) @ (0.5 * _WEIGHTS)
     return JointError(float(np.sqrt(squares.mean())), float(worst.max()))
 
@@ -176,14 +188,18 @@ def measure_age_of_command(
         error = joints.error(used, factor)
         if error is None:
             return None
+        rate = scene.rate or motion.sample_rate
+        more = (factor - 1.0) * motion.sample_rate / rate
+        price = Price(offer.scaled(more), rate) if factor and factor != 1.0 else None
         return Setting(
             label or f'{_hertz(motion.sample_rate * factor)}, {_use_of(used)}',
             error,
-            None,
+            price,
             [(f'{key}.{one}', value) for one, value in changes.items()],
             advice,
         )
 
+    offer = _offer_time(motion, 0.1 if quick else 0.5)
     own = measured({})
     if own is None:
         return None
@@ -199,6 +215,28 @@ def measure_age_of_command(
             advice = f'publish the crank at {motion.sample_rate * factor:g} Hz'
             settings.append(measured({}, factor, advice))
     return Knob(OF_COMMAND, [each for each in settings if each], 0, note=motion.note)
+
+
+def _offer_time(motion: MemberMotion, seconds: float) -> Spread:
+    """Return how long the node takes to read and accept a sample, in [µs]."""
+    names = motion.member.sampled
+    zeros = (0.0,) * len(names)
+    message = JointStateWriter(names).write(BEGIN, zeros, zeros, zeros)
+    name, use = motion.member.drive
+    if name != 'topic' or motion.member.dependent:
+        return Spread(0.0, 0.0, 0.0)
+    read, drive = topic_drive.reader(use, motion.context), TopicDrive(use, True)
+
+    def run() -> None:
+        for _ in range(_BLOCK):
+            drive.offer(read(message), BEGIN)
+
+    (spread,) = in_turn([Contender(run, _BLOCK)], seconds)
+    return spread.scaled(1e6)
+
+
+_BLOCK = 100
+"""Samples that are read together."""
 
 
 class _Samples:

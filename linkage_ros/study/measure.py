@@ -37,10 +37,10 @@ PARTS = (ERRORS, EFFECTS, RECORDING)
 
 _SHARES = {ERRORS: 0.7, EFFECTS: 0.2, RECORDING: 0.1}
 
-_QUICK_LEFT_OUT = (
-    'steps of the drive beyond its half and its double, most rates of ticks, and repetitions '
-    'were left out by --quick'
-)
+_QUICK_LEFT_OUT = '--quick: steps of a drive beyond its half and double, some rates, repetitions'
+
+_QUICK_HORIZON = 10.0
+"""Longest motion of a torque drive that a quick measurement follows, in [s]."""
 
 
 def measure_budget(
@@ -82,6 +82,11 @@ def measure_budget(
         package is not installed.
 
     """
+    left_out: list[str] = [_QUICK_LEFT_OUT] if quick else []
+    drifts = any(member.drive[0] == 'torque' for member in scene.members)
+    if quick and drifts and horizon > _QUICK_HORIZON:
+        left_out.append(f'--quick: what comes after {_QUICK_HORIZON:g} s')
+        horizon = _QUICK_HORIZON
     motions = motions_of(scene, like, horizon) if ERRORS in parts or like else []
     feed = feed_of(motions)
     done, whole = 0.0, sum(_SHARES[part] for part in parts)
@@ -91,7 +96,6 @@ def measure_budget(
         return lambda fraction: progress(min(1.0, begin + share * fraction))
 
     knobs: list[Knob] = []
-    left_out: list[str] = [_QUICK_LEFT_OUT] if quick else []
     if ERRORS in parts:
         found, more = _measure_errors(scene, motions, horizon, quick, feed, part_progress(ERRORS))
         knobs += sorted(found, key=lambda knob: knob.own.error.worst, reverse=True)
@@ -150,7 +154,7 @@ def _measure_errors(
                 horizon,
                 key=scene_key(motion.member, 'drive') + '.torque',
                 quick=quick,
-                seconds=8.0 if quick else 60.0,
+                seconds=6.0 if quick else 60.0,
                 progress=lambda share: progress(0.1 + 0.4 * share),
             )
             left_out += missing
@@ -162,11 +166,15 @@ def _measure_errors(
         of = f' of {motion.member.name}' if motion.member.name else ''
         knobs.append(knob._replace(name=knob.name + of))
     progress(0.5)
-    from linkage_ros.study.solving import measure_solving  # local import: optional dependencies
+    if any(motion.closure.linkage.ratios for motion in motions):
+        left_out.append('solving: the reference knows no ratios')
+    else:
+        from linkage_ros.study.solving import (
+            measure_solving,  # local import: optional dependencies
+        )
 
-    knobs.append(
-        measure_solving(motions, rate, horizon, quick=quick, seconds=1.0 if quick else 8.0)
-    )
+        seconds = 1.0 if quick else 8.0
+        knobs.append(measure_solving(motions, rate, horizon, quick=quick, seconds=seconds))
     progress(0.7)
     knobs = [_accepted(scene, knob) for knob in knobs]
     seconds = 3.0 if quick else 30.0

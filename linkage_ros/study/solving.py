@@ -113,29 +113,33 @@ def measure_solving(
     times = tick_times(rate, horizon, count)
     errors: list[JointError] = []
     contenders: list[tuple[str, JointError, Contender]] = []
-    singular = failed = 0
+    unproved = 0
     for number, motion in enumerate(motions):
-        states = [crank[0] for crank in cranks_at(motion, times) if crank is not None]
         linkage = motion.closure.linkage
+        states = [
+            crank[0]
+            for crank in cranks_at(motion, times)
+            if crank is not None and motion.closure.position(*crank[0]).joints
+        ]
         known, exact = exact_joints(linkage, states)
-        singular += len(states) - len(known)
+        unproved += len(states) - len(known)
         if not known:
             continue
         own = Solver(*_own(motion.closure))
-        others = [] if number else [*comparisons(motion.closure)]
-        for solver in (own, *others):
-            error, missing = judge(linkage, solver.solve, known, exact)
-            progress(0.5)
-            if solver is own:
-                errors.append(error)
-                failed += missing
-            elif missing:
-                continue
-            if not number:
+        errors.append(judge(linkage, own.solve, known, exact)[0])
+        progress(0.2)
+        if number:
+            continue
+        contenders.append((own.label, errors[0], _looped(own.solve, known)))
+        for solver in comparisons(motion.closure):
+            error, failed = judge(linkage, solver.solve, known, exact)
+            if not failed:
                 contenders.append((solver.label, error, _looped(solver.solve, known)))
-    if not errors:
+    if not contenders:
         raise LinkageError(
-            'solving', 'nothing can be proved along the motion', 'see linkage check for its range'
+            'solving',
+            'nothing can be proved along the motion: it stays at a toggle or a change point',
+            'move it, or leave the errors out: --only effects',
         )
     worst = JointError(
         sqrt(sum(e.rms**2 for e in errors) / len(errors)), max(e.worst for e in errors)
@@ -146,7 +150,7 @@ def measure_solving(
         for (label, error, _), spread in zip(contenders, times_of, strict=True)
     ]
     settings[0] = settings[0]._replace(error=worst, changes=())
-    note = f'{singular} states at a toggle or change point' if singular else ''
+    note = f'{unproved} states too near a toggle or change point to be proved' if unproved else ''
     return Knob(NAME, settings, 0, note=note)
 
 
@@ -277,7 +281,7 @@ def _solve_by_spline(closure: Closure, knots: int) -> Solve | None:
             value = low + (value - low) % width
         elif interval.turning:
             value += interval.shift(value)
-        return spline(value)  # type: ignore[no-any-return]
+        return spline(value)
 
     return position
 
