@@ -179,7 +179,7 @@ class _Picture:
             for mark in marks
         ]
         named.sort(key=lambda each: (not each[0].is_own, each[0].is_pale))
-        plot = Box(_LEFT, self.top, WIDTH - _RIGHT, self.bottom)
+        plot = Box(_LEFT + 3.0, self.top, WIDTH - _RIGHT - 3.0, self.bottom)
         found = []
         for mark, colour in named:
             text = mark.setting.label
@@ -305,7 +305,7 @@ _DIRECTIONS = (
 def _places_beside(mark: Mark, text: str) -> Iterator[Box]:
     """Yield places for a label, the nearest first; from beside its mark to above it."""
     width, height = _LETTER * len(text), _TEXT + 1.0
-    for gap in (10.0, 15.0, 22.0):
+    for gap in (10.0,) if mark.is_pale and not mark.is_own else (10.0, 15.0, 22.0):
         for dx, dy in _DIRECTIONS:
             x = mark.x + dx * gap + (0.5 * dx - 0.5) * width
             y = mark.y + dy * gap - 0.5 * height
