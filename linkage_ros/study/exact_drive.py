@@ -288,15 +288,15 @@ class _Run:
     ) -> Iterator[tuple[Margin, Callable[[], None]]]:
         """Yield what may happen, each with what it does."""
         for number, body in enumerate(bodies):
-            if body.rests:
-                continue
-            low, high = body.of.stops
-            if body.sense:
+            if body.sense and not body.rests:
                 yield self._turning(body.sense, number)
+        # Only the crank has stops, and it comes first.
+        low, high = bodies[0].of.stops
+        if not bodies[0].rests:
             if high < inf:
-                yield (lambda _, y, s=high: s - y[0]), self._impact(acting, high, 1.0)
+                yield (lambda _, y: high - y[0]), self._impact(acting, high, 1.0)
             if low > -inf:
-                yield (lambda _, y, s=low: y[0] - s), self._impact(acting, low, -1.0)
+                yield (lambda _, y: y[0] - low), self._impact(acting, low, -1.0)
         if self._motor is None:
             return
         if len(bodies) == 2:

@@ -28,8 +28,9 @@ from linkage_ros.scene.scene import Scene
 from linkage_ros.study.age import measure_age_in_use, measure_age_of_command
 from linkage_ros.study.budget import Budget, Knob, Loss, Setting
 from linkage_ros.study.deliberate import measure_deliberate
+from linkage_ros.study.motion_feed import feed_of
 from linkage_ros.study.prices import add_prices, change_scene, Feed, tick_price, USUAL_RATE
-from linkage_ros.study.scene_motion import feed_of, MemberMotion, motions_of, scene_key
+from linkage_ros.study.scene_motion import MemberMotion, motions_of, scene_key
 
 ERRORS, EFFECTS, RECORDING = 'errors', 'effects', 'recording'
 PARTS = (ERRORS, EFFECTS, RECORDING)
@@ -88,6 +89,7 @@ def measure_budget(
         left_out.append(f'--quick: what comes after {_QUICK_HORIZON:g} s')
         horizon = _QUICK_HORIZON
     motions = motions_of(scene, like, horizon) if ERRORS in parts or like else []
+    horizon = min([horizon, *(motion.length for motion in motions)])
     feed = feed_of(motions)
     done, whole = 0.0, sum(_SHARES[part] for part in parts)
 

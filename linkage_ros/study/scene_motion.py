@@ -25,32 +25,22 @@ Whatever noise, delay or fault the scene adds is no part of its motion: that is 
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import cos, pi, sin, tau
+from math import cos, inf, pi, sin, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.drives import topic as topic_drive
 from linkage_ros.drives.drive import Context, CrankState
-from linkage_ros.drives.torque import TOPIC as TORQUE_TOPIC
 from linkage_ros.drives.torque import TorqueDrive
-from linkage_ros.dynamics.motion import LARGEST
-from linkage_ros.errors import BagError, LinkageError, listed
+from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.messages.joint_state import (
-    EffortCommand,
-    JointStateReader,
-    JointStateWriter,
-    Rejection,
-)
-from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.messages.joint_state import EffortCommand
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
 from linkage_ros.scene.scene import Scene, SceneLinkage
-from linkage_ros.study.prices import Feed, turn_crank, USUAL_RATE
+from linkage_ros.study.prices import USUAL_RATE
 
 BEGIN = NANOSECONDS
 """Time of the first tick, in [ns]."""
@@ -103,6 +93,7 @@ class MemberMotion(NamedTuple):
     # [ns]; () if they come at the rate of `sample_rate`, at once.
     samples: Sequence[tuple[int, int]] = ()
     sample_rate: float = 0.0  # Samples of a topic drive per second; 0 for other drives
+    length: float = inf  # How long it is known, in [s]
     note: str = ''  # What is assumed of it, in a sentence; '' for nothing
 
 
@@ -154,6 +145,10 @@ def without_deliberate(scene: Scene) -> Scene:
 def _motion(
     scene: Scene, line: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
 ) -> MemberMotion:
+    from linkage_ros.study.recorded_motion import (
+        follow_samples,  # local import: it needs the types of this module
+    )
+
     member, context = line.member, line.context
     closure = line.closure
     if type(closure) is not Closure:
@@ -161,15 +156,15 @@ def _motion(
     motion = MemberMotion(member, closure, context, None)
     drive, parameters = member.drive
     if drive == 'torque':
-        return _commanded(motion, line, like, bag, horizon)
+        return _commanded(motion, like, bag, horizon)
     if drive == 'bag':
         opened = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
         fast = scene.rate if parameters.pace == 'fast' else 0.0
-        return _recorded(motion, opened, parameters.topic, fast)
+        return follow_samples(motion, opened, parameters.topic, fast)
     if drive != 'topic':
         return motion._replace(path=_path_of(line))
     if bag is not None:
-        return _recorded(motion, bag, '')
+        return follow_samples(motion, bag)
     if like is None:
         raise member.content.error(
             'drive',
@@ -216,113 +211,17 @@ def _sines(closure: Closure) -> Path:
     return path
 
 
-class _Sample(NamedTuple):
-    """A good sample of a crank, with its stamp and arrival, in [ns]."""
-
-    stamp: int
-    arrival: int
-    values: tuple[float, ...]
-    rates: tuple[float, ...]
-
-
-def _recorded(motion: MemberMotion, bag: Bag, topic: str, pace: float = 0.0) -> MemberMotion:
-    """
-    Return the motion through the samples of a bag: cubics by their values and rates.
-
-    With a ``pace``, in [Hz], each tick takes one sample, whatever its time.
-    """
-    samples = _samples_of(motion, bag, topic)
-    if pace:
-        scale = 1e-9 * pace * (samples[-1].stamp - samples[0].stamp) / (len(samples) - 1)
-        samples = [
-            sample._replace(
-                stamp=round(k * 1e9 / pace), rates=tuple(scale * rate for rate in sample.rates)
-            )
-            for k, sample in enumerate(samples)
-        ]
-    stamps = [sample.stamp - samples[0].stamp for sample in samples]
-    gap = motion.member.drive[1].max_age
-
-    def path(time: int) -> Crank | None:
-        number = bisect_right(stamps, time) - 1
-        if number < 0 or number + 1 >= len(stamps):
-            return None
-        one, other = samples[number], samples[number + 1]
-        length = (other.stamp - one.stamp) * 1e-9
-        if length > gap:
-            return None
-        part = (time - stamps[number]) * 1e-9 / length
-        ends = zip(one.values, one.rates, other.values, other.rates, strict=True)
-        found = [_cubic(part, length, *four) for four in ends]
-        return tuple(value for value, _ in found), tuple(rate for _, rate in found)
-
-    note = f'the crank moves as recorded in {bag.path.name}'
-    if pace:
-        return motion._replace(path=path, note=note)
-    return motion._replace(
-        path=path,
-        samples=[(sample.stamp - samples[0].stamp, sample.arrival - samples[0].stamp)
-                 for sample in samples],
-        sample_rate=(len(stamps) - 1) * 1e9 / stamps[-1],
-        note=note,
-    )  # fmt: skip
-
-
-def _samples_of(motion: MemberMotion, bag: Bag, topic: str) -> list[_Sample]:
-    """Return the good samples of the topic that has most of them."""
-    name, use = motion.member.drive
-    read: Any = JointStateReader(motion.context.inputs_in_messages).read
-    if name == 'topic':
-        read = topic_drive.reader(use, motion.context)
-    else:
-        use = topic_drive.TopicParameters(max_age=use.max_age)
-    of_type = {each.name for each in bag.topics if each.type == JOINT_STATE}
-    received: dict[str, list[tuple[int, Any]]] = {}
-    for heard, log_time, _, data in bag.messages():
-        if heard in of_type and (heard == topic or not topic):
-            sample = read(data)
-            if not isinstance(sample, Rejection):
-                received.setdefault(heard, []).append((log_time, sample))
-    most = max(received.values(), key=len, default=[])
-    drive = topic_drive.TopicDrive(use, True, motion.closure.linkage.inputs)
-    found: list[_Sample] = []
-    for log_time, sample in sorted(most, key=lambda one: one[0]):
-        if drive.offer(sample, log_time) is None and drive.sample is not None:
-            stamp, values, rates, _ = drive.sample
-            if not found or stamp > found[-1].stamp:
-                found.append(_Sample(stamp, log_time, values, rates))
-    if len(found) < 2:
-        names = listed(motion.context.inputs_in_messages)
-        raise BagError(
-            bag.path, f'holds no motion of {names}', 'name a bag with samples of the crank'
-        )
-    return found
-
-
-def _cubic(
-    part: float, length: float, begin: float, start: float, end: float, stop: float
-) -> tuple[float, float]:
-    """Return value and rate of the cubic through two values and rates, at a part of its length."""
-    s, rest = part, 1.0 - part
-    value = begin + (end - begin) * s * s * (3.0 - 2.0 * s)
-    value += length * s * rest * (start * rest - stop * s)
-    rate = 6.0 * s * rest * (end - begin) / length
-    rate += start * rest * (1.0 - 3.0 * s) + stop * s * (3.0 * s - 2.0)
-    return value, rate
-
-
 def _commanded(
-    motion: MemberMotion, line: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
+    motion: MemberMotion, like: str | None, bag: Bag | None, horizon: float
 ) -> MemberMotion:
     """Return the motion of a torque drive, with the commands that come to it."""
     if bag is not None:
-        return motion._replace(
-            commands=_recorded_commands(bag, line, horizon),
-            note=f'commands come as recorded in {bag.path.name}',
-        )
+        from linkage_ros.study.recorded_motion import follow_commands  # local import: as above
+
+        return follow_commands(motion, bag)
     if like is None and moves(motion, horizon):
         return motion._replace(note='no command comes')
-    effort = _usual_effort(motion, line)
+    effort = _usual_effort(motion)
     timeout = motion.member.drive[1].timeout
     period = round(min(COMMAND_PERIOD, 0.5 * timeout) * NANOSECONDS)
     commands = [
@@ -424,7 +323,7 @@ def built(motion: MemberMotion, **changes: Any) -> TorqueDrive:
     return torque.build(replace(motion.member.drive[1], **changes), motion.context)
 
 
-def _usual_effort(motion: MemberMotion, line: LinkagePipeline) -> float:
+def _usual_effort(motion: MemberMotion) -> float:
     """Return the amplitude of the commands: they pass friction and a fifth of the weight."""
     equation = motion.context.mechanics.equation
     drive = built(motion)
@@ -439,95 +338,8 @@ def _usual_effort(motion: MemberMotion, line: LinkagePipeline) -> float:
     motor = motion.member.drive[1].motor
     if motor is None or motor.command == 'effort':
         return effort
-    current = effort / (motor.torque_constant * motor.ratio * motor.efficiency)
+    current: float = effort / (motor.torque_constant * motor.ratio * motor.efficiency)
     if motor.command == 'current':
         return current
-    return motor.resistance * current + motor.torque_constant * motor.ratio * unit
-
-
-def _recorded_commands(bag: Bag, line: LinkagePipeline, horizon: float) -> list[Command]:
-    """Return the commands of a bag, at the times of their recording."""
-    from linkage_ros.bag.run_events import raw_account  # local import: only with a bag
-    from linkage_ros.drives.torque import reader
-
-    read = reader(line.member.drive[1], line.context)
-    topic = raw_account(bag).get('crank_topic')
-    found: list[tuple[int, EffortCommand]] = []
-    for name, log_time, _, data in bag.messages():
-        if topic and name != topic:
-            continue
-        kinds = [each.type for each in bag.topics if each.name == name]
-        if kinds != [JOINT_STATE]:
-            continue
-        command = read(data)
-        if not isinstance(command, Rejection) and -LARGEST <= command.effort <= LARGEST:
-            found.append((log_time, command))
-    if not found:
-        raise BagError(bag.path, 'holds no command of the input', 'name another bag')
-    first = found[0][0]
-    until = round(horizon * NANOSECONDS)
-    return [
-        Command(time - first, command.effort) for time, command in found if time - first < until
-    ]
-
-
-def feed_of(motions: Sequence[MemberMotion]) -> Feed:
-    """Return the messages that make this motion, for a measurement of ticks."""
-    if not any(motion.sample_rate or motion.commands for motion in motions):
-        return turn_crank
-
-    def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
-        if pipeline.topic == TORQUE_TOPIC:
-            return _commands_and_ticks(scene, motions)
-        return (
-            _samples_and_ticks(scene, motions) if pipeline.topic else turn_crank(scene, pipeline)
-        )
-
-    return feed
-
-
-def _samples_and_ticks(
-    scene: Scene, motions: Sequence[MemberMotion]
-) -> Iterator[tuple[int, bytes]]:
-    """Yield ticks, each with a sample; the last one again and again after the end of a bag."""
-    driven = [each for each in motions if each.member.drive[0] == 'topic']
-    if any(each.member.dependent for each in driven):
-        yield from turn_crank(scene, Pipeline(scene))
-        return
-    write = JointStateWriter([name for each in driven for name in each.member.sampled]).write
-    period = 1e9 / (scene.rate or USUAL_RATE)
-    known: list[Crank] = [((0.0,) * len(e.member.sampled),) * 2 for e in driven]
-    number = 0
-    while True:
-        now = BEGIN + round(number * period)
-        found = [each.path(now - BEGIN) for each in driven if each.path]
-        known = [new or old for new, old in zip(found, known, strict=True)]
-        values = [value for crank in known for value in crank[0]]
-        rates = [rate for crank in known for rate in crank[1]]
-        yield now, write(now, values, rates, (0.0,) * len(values))
-        number += 1
-
-
-def _commands_and_ticks(
-    scene: Scene, motions: Sequence[MemberMotion]
-) -> Iterator[tuple[int, bytes]]:
-    """Yield ticks, with the commands that have come since the last one."""
-    driven = [each for each in motions if each.member.drive[0] == 'torque']
-    names = [name for each in driven for name in each.context.inputs_in_messages]
-    write = JointStateWriter(names).write
-    zeros = (0.0,) * len(names)
-    period = 1e9 / scene.rate
-    number, next_ones = 0, [0] * len(driven)
-    efforts = [0.0] * len(driven)
-    while True:
-        elapsed = round(number * period)
-        fresh = False
-        for k, each in enumerate(driven):
-            while next_ones[k] < len(each.commands) and (
-                each.commands[next_ones[k]].time <= elapsed
-            ):
-                efforts[k] = each.commands[next_ones[k]].effort
-                next_ones[k] += 1
-                fresh = True
-        yield BEGIN + elapsed, write(BEGIN, zeros, zeros, efforts) if fresh else b''
-        number += 1
+    voltage: float = motor.resistance * current + motor.torque_constant * motor.ratio * unit
+    return voltage

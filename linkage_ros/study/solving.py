@@ -223,7 +223,7 @@ def _own(closure: Closure) -> tuple[str, Solve]:
 
     def position(*inputs: float) -> Sequence[Any]:
         (joints,) = fast(*inputs) or plain(*inputs).values or ((),)
-        return joints  # type: ignore[no-any-return]
+        return joints
 
     return (CLOSED_FORM if closure.by_steps else ITERATED), position
 
@@ -282,7 +282,8 @@ def _solve_by_spline(closure: Closure, knots: int) -> Solve | None:
             value = low + (value - low) % width
         elif interval.turning:
             value += interval.shift(value)
-        return spline(value)
+        joints: Sequence[Any] = spline(value)
+        return joints
 
     return position
 

@@ -28,8 +28,8 @@ import pytest
 from .own_runs import (
     BEGIN,
     command_messages,
-    FourBar,
     four_bar_joints,
+    FourBar,
     parabolas,
     parabolas_with_play,
     run_scene,
