@@ -58,7 +58,7 @@ Of the sine of a crank, in [Hz] and [rad]; for a limited one, as a fraction of i
 So a crank that turns passes through all its poses, some 1.6 turns a second at most.
 """
 
-_SELDOM = NANOSECONDS // 5
+_SELDOM = NANOSECONDS // 20
 """Longest time between two looks at a torque drive, in [ns]."""
 
 _BEYOND = 0.5 * pi
