@@ -154,7 +154,7 @@ def _section(shown: Shown, budget: Budget, picture: str) -> Iterator[str]:
     yield ''
     yield f'![Error against cost of {shown.scene}](accuracy/{picture})'
     yield ''
-    yield from table(heads_of(budget), [row.cells() for row in rows_of(budget)])
+    yield from table(heads_of(budget), rows_of(budget))
     yield ''
     yield from (f'{escaped(line).capitalize()}.' for line in closing_lines(budget)[:1])
     yield ''

@@ -212,5 +212,5 @@ def _print(budget: Budget, answer: NeedAnswer | None) -> None:
         print(answer.text)
     print(*lead_lines(budget), sep='\n')
     print()
-    show(Table('', heads_of(budget), [row.cells() for row in rows_of(budget)]))
+    show(Table('', heads_of(budget), rows_of(budget)))
     print(*closing_lines(budget), sep='\n')

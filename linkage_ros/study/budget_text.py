@@ -23,7 +23,6 @@ is within noise, and no number is told of it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import floor, isfinite, log10
 from typing import Any, NamedTuple
 
@@ -184,7 +183,7 @@ def _error_line(budget: Budget, knobs: Sequence[Knob]) -> str:
     total, most = total_error(budget), knobs[0]
     if not total:
         return f'{budget.scene}: exact'
-    share = most.own.error.worst / total
+    share = most.own.error.worst / total if isfinite(total) else 1.0
     if len(knobs) == 1 or share > 0.99:
         cause = f'by {_called(most)}'
     elif share >= 0.9:
@@ -204,7 +203,7 @@ def _called(knob: Knob) -> str:
 def _advice_line(budget: Budget, knob: Knob) -> str:
     """Return what to write for less of the greatest error."""
     total = total_error(budget)
-    rest = total - knob.own.error.worst
+    rest = sum(each.own.error.worst for each in error_knobs(budget) if each is not knob)
     others = [each for each in knob.settings if each is not knob.own and each.line]
     for factor, words in ((0.1, 'a tenth'), (0.2, 'a fifth'), (0.5, 'half')):
         good = [each for each in others if rest + each.error.worst <= factor * total]
@@ -228,9 +227,8 @@ def _cost_text(budget: Budget, knob: Knob, setting: Setting) -> str:
     return f'{text} a tick, {share_text(change)} of a core'
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """A row of the table, as text."""
+class Row(NamedTuple):
+    """A row of the table, as text: its cells, in the order of the columns."""
 
     name: str
     rms: str
@@ -239,10 +237,6 @@ class Row:
     core: str
     cheaper: str = ''
     better: str = ''  # Or a sentence where there is no other setting
-
-    def cells(self) -> tuple[str, ...]:
-        """Return the cells, in the order of the columns."""
-        return self.name, self.rms, self.worst, self.cost, self.core, self.cheaper, self.better
 
 
 def rows_of(budget: Budget) -> list[Row]:
@@ -359,10 +353,24 @@ def rate_text(rate: float) -> str:
 
 def budget_json(budget: Budget) -> dict[str, Any]:
     """Return a budget as JSON holds it; errors in [rad], times in [µs]."""
+
+    def setting_json(knob: Knob, setting: Setting) -> dict[str, Any]:
+        return {
+            'label': setting.label,
+            # What runs away is infinitely far off, and JSON has no such number.
+            **{
+                name: value if isfinite(value) else None
+                for name, value in setting.error._asdict().items()
+            },
+            'price': _price_json(setting.price),
+            'core': budget.core_of(knob, setting),
+            'write': setting.line,
+        }
+
     return {
         'scene': budget.scene,
         'lines': lead_lines(budget),
-        'error': total_error(budget),
+        'error': total_error(budget) if isfinite(total_error(budget)) else None,
         'rate': budget.rate,
         'tick': _price_json(budget.tick),
         'sources': [
@@ -372,17 +380,7 @@ def budget_json(budget: Budget) -> dict[str, Any]:
                 'after_s': knob.after,
                 'note': knob.note,
                 'chosen': knob.chosen,
-                'settings': [
-                    {
-                        'label': setting.label,
-                        'rms': setting.error.rms,
-                        'worst': setting.error.worst,
-                        'price': _price_json(setting.price),
-                        'core': budget.core_of(knob, setting),
-                        'write': setting.line,
-                    }
-                    for setting in knob.settings
-                ],
+                'settings': [setting_json(knob, setting) for setting in knob.settings],
             }
             for knob in budget.knobs
         ],
@@ -403,11 +401,5 @@ def budget_json(budget: Budget) -> dict[str, Any]:
 def _price_json(price: Price | None) -> dict[str, Any] | None:
     if price is None:
         return None
-    low, middle, high = price.tick
-    return {
-        'us': middle,
-        'low_us': low,
-        'high_us': high,
-        'core': price.core,
-        'within_noise': price.is_noise,
-    }
+    times = dict(zip(('low_us', 'us', 'high_us'), price.tick, strict=True))
+    return {**times, 'core': price.core, 'within_noise': price.is_noise}

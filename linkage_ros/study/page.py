@@ -61,7 +61,7 @@ def _body(budget: Budget, *, has_field: bool) -> Iterator[str]:
     yield from table_html(
         'Where the error comes from, and what each setting costs',
         [head.lstrip('>') for head in heads],
-        [row.cells() for row in rows_of(budget)],
+        rows_of(budget),
         [head.startswith('>') for head in heads],
     )
     yield '</figure>'

@@ -47,6 +47,9 @@ _MARK = 5.0
 _LEAST = 1e-18
 """Smaller errors are drawn on the lower edge: no double can have them."""
 
+_MOST = 1e3
+"""Greater errors are drawn on the upper edge, such as that of a step that runs away, in [rad]."""
+
 _FAINT = '#6b7782'
 _HALO = 'stroke="#ffffff" stroke-width="3" paint-order="stroke"'
 """So that no line of the grid runs through letters."""
@@ -125,7 +128,7 @@ class _Picture:
         self.height = self.bottom + _BELOW
         settings = [(knob, setting) for knob in knobs for setting in knob.settings]
         costs = [budget.core_of(knob, setting) for knob, setting in settings]
-        errors = [max(setting.error.worst, _LEAST) for _, setting in settings]
+        errors = [_drawn(setting) for _, setting in settings]
         # Room beside the outermost marks, for their labels.
         low, high = log10(min(costs)), log10(max(costs))
         self.x = _Scale(low - 0.25, high + 0.45, _LEFT, WIDTH - _RIGHT)
@@ -145,7 +148,7 @@ class _Picture:
         return [
             Mark(
                 self.x.place(cost),
-                self.y.place(max(error, _LEAST)),
+                self.y.place(_drawn(setting)),
                 setting,
                 f'{knob.name}, {setting.label}: {error_text(error)} rad; {share_text(cost)}',
                 setting is knob.own,
@@ -176,7 +179,7 @@ class _Picture:
             for mark in marks
         ]
         named.sort(key=lambda each: (not each[0].is_own, each[0].is_pale))
-        plot = Box(_LEFT, self.top, WIDTH - _RIGHT, self.bottom)
+        plot = Box(_LEFT + 3.0, self.top, WIDTH - _RIGHT - 3.0, self.bottom)
         found = []
         for mark, colour in named:
             text = mark.setting.label
@@ -277,6 +280,10 @@ class _Picture:
                 yield f'{_shape(number, mark.x, mark.y, style)}</g>'
 
 
+def _drawn(setting: Setting) -> float:
+    return min(max(setting.error.worst, _LEAST), _MOST)
+
+
 def _legend_places(names: Sequence[str]) -> Iterator[tuple[float, int]]:
     """Yield the left edge and the row of each name above the plot."""
     x, row = 12.0, 0
@@ -298,7 +305,7 @@ _DIRECTIONS = (
 def _places_beside(mark: Mark, text: str) -> Iterator[Box]:
     """Yield places for a label, the nearest first; from beside its mark to above it."""
     width, height = _LETTER * len(text), _TEXT + 1.0
-    for gap in (10.0, 15.0, 22.0):
+    for gap in (10.0,) if mark.is_pale and not mark.is_own else (10.0, 15.0, 22.0):
         for dx, dy in _DIRECTIONS:
             x = mark.x + dx * gap + (0.5 * dx - 0.5) * width
             y = mark.y + dy * gap - 0.5 * height

@@ -306,19 +306,6 @@ def _mean_of_most(values: Sequence[float]) -> float:
     return fmean(sorted(values)[beyond:end])
 
 
-def price_changes(
-    scene: Scene,
-    changes: Sequence[Sequence[Change]],
-    seconds: float,
-    feed: Feed = turn_crank,
-    progress: Progress = lambda _: None,
-) -> list[Price]:
-    """Return what each change of keys adds to a tick of the scene as it is."""
-    return price_scenes(
-        scene, [change_scene(scene, each) for each in changes], seconds, feed, progress
-    )
-
-
 def add_prices(
     scene: Scene,
     knobs: Sequence[Knob],
@@ -340,7 +327,8 @@ def add_prices(
     }
     # Two knobs may ask for the same keys, such as a rate.
     different = {tuple(settings_of(changes)): changes for changes in asked.values()}
-    found = price_changes(scene, [*different.values()], seconds, feed, progress)
+    changed = [change_scene(scene, changes) for changes in different.values()]
+    found = price_scenes(scene, changed, seconds, feed, progress)
     prices = dict(zip(different, found, strict=True))
     return [
         knob._replace(
@@ -353,14 +341,3 @@ def add_prices(
         )
         for row, knob in enumerate(knobs)
     ]
-
-
-def part_price(
-    scene: Scene,
-    without: Scene,
-    seconds: float,
-    feed: Feed = turn_crank,
-    progress: Progress = lambda _: None,
-) -> Price:
-    """Return what a part of a scene takes of its tick: the scene less the scene without it."""
-    return price_scenes(without, [scene], seconds, feed, progress)[0]

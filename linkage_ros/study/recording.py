@@ -24,17 +24,16 @@ recorder's thread and of passing the messages to it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 import gc
-from itertools import count
 from pathlib import Path
 from statistics import median
 import sys
 import tempfile
 from time import monotonic_ns, sleep, thread_time_ns
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.bag.metadata import BagSummary
 from linkage_ros.bag.recorder import Recorder
@@ -42,7 +41,6 @@ from linkage_ros.bag.storage import FLUSH_AFTER, Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.measuring import alternating, Progress, spread_of
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -62,14 +60,6 @@ _LONGEST_PERIOD = 2.0  # [s]
 _ROUNDS = 3
 
 
-class RecordedRun(NamedTuple):
-    """What was measured of a run."""
-
-    per_tick: float  # Processor time for recording a tick, in [µs]
-    stake: float  # Longest time that a power cut would have lost, in [s]
-    dropped: int
-
-
 def measure_recording(
     scene: Scene,
     folder: Path,
@@ -79,47 +69,27 @@ def measure_recording(
     progress: Progress = lambda _: None,
 ) -> list[Loss]:
     """
-    Record a scene with its own flush period and two others.
+    Record a scene with its own flush period and two others; if quick, with its own only, once.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    folder
-        Folder on the disk to be measured; the bags are made there and removed.
-    quick
-        Whether to run the scene's own setting only, once.
-    feed
-        Times and crank messages of a run.
-    progress
-        Called now and then with the fraction that is done.
-
-    Returns
-    -------
-    losses
-        Of the scene's own setting first; empty if the scene records no bag as it runs.
-
-    Raises
-    ------
-    RecordingError
-        If a bag cannot be made there, or ended early.
-
+    The bags are made in the folder, on the disk to be measured, and removed. The scene's own
+    setting comes first; there is none if it records no bag as it runs. A RecordingError says that
+    a bag cannot be made there, or ended early.
     """
     if scene.record is None or scene.record.storage.snapshot_seconds:
         return []
     own = scene.record.storage
-    rounds = 1 if quick else _ROUNDS
-    settings = [own] if quick else [own, *_others(own)]
+    rounds, settings = (1, [own]) if quick else (_ROUNDS, [own, *_others(own)])
     closures = Pipeline(scene).closures
-    runs: list[list[RecordedRun]] = [[] for _ in settings]
+    runs: list[list[_Run]] = [[] for _ in settings]
     lengths = [max(_SHORTEST, _LONGER * each.flush_period) for each in settings]
     done, whole = 0.0, rounds * sum(lengths)
     with tempfile.TemporaryDirectory(prefix='recording_', dir=folder) as temporary:
         for index in alternating(range(len(settings)), rounds):
             progress(done / whole)
             bag = Path(temporary, f'{index}_{len(runs[index])}')
+            pipeline = Pipeline(scene, closures)
             runs[index].append(
-                record_run(scene, closures, bag, settings[index], lengths[index], feed)
+                _record(scene, pipeline, bag, settings[index], lengths[index], feed)
             )
             done += lengths[index]
     progress(1.0)
@@ -143,49 +113,46 @@ def _others(own: Storage) -> Iterator[Storage]:
             yield replace(own, flush_period=period)
 
 
-def record_run(
-    scene: Scene,
-    closures: Sequence[Closure],
-    folder: Path,
-    storage: Storage,
-    seconds: float,
-    feed: Feed = turn_crank,
-) -> RecordedRun:
-    """
-    Tick a scene in real time, at its own rate up to 1 kHz, and record it as the node does.
+class _Run(NamedTuple):
+    """What was measured of a run."""
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    closures
-        Its linkages; they have no state and serve every run.
-    folder
-        Folder of the bag, which stays.
-    storage
-        Settings of the recorder.
-    seconds
-        Duration, in [s]; longer if there was no flush by then.
-    feed
-        Times and crank messages of the run.
+    per_tick: float  # Processor time for recording a tick, in [µs]
+    stake: float  # Longest time that a power cut would have lost, in [s]
+    dropped: int
 
-    Raises
-    ------
-    RecordingError
-        If the bag cannot be created, or ended early.
 
-    """
+def _record(
+    scene: Scene, pipeline: Pipeline, folder: Path, storage: Storage, seconds: float, feed: Feed
+) -> _Run:
+    """Tick in real time, at the scene's rate up to 1 kHz, and record it as the node does."""
     period = 1e9 / min(scene.rate or USUAL_RATE, USUAL_RATE)
-    pipeline = Pipeline(scene, closures)
+    crank = 1 if pipeline.topic else 0
+    passing = []
     with _as_in_the_node():
         files = {name: ('application/yaml', data) for name, data in scene.files.items()}
         writer = _WatchedWriter(folder, _topics(pipeline), files, storage)
         recorder = Recorder(writer, flush_period=storage.flush_period)
-
-        def going_on(now: float) -> bool:
-            return now < (seconds if writer.flushes else _PATIENCE * seconds)
-
-        passing = _tick(feed(scene, pipeline), pipeline, recorder, period, going_on)
+        offer = recorder.offer
+        begin = monotonic_ns()
+        for number, (now, sample) in enumerate(feed(scene, pipeline), 1):
+            wait = begin + round(number * period) - monotonic_ns()
+            if wait > 0:
+                sleep(wait * 1e-9)
+            if sample:
+                pipeline.offer(sample, now)
+            tick = pipeline.tick(now)
+            before = monotonic_ns()
+            if sample:
+                offer(0, now, now, sample)
+            if tick.message:
+                offer(crank, now, now, tick.message)
+                for topic, extra in enumerate(tick.extras, crank + 1):
+                    if extra:
+                        offer(topic, now, now, extra)
+            passing.append(monotonic_ns() - before)
+            patience = 1.0 if writer.flushes else _PATIENCE
+            if (before - begin) * 1e-9 >= patience * seconds:
+                break
         summary = recorder.stop()
     if summary.failure or not writer.flushes:
         reason = summary.failure or 'the disk was not written to in time'
@@ -196,46 +163,11 @@ def record_run(
     between = FLUSH_AFTER * storage.flush_period * 1e9 / period
     writing = (writer.cpu - flushing) / len(passing)
     per_tick = writing + flushing / len(writer.flushes) / between + median(passing)
-    return RecordedRun(
+    return _Run(
         per_tick * 1e-3,
         max(flush.stake for flush in writer.flushes) * 1e-9,
         sum(topic.dropped for topic in summary.topics),
     )
-
-
-def _tick(
-    fed: Iterator[tuple[int, bytes]],
-    pipeline: Pipeline,
-    recorder: Recorder,
-    period: float,
-    going_on: Callable[[float], bool],
-) -> list[int]:
-    """Tick at a period, in [ns]; return the time of passing the messages of each tick, in [ns]."""
-    crank = 1 if pipeline.topic else 0
-    offer = recorder.offer
-    passing = []
-    begin = monotonic_ns()
-    for number, (now, sample) in zip(count(1), fed):
-        due = begin + round(number * period)
-        wait = due - monotonic_ns()
-        if wait > 0:
-            sleep(wait * 1e-9)
-        if sample:
-            pipeline.offer(sample, now)
-        tick = pipeline.tick(now)
-        before = monotonic_ns()
-        if sample:
-            offer(0, now, now, sample)
-        if tick.message:
-            offer(crank, now, now, tick.message)
-            for topic, extra in enumerate(tick.extras, crank + 1):
-                if extra:
-                    offer(topic, now, now, extra)
-        after = monotonic_ns()
-        passing.append(after - before)
-        if not going_on((after - begin) * 1e-9):
-            break
-    return passing
 
 
 def _topics(pipeline: Pipeline) -> list[Topic]:
@@ -271,14 +203,8 @@ class _Flush(NamedTuple):
 class _WatchedWriter(BagWriter):
     """A writer that measures its own cost; only its constructor runs outside its thread."""
 
-    def __init__(
-        self,
-        folder: Path,
-        topics: list[Topic],
-        attachments: Mapping[str, tuple[str, bytes]],
-        storage: Storage,
-    ) -> None:
-        super().__init__(folder, topics, attachments, storage)
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
         self.flushes: list[_Flush] = []
         self.cpu = 0
         self._safe_from = monotonic_ns()

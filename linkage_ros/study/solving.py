@@ -40,6 +40,7 @@ from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.measuring import Contender, in_turn, Progress
 from linkage_ros.resources import shipped
 from linkage_ros.study.budget import JointError, Knob, Price, Setting
+from linkage_ros.study.budget_text import error_text
 from linkage_ros.study.four_bar_formulas import (
     plain_four_bar,
     Solve,
@@ -235,7 +236,7 @@ def comparisons(closure: Closure) -> Iterator[Solver]:
         yield Solver('float32', solve_in_single_precision(shape))
         yield Solver('textbook form', solve_by_textbook(shape))
     for tolerance in _TOLERANCES:
-        yield Solver(f'Newton to {tolerance:.0e}', solve_by_newton(linkage, tolerance))
+        yield Solver(f'Newton to {error_text(tolerance)}', solve_by_newton(linkage, tolerance))
     if len(linkage.inputs) == 1 and find_spec('scipy') is not None:
         for knots in _KNOTS:
             spline = _solve_by_spline(closure, knots)

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 from linkage_ros.errors import FileError
-from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.scene.load import kind_of, SCENE_FILE
@@ -51,11 +50,12 @@ def tuned_scene(
 
     """
     content = parse_yaml(scene.files[SCENE_FILE], scene.name)
+    scene_mapping: Any = content.mapping
     file = named_file(named, 'scenes', 'linkages')
     if kind_of(read_yaml(file)[0]) == 'linkage':
-        content.mapping['linkage'] = _path_from(folder, file)
+        scene_mapping['linkage'] = _path_from(folder, file)
     else:
-        for within, key in _paths(content):
+        for within, key in _paths(scene_mapping):
             path = file.parent / within[key]
             if key == 'linkage':
                 path = linkage_of_scene(within[key], file.parent)
@@ -63,9 +63,8 @@ def tuned_scene(
     return apply_settings(content, settings_of(changes))
 
 
-def _paths(content: Section) -> Iterator[tuple[Any, str]]:
+def _paths(scene: Any) -> Iterator[tuple[Any, str]]:
     """Yield the mappings of a scene that hold the path of a file, with its key."""
-    scene = content.mapping
     entries = scene.get('linkages') or []
     for entry in (scene, *(entries if isinstance(entries, list) else entries.values())):
         if 'linkage' in entry:

@@ -61,7 +61,7 @@ def options() -> Iterator[tuple[str, argparse.Action]]:
 SHORTENED = {
     '--seconds 10': '--seconds 0.3',
     '--seconds 5': '--seconds 0.3',
-    '--quick': '--quick --only recording',
+    '--quick': '--quick --only errors --horizon 0.2',
     '--rate 0.5': '--rate 10',
 }
 """Parts of examples that would take seconds, and what the test types instead."""

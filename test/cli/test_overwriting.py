@@ -59,7 +59,6 @@ FOLDERS = {
 }
 
 
-
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     scene = scene_file(tmp_path, 'rate: 100\n')
@@ -75,7 +74,7 @@ def test_all_commands_that_write_are_tried() -> None:
         options = {option for action in parser._actions for option in action.option_strings}
         if '-o' in options:
             writing.add(command)
-            assert ('--force' in options), command
+            assert '--force' in options, command
     assert writing == {*WRITES, *FOLDERS}
 
 

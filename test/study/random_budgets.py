@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 import os
 from random import Random
 
@@ -70,11 +71,11 @@ def _budget(random: Random) -> Budget:
 
 def _setting(random: Random, rate: float) -> Setting:
     """Return a setting: with keys, with advice alone, or for comparison only."""
-    worst = random.choice([0.0, *(10.0 ** random.uniform(-18.0, 1.0) for _ in range(9))])
+    worst = random.choice([0.0, inf, *(10.0 ** random.uniform(-18.0, 1.0) for _ in range(12))])
     price = Price(_spread(random, random.uniform(-50.0, 900.0)), rate)
     return Setting(
         random.choice(LABELS),
-        JointError(worst * random.random(), worst),
+        JointError(worst * random.uniform(0.1, 1.0), worst),
         random.choice([None, price]),
         random.choice(CHANGES),
         random.choice(['', 'carry the state forward']),

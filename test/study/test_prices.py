@@ -30,7 +30,6 @@ from linkage_ros.study.budget import JointError, Knob, Setting
 from linkage_ros.study.prices import (
     add_prices,
     change_scene,
-    price_changes,
     price_scenes,
     tick_price,
     time_ticks,
@@ -123,7 +122,8 @@ def test_blocks_of_scenes_that_tick_at_different_rates_take_the_same_simulated_t
         return real(scene, clock)
 
     monkeypatch.setattr(TimedScene, 'time_block', time_block)
-    price_changes(DEMO, [[('rate', rate)] for rate in (50.0, 300.0, 2000.0)], 0.01)
+    others = [change_scene(DEMO, [('rate', rate)]) for rate in (50.0, 300.0, 2000.0)]
+    price_scenes(DEMO, others, 0.01)
     assert len({round(block / rate, 6) for rate, block in blocks}) == 1
     assert min(block for _, block in blocks) >= 20
 
