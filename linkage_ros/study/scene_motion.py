@@ -58,8 +58,8 @@ Of the sine of a crank, in [Hz] and [rad]; for a limited one, as a fraction of i
 So a crank that turns passes through all its poses, some 1.6 turns a second at most.
 """
 
-_SELDOM = NANOSECONDS // 5
-"""Longest time between two looks at a torque drive, in [ns]."""
+_LOOK = 2e-3
+"""Time between two looks at a torque drive, in [s], or its step if that is longer."""
 
 _BEYOND = 0.5 * pi
 """A step over more than this, in [rad], follows no motion: the input runs away."""
@@ -260,20 +260,21 @@ def cranks_at(motion: MemberMotion, times: Sequence[int], **changes: Any) -> lis
     if motion.path is not None:
         return [motion.path(time) for time in times]
     drive = built(motion, **changes)
+    step = changes.get('step', motion.member.drive[1].step)
+    look = max(1, round(_LOOK / step)) * round(step * NANOSECONDS)
     commands, number = motion.commands, 0
     passed = 0
     drive.state(BEGIN)
     found: list[Crank | None] = []
     for time in times:
-        # A drive that is asked too seldom leaves time out.
-        stops = [*range(passed + _SELDOM, time, _SELDOM), time]
-        for stop in stops:
+        # A drive that is asked too seldom leaves time out, and a runaway is to be seen early.
+        for stop in (*range(passed - passed % look + look, time, look), time):
             while number < len(commands) and commands[number].time <= stop:
                 arrival, effort = commands[number]
                 drive.offer(EffortCommand(0, effort), BEGIN + arrival)
                 number += 1
             crank = drive.state(BEGIN + stop)
-            _check_bounded(crank, stop, changes.get('step', motion.member.drive[1].step))
+            _check_bounded(crank, stop, step)
         passed = time
         found.append((crank.angles, crank.rates))
     return found

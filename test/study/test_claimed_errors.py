@@ -170,7 +170,8 @@ def samples_of(motion, joint, rate, phase, horizon):
 @pytest.mark.parametrize('carried', [True, False])
 def test_the_age_of_a_command_is_that_of_samples_at_100_hz(tmp_path, carried):
     (tmp_path / 'scene.yaml').write_text(
-        f'linkage: four_bar\nrate: 100\ndrive: {{topic: {{carry_forward: {str(carried).lower()}}}}}\n'
+        'linkage: four_bar\nrate: 100\ndrive: {topic: {carry_forward: '
+        f'{str(carried).lower()}}}}}\n'
     )
     scene = load_scene(tmp_path / 'scene.yaml')
     (motion,) = motions_of(scene, 'sine', HORIZON)

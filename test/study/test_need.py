@@ -20,13 +20,15 @@ import random
 
 from linkage_ros.measuring import Spread
 from linkage_ros.scene.load import load_scene
+from linkage_ros.study.age import CARRY, IN_USE, measure_age_in_use
 from linkage_ros.study.budget import Budget, JointError, Knob, Price, Setting
-from linkage_ros.study.measure import ERRORS, measure_budget
+from linkage_ros.study.drive_step import measure_drive_step
 from linkage_ros.study.need import answer_need, answers_of
 from linkage_ros.study.prices import change_scene
+from linkage_ros.study.scene_motion import motions_of
 import pytest
 
-RATE = 1000.0
+RATE, HORIZON = 1000.0, 1.0
 
 
 def price(micros, rate=RATE):
@@ -117,25 +119,44 @@ effects: {velocity: {}}
 """
 
 
+def errors_of(scene):
+    """Return the knobs of age and step, whose prices grow with the rate and the steps."""
+    motions = motions_of(scene, None, HORIZON)
+    knobs = [measure_age_in_use(scene, motions, HORIZON, quick=True)]
+    if motions[0].path is None:
+        knobs.append(measure_drive_step(motions[0], scene.rate, HORIZON, quick=True)[0])
+    return [
+        knob._replace(
+            settings=[each._replace(price=price_of(scene, each)) for each in knob.settings]
+        )
+        for knob in knobs
+    ]
+
+
+def price_of(scene, setting):
+    changes = dict(setting.changes or ())
+    step = changes.get('drive.torque.step')
+    dearer = 0.0 if step is None else 10.0 * (scene.members[0].drive[1].step / step - 1.0)
+    return price(dearer, changes.get('rate', scene.rate))
+
+
 @pytest.mark.parametrize('text', [SWINGS, FOLLOWS], ids=['torque', 'sine'])
 def test_a_need_is_met_when_it_is_run(tmp_path, text):
     """What was written for a need is measured anew, with its advice followed."""
     (tmp_path / 'scene.yaml').write_text(text)
     scene = load_scene(tmp_path / 'scene.yaml')
-    measured = {'horizon': 2.0, 'quick': True, 'parts': [ERRORS]}
-    budget = measure_budget(scene, **measured)
-    answers = []
+    budget = Budget('scene', scene.rate, price(50.0, scene.rate), errors_of(scene), [], [])
+    texts = []
     for need in (0.1, 5e-3, 5e-4):
         answer = answer_need(budget, need)
         assert answer.is_met, answer.text
-        answers.append(answer)
-        again = measure_budget(change_scene(scene, answer.changes), **measured)
+        texts.append(answer.text.partition(': ')[2])
         total = 0.0
-        for knob in again.knobs:
+        for knob in errors_of(change_scene(scene, answer.changes)):
             error = knob.own.error.worst
-            if 'carry forward' in answer.text and knob.name == 'age in use':
+            if CARRY in answer.text and knob.name == IN_USE:
                 label = knob.own.label.replace('held', 'carried forward')
                 (error,) = (s.error.worst for s in knob.settings if s.label == label)
             total += error
         assert total <= 1.05 * need, answer.text
-    assert len({answer.text.partition(': ')[2] for answer in answers}) > 1
+    assert len(set(texts)) > 1

@@ -1,0 +1,193 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What cannot be measured is one line; what can has knobs whose own settings are the scene's."""
+
+from math import cos, inf, sin
+
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import LinkageError
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.scene.load import load_scene
+from linkage_ros.study.age import (
+    errors_in_use,
+    IN_USE,
+    measure_age_in_use,
+    measure_age_of_command,
+    OF_COMMAND,
+)
+from linkage_ros.study.drive_step import measure_drive_step
+from linkage_ros.study.drive_step import NAME as STEP
+from linkage_ros.study.measure import ERRORS, measure_budget
+from linkage_ros.study.scene_motion import motions_of
+from linkage_ros.study.solving import judge_hard_cases, measure_solving
+import pytest
+
+from ..support.scenes import PENDULUM
+
+NEVER = """
+linkage: double_rocker
+drive: {sine: {mean: 3.0, amplitude: 0.1, frequency: 1}}
+"""
+RUNAWAY = """
+linkage: four_bar
+drive: {torque: {start: 0.5}}
+loads: {efforts: {crank_joint: {constant: 5.0}}}
+"""
+TOPIC = 'linkage: four_bar'
+
+
+@pytest.mark.parametrize(
+    ('text', 'like', 'words'),
+    [
+        (NEVER, None, 'drive: moves the linkage nowhere where its loops close'),
+        (RUNAWAY, None, 's the input runs away and passes'),
+        (TOPIC, None, 'topic has no motion of its own; say what its crank does: --like sine'),
+        (TOPIC, 'nowhere', 'nowhere: does not exist'),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_line(tmp_path, text, like, words):
+    (tmp_path / 'scene.yaml').write_text(text)
+    scene = load_scene(tmp_path / 'scene.yaml')
+    with pytest.raises(LinkageError) as raised:
+        measure_budget(scene, like=like, quick=True, parts=[ERRORS])
+    assert words in str(raised.value)
+    assert '\n' not in str(raised.value)
+
+
+def test_a_remedy_of_a_runaway_works(tmp_path):
+    (tmp_path / 'scene.yaml').write_text(RUNAWAY)
+    scene = load_scene(tmp_path / 'scene.yaml')
+    with pytest.raises(LinkageError) as raised:
+        motions_of(scene, None, 10.0)
+    horizon = float(str(raised.value).rpartition('--horizon ')[2])
+    (motion,) = motions_of(scene, None, horizon)
+    knob, _ = measure_drive_step(motion, scene.rate, horizon, quick=True)
+    assert 0.0 < knob.own.error.worst < 0.1
+
+
+def test_a_topic_scene_has_its_knobs_sorted(tmp_path):
+    (tmp_path / 'scene.yaml').write_text('linkage: four_bar\nrate: 100\neffects: {velocity: {}}')
+    scene = load_scene(tmp_path / 'scene.yaml')
+    shares = []
+    budget = measure_budget(
+        scene, like='sine', quick=True, parts=[ERRORS], horizon=2.0, progress=shares.append
+    )
+    assert [knob.name for knob in budget.knobs] == [IN_USE, OF_COMMAND, 'solving']
+    assert all(not (knob.own.changes or knob.own.advice) for knob in budget.knobs)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    for knob in budget.knobs[:2]:
+        for setting in knob.settings:
+            assert setting is knob.own or setting.line
+            assert setting.price is not None or not setting.changes
+    assert budget.knobs[2].own.error.worst < 1e-14
+
+
+def test_of_twice_the_rate_half_the_error_is_left_and_a_quarter_where_it_is_carried():
+    motions = motions_of(load_scene('demo'), 'sine', 4.0)
+    (held, carried), (held_then, carried_then) = errors_in_use(motions, [500.0, 1000.0], 4.0)
+    assert held.rms / held_then.rms == pytest.approx(2.0, rel=0.02)
+    assert carried.rms / carried_then.rms == pytest.approx(4.0, rel=0.02)
+
+
+def test_without_published_rates_carrying_forward_asks_for_them(tmp_path):
+    (tmp_path / 'scene.yaml').write_text(TOPIC)
+    scene = load_scene(tmp_path / 'scene.yaml')
+    knob = measure_age_in_use(scene, motions_of(scene, 'sine', 1.0), 1.0, quick=True)
+    carried = [each for each in knob.settings if 'carried' in each.label]
+    assert carried
+    assert all(('effects.velocity', {}) in each.changes for each in carried)
+
+
+def test_two_linkages_are_measured_together():
+    scene = load_scene('two_fingers')
+    motions = motions_of(scene, None, 2.0)
+    both = errors_in_use(motions, [scene.rate], 2.0)[0][0]
+    each = [errors_in_use([motion], [scene.rate], 2.0)[0][0] for motion in motions]
+    assert both.worst == pytest.approx(max(one.worst for one in each))
+    assert both.rms >= max(one.rms for one in each) * (1.0 - 1e-12)
+
+
+def test_the_order_of_a_method_shows_in_its_steps(tmp_path):
+    (tmp_path / 'scene.yaml').write_text(
+        'linkage: four_bar\nrate: 500\nloads: {gravity: [0, -9.81], drive_inertia: 0.001}\n'
+        'drive: {torque: {start: 0.5, step: 0.008, timeout: 10}}\n'
+    )
+    (motion,) = motions_of(load_scene(tmp_path / 'scene.yaml'), None, 2.0)
+    knob, _ = measure_drive_step(motion, 500.0, 2.0, quick=True)
+    assert knob.name == STEP
+    errors = {each.label: each.error.worst for each in knob.settings}
+    assert errors['rk4, 16 ms'] / errors['rk4, 8 ms'] == pytest.approx(16.0, rel=0.25)
+    assert errors['rk4, 8 ms'] / errors['rk4, 4 ms'] == pytest.approx(16.0, rel=0.25)
+
+
+def test_comparisons_stand_in_their_order():
+    motions = motions_of(load_scene('demo'), 'sine', 10.0)
+    knob = measure_solving(motions, 1000.0, 10.0, quick=True, seconds=0.1)
+    errors = {each.label: each.error.worst for each in knob.settings}
+    assert errors['30 digits'] < 1e-28 < errors['closed form'] < 1e-14 < errors['float32'] < 1e-5
+    assert errors['spline, 64 knots'] > errors['spline, 1,024 knots'] > errors['closed form']
+    assert all(each.changes is None for each in knob.settings if each is not knob.own)
+
+
+def test_in_hard_cases_the_closed_form_never_fails_and_the_textbook_does():
+    cases = list(judge_hard_cases())
+    failed = {(case.place, case.solver): case.failed for case in cases}
+    places = {place for place, _ in failed}
+    assert len(places) == 2
+    assert not any(failed[place, 'closed form'] for place in places)
+    assert failed['change point of parallelogram', 'textbook form']
+    assert all(case.worst < inf for case in cases if case.solver == 'closed form')
+
+
+def bag_of(folder, delay, count=400, rate=200.0):
+    """Write a bag of samples of a sine, each recorded a delay after its stamp, in [s]."""
+    write = JointStateWriter(['drive_joint']).write
+    topics = [Topic('/crank_states', JOINT_STATE, '', '')]
+    writer = BagWriter(folder, topics, {})
+    for number in range(count):
+        time = number / rate
+        stamp = 10**18 + round(time * 1e9)
+        data = write(stamp, (1.5 * sin(3.0 * time),), (4.5 * cos(3.0 * time),), (0.0,))
+        writer.write(0, stamp + round(delay * 1e9), stamp + round(delay * 1e9), data)
+    writer.close()
+    return folder
+
+
+def test_a_bag_gives_motion_rate_and_delay(tmp_path):
+    """Carried over 20 ms of delay and up to 4 ms until the next sample, a sine is off by w²·A·t²/2."""
+    bag = bag_of(tmp_path / 'bag', 0.02)
+    (tmp_path / 'scene.yaml').write_text(PENDULUM_SCENE)
+    (tmp_path / 'pendulum.yaml').write_text(PENDULUM)
+    scene = load_scene(tmp_path / 'scene.yaml')
+    (motion,) = motions_of(scene, str(bag), 1.9)
+    assert motion.sample_rate == pytest.approx(200.0)
+    assert motion.length == pytest.approx(399 / 200.0)
+    for time in (0.1, 0.7123, 1.5):
+        values, rates = motion.path(round(time * 1e9))
+        assert values[0] == pytest.approx(1.5 * sin(3.0 * time), abs=1e-7)
+        assert rates[0] == pytest.approx(4.5 * cos(3.0 * time), abs=1e-4)
+    knob = measure_age_of_command(motion, scene, 1.9)
+    assert knob.own.error.worst == pytest.approx(0.5 * 9.0 * 1.5 * 0.024**2, rel=0.03)
+    (least,) = (each for each in knob.settings if each.label == 'without delay')
+    assert least.error.worst == pytest.approx(0.5 * 9.0 * 1.5 * 0.004**2, rel=0.03)
+    (held,) = (each for each in knob.settings if 'held' in each.label)
+    assert held.error.worst == pytest.approx(4.5 * 0.024, rel=0.02)
+    assert held.changes == [('drive.topic.carry_forward', False)]
+
+
+PENDULUM_SCENE = 'linkage: pendulum.yaml\nrate: 1000\n'
