@@ -39,14 +39,8 @@ from linkage_ros.measuring import Contender, in_turn, Progress
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
-from linkage_ros.study.scene_motion import (
-    built,
-    Crank,
-    cranks_at,
-    MemberMotion,
-    refuse_horizon,
-    tick_times,
-)
+from linkage_ros.study.member_motion import Crank, MemberMotion
+from linkage_ros.study.scene_motion import built, cranks_at, refuse_horizon, tick_times
 import numpy as np
 
 NAME = 'step of the drive'

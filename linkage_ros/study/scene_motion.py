@@ -25,13 +25,13 @@ Whatever noise, delay or fault the scene adds is no part of its motion: that is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from math import cos, inf, pi, sin, tau
-from typing import Any, NamedTuple
+from math import cos, pi, sin, tau
+from typing import Any
 
 from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.drives.drive import CrankState
 from linkage_ros.drives.torque import TorqueDrive
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
@@ -40,7 +40,9 @@ from linkage_ros.messages.joint_state import EffortCommand
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
 from linkage_ros.scene.scene import Scene, SceneLinkage
+from linkage_ros.study.member_motion import Command, Crank, MemberMotion, Path
 from linkage_ros.study.prices import USUAL_RATE
+from linkage_ros.study.recorded_motion import follow_commands, follow_samples
 
 BEGIN = NANOSECONDS
 """Time of the first tick, in [ns]."""
@@ -66,35 +68,6 @@ _BEYOND = 0.5 * pi
 
 _STANDS = 1e-9
 """Motions smaller than this, in [rad] or [m], are none."""
-
-Crank = tuple[tuple[float, ...], tuple[float, ...]]
-"""Values and rates of the inputs."""
-
-Path = Callable[[int], Crank | None]
-"""Values and rates of the inputs at a time since the first tick, in [ns]."""
-
-
-class Command(NamedTuple):
-    """A command of a torque drive, in the unit that it takes."""
-
-    time: int  # Arrival after the first tick, in [ns]
-    effort: float
-
-
-class MemberMotion(NamedTuple):
-    """What one linkage of a scene does."""
-
-    member: SceneLinkage
-    closure: Closure  # The closed form of its linkage, with the deviations of its parts
-    context: Context
-    path: Path | None  # Its inputs at any time; None for a torque drive
-    commands: Sequence[Command] = ()
-    # When the samples of a topic drive are taken and when they come, after the first tick, in
-    # [ns]; () if they come at the rate of `sample_rate`, at once.
-    samples: Sequence[tuple[int, int]] = ()
-    sample_rate: float = 0.0  # Samples of a topic drive per second; 0 for other drives
-    length: float = inf  # How long it is known, in [s]
-    note: str = ''  # What is assumed of it, in a sentence; '' for nothing
 
 
 def motions_of(scene: Scene, like: str | None, horizon: float) -> list[MemberMotion]:
@@ -145,10 +118,6 @@ def without_deliberate(scene: Scene) -> Scene:
 def _motion(
     scene: Scene, line: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
 ) -> MemberMotion:
-    from linkage_ros.study.recorded_motion import (
-        follow_samples,  # local import: it needs the types of this module
-    )
-
     member, context = line.member, line.context
     closure = line.closure
     if type(closure) is not Closure:
@@ -216,8 +185,6 @@ def _commanded(
 ) -> MemberMotion:
     """Return the motion of a torque drive, with the commands that come to it."""
     if bag is not None:
-        from linkage_ros.study.recorded_motion import follow_commands  # local import: as above
-
         return follow_commands(motion, bag)
     if like is None and moves(motion, horizon):
         return motion._replace(note='no command comes')
