@@ -42,8 +42,7 @@ from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
 from linkage_ros.scene.scene import Scene
 from linkage_ros.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
-from linkage_ros.study.prices import USUAL_RATE
-from linkage_ros.study.scene_motion import (
+from linkage_ros.study.member_motion import (
     BEGIN,
     Crank,
     cranks_at,
@@ -51,6 +50,7 @@ from linkage_ros.study.scene_motion import (
     scene_key,
     tick_times,
 )
+from linkage_ros.study.prices import USUAL_RATE
 import numpy as np
 
 IN_USE, OF_COMMAND = 'age in use', 'age of the command'

@@ -25,7 +25,7 @@ from typing import Any
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint
 from linkage_ros.study.budget import JointError
-from linkage_ros.study.scene_motion import Crank
+from linkage_ros.study.member_motion import Crank
 import numpy as np
 
 

@@ -28,7 +28,7 @@ from linkage_ros.dynamics.motion import LARGEST
 from linkage_ros.errors import BagError, listed
 from linkage_ros.messages.joint_state import JointStateReader, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.study.scene_motion import Command, Crank, MemberMotion
+from linkage_ros.study.member_motion import Command, Crank, MemberMotion
 
 
 class _Sample(NamedTuple):
