@@ -196,7 +196,8 @@ def test_arguments_have_the_same_name_in_all_commands() -> None:
 
 def test_numbers_of_things_and_defaults_are_told_in_one_way() -> None:
     typed = [(c, o) for c, o in options() if o.option_strings and o.nargs != 0 and not o.choices]
-    several = {'output', 'rate', 'at', 'input', 'joint', 'need'}  # of kinds of their own in some commands
+    # Of kinds of their own in some commands.
+    several = {'output', 'rate', 'at', 'input', 'joint', 'need'}
     for command, action in typed:
         where = command, action.dest
         assert not re.search(r'\((here|default) ', action.help or ''), where
