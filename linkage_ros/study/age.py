@@ -42,9 +42,15 @@ from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
 from linkage_ros.scene.scene import Scene
 from linkage_ros.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
-from linkage_ros.study.member_motion import Crank, MemberMotion
+from linkage_ros.study.member_motion import (
+    BEGIN,
+    Crank,
+    cranks_at,
+    MemberMotion,
+    scene_key,
+    tick_times,
+)
 from linkage_ros.study.prices import USUAL_RATE
-from linkage_ros.study.scene_motion import BEGIN, cranks_at, scene_key, tick_times
 import numpy as np
 
 IN_USE, OF_COMMAND = 'age in use', 'age of the command'

@@ -39,8 +39,14 @@ from linkage_ros.measuring import Contender, in_turn, Progress
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.study.joint_errors import distances, error_of, joints_at
-from linkage_ros.study.member_motion import Crank, MemberMotion
-from linkage_ros.study.scene_motion import built, cranks_at, refuse_horizon, tick_times
+from linkage_ros.study.member_motion import (
+    build_drive,
+    Crank,
+    cranks_at,
+    MemberMotion,
+    refuse_horizon,
+    tick_times,
+)
 import numpy as np
 
 NAME = 'step of the drive'
@@ -174,7 +180,7 @@ def exact_cranks(
 def _integrated(motion: MemberMotion, times: Sequence[int], factor: float) -> list[Crank | None]:
     from linkage_ros.study import exact_drive  # local import: scipy is optional
 
-    drive = built(motion)
+    drive = build_drive(motion)
     use: TorqueParameters = motion.member.drive[1]
     delay = use.motor.delay if use.motor else 0.0
     changes: list[tuple[float, float | None]] = [(0.0, None)]

@@ -155,7 +155,8 @@ def exact_motion(
     ends = [*(each.time for each in acting[1:]), inf]
     for now, end in zip(acting, ends, strict=True):
         until = min(end, times[-1])
-        wanted = [time for time in times[len(found) :] if time < end or end == inf]
+        begin = len(found)
+        wanted = [time for time in times[begin:] if time < end or end == inf]
         found += run.go(now, until, wanted)
         if end >= times[-1] and len(found) == len(times):
             break
@@ -187,7 +188,8 @@ class _Run:
             bodies = self._bodies(acting)
             for body in bodies:
                 body.settle(self._time)
-            found += self._piece(bodies, acting, until, times[len(found) :])
+            begin = len(found)
+            found += self._piece(bodies, acting, until, times[begin:])
         return found + [self._crank] * (len(times) - len(found))
 
     def _bodies(self, acting: Acting) -> list[_Body]:

@@ -28,10 +28,10 @@ from linkage_ros.scene.scene import Scene
 from linkage_ros.study.age import measure_age_in_use, measure_age_of_command
 from linkage_ros.study.budget import Budget, Knob, Loss, Setting
 from linkage_ros.study.deliberate import measure_deliberate
-from linkage_ros.study.member_motion import MemberMotion
+from linkage_ros.study.member_motion import MemberMotion, scene_key
 from linkage_ros.study.motion_feed import feed_of
 from linkage_ros.study.prices import add_prices, change_scene, Feed, tick_price, USUAL_RATE
-from linkage_ros.study.scene_motion import motions_of, scene_key
+from linkage_ros.study.scene_motion import motions_of
 
 ERRORS, EFFECTS, RECORDING = 'errors', 'effects', 'recording'
 PARTS = (ERRORS, EFFECTS, RECORDING)

@@ -23,9 +23,8 @@ from linkage_ros.drives.torque import TOPIC as TORQUE_TOPIC
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
-from linkage_ros.study.member_motion import Crank, MemberMotion
+from linkage_ros.study.member_motion import BEGIN, Crank, MemberMotion
 from linkage_ros.study.prices import Feed, turn_crank, USUAL_RATE
-from linkage_ros.study.scene_motion import BEGIN
 
 
 def feed_of(motions: Sequence[MemberMotion]) -> Feed:

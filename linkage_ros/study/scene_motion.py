@@ -14,38 +14,36 @@
 
 
 """
-The motion that a scene makes: its inputs at any time, and the joints that belong to them.
+The motion that a scene makes.
 
 A drive that computes its crank is asked itself. A `topic` drive has no motion of its own: it is
 said what its crank does, by a sine or by the samples of a bag. To a `torque` drive commands come:
 those of a bag, or a sine of effort; without either it moves by its start, weight and loads alone.
-
-Whatever noise, delay or fault the scene adds is no part of its motion: that is asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from math import cos, pi, sin, tau
-from typing import Any
 
 from linkage_ros.bag.reader import Bag, read_bag
 from linkage_ros.drives.drive import CrankState
-from linkage_ros.drives.torque import TorqueDrive
-from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.messages.joint_state import EffortCommand
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
-from linkage_ros.scene.scene import Scene, SceneLinkage
-from linkage_ros.study.member_motion import Command, Crank, MemberMotion, Path
+from linkage_ros.scene.scene import Scene
+from linkage_ros.study.member_motion import (
+    BEGIN,
+    build_drive,
+    Command,
+    Crank,
+    cranks_at,
+    MemberMotion,
+    Path,
+)
 from linkage_ros.study.prices import USUAL_RATE
 from linkage_ros.study.recorded_motion import follow_commands, follow_samples
-
-BEGIN = NANOSECONDS
-"""Time of the first tick, in [ns]."""
 
 SINE = 'sine'
 """What ``like`` is for a sine; anything else is the path of a bag."""
@@ -59,12 +57,6 @@ Of the sine of a crank, in [Hz] and [rad]; for a limited one, as a fraction of i
 
 So a crank that turns passes through all its poses, some 1.6 turns a second at most.
 """
-
-_LOOK = 2e-3
-"""Time between two looks at a torque drive, in [s], or its step if that is longer."""
-
-_BEYOND = 0.5 * pi
-"""A step over more than this, in [rad], follows no motion: the input runs away."""
 
 _STANDS = 1e-9
 """Motions smaller than this, in [rad] or [m], are none."""
@@ -205,78 +197,6 @@ def _commanded(
     return motion._replace(commands=commands, note=note)
 
 
-def cranks_at(motion: MemberMotion, times: Sequence[int], **changes: Any) -> list[Crank | None]:
-    """
-    Return the crank at some times since the first tick, in [ns] and in order.
-
-    Parameters
-    ----------
-    motion
-        What the linkage does.
-    times
-        The times.
-    **changes
-        Parameters of a torque drive that differ from the scene's: its method, or its step.
-
-    Raises
-    ------
-    LinkageError
-        The input runs away before the last time.
-
-    """
-    if motion.path is not None:
-        return [motion.path(time) for time in times]
-    drive = built(motion, **changes)
-    step = changes.get('step', motion.member.drive[1].step)
-    look = max(1, round(_LOOK / step)) * round(step * NANOSECONDS)
-    commands, number = motion.commands, 0
-    passed = 0
-    drive.state(BEGIN)
-    found: list[Crank | None] = []
-    for time in times:
-        # A drive that is asked too seldom leaves time out, and a runaway is to be seen early.
-        for stop in (*range(passed - passed % look + look, time, look), time):
-            while number < len(commands) and commands[number].time <= stop:
-                arrival, effort = commands[number]
-                drive.offer(EffortCommand(0, effort), BEGIN + arrival)
-                number += 1
-            crank = drive.state(BEGIN + stop)
-            _check_bounded(crank, stop, step)
-        passed = time
-        found.append((crank.angles, crank.rates))
-    return found
-
-
-def tick_times(rate: float, horizon: float, most: int) -> list[int]:
-    """Return the times of some ticks up to the horizon, in [ns], the last one too."""
-    count = max(1, int(horizon * rate * (1.0 + 1e-12)))
-    chosen = sorted({round(count * k / most) for k in range(1, most + 1)} - {0})
-    return [round(number * NANOSECONDS / rate) for number in chosen]
-
-
-def scene_key(member: SceneLinkage, key: str) -> str:
-    """Return where a key of a linkage stands in its scene: in its own entry, or for all."""
-    own = member.name and key in member.content
-    return f'linkages.{member.name}.{key}' if own else key
-
-
-def refuse_horizon(time: float, why: str) -> LinkageError:
-    """Return the error of a motion that has no end at the horizon; the time is in [s]."""
-    return LinkageError(
-        '--horizon',
-        f'lies beyond the motion: after {time:.3g} s {why}',
-        f'take less: --horizon {0.5 * time:.2g}',
-    )
-
-
-def _check_bounded(crank: CrankState, time: int, step: float) -> None:
-    """Refuse a rate that is too fast for the step."""
-    passed = abs(crank.rates[0]) * step
-    if not passed <= _BEYOND:
-        why = f'the input runs away and passes {passed:.2g} rad in a step'
-        raise refuse_horizon(time * 1e-9, why)
-
-
 def moves(motion: MemberMotion, horizon: float) -> bool:
     """Return whether a torque drive moves without commands."""
     looks = [round(horizon * NANOSECONDS * k / 100) for k in range(101)]
@@ -284,17 +204,10 @@ def moves(motion: MemberMotion, horizon: float) -> bool:
     return max(values) - min(values) > _STANDS
 
 
-def built(motion: MemberMotion, **changes: Any) -> TorqueDrive:
-    """Return the torque drive at its start, with other parameters."""
-    from linkage_ros.drives import torque  # local import: only with forces
-
-    return torque.build(replace(motion.member.drive[1], **changes), motion.context)
-
-
 def _usual_effort(motion: MemberMotion) -> float:
     """Return the amplitude of the commands: they pass friction and a fifth of the weight."""
     equation = motion.context.mechanics.equation
-    drive = built(motion)
+    drive = build_drive(motion)
     start = motion.member.drive[1].start
     low, high = (min(max(end, start - tau), start + tau) for end in drive.acting(None)[0].stops)
     found = [terms for k in range(90) if (terms := equation(low + (high - low) * k / 90.0))]

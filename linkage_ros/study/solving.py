@@ -48,9 +48,8 @@ from linkage_ros.study.four_bar_formulas import (
     solve_in_single_precision,
 )
 from linkage_ros.study.joint_errors import size_of
-from linkage_ros.study.member_motion import MemberMotion
+from linkage_ros.study.member_motion import cranks_at, MemberMotion, tick_times
 from linkage_ros.study.newton import solve_by_newton
-from linkage_ros.study.scene_motion import cranks_at, tick_times
 import numpy as np
 
 NAME = 'solving'

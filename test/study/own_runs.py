@@ -150,7 +150,8 @@ class FourBar:
         ends = [*(time for time, _ in commands[1:]), times[-1]]
         for (_, effort), end in zip(commands, ends, strict=True):
             while now < end:
-                wanted = [time for time in times[len(found) :] if now < time <= end]
+                passed = len(found)
+                wanted = [time for time in times[passed:] if now < time <= end]
                 now, state, values = self._piece(state, effort, now, end, wanted)
                 found += values
         return found
@@ -202,7 +203,8 @@ def parabolas(start, inertia, commands, times, stops=(-inf, inf), restitution=0.
             hits = (first_root(high - q, -w, -a, end - now), first_root(q - low, w, a, end - now))
             rests = not w and ((q >= high and a >= 0.0) or (q <= low and a <= 0.0))
             t = end - now if rests else min([t for t in hits if t is not None], default=end - now)
-            for time in times[len(found) :]:
+            passed = len(found)
+            for time in times[passed:]:
                 if time > now + t:
                     break
                 s = time - now
@@ -240,7 +242,8 @@ def parabolas_with_play(start, inertia, motor, play, commands, times):
                 )
                 meets = min([t for t in each if t is not None], default=None)
             t = end - now if meets is None else meets
-            for time in times[len(found) :]:
+            passed = len(found)
+            for time in times[passed:]:
                 if time > now + t:
                     break
                 s = time - now

@@ -169,7 +169,7 @@ def bag_of(folder, delay, count=400, rate=200.0):
 
 
 def test_a_bag_gives_motion_rate_and_delay(tmp_path):
-    """Carried over 20 ms of delay and up to 4 ms until the next sample, a sine is off by w²·A·t²/2."""
+    """A sine that is carried over 20 ms and up to 4 ms more is off by w²·A·t²/2."""
     bag = bag_of(tmp_path / 'bag', 0.02)
     (tmp_path / 'scene.yaml').write_text(PENDULUM_SCENE)
     (tmp_path / 'pendulum.yaml').write_text(PENDULUM)
