@@ -54,13 +54,13 @@ def shared(folder):
 ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1,<7.2', 'ros-jazzy-common-interfaces>=5.3,<5.4']
 # From 70.1 it builds wheels by itself; 80 took the develop command that --symlink-install needs.
 SETUPTOOLS = 'setuptools>=70.1,<80'
-# Reports: pictures, tables, pages, and the reference of fifty digits.
+# Reports: pictures, tables, pages; exact solutions for the study of accuracy.
 REPORT = [
     'matplotlib>=3.6,<4',
-    'mpmath>=1.2,<2',
     'plotly>=6,<8',
     'python-flint>=0.6,<1',
     'rich>=13,<16',
+    'scipy>=1.11,<2',
 ]
 # Synthesis by fitting and searching; exact synthesis needs numpy only.
 DESIGN = ['scipy>=1.11,<2']
@@ -99,8 +99,8 @@ TEST = [
     'yourdfpy',
     # Checks and runs FMUs.
     'fmpy>=0.3.22,<0.4',
-    # References for drives and forces: splines, and a rigid-body engine.
-    'scipy',
+    # References: fifty digits, and a rigid-body engine.
+    'mpmath>=1.2,<2',
     'mujoco>=3',
     *COMPLETION,
     *DASK,

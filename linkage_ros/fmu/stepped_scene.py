@@ -385,7 +385,7 @@ def _refuse(scene: Scene) -> None:
             raise member.content.error(
                 'accuracy',
                 'lets every machine choose its own solver',
-                'name a solver, as linkage accuracy shows them',
+                'name a solver instead',
             )
         for effect in member.effects:
             if '.' in effect:

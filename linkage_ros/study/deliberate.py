@@ -192,26 +192,9 @@ def measure_deliberate(
     progress: Progress = lambda _: None,
 ) -> list[Knob]:
     """
-    Measure what each effect and fault of a scene makes different, and what it costs.
+    Return a knob for each effect and fault of a scene, by size, and one for all of them together.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    quick
-        Whether to take a few seconds only.
-    horizon
-        Duration of the compared runs, in [s].
-    feed
-        Times and crank messages of a run.
-    progress
-        Called now and then with the fraction that is done.
-
-    Returns
-    -------
-    knobs
-        One for each effect and fault, by size, and one for all of them together.
-
+    The compared runs are as long as the horizon, in [s], or shorter if quick.
     """
     variants = list(_variants(scene))
     if not variants:

@@ -186,24 +186,8 @@ def time_ticks(
     """
     Return for each scene the times of a tick in [µs], of each block in each round.
 
-    Parameters
-    ----------
-    scenes
-        The scenes, which take turns.
-    seconds
-        Approximate duration of all.
-    feed
-        Times and crank messages of a scene.
-    progress
-        Called now and then with the fraction that is done.
-
-    Raises
-    ------
-    FileError
-        If parts of a scene cannot be combined.
-    LinkageError
-        If a scene publishes nothing.
-
+    It takes some seconds for all of them together. A FileError says that parts of a scene cannot
+    be combined, a LinkageError that a scene publishes nothing.
     """
     timed = [TimedScene(scene, feed) for scene in scenes]
     # Blocks of the same simulated time, so that motions that differ are compared where they are
@@ -314,10 +298,9 @@ def add_prices(
     progress: Progress = lambda _: None,
 ) -> list[Knob]:
     """
-    Return the knobs with the prices of all settings that a scene can ask for.
+    Return the knobs with what each setting that a scene can ask for adds to its tick.
 
-    A setting other than the scene's own gets what it adds to a tick. The scene's own setting
-    keeps its price. Settings without keys, and those that have a price, stay as they are.
+    The scene's own setting, those without keys and those that have a price stay as they are.
     """
     asked = {
         (row, column): setting.changes

@@ -35,19 +35,10 @@ def tuned_scene(
     scene: Scene, named: str | os.PathLike[str], changes: Sequence[Change], folder: Path
 ) -> bytes:
     """
-    Return a scene file with changed keys.
+    Return the file of a scene with changed keys, to be written into a folder.
 
-    Parameters
-    ----------
-    scene
-        The scene, with what was set for it already.
-    named
-        What it was loaded from: a scene file, a linkage file, or the name of one.
-    changes
-        The keys with their values.
-    folder
-        Where the file goes; paths of linkages and bags in it lead from there.
-
+    The scene has what was set for it already; ``named`` is what it was loaded from: a scene file,
+    a linkage file, or a name. Paths of linkages and bags lead from the folder.
     """
     content = parse_yaml(scene.files[SCENE_FILE], scene.name)
     scene_mapping: Any = content.mapping

@@ -51,8 +51,8 @@ def prefix(tmp_path_factory, copy_checkout, run):
 def test_core_imports_without_extras(prefix, import_core):
     file, _ = import_core(
         prefix / 'bin' / 'python',
-        # The report draws, so that it may need its extra.
-        skip=('node', 'cli', 'accuracy'),
+        # The study may need its extra.
+        skip=('node', 'cli', 'study'),
         refuse=ROS + REPORT,
         cwd=prefix,
     )
