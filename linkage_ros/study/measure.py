@@ -170,7 +170,7 @@ def _measure_errors(
                 horizon,
                 key=scene_key(motion.member, 'drive') + '.torque',
                 quick=quick,
-                seconds=6.0 if quick else 60.0,
+                seconds=7.0 if quick else 60.0,
                 progress=lambda share: progress(0.1 + 0.4 * share),
             )
             left_out += missing
