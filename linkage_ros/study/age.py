@@ -57,7 +57,7 @@ IN_USE, OF_COMMAND = 'age in use', 'age of the command'
 
 CARRY = 'carry forward by the published rates'
 
-_PERIODS = 300
+_PERIODS, _QUICK_PERIODS = 300, 100
 """Periods at which a state is used, at most."""
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -92,7 +92,11 @@ def measure_age_in_use(
     factors = _QUICK_FACTORS if quick else _FACTORS
     rates = [rate * f for f in factors if LOWEST_RATE <= rate * f <= HIGHEST_RATE]
     settings: list[Setting] = []
-    for ticks, errors in zip(rates, errors_in_use(motions, rates, horizon), strict=True):
+    for ticks, errors in zip(
+        rates,
+        errors_in_use(motions, rates, horizon, _QUICK_PERIODS if quick else _PERIODS),
+        strict=True,
+    ):
         changes: list[tuple[str, object]] = []
         advice = ''
         if ticks != rate:
@@ -111,7 +115,10 @@ def measure_age_in_use(
 
 
 def errors_in_use(
-    motions: Sequence[MemberMotion], rates: Sequence[float], horizon: float
+    motions: Sequence[MemberMotion],
+    rates: Sequence[float],
+    horizon: float,
+    periods: int = _PERIODS,
 ) -> list[tuple[JointError, JointError]]:
     """
     Return for each rate the errors of a state in use: held, and carried by its rates.
@@ -122,7 +129,7 @@ def errors_in_use(
         The loops close at no state of the motion.
 
     """
-    blocks = [_times_of_use(rate, horizon) for rate in rates]
+    blocks = [_times_of_use(rate, horizon, periods) for rate in rates]
     # All in one run, since a drive that integrates takes time for it.
     times = sorted({time for block in blocks for time in block.ravel().tolist()})
     held: list[list[Any]] = [[] for _ in rates]
@@ -149,10 +156,10 @@ def errors_in_use(
     return found
 
 
-def _times_of_use(rate: float, horizon: float) -> Any:
+def _times_of_use(rate: float, horizon: float, periods: int) -> Any:
     """Return times of ticks, each with those of its use, in [ns] (ticks, 1 + parts)."""
     count = max(1, int(horizon * rate) - 1)
-    numbers = np.unique(np.round(np.linspace(0, count, _PERIODS + 1)))
+    numbers = np.unique(np.round(np.linspace(0, count, periods + 1)))
     uses = numbers[:, None] + np.array((0.0, *_PARTS))
     return np.round(uses * (NANOSECONDS / rate)).astype(int)
 

@@ -21,7 +21,8 @@ ticks are compared with the exact ones. These come from `linkage_ros.study.exact
 own error from a second run at ten times the tolerance: it falls as the power 7/8 of the tolerance
 at least, so a sixth of the difference is no less than the error of the first. Where scipy is not
 installed or a winding adds a state, the exact motion is that of the drive itself at a sixteenth of
-its step; its own error is a third of the difference from an eighth, as for a method of order 2.
+its step, or what there is time for; its own error is a third of the difference from twice that
+step, as for a method of order 2.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from math import inf
-from time import monotonic
+from time import process_time
 from typing import Any
 
 from linkage_ros.drives.torque import TorqueParameters
@@ -88,7 +89,7 @@ def measure_drive_step(
     quick
         Whether to measure a few settings only.
     seconds
-        Time that the measurement may take, in [s].
+        Processor time that the measurement may take, in [s].
     progress
         Called with the fraction that is done.
 
@@ -98,13 +99,14 @@ def measure_drive_step(
         The input runs away, or stops at a toggle, before the horizon.
 
     """
-    begun = monotonic()
+    begun = process_time()
     use: TorqueParameters = motion.member.drive[1]
     ticks = tick_times(rate, horizon, _TICKS)
     own = cranks_at(motion, ticks)
-    taken = monotonic() - begun
+    taken = process_time() - begun
     price = _price(motion, rate, horizon, 0.5 if quick else 2.0)
-    exact, doubt = exact_cranks(motion, ticks)
+    finest = next((n for n in (16, 8) if 1.5 * n * taken <= seconds), 4)
+    exact, doubt = exact_cranks(motion, ticks, finest)
     joints, _ = joints_at(motion.closure, exact)
     floor = doubt or JointError(0.0, 0.0)
     settings = [
@@ -115,7 +117,7 @@ def measure_drive_step(
     for number, (method, step) in enumerate(wanted):
         progress((number + 1) / (len(wanted) + 1))
         work = taken * _EVALUATIONS[method] / _EVALUATIONS[use.method] * use.step / step
-        if monotonic() - begun + work > seconds:
+        if process_time() - begun + work > seconds:
             left_out.append(_label(method, step))
             continue
         try:
@@ -130,6 +132,9 @@ def measure_drive_step(
         settings.append(Setting(_label(method, step), error, None, changes))
     progress(1.0)
     note = motion.note
+    if _stands_in(use):
+        note += f'; for the exact motion stands the drive at 1/{finest} of its step, known to '
+        note += f'{floor.worst:.1g} rad'
     if floor.worst > _UNSURE:
         note += f'; two motions that are nearly equal part: this one is known to {floor.worst:.1g}'
     if left_out:
@@ -154,10 +159,12 @@ def _price(motion: MemberMotion, rate: float, horizon: float, seconds: float) ->
 
 
 def exact_cranks(
-    motion: MemberMotion, times: Sequence[int]
+    motion: MemberMotion, times: Sequence[int], finest: int = 16
 ) -> tuple[list[Crank | None], JointError | None]:
     """
     Return the exact motion at some times, in [ns], and its own error.
+
+    Where the drive itself stands in for it, its step is divided by up to ``finest``.
 
     Raises
     ------
@@ -166,8 +173,7 @@ def exact_cranks(
 
     """
     use: TorqueParameters = motion.member.drive[1]
-    wound = use.motor is not None and use.motor.inductance > 0.0
-    if wound or find_spec('scipy') is None:
+    if _stands_in(use):
         one, other = (cranks_at(motion, times, step=max(_SHORTEST, use.step / n)) for n in (16, 8))
         part = 3.0
     else:
@@ -175,6 +181,12 @@ def exact_cranks(
         part = 6.0
     doubt = error_of([_apart(motion, other, joints_at(motion.closure, one)[0])])
     return one, doubt and JointError(doubt.rms / part, doubt.worst / part)
+
+
+def _stands_in(use: TorqueParameters) -> bool:
+    """Return whether the drive itself, with a short step, stands in for the exact motion."""
+    wound = use.motor is not None and use.motor.inductance > 0.0
+    return wound or find_spec('scipy') is None
 
 
 def _integrated(motion: MemberMotion, times: Sequence[int], factor: float) -> list[Crank | None]:

@@ -19,16 +19,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
+from math import floor
 from pathlib import Path
+from time import process_time
 
 from linkage_ros.errors import FileError
 from linkage_ros.measuring import describe_machine, Progress
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 from linkage_ros.study.age import measure_age_in_use, measure_age_of_command
 from linkage_ros.study.budget import Budget, Knob, Loss, Setting
 from linkage_ros.study.deliberate import measure_deliberate
-from linkage_ros.study.member_motion import MemberMotion, scene_key
+from linkage_ros.study.member_motion import cranks_at, MemberMotion, scene_key
 from linkage_ros.study.motion_feed import feed_of
 from linkage_ros.study.prices import add_prices, change_scene, Feed, tick_price, USUAL_RATE
 from linkage_ros.study.scene_motion import motions_of
@@ -41,8 +44,8 @@ _SHARES = {ERRORS: 0.7, EFFECTS: 0.2, RECORDING: 0.1}
 
 _QUICK_LEFT_OUT = '--quick: steps of a drive beyond its half and double, some rates, repetitions'
 
-_QUICK_HORIZON = 10.0
-"""Longest motion of a torque drive that a quick measurement follows, in [s]."""
+_QUICK_RUN = 0.9
+"""Longest time that one run of the torque drives may take in a quick measurement, in [s]."""
 
 
 def measure_budget(
@@ -85,12 +88,11 @@ def measure_budget(
 
     """
     left_out: list[str] = [_QUICK_LEFT_OUT] if quick else []
-    drifts = any(member.drive[0] == 'torque' for member in scene.members)
-    if quick and drifts and horizon > _QUICK_HORIZON:
-        left_out.append(f'--quick: what comes after {_QUICK_HORIZON:g} s')
-        horizon = _QUICK_HORIZON
     motions = motions_of(scene, like, horizon) if ERRORS in parts or like else []
     horizon = min([horizon, *(motion.length for motion in motions)])
+    if quick and ERRORS in parts and (followed := _followed(motions, horizon)) < horizon:
+        horizon = followed
+        left_out.append(f'--quick: what comes after {horizon:g} s')
     feed = feed_of(motions)
     done, whole = 0.0, sum(_SHARES[part] for part in parts)
 
@@ -132,6 +134,17 @@ def measure_budget(
     )
 
 
+def _followed(motions: Sequence[MemberMotion], horizon: float) -> float:
+    """Return how much of the motion a quick measurement has time to follow, in [s]."""
+    sample = min(0.2, horizon)
+    begun = process_time()
+    for motion in motions:
+        if motion.path is None:
+            cranks_at(motion, [round(sample * NANOSECONDS)])
+    speed = (process_time() - begun) / sample
+    return min(horizon, max(1.0, floor(_QUICK_RUN / speed))) if speed else horizon
+
+
 def _measure_errors(
     scene: Scene,
     motions: Sequence[MemberMotion],
@@ -157,7 +170,7 @@ def _measure_errors(
                 horizon,
                 key=scene_key(motion.member, 'drive') + '.torque',
                 quick=quick,
-                seconds=6.0 if quick else 60.0,
+                seconds=7.0 if quick else 60.0,
                 progress=lambda share: progress(0.1 + 0.4 * share),
             )
             left_out += missing

@@ -38,7 +38,6 @@ from linkage_ros.study.member_motion import (
     build_drive,
     Command,
     Crank,
-    cranks_at,
     MemberMotion,
     Path,
 )
@@ -57,6 +56,9 @@ Of the sine of a crank, in [Hz] and [rad]; for a limited one, as a fraction of i
 
 So a crank that turns passes through all its poses, some 1.6 turns a second at most.
 """
+
+_LOOK = 0.1
+"""Time between two looks whether anything moves, in [s]."""
 
 _STANDS = 1e-9
 """Motions smaller than this, in [rad] or [m], are none."""
@@ -89,22 +91,14 @@ def motions_of(scene: Scene, like: str | None, horizon: float) -> list[MemberMot
 
 def without_deliberate(scene: Scene) -> Scene:
     """Return a scene without recording, faults and what its sensors and wear change."""
-    kept = ('velocity', 'friction', 'tolerance')
-    members = tuple(
-        replace(member, effects={k: v for k, v in member.effects.items() if k in kept})
-        for member in scene.members
-    )
-    members = tuple(
-        member
-        if member.drive[0] == 'torque'
-        else replace(
-            member,
-            loads=None,
-            effects={k: v for k, v in member.effects.items() if k != 'friction'},
-        )
-        for member in members
-    )
-    return replace(scene, members=members, faults={}, record=None)
+    members = []
+    for member in scene.members:
+        forced = member.drive[0] == 'torque'
+        kept = {'velocity', 'tolerance', *(('friction',) if forced else ())}
+        effects = {name: use for name, use in member.effects.items() if name in kept}
+        loads = member.loads if forced else None
+        members.append(replace(member, effects=effects, loads=loads))
+    return replace(scene, members=tuple(members), faults={}, record=None)
 
 
 def _motion(
@@ -199,9 +193,13 @@ def _commanded(
 
 def moves(motion: MemberMotion, horizon: float) -> bool:
     """Return whether a torque drive moves without commands."""
-    looks = [round(horizon * NANOSECONDS * k / 100) for k in range(101)]
-    values = [crank[0][0] for crank in cranks_at(motion, looks) if crank]
-    return max(values) - min(values) > _STANDS
+    drive = build_drive(motion)
+    begin = drive.state(BEGIN).angles[0]
+    for number in range(1, 2 + int(horizon / _LOOK)):
+        time = BEGIN + round(number * _LOOK * NANOSECONDS)
+        if abs(drive.state(time).angles[0] - begin) > _STANDS:
+            return True
+    return False
 
 
 def _usual_effort(motion: MemberMotion) -> float:

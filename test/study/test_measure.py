@@ -71,10 +71,10 @@ def test_bad_input_is_one_line(tmp_path, text, like, words):
 def test_a_remedy_of_a_runaway_works(tmp_path):
     (tmp_path / 'scene.yaml').write_text(RUNAWAY)
     scene = load_scene(tmp_path / 'scene.yaml')
+    (motion,) = motions_of(scene, None, 10.0)
     with pytest.raises(LinkageError) as raised:
-        motions_of(scene, None, 10.0)
+        measure_drive_step(motion, scene.rate, 10.0, quick=True)
     horizon = float(str(raised.value).rpartition('--horizon ')[2])
-    (motion,) = motions_of(scene, None, horizon)
     knob, _ = measure_drive_step(motion, scene.rate, horizon, quick=True)
     assert 0.0 < knob.own.error.worst < 0.1
 
