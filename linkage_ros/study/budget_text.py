@@ -80,9 +80,9 @@ def share_text(share: float) -> str:
     """Return a share of a core: 0.6 %."""
     percent = 100.0 * abs(share)
     sign = '−' if share < 0.0 else ''
-    if percent < 0.05:
-        return 'below 0.1 %'
-    return f'{sign}{percent:.{0 if percent >= 9.95 else 1}f} %'
+    if percent < 0.005:
+        return 'below 0.01 %'
+    return f'{sign}{percent:.{0 if percent >= 9.95 else 1 if percent >= 0.095 else 2}f} %'
 
 
 def seconds_text(seconds: float) -> str:
