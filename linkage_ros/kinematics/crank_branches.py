@@ -322,9 +322,9 @@ class CrankBranch:
         crank, slope = self._narrow(y, p, self.cranks[i + 1], crank)
         return crank + turns, slope
 
-    def slope(self, crank: float) -> float:
-        """Return the slope of the output at a crank."""
-        return self._evaluate(crank)[1]
+    def evaluate(self, crank: float) -> tuple[float, float]:
+        """Return the output at a crank of the branch, and its slope there."""
+        return self._evaluate(crank)
 
     def _narrow(
         self, y: float, below: float, above: float, start: float = nan
