@@ -49,6 +49,7 @@ LIBRARIES = (
     'jsonschema',
     'matplotlib.backends.backend_agg',
     'matplotlib.backends.backend_svg',
+    'matplotlib.figure',
     'plotly.graph_objects',
     'rich.console',
     'rosbags.highlevel',
