@@ -209,7 +209,9 @@ class CrankBranch:
             y, rise = self._at_share(i / cells)
             while k < len(piece) - 2 and piece[k + 1][1] < y:
                 k += 1
-            crank, slope = self._narrow(y, piece[k][0], piece[k + 1][0])
+            (below, less), (above, more) = piece[k], piece[k + 1]
+            start = below + (above - below) * ((y - less) / (more - less))
+            crank, slope = self._narrow(y, below, above, start)
             self.cranks.append(crank)
             slopes.append(rise / abs(slope) if slope else inf)
         self.cranks.append(self.last)
