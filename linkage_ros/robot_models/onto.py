@@ -29,7 +29,7 @@ from math import atan2, cos, hypot, sin
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from linkage_ros.errors import FileError, listed
+from linkage_ros.errors import FileError, listed, quoted
 from linkage_ros.kinematics.linkage import carriers, GROUND, NO_LIMITS, SlideJoint
 from linkage_ros.robot_models.orientation import named_joints, spans
 from linkage_ros.robot_models.part import free_name, Names, Part, prefixed, PrefixedNames
@@ -112,6 +112,10 @@ class _Onto:
         self._linkage = part.closure.linkage
         self._planar = lay_flat(robot, self._loops())
         names.links = {link: self._body(link) for link in self._linkage.links}
+        for body in names.links.values():
+            if body not in self._planar.heights:
+                reason = f'has no link {quoted(body)} that its joints move'
+                raise self._error('', reason, _REMEDY)
         self._near = _SAME * part.closure.scale
         self._spans = spans(part.closure)
 
@@ -186,11 +190,8 @@ class _Onto:
 
     def _hold(self, tree: Tree, chain: Chain, parent: str, child: str) -> None:
         """Tell the tree how the robot holds a link."""
-        slide = chain.slide
-        if slide is not None:
-            joint = named_joints(self._linkage)[slide.name.removeprefix(self._names.prefix)]
-            assert isinstance(joint, SlideJoint)
-            tree.slides.append(joint.slider)
+        if chain.slide is not None:
+            tree.slides.append(self._slider(chain.slide))
             return
         place = chain.joints[0].place
         links = self._linkage.links
@@ -210,10 +211,9 @@ class _Onto:
 
     def _end_slide(self, tree: Tree, slide: PlanarJoint) -> LoopJoint:
         """Add the frames that meet where a slide of the robot ends in a link without a shape."""
-        joint = named_joints(self._linkage)[slide.name.removeprefix(self._names.prefix)]
-        assert isinstance(joint, SlideJoint)
-        tree.slides.append(joint.slider)
-        slider = self._linkage.sliders[joint.slider]
+        name = self._slider(slide)
+        tree.slides.append(name)
+        slider = self._linkage.sliders[name]
         on = carriers(self._linkage.links)[slider.point][0]
         place = complex(*self._linkage.links[on][slider.point])
         frames = []
@@ -221,7 +221,16 @@ class _Onto:
             frame = self._names.frame_on(slider.point, link)
             frames.append(frame)
             tree.joints.append(TreeJoint(f'{frame}_fixed', 'fixed', link, frame, there))
-        return LoopJoint('slide', joint.slider, tuple(frames))
+        return LoopJoint('slide', name, tuple(frames))
+
+    def _slider(self, slide: PlanarJoint) -> str:
+        """Return the slider of the linkage that a joint of the robot is."""
+        name = slide.name.removeprefix(self._names.prefix)
+        joint = named_joints(self._linkage).get(name)
+        if not isinstance(joint, SlideJoint):
+            reason = 'slides, and not in the linkage'
+            raise self._error(f'joint {slide.name}', reason, _REMEDY)
+        return joint.slider
 
     def _height(self, tree: Tree, frame: str) -> float:
         """Return the height above the plane of the link that a frame is on, in [m]."""

@@ -132,10 +132,21 @@ def test_what_linkage_urdf_wrote_lacks_nothing(tmp_path, capsys):
     assert 'no.urdf: cannot be read' in capsys.readouterr().err
 
 
+ROCKER = joint('rocker_joint', 'base', 'rocker', '0.15 0 0', kind='{}', axis='{}')
 BAD = {
     'another robot': (
         robot(TREE.replace('xyz="0.1 0 0"', 'xyz="0.11 0 0"')),
         'r.urdf: joint coupler_joint: is at (0.11, 0) m of the plane, where the linkage has no',
+    ),
+    'a slide instead of a pin': (
+        robot(
+            TREE.replace(ROCKER.format('revolute', '0 0 1'), ROCKER.format('prismatic', '1 0 0'))
+        ),
+        'r.urdf: joint rocker_joint: slides, and not in the linkage; name the robot',
+    ),
+    'another link': (
+        robot(TREE.replace('"rocker"', '"follower"')),
+        "r.urdf: has no link 'rocker' that its joints move; name the robot",
     ),
     'other names': (
         robot(TREE.replace('_joint"', '_pin"')),
