@@ -125,6 +125,11 @@ def add_set(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_ros_arguments(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare ``--ros-args``, after which all words are for ROS; say what they are."""
+    parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[], help=what)
+
+
 def check_no_settings(settings: Sequence[str]) -> None:
     """Raise if keys are set and no scene is named."""
     if settings:

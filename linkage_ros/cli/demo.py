@@ -143,7 +143,7 @@ def _command(member: SceneLinkage, seconds: float) -> list[str]:
     module, *parameters = _BESIDE[drive]
     # A time limit, so that it ends by itself even if this process is killed.
     limit = seconds + _PATIENCE + 10.0
-    parameters += [f'joint:={member.inputs[0]}', f'seconds:={limit:.1f}']
+    parameters += [f'joint:={member.sampled[0]}', f'seconds:={limit:.1f}']
     pairs = [part for parameter in parameters for part in ('-p', parameter)]
     return [sys.executable, '-m', module, '--ros-args', *pairs]
 

@@ -17,7 +17,8 @@
 Make a linkage file of a URDF and the pins that close its loops.
 
 Frames that are called PIN_on_LINK, as ``linkage urdf`` writes them, close by themselves, and so do
-pins that the tags ``loop_joint`` and ``loop_constraint`` of simulators name.
+pins that simulators close loops by: the tags ``loop_joint`` and ``loop_constraint``, and joints of
+``<gazebo>``, which are where they are with all joints at 0.
 """
 
 from __future__ import annotations
@@ -30,16 +31,11 @@ from threading import Event
 
 from linkage_ros.cli.arguments import add_output, LINKAGES
 from linkage_ros.cli.robot_model import write_or_print
-from linkage_ros.errors import LinkageError
-from linkage_ros.files.file_access import read_regular
-from linkage_ros.files.file_kinds import kind_of_folder
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.robot_models.from_urdf import from_urdf
-from linkage_ros.robot_models.urdf_file import read_urdf
-
-_LARGEST_FILE = 10_000_000
+from linkage_ros.robot_models.urdf_file import read_urdf, read_urdf_file
 
 EXAMPLE = 'linkage import four_bar.urdf --input crank_joint -o my_four_bar.yaml'
 
@@ -79,18 +75,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Write the linkage file; say what it leaves out."""
     file = arguments.file
-    try:
-        data = read_regular(file, _LARGEST_FILE)
-    except IsADirectoryError:
-        reason = f'is {kind_of_folder(file).noun}, and no URDF'
-        raise LinkageError(file, reason, 'name a URDF file') from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise LinkageError(file, f'cannot be read ({reason})', 'name a URDF file') from None
-    if len(data) > _LARGEST_FILE:
-        raise LinkageError(file, f'is larger than {_LARGEST_FILE} bytes', 'name a URDF file')
     made = from_urdf(
-        read_urdf(data, str(file)),
+        read_urdf(read_urdf_file(file), str(file)),
         arguments.close,
         arguments.input,
         dict(arguments.at),

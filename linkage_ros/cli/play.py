@@ -32,7 +32,7 @@ from threading import Event
 from linkage_ros.bag.order import LogTimeOrder
 from linkage_ros.bag.reader import Bag, is_in_use
 from linkage_ros.bag.topic import Topic
-from linkage_ros.cli.arguments import add_bag, bounded
+from linkage_ros.cli.arguments import add_bag, add_ros_arguments, bounded
 from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.terminal import progress, ProgressCallback
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
@@ -90,9 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='SECONDS',
         help='wait until somebody listens to one of the topics, for so long at most',
     )
-    parser.add_argument(
-        '--ros-args', nargs=argparse.REMAINDER, default=[], help='remappings: -r OLD:=NEW'
-    )
+    add_ros_arguments(parser, 'remappings: -r OLD:=NEW')
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:

@@ -26,7 +26,7 @@ import argparse
 from importlib import import_module
 from threading import Event
 
-from linkage_ros.cli.arguments import add_set, bounded, SCENE_HELP
+from linkage_ros.cli.arguments import add_ros_arguments, add_set, bounded, SCENE_HELP
 from linkage_ros.errors import missing_packages_reported
 
 EXAMPLE = 'linkage relay four_bar --joint rocker_joint --branch 1 --seconds 5'
@@ -51,9 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='SECONDS',
         help='how long; until a signal if not given',
     )
-    parser.add_argument(
-        '--ros-args', nargs=argparse.REMAINDER, default=[], help='remappings: -r OLD:=NEW'
-    )
+    add_ros_arguments(parser, 'remappings: -r OLD:=NEW')
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:

@@ -23,6 +23,7 @@ bodies, masses, springs and the closed loops.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 import sys
 from threading import Event
@@ -33,8 +34,10 @@ from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.resources import named_file
 from linkage_ros.robot_models.mjcf import mjcf
+from linkage_ros.robot_models.onto import urdf_onto
 from linkage_ros.robot_models.part import Part, PartError
 from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.urdf_file import read_urdf, read_urdf_file
 from linkage_ros.scene.load import kind_of
 from linkage_ros.scene.robot_model import scene_model, Write
 
@@ -53,13 +56,36 @@ EXAMPLE = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('file', metavar='SCENE', help=SCENE_HELP)
-    add_output(parser, SUFFIXES[parser.get_default('command')], 'the model is printed')
+    command = parser.get_default('command')
+    add_output(parser, SUFFIXES[command], 'the model is printed')
+    if command == 'urdf':
+        parser.add_argument(
+            '--onto',
+            type=Path,
+            metavar='URDF',
+            help='the robot that the linkage was imported from: keep it as it is, and add only '
+            'what closes the loops',
+        )
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Write the model."""
-    write_or_print(model_of(arguments.file, WRITERS[arguments.command]), arguments.output)
+    write = WRITERS[arguments.command]
+    if arguments.command == 'urdf' and arguments.onto:
+        write = _onto(arguments.onto)
+    write_or_print(model_of(arguments.file, write), arguments.output)
     return 0
+
+
+def _onto(file: Path) -> Write:
+    """Return a writer that keeps a robot as it is, and adds what closes the loops."""
+    data = read_urdf_file(file)
+    robot = read_urdf(data, str(file))
+
+    def write(_: str, parts: Sequence[Part]) -> bytes:
+        return urdf_onto(robot, data, parts)
+
+    return write
 
 
 def model_of(named: str, write: Write) -> bytes:

@@ -26,7 +26,14 @@ from threading import Event
 from time import monotonic
 from typing import Any, NamedTuple
 
-from linkage_ros.cli.arguments import add_radians, add_set, AngleUnit, bounded, SCENE_HELP
+from linkage_ros.cli.arguments import (
+    add_radians,
+    add_ros_arguments,
+    add_set,
+    AngleUnit,
+    bounded,
+    SCENE_HELP,
+)
 from linkage_ros.cli.page_of_run import check_page, PageOfRun, view_command
 from linkage_ros.cli.proof import LONGEST_PROOF, proof_of
 from linkage_ros.cli.terminal import show, Table
@@ -243,9 +250,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('scene', metavar='SCENE', help=f'{SCENE_HELP}; a linkage is moved')
     add_run_arguments(parser)
-    parser.add_argument(
-        '--ros-args', nargs=argparse.REMAINDER, default=[], help='remappings, parameters, QoS'
-    )
+    add_ros_arguments(parser, 'remappings, parameters, QoS')
 
 
 def add_run_arguments(parser: argparse.ArgumentParser) -> None:

@@ -46,11 +46,12 @@ from linkage_ros.cli.arguments import (
 )
 from linkage_ros.cli.terminal import progress, show, Table, text
 from linkage_ros.drawing.curves import traced_carriers
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import LinkageError, listed
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics.topology import assur_groups, Iterated
 from linkage_ros.names import csv_text
 
 _STEPS = 36
@@ -90,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME=VALUE',
         help='solve for every input at which a dependent joint, or a coordinate of a traced point '
         'such as P.x, has a value; --rate and --acceleration are then those of the joint; may be '
-        'repeated',
+        'repeated; of a linkage with several inputs as many joints, which become its inputs',
     )
     parser.add_argument(
         '--sweep', action='store_true', help='solve over the range; the default where no --at is'
@@ -143,7 +144,9 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         )
     closure = load(arguments.file)
     if arguments.joint:
-        columns, rows = _inverse_table(closure, arguments)
+        _check_alone(arguments)
+        several = len(closure.input_names) > 1
+        columns, rows = (_exchanged_table if several else _inverse_table)(closure, arguments)
     else:
         columns, rows = _forward_table(closure, arguments)
     kind = arguments.format or 'table'
@@ -181,17 +184,34 @@ def _forward_table(
     return list(_columns(closure, question)), rows
 
 
+def _check_alone(arguments: argparse.Namespace) -> None:
+    """Refuse other options that say which states to solve, besides ``--joint``."""
+    swept = arguments.sweep or arguments.first is not None or arguments.last is not None
+    for option, given in (('--at', arguments.at), ('--sweep', swept)):
+        if given:
+            where = f'--joint {arguments.joint[0][0]}'
+            raise LinkageError(where, f'{option} is given too', 'leave one of them out')
+
+
+def _exchanged_table(
+    closure: Closure, arguments: argparse.Namespace
+) -> tuple[list[Column], list[list[Any]]]:
+    """Return the row of the state in which as many joints as inputs have the typed values."""
+    names, typed = zip(*arguments.joint, strict=True)
+    inverse = closure.driven_by(*names)
+    groups = assur_groups(inverse.linkage).groups
+    links = [link for group in groups if isinstance(group, Iterated) for link in group.links]
+    if links:
+        told = f'{listed(links)} are solved by iteration, from the pose of the file'
+        print(f'linkage solve: note: with {listed(names)} as inputs {told}', file=sys.stderr)
+    return _forward_table(inverse, argparse.Namespace(**vars(arguments) | {'at': [typed]}))
+
+
 def _inverse_table(
     closure: Closure, arguments: argparse.Namespace
 ) -> tuple[list[Column], list[list[Any]]]:
     """Return a row for every input at which the joint has one of the typed values."""
     name = arguments.joint[0][0]
-    swept = arguments.sweep or arguments.first is not None or arguments.last is not None
-    for option, given in (('--at', arguments.at), ('--sweep', swept)):
-        if given:
-            raise LinkageError(
-                f'--joint {name}', f'{option} is given too', 'leave one of them out'
-            )
     columns, rows = [], []
     for joint, typed in arguments.joint:
         option = f'--joint {joint}={typed:g}'
@@ -231,7 +251,8 @@ def _unreached(
             beyond = closure.beyond(closure.position(branch.find(value)[0]))
             reason = f'is reached only beyond limits: {beyond}'
             return LinkageError(option, reason, 'ask for another value, or widen the limits')
-    ends = min(branch.low for branch in free), max(branch.high for branch in free)
+    within = closure.branches(joint)
+    ends = min(branch.low for branch in within), max(branch.high for branch in within)
     low, high = (angles.value_text(end, free[0].turning) for end in ends)
     return LinkageError(option, 'is not reached', f'{joint} goes from {low} to {high}')
 

@@ -279,6 +279,14 @@ class _Scene:
         self.figure.set_layout_engine('none')  # the same places in all pictures
         frames = link_frames(shown.closure, shown.position)
         self.origin = {link: frames[link] for link in motion.links}
+        moving = [artist for _, artist in self.parts] + self.marks + self.dots
+        self._front = [
+            artist
+            for axes in (self.plane, *self.panels.values())
+            for artist in sorted(axes.get_children(), key=lambda artist: artist.zorder)
+            if artist.zorder >= min(part.zorder for part in moving if part.axes is axes)
+        ]
+        self._behind: Any = None
 
     def across(self, i: int) -> float:
         """Return the place of the mark at an instant, as its axis shows it."""
@@ -314,8 +322,19 @@ class _Scene:
             dot.set_data([self.across(i)], [self.height(i, number)])
 
     def pixels(self) -> Any:
-        """Return the pixels of the picture, of shape (height, width, 3)."""
-        self.canvas.draw()
+        """
+        Return the pixels of the picture, of shape (height, width, 3).
+
+        What lies behind all that moves, most of all the letters of the axes, is painted once.
+        """
+        if self._behind is None:
+            for artist in self._front:
+                artist.set_animated(True)
+            self.canvas.draw()
+            self._behind = self.canvas.copy_from_bbox(self.figure.bbox)
+        self.canvas.restore_region(self._behind)
+        for artist in self._front:
+            artist.axes.draw_artist(artist)
         return np.asarray(self.canvas.buffer_rgba())[:, :, :3].copy()
 
     def places(self, axes: Any, x: Sequence[float], y: Sequence[float]) -> Any:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from math import isfinite, nan
+from math import floor, isfinite, nan
 from typing import TYPE_CHECKING
 
 from linkage_ros.drives.drive import LARGEST
@@ -53,7 +53,17 @@ def crank_of(branch: CrankBranch, value: float, rate: float) -> tuple[float, flo
     crank, slope = branch.find(value)
     if abs(slope) < branch.flat:
         return crank, nan
-    return crank, rate / (branch.slope(crank) if isfinite(slope) else slope)
+    return crank, rate / (branch.evaluate(crank)[1] if isfinite(slope) else slope)
+
+
+def joint_of(branch: CrankBranch, crank: float, rate: float) -> tuple[float, float]:
+    """Return the joint and its rate for a crank and its rate; at rest at the end of the branch."""
+    turns = floor((crank - branch.least) / branch.period) if branch.period else 0
+    crank -= turns * branch.period
+    within = min(max(crank, branch.least), branch.most)
+    value, slope = branch.evaluate(within)
+    value += turns * (branch.rise if branch.rises else -branch.rise)
+    return value, rate * slope if within == crank else 0.0
 
 
 class DependentSampleReader:

@@ -603,7 +603,8 @@ class Closure:
         Return the closure error of a closed position, in [m].
 
         Each link is placed by its own pin or slider and its angle. The result is the largest
-        distance between the two places of a pin, or of a slider's point.
+        distance between the two places of a pin, or of a slider's point. Ratios between joints
+        join no places, and are not counted.
         """
         points, angles = self.points(position), self.link_angles(position)
         worst = 0.0

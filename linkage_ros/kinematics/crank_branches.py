@@ -209,7 +209,9 @@ class CrankBranch:
             y, rise = self._at_share(i / cells)
             while k < len(piece) - 2 and piece[k + 1][1] < y:
                 k += 1
-            crank, slope = self._narrow(y, piece[k][0], piece[k + 1][0])
+            (below, less), (above, more) = piece[k], piece[k + 1]
+            start = below + (above - below) * ((y - less) / (more - less))
+            crank, slope = self._narrow(y, below, above, start)
             self.cranks.append(crank)
             slopes.append(rise / abs(slope) if slope else inf)
         self.cranks.append(self.last)
@@ -322,9 +324,9 @@ class CrankBranch:
         crank, slope = self._narrow(y, p, self.cranks[i + 1], crank)
         return crank + turns, slope
 
-    def slope(self, crank: float) -> float:
-        """Return the slope of the output at a crank."""
-        return self._evaluate(crank)[1]
+    def evaluate(self, crank: float) -> tuple[float, float]:
+        """Return the output at a crank of the branch, and its slope there."""
+        return self._evaluate(crank)
 
     def _narrow(
         self, y: float, below: float, above: float, start: float = nan

@@ -34,10 +34,11 @@ import os
 from queue import Empty, SimpleQueue
 from threading import Event, Lock, Thread
 from time import monotonic, sleep, time_ns
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.srv import GetState
+from linkage_ros.drives.dependent_samples import DependentSampleReader, joint_of, sampled_inverse
 from linkage_ros.errors import clean, did_you_mean, LinkageError, listed, quoted, shortened
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, JointStateWriter
 from linkage_ros.messages.layout import NANOSECONDS
@@ -51,6 +52,7 @@ from linkage_ros.node.scene_topics import (
     TakenByTick,
 )
 from linkage_ros.replay.replay import read_change
+from linkage_ros.scene.scene import SceneLinkage
 from linkage_ros.signals import bounded_end
 from linkage_ros.view.hand_crank import HandCrank, HELD
 from linkage_ros.view.live import KINDS
@@ -64,6 +66,11 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.crank_branches import CrankBranch
+
+Floats = Sequence[float]
 
 _STATES_PERIOD = 1.0 / 60.0
 _HAND_PERIOD = 0.01
@@ -314,7 +321,7 @@ class LiveBridge:
         # Taken by a timer, so that a fast node costs this process nothing.
         self._joint_states = self._subscribe(JointState, run.account.joint_states_topic)
         self._read_joints = JointStateReader(run.scene.joints)
-        self._read_inputs = JointStateReader(run.shown.inputs)
+        self._read_inputs = _crank_reader(run.shown)
         self._crank_states = None
         if run.crank_topic not in ('', run.account.joint_states_topic):
             self._crank_states = self._subscribe(JointState, run.crank_topic)
@@ -502,7 +509,7 @@ class LiveBridge:
             at[number] = target
         self._hand.turn(number, target, at, monotonic())
         self._hold(run)
-        return f'{listed(run.turned.inputs)} on {run.crank_topic}, by hand'
+        return f'{listed(run.turned.sampled)} on {run.crank_topic}, by hand'
 
     def _push(self, content: Mapping[str, Any]) -> str:
         run = self._turnable('torque', 'effort')
@@ -528,7 +535,7 @@ class LiveBridge:
             self._hand_timer = self._node.create_timer(
                 _HAND_PERIOD, self._publish_hand, clock=self._steady
             )
-            self._write_crank = JointStateWriter(run.turned.inputs).write
+            self._write_crank = _crank_writer(run.turned)
         if self._hand_timer.is_canceled():
             self._hand_timer.reset()
 
@@ -579,6 +586,32 @@ def _flag(content: Mapping[str, Any]) -> bool:
     if not isinstance(on, bool):
         raise LinkageError('on', f'{quoted(on)} is not valid', 'send true or false')
     return on
+
+
+def _branch_of(member: SceneLinkage) -> CrankBranch:
+    """Return the branch on which a dependent joint moves a crank."""
+    return sampled_inverse(member.closure, member.dependent, member.drive[1].branch).branch
+
+
+def _crank_reader(member: SceneLinkage) -> JointStateReader | DependentSampleReader:
+    """Return the reader of its inputs, as samples or published joints name them."""
+    if not member.dependent:
+        return JointStateReader(member.inputs)
+    return DependentSampleReader(_branch_of(member), member.sampled[0])
+
+
+def _crank_writer(member: SceneLinkage) -> Callable[[int, Floats, Floats], bytes]:
+    """Return the writer of samples as its drive takes them: of inputs, or of a dependent joint."""
+    write = JointStateWriter(member.sampled).write
+    if not member.dependent:
+        return write
+    branch = _branch_of(member)
+
+    def write_joint(stamp: int, cranks: Floats, rates: Floats) -> bytes:
+        value, rate = joint_of(branch, cranks[0], rates[0])
+        return write(stamp, (value,), (rate,))
+
+    return write_joint
 
 
 def _any_of(names: Sequence[str] | Mapping[str, Any]) -> str:

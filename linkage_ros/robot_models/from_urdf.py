@@ -43,6 +43,7 @@ from linkage_ros.robot_models.planar import (
     add_places,
     find_closings,
     find_loops,
+    find_pinned,
     lay_flat,
     Planar,
 )
@@ -217,7 +218,7 @@ class _Import:
         inputs: Sequence[str],
         at: Mapping[str, float],
     ) -> None:
-        close = (*urdf.closings, *close)
+        close = (*urdf.closings, *find_pinned(urdf), *close)
         self._urdf = urdf = add_places(urdf, close)
         self._closings, alone = find_closings(urdf, close)
         moving = [joint.name for joint in urdf.joints.values() if joint.kind in MOVING]

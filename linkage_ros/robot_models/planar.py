@@ -22,7 +22,7 @@ as in a linkage file.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from math import cos, sin
 import re
@@ -86,6 +86,20 @@ def find_closings(
 
 _NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 _PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
+
+
+def find_pinned(urdf: UrdfFile) -> Iterator[tuple[str, str]]:
+    """Yield pairs of places that meet, LINK.x,y,z, of joints that Gazebo closes loops by."""
+    frames = {urdf.root: (np.eye(3), np.zeros(3))}
+    for joint in urdf.joints.values():
+        turn, place = frames[joint.parent]
+        frames[joint.child] = (turn @ _turned(joint.rpy), place + turn @ np.array(joint.xyz))
+    for end, parent in urdf.pinned:
+        found = _PLACE.fullmatch(end)
+        assert found
+        (turn, place), (to, origin) = frames[found[1]], frames[parent]
+        there = to.T @ (place + turn @ np.array([*map(float, found.groups()[1:])]) - origin)
+        yield end, f'{parent}.{",".join(repr(float(value)) for value in there)}'
 
 
 def add_places(urdf: UrdfFile, asked: Sequence[tuple[str, str]]) -> UrdfFile:
@@ -188,6 +202,12 @@ class Planar:
     marks: list[tuple[str, str, complex]] = field(default_factory=list)
     # Masses of bodies, as far as they are given.
     masses: dict[str, Mass] = field(default_factory=dict)
+    # x, y and normal of the plane in the frame of the ground, as rows.
+    basis: Array = None
+    # With all joints at 0, rotation of each link of the URDF from the frame of the ground, and
+    # height of each body above the plane, in [m].
+    turns: dict[str, Array] = field(default_factory=dict)
+    heights: dict[str, float] = field(default_factory=dict)
 
 
 def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
@@ -205,7 +225,7 @@ def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
     def flat(vector: Array) -> complex:
         return complex(basis[0] @ vector, basis[1] @ vector)
 
-    planar = Planar(loops.ground)
+    planar = Planar(loops.ground, basis=basis, turns=turns, heights={loops.ground: 0.0})
     bodies = {loops.ground: (loops.ground, np.zeros(3))}
     for joint in urdf.joints.values():
         if joint.parent not in bodies or not (
@@ -218,6 +238,7 @@ def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
             bodies[joint.child] = (body, place)
             continue
         bodies[joint.child] = (joint.child, np.zeros(3))
+        planar.heights[joint.child] = planar.heights[body] + float(basis[2] @ place)
         axis = turns[joint.child] @ _unit(joint.axis)
         turning = joint.kind != 'prismatic'
         along = complex(1 if basis[2] @ axis > 0.0 else -1) if turning else flat(axis)

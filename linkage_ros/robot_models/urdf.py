@@ -29,6 +29,7 @@ from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     carriers,
     GROUND,
@@ -215,7 +216,7 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
             mount = TreeJoint(
                 model.names.joint('mount'), 'fixed', root, model.names.own(GROUND), 0j
             )
-            _joint(robot, mount, None, NO_LIMITS)
+            add_joint(robot, mount, None, NO_LIMITS)
     _refuse_expressions(0, robot, of_linkage=False)
     for count, model in enumerate(models):
         before = len(robot)
@@ -298,8 +299,10 @@ def _write(robot: ET.Element, model: _Model) -> None:
         of = joint.mimics or joint.name
         limits = given.get(of, NO_LIMITS)
         mimic = followed.get(of, Ratio(of, 1.0) if joint.mimics else None)
-        computed[of] = _joint(robot, joint, ranges.get(of), limits, model.part.wrapped, mimic)
-    _start(robot, model, computed)
+        computed[of] = add_joint(robot, joint, ranges.get(of), limits, model.part.wrapped, mimic)
+    start = start_element(model.part.closure, names, computed)
+    if start is not None:
+        robot.append(start)
 
 
 def _following(linkage: Linkage, names: PrefixedNames) -> Iterator[tuple[str, Ratio]]:
@@ -342,7 +345,7 @@ def _visuals(link: ET.Element, name: str, body: Body, origin: complex) -> None:
             ET.SubElement(material, 'color', rgba=numbers(*body.colour))
 
 
-def _joint(
+def add_joint(
     robot: ET.Element,
     joint: TreeJoint,
     span: Span | None,
@@ -394,25 +397,27 @@ def _origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
     ET.SubElement(element, 'origin', xyz=xyz, rpy=rpy)
 
 
-def _start(robot: ET.Element, model: _Model, computed: Mapping[str, Mapping[str, str]]) -> None:
+def start_element(
+    closure: Closure, names: PrefixedNames, computed: Mapping[str, Mapping[str, str]]
+) -> ET.Element | None:
     """
-    Write the data that URDF has no elements for: the inputs, and a pose that closes the loops.
+    Return the data that URDF has no elements for: the inputs, and a pose that closes the loops.
 
-    Also write which joint limits were made up. Readers of URDF ignore unknown elements;
-    ``linkage import`` reads these.
+    It also tells which joint limits were made up. Readers of URDF ignore unknown elements;
+    ``linkage import`` reads these. None if several inputs do not close where each is in range.
     """
-    closure, names = model.part.closure, model.names
     inputs = usual_inputs(closure)
     given = zip(closure.linkage.inputs, inputs, strict=True)
     values = {driven.joint: value for driven, value in given}
     position = closure.position(*inputs)
     if not position.joints:
-        return  # several inputs may each be in range, but not close together
+        return None
     values |= dict(zip(closure.linkage.joints, position.joints, strict=True))
-    element = ET.SubElement(robot, 'linkage_start')
+    element = ET.Element('linkage_start')
     for name in named_joints(closure.linkage):
         kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'
         named = names.own(name)
         joint = ET.SubElement(element, kind, name=named, value=number(values[name]))
         if named in computed:
             ET.SubElement(joint, 'computed', dict(computed[named]))
+    return element

@@ -18,11 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import inf, isfinite
+from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.errors import FileError, listed, quoted
-from linkage_ros.files.file_kinds import kind_of_bytes
+from linkage_ros.errors import FileError, LinkageError, listed, quoted
+from linkage_ros.files.file_access import read_regular
+from linkage_ros.files.file_kinds import kind_of_bytes, kind_of_folder
 from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
 
 # The content of a URDF: links and joints by name.
@@ -83,6 +85,8 @@ class UrdfFile(NamedTuple):
     start: Mapping[str, float]
     # Places that meet, LINK.x,y,z, as tags say by which simulators close loops.
     closings: tuple[tuple[str, str], ...]
+    # Places, LINK.x,y,z, that meet a link where they are with all joints at 0, as Gazebo says.
+    pinned: tuple[tuple[str, str], ...]
     unread: tuple[str, ...]  # Tags that may close loops and are not read, in words
 
 
@@ -102,6 +106,24 @@ _USUAL_TAGS = (
     'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
     *_LOOP_TAGS,
 )  # fmt: skip
+
+
+_LARGEST_FILE = 10_000_000
+
+
+def read_urdf_file(file: Path) -> bytes:
+    """Return the content of a URDF; a LinkageError has the reason why it cannot be read."""
+    try:
+        data = read_regular(file, _LARGEST_FILE)
+    except IsADirectoryError:
+        reason = f'is {kind_of_folder(file).noun}, and no URDF'
+        raise LinkageError(file, reason, 'name a URDF file') from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise LinkageError(file, f'cannot be read ({reason})', 'name a URDF file') from None
+    if len(data) > _LARGEST_FILE:
+        raise LinkageError(file, f'is larger than {_LARGEST_FILE} bytes', 'name a URDF file')
+    return data
 
 
 def read_urdf(data: bytes, file: str) -> UrdfFile:
@@ -157,6 +179,7 @@ class _Reader:
             tuple(each.get('name', '') for each in said if each.tag == 'input'),
             {each.get('name', ''): self._value(each, 'value', 'linkage_start') for each in said},
             self._closings(root, links),
+            tuple(self._pinned(root, links)),
             tuple(_unread(root)),
         )
 
@@ -174,6 +197,20 @@ class _Reader:
                 )
                 found.setdefault(frozenset((one, other)), (one, other))
         return tuple(found.values())
+
+    def _pinned(
+        self, root: ET.Element, links: Mapping[str, UrdfLink]
+    ) -> Iterator[tuple[str, str]]:
+        """Yield places on links, and the links that joints of <gazebo> pin them to."""
+        for joint in filter(_is_pin_of_gazebo, root.findall('gazebo/joint')):
+            where = f'joint {joint.get("name", "")} of <gazebo>'
+            parent, child = ((joint.findtext(end) or '').strip() for end in ('parent', 'child'))
+            for end, link in (('parent', parent), ('child', child)):
+                if link not in links:
+                    raise self._error(where, f'its {end} {quoted(link)} is no link', 'name a link')
+            pose = {'pose': joint.findtext('pose') or '0 0 0 0 0 0'}
+            values = self._values(ET.Element('joint', pose), 'pose', where, 6, '')
+            yield f'{child}.{",".join(map(repr, values[:3]))}', parent
 
     def _place(
         self, element: ET.Element, link: str, place: str, where: str, links: Mapping[str, UrdfLink]
@@ -370,9 +407,19 @@ def _made_up(joint: ET.Element) -> Mapping[str, str] | None:
     return None if computed is None else computed.attrib
 
 
+def _is_pin_of_gazebo(joint: ET.Element) -> bool:
+    """Return whether a joint of SDF is a pin whose pose is in the frame of its child."""
+    pose = joint.find('pose')
+    relative = '' if pose is None else pose.get('relative_to', '')
+    in_child = relative in ('', joint.get('name'), (joint.findtext('child') or '').strip())
+    return in_child and joint.get('type', '') in ('revolute', 'continuous', 'ball')
+
+
 def _unread(root: ET.Element) -> Iterator[str]:
     """Yield the tags that may close loops and are not read, in words."""
     for joint in root.findall('gazebo/joint'):
+        if _is_pin_of_gazebo(joint):
+            continue
         ends = f'{joint.findtext("parent", "")} and {joint.findtext("child", "")}'
         yield f'joint {joint.get("name", "")} of <gazebo>, between {ends}'
     for element in root:

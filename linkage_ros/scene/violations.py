@@ -19,9 +19,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from re import search
+import sys
+from types import ModuleType
 from typing import Any, TYPE_CHECKING
 
-from jsonschema import Draft202012Validator
 from linkage_ros.errors import did_you_mean, FileError, listed, quoted
 from linkage_ros.files.parameters import Schema, under_part
 from linkage_ros.files.section import LinedDict, Section
@@ -49,6 +50,23 @@ _Path = tuple[str | int, ...]
 _Problem = tuple[_Path, str, str]
 
 
+_IRI_GRAMMAR = 'rfc3987_syntax'
+
+
+def import_jsonschema() -> ModuleType:
+    """
+    Return the library without its check of IRIs, which no schema of this package asks for.
+
+    Where another package, such as Jupyter, has brought the grammar, it is compiled for seconds.
+    """
+    sys.modules.setdefault(_IRI_GRAMMAR, None)  # type: ignore[arg-type]
+    import jsonschema
+
+    if sys.modules[_IRI_GRAMMAR] is None:
+        del sys.modules[_IRI_GRAMMAR]
+    return jsonschema
+
+
 def violations(content: Section, schema: Schema) -> list[FileError]:
     """
     Return the violations in a file, in the order of its lines.
@@ -62,7 +80,8 @@ def violations(content: Section, schema: Schema) -> list[FileError]:
 
     """
     whole = content.mapping
-    broken = list(Draft202012Validator(schema).iter_errors(whole))
+    validator = import_jsonschema().Draft202012Validator(schema)
+    broken: list[ValidationError] = list(validator.iter_errors(whole))
     # A value of the wrong type breaks further rules, which are not worth reporting.
     mistyped = {tuple(error.absolute_path) for error in broken if error.validator == 'type'}
     units = _units(whole)

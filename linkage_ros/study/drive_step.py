@@ -104,7 +104,7 @@ def measure_drive_step(
     ticks = tick_times(rate, horizon, _TICKS)
     own = cranks_at(motion, ticks)
     taken = process_time() - begun
-    price = _price(motion, rate, horizon, 0.5 if quick else 2.0)
+    price = _price(motion, rate, horizon, 0.3 if quick else 2.0)
     finest = next((n for n in (16, 8) if 1.5 * n * taken <= seconds), 4)
     exact, doubt = exact_cranks(motion, ticks, finest)
     joints, _ = joints_at(motion.closure, exact)

@@ -157,6 +157,7 @@ def _measure_errors(
     rate = scene.rate or USUAL_RATE
     knobs: list[Knob] = [measure_age_in_use(scene, motions, horizon, quick=quick)]
     left_out: list[str] = []
+    integrated = sum(motion.path is None for motion in motions)
     progress(0.1)
     for motion in motions:
         if motion.member.drive[0] == 'torque':
@@ -170,7 +171,7 @@ def _measure_errors(
                 horizon,
                 key=scene_key(motion.member, 'drive') + '.torque',
                 quick=quick,
-                seconds=7.0 if quick else 60.0,
+                seconds=(7.0 if quick else 60.0) / integrated,
                 progress=lambda share: progress(0.1 + 0.4 * share),
             )
             left_out += missing

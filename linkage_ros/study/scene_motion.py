@@ -108,7 +108,7 @@ def _motion(
     closure = line.closure
     if type(closure) is not Closure:
         closure = Closure(closure.linkage)
-    motion = MemberMotion(member, closure, context, None)
+    motion = MemberMotion(member, closure, context, line.closure, None)
     drive, parameters = member.drive
     if drive == 'torque':
         return _commanded(motion, like, bag, horizon)

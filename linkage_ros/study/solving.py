@@ -126,7 +126,7 @@ def measure_solving(
         unproved += len(states) - len(known)
         if not known:
             continue
-        own = Solver(*_own(motion.closure))
+        own = _own(motion.solution)
         errors.append(judge(linkage, own.solve, known, exact)[0])
         progress(0.2)
         if number:
@@ -217,7 +217,11 @@ def off(linkage: Linkage, joints: Sequence[Any], balls: Sequence[Any]) -> float:
     return worst
 
 
-def _own(closure: Closure) -> tuple[str, Solve]:
+def _own(closure: Closure) -> Solver:
+    """Return what a scene solves with, as a tick does."""
+    if type(closure) is not Closure:
+        kind = type(closure).__name__.removesuffix('Closure').lower()
+        return Solver(kind, lambda *inputs: closure.position(*inputs).joints)
     compiled = closure.compiled(0)
     fast, plain = compiled.fast, compiled.plain
 
@@ -225,7 +229,7 @@ def _own(closure: Closure) -> tuple[str, Solve]:
         (joints,) = fast(*inputs) or plain(*inputs).values or ((),)
         return joints
 
-    return (CLOSED_FORM if closure.by_steps else ITERATED), position
+    return Solver(CLOSED_FORM if closure.by_steps else ITERATED, position)
 
 
 def comparisons(closure: Closure) -> Iterator[Solver]:
@@ -323,7 +327,7 @@ def judge_hard_cases() -> Iterator[HardCase]:
         # Next to a change point the other assembly is as near as the change point itself.
         limits = [0.1 * distances[states.index(tuple(state))] for state in known]
         far = limits if place == 'change point' else None
-        for solver in (Solver(*_own(closure)), *comparisons(closure)):
+        for solver in (_own(closure), *comparisons(closure)):
             error, failed = judge(linkage, solver.solve, known, exact, far)
             yield HardCase(f'{place} of {name}', solver.label, error.worst, failed, len(known))
 

@@ -22,7 +22,7 @@ from campaigns.accuracy.random_families import RANDOM
 from campaigns.accuracy.run import make, parts, run
 import pytest
 
-RANDOM_CASES, HARD_CASES = 20_000, 4_000
+RANDOM_CASES, HARD_CASES = 10_000, 2_000
 SEED = 20261121
 """Another seed than the campaign's, whose findings are fixed."""
 

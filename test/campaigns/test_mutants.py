@@ -45,8 +45,9 @@ def test_the_tests_beside_each_module_are_there():
         ('def test_sum():\n    assert 1 + 1 == 2\n', ''),
         ('def test_sum():\n    assert 1 + 1 == 3\n', 'FAILED test_sum.py::test_sum'),
         ('import nothing_of_this_name\n', 'ERROR test_sum.py'),
+        ('def test_sum():\n    while True:\n        pass\n', ''),
     ],
 )
-def test_a_mutant_is_killed_by_the_test_that_fails(tmp_path, text, killer):
+def test_a_mutant_is_killed_by_the_test_that_fails_within_its_time(tmp_path, text, killer):
     (tmp_path / 'test_sum.py').write_text(text)
-    assert first_failure(tmp_path, ['test_sum.py']) == killer
+    assert first_failure(tmp_path, ['test_sum.py'], longest=2) == killer

@@ -138,7 +138,7 @@ SHORT_COUPLER = 'four_bar: {a: 0.12, b: 0.04, c: 0.08, d: 0.1}\n'
     ('arguments', 'said'),
     [
         (['demo'], r'drive: topic has no motion of its own; .*--like sine'),
-        (['stuck.yaml'], 'nowhere where its loops close; see linkage check'),
+        (['stuck.yaml'], 'moves the linkage nowhere where its loops close; see linkage check'),
         (['nowhere.yaml'], r'nowhere.yaml: '),
         (['demo', '--like', 'no_bag'], r'no_bag: '),
         (['demo', '--horizon', '-1'], r'--horizon'),

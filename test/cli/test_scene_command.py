@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import fields
 from importlib import import_module
+from importlib.util import find_spec
 import json
 from math import inf
 from pathlib import Path
@@ -38,6 +39,8 @@ from .conftest import json_keys, Run
 CONFIG = Path(__file__).parents[2] / 'config'
 SCENES = sorted((CONFIG / 'scenes').glob('*.yaml'))
 FOUR_BAR = CONFIG / 'linkages' / 'four_bar.yaml'
+
+needs_jsonschema = pytest.mark.skipif(find_spec('jsonschema') is None, reason='needs jsonschema')
 
 
 def run(*typed: str) -> int:
@@ -150,8 +153,8 @@ BAD_SAID = [
 ]
 
 
+@needs_jsonschema
 def test_everything_that_is_wrong_is_said_at_once(linkage: Run, tmp_path):
-    pytest.importorskip('jsonschema')
     (tmp_path / 'bad.yaml').write_text(BAD)
     answer = linkage('scene', 'bad.yaml')
     assert answer.returncode == 2
@@ -234,9 +237,9 @@ WRONG = [
 ]
 
 
+@needs_jsonschema
 @pytest.mark.parametrize(('scene', 'drawn', 'said'), WRONG, ids=[row[2][0][:40] for row in WRONG])
 def test_wrong_files_are_refused_in_a_line(linkage: Run, tmp_path, scene, drawn, said):
-    pytest.importorskip('jsonschema')
     (tmp_path / 's.yaml').write_text(scene)
     (tmp_path / 'l.yaml').write_text(drawn)
     answer = linkage('scene', 's.yaml')
@@ -335,8 +338,8 @@ def test_a_linkage_file_is_shown_as_the_scene_that_it_stands_for(path, capsys):
     assert stages == ['constant_rate' if path == FOUR_BAR else 'sine', 'velocity']
 
 
+@needs_jsonschema
 def test_a_bad_linkage_file_is_one_by_the_schema_of_linkages(linkage: Run, tmp_path):
-    pytest.importorskip('jsonschema')
     (tmp_path / 'bad.yaml').write_text(
         'links: {ground: {A: 1}}\ntrcaed: []\njoints: {}\ninput: {joint: a, slider: b}\n'
     )

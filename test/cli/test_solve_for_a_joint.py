@@ -16,10 +16,11 @@
 
 from __future__ import annotations
 
+from cmath import phase, rect
 import csv
 import io
 import json
-from math import radians, remainder, tau
+from math import acos, radians, remainder, tau
 from pathlib import Path
 
 from linkage_ros import load
@@ -61,6 +62,62 @@ def test_rates_are_those_of_the_joint(linkage: Run) -> None:
         assert found == pytest.approx([-0.08, 0.01, 0.02], rel=1e-11)
 
 
+def test_as_many_joints_as_inputs_become_inputs(linkage: Run) -> None:
+    asked = ('--joint', 'right_elbow=1.4', '--joint', 'left_elbow=-1.2', '--radians')
+    (row,) = solved(linkage, 'five_bar', *asked)
+    position = load('five_bar').position(
+        float(row['left_crank_joint [rad]']), float(row['right_crank_joint [rad]'])
+    )
+    assert position['right_elbow'] == pytest.approx(1.4, abs=1e-14)
+    assert position['left_elbow'] == pytest.approx(-1.2, abs=1e-14)
+
+
+def three_arms() -> str:
+    """Return a planar parallel robot of three arms, each of 70 and 80 mm; its pose by circles."""
+    corners = [rect(0.12, tau * k / 3) for k in range(3)]
+    hinges = [rect(0.035, tau * k / 3 + 0.2) for k in range(3)]
+    lines = ['links:', f'  ground: {{{", ".join(place(f"O{k}", corners[k]) for k in range(3))}}}']
+    lines += [f'  platform: {{{", ".join(place(f"B{k}", hinges[k]) for k in range(3))}}}']
+    points, cranks = [place(f'B{k}', hinges[k]) for k in range(3)], []
+    for k, (corner, hinge) in enumerate(zip(corners, hinges, strict=True)):
+        across = hinge - corner
+        opening = acos((0.07**2 + abs(across) ** 2 - 0.08**2) / (2 * 0.07 * abs(across)))
+        cranks.append(phase(across) + opening)
+        points.append(place(f'A{k}', corner + rect(0.07, cranks[k])))
+        lines += [
+            f'  crank{k}: {{O{k}: [0, 0], A{k}: [0.07, 0]}}',
+            f'  rod{k}: {{A{k}: [0, 0], B{k}: [0.08, 0]}}',
+        ]
+    lines += ['input:']
+    lines += [f'  - {{joint: motor{k}, parent: ground, child: crank{k}}}' for k in range(3)]
+    lines += [f'pose: {{inputs: {cranks}, points: {{{", ".join(points)}}}}}', 'joints:']
+    lines += [f'  elbow{k}: {{parent: crank{k}, child: rod{k}}}' for k in range(3)]
+    return '\n'.join([*lines, ''])
+
+
+def place(name: str, at: complex) -> str:
+    return f'{name}: [{at.real!r}, {at.imag!r}]'
+
+
+def test_links_that_are_then_iterated_are_named(linkage: Run, tmp_path: Path) -> None:
+    (tmp_path / 'arms.yaml').write_text(three_arms(), 'utf-8')
+    closure = load(tmp_path / 'arms.yaml')
+    pose = closure.linkage.pose
+    assert pose is not None
+    wanted = closure.position(*pose.inputs)
+    joints = (f'elbow0={wanted["elbow0"]!r}', f'elbow1={wanted["elbow1"]!r}')
+    asked = [
+        word for name in (*joints, f'motor2={pose.inputs[2]!r}') for word in ('--joint', name)
+    ]
+    answer = linkage('solve', 'arms.yaml', '--radians', '--format', 'csv', *asked)
+    assert answer.stderr.startswith('linkage solve: note: with elbow0, elbow1, motor2 as inputs ')
+    assert answer.stderr.endswith(' are solved by iteration, from the pose of the file\n')
+    (row,) = csv.DictReader(io.StringIO(answer.stdout))
+    for k in range(2):
+        off = float(row[f'motor{k} [rad]']) - pose.inputs[k]
+        assert remainder(off, tau) == pytest.approx(0.0, abs=1e-9)
+
+
 def test_table_and_json_hold_the_same(linkage: Run) -> None:
     asked = ('four_bar', '--joint', 'rocker_joint=1.2', '--radians')
     table = linkage('solve', *asked).stdout.splitlines()
@@ -97,7 +154,9 @@ def limited(tmp_path: Path) -> str:
         ('four_bar --joint rocker_joint=90 --from 3', '--sweep is given too'),
         ('four_bar --joint rocker_joint=90 --joint P.x=3', 'one joint at a time'),
         ('four_bar --joint rocker_joint=90 --rate 1,2', '2 value(s) for 1 input(s)'),
-        ('five_bar --joint left_rod_joint=3', 'there are 2 inputs'),
+        ('five_bar --joint left_elbow=3', 'left_elbow: 1 for 2 inputs; name 2 different joints'),
+        ('five_bar --joint left_elbow=3 --joint elbow=3', 'elbow: is neither a published joint'),
+        ('five_bar --joint left_elbow=3 --joint right_elbow=3 --at 3,3', '--at is given too'),
         ('peaucellier --joint P.x=3', 'does not move with the input'),
         ('limited.yaml --joint rocker_joint=55', 'is reached only beyond limits: crank_joint at'),
     ],

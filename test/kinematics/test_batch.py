@@ -41,8 +41,8 @@ from .linkages import four_bar_linkage, FourBar
 from .reference import ANGLE, four_bar, Quantity, RATE, TOGGLE, turned, Worst
 from .samples import FOUR_BARS, four_bars, FourBarCase
 
-COUNT = 200
-ACCELERATED = 30
+COUNT = 100
+ACCELERATED = 15
 ACCELERATION = 4.0
 """Limit for accelerations in units of u·κ; of 12,700 loops of all families the worst had 2.3."""
 

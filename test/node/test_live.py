@@ -136,6 +136,29 @@ def test_the_linkage_comes_from_the_node_and_a_hand_turns_its_crank(graph, start
         assert stamp_of(cranks[-1]) - stamp_of(cranks[0]) > 0
 
 
+def test_a_hand_turns_the_crank_where_samples_name_a_dependent_joint(graph, start, write_scene):
+    closure = load(LINKAGES / 'four_bar.yaml')
+    wanted = closure.position(ANGLE)
+    ((branch, _),) = (
+        each for each in closure.cranks('rocker_joint', wanted['rocker_joint'])
+        if abs(each[1] - ANGLE) < 1e-9
+    )  # fmt: skip
+    drive = f'drive: {{topic: {{joint: rocker_joint, branch: {branch}, max_age: 0.2}}}}'
+    start(write_scene('both_ways', f'rate: 200\neffects: {{velocity: {{}}}}\n{drive}\n'))
+    samples = graph.listen(JointState, '/crank_states')
+    states = graph.listen(JointState, '/joint_states')
+    with bridged(graph) as followed:
+
+        def turned():
+            followed.ask('crank', angle=ANGLE)
+            at_rest = states and states[-1].position[:] == pytest.approx(wanted.joints, abs=1e-6)
+            return samples and at_rest and followed.newest('state')
+
+        state = wait_for(turned, 'the pose of that angle')
+        assert samples[-1].name == ['rocker_joint']
+        assert state['inputs'] == pytest.approx([ANGLE], abs=1e-5)
+
+
 def test_a_fault_and_a_recording_begin_and_end(graph, start, scene):
     states = graph.listen(JointState, '/joint_states')
     start(scene)

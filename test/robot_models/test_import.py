@@ -26,6 +26,7 @@ from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
 from linkage_ros.robot_models.from_urdf import from_urdf
+from linkage_ros.robot_models.planar import find_pinned
 from linkage_ros.robot_models.urdf_file import read_urdf
 import numpy as np
 import pytest
@@ -259,8 +260,17 @@ def closed_values(crank):
         LOOP_JOINT.format('spherical'),
         LOOP_CONSTRAINT,
         LOOP_JOINT.format('revolute') + LOOP_CONSTRAINT,
+        SDF_JOINT,
+        SDF_JOINT.replace('<pose>', '<pose relative_to="coupler">'),
     ],
-    ids=['loop_joint', 'spherical', 'loop_constraint', 'one pin by both'],
+    ids=[
+        'loop_joint',
+        'spherical',
+        'loop_constraint',
+        'one pin by both',
+        'gazebo',
+        'gazebo, frame named',
+    ],
 )
 def test_loop_tags_close_as_places_do(tags):
     at = closed_values(0.5)
@@ -269,12 +279,34 @@ def test_loop_tags_close_as_places_do(tags):
     assert found.left_out == ()
     for crank in (0.5, 1.1, 2.0):
         joints = Closure(found.linkage).position(crank)
-        assert joints.joints == Closure(asked.linkage).position(crank).joints
+        expected = Closure(asked.linkage).position(crank).joints
+        assert joints.joints == pytest.approx(expected, abs=1e-12)
         assert joints['rocker_joint'] == pytest.approx(closed_values(crank)['rocker_joint'])
 
 
+def test_a_pin_of_gazebo_is_where_it_is_with_all_joints_at_0():
+    """Frames are turned so that the loop is closed there, and its plane is tilted."""
+    at = closed_values(0.5)
+    turned = ''.join(map(LINK, ('base', 'floor', 'crank', 'coupler', 'rocker')))
+    turned += joint('tilt', 'base', 'floor', '1 2 3', '0.3 0.2 0.1', kind='fixed')
+    turned += ''.join(
+        joint(f'{child}_joint', parent, child, f'{x} 0 0', f'0 0 {at[child + "_joint"]}',
+              axis='0 0 1')
+        for parent, child, x in (
+            ('floor', 'crank', 0), ('crank', 'coupler', 0.1), ('floor', 'rocker', 0.15),
+        )
+    )  # fmt: skip
+    ((end, place),) = find_pinned(read_urdf(robot(turned, SDF_JOINT).encode(), 'r'))
+    assert end == 'coupler.0.2,0.0,0.0'
+    link, _, xyz = place.partition('.')
+    assert link == 'rocker'
+    assert [*map(float, xyz.split(','))] == pytest.approx([0.15, 0.0, 0.0], abs=1e-12)
+
+
 UNREAD = {
-    SDF_JOINT: 'joint pin of <gazebo>, between rocker and coupler',
+    SDF_JOINT.replace(
+        '<pose>', '<pose relative_to="base">'
+    ): 'joint pin of <gazebo>, between rocker and coupler',
     LOOP_JOINT.format('prismatic'): '<loop_joint> pin, which is no pin',
     '<constraint type="ball"/>': '<constraint>',
 }
@@ -308,6 +340,14 @@ BAD = {
     'a loop tag without a place': (
         robot(TREE, LOOP_CONSTRAINT.replace('0.2 0 0', '0.2')),
         "x.urdf: loop_constraint pin: xyz='0.2' is not 3 finite numbers; correct it",
+    ),
+    'a pin of gazebo on no link': (
+        robot(TREE, SDF_JOINT.replace('>rocker<', '>rod<')),
+        "x.urdf: joint pin of <gazebo>: its parent 'rod' is no link; name a link",
+    ),
+    'a pin of gazebo nowhere': (
+        robot(TREE, SDF_JOINT.replace('0.2 0 0 0 0 0', '0.2 0 inf 0 0 0')),
+        "x.urdf: joint pin of <gazebo>: pose='0.2 0 inf 0 0 0' is not 6 finite numbers; correct",
     ),
     'no XML': ('<robot', 'x.urdf:1: is no XML (unclosed token: line 1, column 0); name a URDF'),
     'another file': ('<sdf/>', 'x.urdf: holds <sdf>, not <robot>; name a URDF file'),

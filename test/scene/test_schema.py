@@ -19,6 +19,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
+from importlib.util import find_spec
 import json
 from math import pi
 from pathlib import Path
@@ -67,6 +68,7 @@ from linkage_ros.files.units import Units
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.schema import as_text, linkage_schema, parameter_types, scene_schema
+from linkage_ros.scene.violations import import_jsonschema
 import pytest
 import yaml
 
@@ -74,7 +76,9 @@ from . import test_bad_files as bad
 from .conftest import CONFIG, SCENE
 from .test_bad_files import WRITTEN_OUT
 
-Validator = pytest.importorskip('jsonschema').Draft202012Validator
+if find_spec('jsonschema') is None:
+    pytest.skip('needs jsonschema', allow_module_level=True)
+Validator = import_jsonschema().Draft202012Validator
 SCENES = sorted((CONFIG / 'scenes').glob('*.yaml'))
 LINKAGES = sorted((CONFIG / 'linkages').glob('*.yaml'))
 SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}

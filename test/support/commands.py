@@ -43,12 +43,13 @@ import time
 import linkage_ros
 from linkage_ros.cli.main import main
 from linkage_ros.processes import private_domain
+from linkage_ros.scene.violations import import_jsonschema
 
 # What commands import only where they need it.
 LIBRARIES = (
-    'jsonschema',
     'matplotlib.backends.backend_agg',
     'matplotlib.backends.backend_svg',
+    'matplotlib.figure',
     'plotly.graph_objects',
     'rich.console',
     'rosbags.highlevel',
@@ -136,6 +137,8 @@ def _serve(control: socket.socket) -> None:
     for name in (*LIBRARIES, *(module.name for module in modules)):
         with suppress(ImportError):
             import_module(name)
+    with suppress(ImportError):
+        import_jsonschema()
     for name in THREADED:
         del sys.modules[name]
     assert len([*Path('/proc/self/task').iterdir()]) == 1, 'a library has started a thread'
