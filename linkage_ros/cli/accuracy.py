@@ -44,7 +44,7 @@ from linkage_ros.study.budget_text import (
     lead_lines,
     rows_of,
 )
-from linkage_ros.study.measure import measure_budget, PARTS
+from linkage_ros.study.measure import EFFECTS, measure_budget, PARTS, RECORDING
 from linkage_ros.study.need import answer_need, answers_of
 from linkage_ros.study.page import budget_html
 from linkage_ros.study.picture import budget_svg
@@ -123,6 +123,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     parts = _parts(arguments.only)
     _check(arguments, parts)
     scene, like, is_bag = _source(arguments, stop)
+    _check_content(scene, parts)
     if is_bag and arguments.output:
         raise LinkageError('-o', 'the scene is in a bag', 'write the lines into its file by hand')
     try:
@@ -176,6 +177,17 @@ def _check(arguments: argparse.Namespace, parts: Sequence[str]) -> None:
         raise LinkageError('-o', 'is the scene that meets a need', 'say it: --need 1e-3')
     if arguments.need is not None and 'errors' not in parts:
         raise LinkageError('--need', 'is for errors', f'write --only errors,{arguments.only}')
+
+
+def _check_content(scene: Scene, parts: Sequence[str]) -> None:
+    """Raise if a scene has nothing of what alone is to be measured."""
+    has_effects = scene.faults or any(member.effects for member in scene.members)
+    if parts == [EFFECTS] and not has_effects:
+        raise LinkageError('--only effects', 'the scene has none, and no fault', 'leave it out')
+    if parts == [RECORDING] and scene.record is None:
+        raise LinkageError(
+            '--only recording', 'the scene records no bag', 'add --set record.directory=runs'
+        )
 
 
 def _source(arguments: argparse.Namespace, stop: Event) -> _Source:

@@ -120,6 +120,10 @@ def test_a_page_and_a_picture_are_written(by_hand: Any, tmp_path: Path) -> None:
     [
         (['--only', 'error'], "--only error: there is no such part; did you mean 'errors'?"),
         (['--only', 'x'], f'--only x: there is no such part; known: {", ".join(PARTS)}'),
+        (
+            ['--only', 'effects', '--set', 'effects={}'],
+            '--only effects: the scene has none, and no fault; leave it out',
+        ),
         (['-o', 'x.yaml'], '-o: is the scene that meets a need; say it: --need 1e-3'),
         (['--need', '1', '--only', 'effects'],
          '--need: is for errors; write --only errors,effects'),
