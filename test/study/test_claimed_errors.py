@@ -14,7 +14,9 @@
 
 """Claimed errors are those of an own run against the truth; a need is met when it is run."""
 
+from functools import partial
 from math import remainder, tau
+import os
 import random
 
 from linkage_ros.messages.joint_state import JointStateWriter
@@ -133,27 +135,52 @@ def test_the_step_of_a_drive_is_as_far_off_as_a_run_is(
 ):
     scene = scene_of(tmp_path, text, method, limits)
     (motion,) = motions_of(scene, like, HORIZON)
-    claimed = measure_drive_step(motion, scene.rate, HORIZON, quick=True)[0].own.error
-
-    ticks = round(HORIZON * scene.rate) + 1
-    runs = [
-        *run_scene(
-            scene, ticks, command_messages(motion.commands, motion.member.linkage.inputs[0].joint)
-        )
-    ]
-    times = [number / scene.rate for number in range(1, ticks)]
-    exact = truth(motion, times)
-    apart = [
-        max(
-            abs(remainder(joints[joint] - value, tau))
-            for joint, value in joints_of(name, theta).items()
-        )
-        for (_, joints, _), theta in zip(runs[1:], exact, strict=True)
-    ]
-    worst, rms = max(apart), np.sqrt(np.mean(np.square(apart)))
+    worst, rms, claimed = compared(scene, motion, HORIZON, name, partial(truth, motion))
     assert worst > 1e-7, 'a smaller one would say nothing'
     assert worst / 1.5 <= claimed.worst <= 1.5 * worst
     assert rms / 1.5 <= claimed.rms <= 1.5 * rms
+
+
+def compared(scene, motion, horizon, name, truth):
+    """Return the worst and the rms error of an own run, and what is claimed of it."""
+    claimed = measure_drive_step(motion, scene.rate, horizon, quick=True, seconds=0.0)[0]
+    ticks = round(horizon * scene.rate) + 1
+    joint = motion.member.linkage.inputs[0].joint
+    runs = [*run_scene(scene, ticks, command_messages(motion.commands, joint))]
+    exact = truth([number / scene.rate for number in range(1, ticks)])
+    apart = []
+    for (_, joints, _), theta in zip(runs[1:], exact, strict=True):
+        expected = joints_of(name, theta)
+        apart.append(max(abs(remainder(joints[j] - expected[j], tau)) for j in expected))
+    return max(apart), np.sqrt(np.mean(np.square(apart))), claimed.own.error
+
+
+SAMPLE = int(os.environ.get('LINKAGE_STATES', '3'))
+"""Random scenes; a large sample by the environment."""
+
+
+@pytest.mark.parametrize('seed', range(SAMPLE))
+def test_random_scenes_are_as_far_off_as_claimed(tmp_path, seed):
+    rng = random.Random(seed)
+    inertia, viscous = 10.0 ** rng.uniform(-3.5, -2.5), 10.0 ** rng.uniform(-5.0, -3.0)
+    dry, gravity = rng.choice([0.0, rng.uniform(0.0, 0.004)]), rng.choice([0.0, 9.81])
+    start, step = rng.uniform(-3.0, 3.0), rng.choice([0.002, 0.005, 0.01])
+    method = rng.choice(['semi_implicit_euler', 'rk4'])
+    (tmp_path / 'scene.yaml').write_text(
+        f'linkage: four_bar\nrate: 200\n'
+        f'drive: {{torque: {{start: {start}, method: {method}, step: {step}}}}}\n'
+        f'loads: {{gravity: [0, {-gravity}], drive_inertia: {inertia:.9f}}}\n'
+        f'effects: {{friction: {{joints: {{O2: {{viscous: {viscous:.9f}, coulomb: {dry}}}}}}}}}\n'
+    )
+    scene = load_scene(tmp_path / 'scene.yaml')
+    (motion,) = motions_of(scene, 'sine', 3.0)
+    bar = FourBar(round(inertia, 9), gravity, round(viscous, 9), (dry, 0.0, 0.0, 0.0))
+    worst, rms, claimed = compared(
+        scene, motion, 3.0, 'rubs', partial(bar.moved, start, commands_of(motion))
+    )
+    # The own run of LSODA is itself some 1e-8 off.
+    assert worst / 1.5 - 1e-7 <= claimed.worst <= 1.5 * worst + 1e-7
+    assert rms / 1.5 - 1e-7 <= claimed.rms <= 1.5 * rms + 1e-7
 
 
 def samples_of(motion, joint, rate, phase, horizon):
