@@ -204,6 +204,22 @@ def test_after_its_turns_a_branch_begins_again_and_angles_have_grown_by_them():
     assert seen
 
 
+def test_an_input_that_does_not_turn_round_is_taken_modulo_a_turn():
+    checked = 0
+    for _, linkage, _, _ in family('three arms'):
+        closure = Closure(linkage)
+        (interval,) = closure.input_ranges
+        if interval.whole or interval.highest - interval.lowest >= tau:
+            continue
+        for x in np.linspace(interval.lowest, interval.highest, 7)[1:-1].tolist():
+            expected = closure.points(closure.position(x))
+            for turns in (1, -1, 3):
+                found = closure.points(closure.position(x + turns * tau))
+                assert all(abs(found[key] - place) < 1e-12 for key, place in expected.items())
+        checked += 1
+    assert checked > 2
+
+
 @pytest.mark.parametrize('name', DEFECTS)
 def test_what_once_leapt_stays_on_its_branch(name):
     closure = defect(name)
