@@ -164,7 +164,7 @@ def _measure_errors(
                 horizon,
                 key=scene_key(motion.member, 'drive') + '.torque',
                 quick=quick,
-                seconds=(7.0 if quick else 60.0) / integrated,
+                seconds=(6.0 if quick else 60.0) / integrated,
                 progress=lambda share: progress(0.1 + 0.4 * share),
             )
             left_out += missing
