@@ -105,6 +105,8 @@ _CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 _DIAGNOSTICS_QOS = QoSProfile(depth=1)
 _WATCH_PERIOD = 0.25
 _NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
+_TWIN_PATIENCE = 0.5
+"""How long a node of the same name is seen without a warning, in [s]: one that has just ended."""
 
 Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
 
@@ -166,6 +168,7 @@ class LinkageNode(LifecycleNode):
         self.add_on_set_parameters_callback(self._on_parameters)
         self._warnings = Warnings(self.get_logger())
         self._before = self._before_last = Snapshot()
+        self._twin_since = inf
         self._real_time = RealTime(
             self.get_parameter('thread_priority').value,
             [each for each in self.get_parameter('cpu_affinity').value if each != -1],
@@ -516,7 +519,9 @@ class LinkageNode(LifecycleNode):
         """Return that there is another node of this name, or of these joints; '' if not."""
         name = self.get_fully_qualified_name()
         nodes = self.get_node_names_and_namespaces()
-        if [f'{space.rstrip("/")}/{each}' for each, space in nodes].count(name) > 1:
+        has_twin = [f'{space.rstrip("/")}/{each}' for each, space in nodes].count(name) > 1
+        self._twin_since = min(self._twin_since, now.time) if has_twin else inf
+        if now.time - self._twin_since > _TWIN_PATIENCE * NANOSECONDS:
             return (
                 f'another node is named {name}: services and diagnostics of both mix; rename one, '
                 'as by -r __ns:=/left'
