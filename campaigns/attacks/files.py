@@ -184,8 +184,7 @@ COMMANDS = {
     'fmu': [_FILE, '-o', 'x.fmu'],
     'scene': [_FILE],
     'simulate': [_FILE, '--seconds', '0.05', '-o', 'x.csv'],
-    'cost': [_FILE, '--ticks', '2'],
-    'accuracy': [_FILE, '--quick', '--only', 'effects,dynamics', '-o', 'page'],
+    'accuracy': [_FILE, '--quick', '--only', 'effects', '--page', 'x.html'],
     'replay': ['bag', '--scene', _FILE],
     'run': [_FILE, '--plain', '--seconds', '0.1', '--runs', 'runs'],
     'relay': [_FILE, '--joint', 'rocker_joint', '--seconds', '0.1'],
@@ -193,7 +192,7 @@ COMMANDS = {
 """Arguments of each command."""
 
 _SCENE = (
-    'view', 'fmu', 'scene', 'simulate', 'cost', 'urdf', 'mjcf', 'accuracy', 'replay', 'run',
+    'view', 'fmu', 'scene', 'simulate', 'urdf', 'mjcf', 'accuracy', 'replay', 'run',
     'relay',
 )  # fmt: skip
 _TABLES = {

@@ -59,7 +59,7 @@ class NoMotionError(Exception):
     """The exact motion does not go on: a toggle, or rates without bound."""
 
     def __init__(self, time: float) -> None:
-        super().__init__(f'after {time:.3g} s')
+        super().__init__(time)
         self.time = time
 
 

@@ -317,7 +317,10 @@ TYPED = {
 # Commands that take a scene; its drive may play a bag.
 FOLLOWS = 'linkage: l.yaml\ndrive: {bag: {file: bag}}\n'
 
-WITH_A_SCENE = (['scene', 'follows.yaml'], ['cost', 'follows.yaml', '--ticks', '5'])
+WITH_A_SCENE = (
+    ['scene', 'follows.yaml'],
+    ['accuracy', 'follows.yaml', '--quick', '--only', 'errors'],
+)
 
 
 def takes_a_bag(command: str) -> bool:
