@@ -14,7 +14,7 @@ Only the stages that the scene names are built; a tick never reads the scene.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
@@ -24,16 +24,14 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, DRIVES
 from linkage_ros.effects.angle_unwrap import all_wrapped, beginnings, Continuous
-from linkage_ros.effects.dispatch import Effect, effect_of, in_order, module_of, needs
 from linkage_ros.effects.stage import (
     FORCE_EFFECTS,
     MechanismState,
-    PUBLISHED_WITH,
     SensorReading,
     SensorStage,
     WriterStage,
 )
-from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import Position
@@ -49,6 +47,7 @@ from linkage_ros.pipeline.straight_tick import (
     straight_share,
     straight_tick,
 )
+from linkage_ros.pipeline.wanted_effects import choose_effects, WantedEffects
 from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.solvers.registry import SOLVERS
 
@@ -174,132 +173,131 @@ class LinkagePipeline:
 
     def _build(self, scene: Scene, closure: Closure | None, injection: Injection | None) -> None:
         member = self.member
-        _refuse_not_imported(member)
-        drive, drive_parameters = member.drive
-        drive_module = import_module(DRIVES[drive])
-        named = set(member.effects)
-        named |= {also for effect in named for also in PUBLISHED_WITH.get(effect, ())}
-        moves_by_rates = getattr(drive_parameters, 'carry_forward', True)
-        starting = named - _between_readings(member, named, moves_by_rates)
-        computed = named | {need for effect in starting for need in needs(effect)}
-        effects = [effect_of(name) for name in in_order(computed)]
-        self.stages = tuple(effect.name for effect in effects)
+        wanted = choose_effects(member)
+        self.stages = tuple(effect.name for effect in wanted.effects)
         """Names of the computed effects, in physical order."""
-        forced = drive == 'torque' or not computed.isdisjoint(FORCE_EFFECTS)
-        _refuse_idle(member, forced)
-        _refuse_solver(member, forced)
-
         seed = f'{scene.seed}/{member.name}'
-        given = {
-            effect.name: member.effects.get(effect.name) or effect.parameters()
-            for effect in effects
-        }
-        self.closure = closure or _closure(member, effects, given, seed, forced)
-        self.context = context = Context(
+        self.closure = closure or _closure(member, wanted, seed)
+        friction = wanted.parameters.get('friction')
+        self.context = Context(
             closure=self.closure,
             rate=scene.rate,
-            needs_rate='velocity' in computed,
+            needs_rate='velocity' in self.stages,
             seed=seed,
             loads=member.loads,
-            friction=given['friction'].friction if 'friction' in given else None,
+            friction=friction.friction if friction is not None else None,
             prefix=member.prefix,
             dependent=scene.dependent_joints,
             effects=frozenset(member.effects),
-            moves_by_rates=moves_by_rates,
+            moves_by_rates=wanted.moves_by_rates,
         )
+        self._build_drive(wanted, injection)
+        self._build_mechanism(wanted, injection)
+        self._build_sensors(wanted, injection, wrapped=scene.wrapped)
+        self._build_outputs(wanted)
+        self._straight = self._compile_tick(wanted)
 
-        # Crank.
-        self.topic: str = getattr(drive_module, 'TOPIC', '')
+    def _build_drive(self, wanted: WantedEffects, injection: Injection | None) -> None:
+        """Build what gives the crank state: the drive, its messages and the effects on it."""
+        drive, parameters = self.member.drive
+        module = import_module(DRIVES[drive])
+        self.topic: str = getattr(module, 'TOPIC', '')
         """Topic of the drive; '' for none."""
-        self.drive: Drive = drive_module.build(drive_parameters, context)
-        self._read_message = drive_module.reader(drive_parameters, context) if self.topic else None
+        self.drive: Drive = module.build(parameters, self.context)
+        self._read_message = module.reader(parameters, self.context) if self.topic else None
         self._spoil = injection.build('message') if injection is not None else []
         if self._spoil and not self.topic:
             raise DefinitionError(
                 'faults', f'not_a_number spoils messages, and {drive} has none', 'leave it out'
             )
-        self._drive_stages = [
-            effect.drive_stage(given[effect.name], context)
-            for effect in effects
-            if effect.drive_stage is not None
-        ]
-        # Closure and mechanism.
-        self._timed = forced and member.loads is not None and member.loads.applied.timed
+        self._drive_stages = [*wanted.build('drive_stage', self.context).values()]
+
+    def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
+        """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
+        loads = self.member.loads if wanted.computes_forces else None
+        self._timed = loads is not None and loads.applied.timed
         self._first = -1
         self.wrenches: dict[str, HeldWrench] = {}
         """The wrenches that messages give, by the name of the link."""
-        if forced and member.loads is not None and member.loads.applied.wrenches:
-            applied = context.mechanics.applied
+        if loads is not None and loads.applied.wrenches:
+            applied = self.context.mechanics.applied
             assert applied is not None
             self.wrenches = applied.wrenches
         self._close = self.closure.position
-        if member.silent_beyond_limits and self.closure.bounds:
+        if self.member.silent_beyond_limits and self.closure.bounds:
             self._close = _silent_beyond(self._close, self.closure)
-        self._faults = injection.build('mechanism', context) if injection is not None else []
-        self._stages = [
-            effect.stage(given[effect.name], context)
-            for effect in effects
-            if effect.stage is not None
-        ]
-        self._read_off = named & computed
-        # Sensors.
-        sensors: dict[str, Any] = {
-            effect.name: effect.sensor(given[effect.name], context)
-            for effect in effects
-            if effect.sensor is not None
-        }
+        self._faults = injection.build('mechanism', self.context) if injection is not None else []
+        self._stages = [*wanted.build('stage', self.context).values()]
+
+    def _build_sensors(
+        self, wanted: WantedEffects, injection: Injection | None, *, wrapped: bool
+    ) -> None:
+        """Build what makes the published reading of the ideal one."""
+        sensors = wanted.build('sensor', self.context)
         if {'encoder', 'rate_limit'} <= set(sensors):
             sensors['rate_limit'].read_by(sensors['encoder'])
-        broken = injection.build('sensor', member.joints) if injection is not None else []
+        joints = self.member.joints
+        broken = injection.build('sensor', joints) if injection is not None else []
         angles = Continuous(self.closure.turning, beginnings(self.closure))
         behind = [*sensors.values(), *broken]
-        running = [angles] if behind or not scene.wrapped else []
-        if behind and 'velocity' in computed - named:
+        self._running = angles if behind or not wrapped else None
+        self._read_off = wanted.named
+        if behind and 'velocity' in self.stages and 'velocity' not in wanted.named:
             # Only used between readings; not published.
             self._read_off |= {'velocity'}
             behind.append(_without_rates)
-        if scene.wrapped:
+        if wrapped:
             behind.append(all_wrapped(self.closure.turning))
+        running = [] if self._running is None else [self._running]
         self._sensors = [SensorStage.of(sensor) for sensor in (*running, *behind)]
-        # Messages.
+        self._read_behind = partial(self._read, first=len(running)) if behind else None
+
+    def _build_outputs(self, wanted: WantedEffects) -> None:
+        """Build the messages beside the joint states: of the effects, and of the drive."""
+        member = self.member
+        writers = wanted.build('writer', self.context, wanted.named)
         self.extras = [
             _output(
                 effect.name,
                 effect.topic,
                 effect.message,
-                effect.writer(given[effect.name], context),
+                writers[effect.name],
                 member.name,
                 of_reading=effect.of_reading,
             )
-            for effect in effects
-            if effect.writer is not None and effect.name in named
+            for effect in wanted.effects
+            if effect.name in writers
         ]
         """The topics beside the joint states."""
-        if (of_drive := getattr(drive_module, 'writer', None)) is not None:
-            written = of_drive(drive_parameters, context, self.drive)
+        drive, parameters = member.drive
+        module = import_module(DRIVES[drive])
+        if (of_drive := getattr(module, 'writer', None)) is not None:
+            written = of_drive(parameters, self.context, self.drive)
             if written is not None:
-                topic, message = drive_module.EXTRA_TOPIC, drive_module.EXTRA_MESSAGE
+                topic, message = module.EXTRA_TOPIC, module.EXTRA_MESSAGE
                 self.extras.append(
                     _output(drive, topic, message, written, member.name, of_reading=True)
                 )
 
-        self._read_behind = partial(self._read, first=len(running)) if behind else None
-        self._straight: Straight | None = None
-        moved = {effect.name for effect in effects if effect.stage is not None}
-        numbers_only = not self._faults and not self._timed
+    def _compile_tick(self, wanted: WantedEffects) -> Straight | None:
+        """Generate the tick up to the reading; None where a part of it has no generated form."""
+        moved = {effect.name for effect in wanted.effects if effect.stage is not None}
+        if not self.closure.by_steps or self._faults or self._timed:
+            return None
+        if not moved <= {*_KINEMATIC, *FORCE_EFFECTS}:
+            return None
         if self.wrenches and not moved.isdisjoint(FORCE_EFFECTS):
-            numbers_only = False  # A compiled tick computes from the crank alone.
-        if self.closure.by_steps and moved <= {*_KINEMATIC, *FORCE_EFFECTS} and numbers_only:
-            wanted = None
-            if 'acceleration' in moved:
-                of = [given[name] for name in self.stages if name in moved]
-                of += [self._read_off, context.loads, context.friction]
-                wanted = _Wanted(of, self._ideal)
-            compiled = self.closure.compiled(len(moved.intersection(_KINEMATIC)), wanted)
-            # Where the forces have no solution, a compiled path has fewer values.
-            if len({tuple(map(len, path.outputs)) for path in compiled.paths}) == 1:
-                running_on = angles if running else None
-                self._straight = straight(self.drive, self._drive_stages, compiled, running_on)
+            return None  # A compiled tick computes from the crank alone.
+        outputs = None
+        if 'acceleration' in moved:
+            of = [wanted.parameters[name] for name in self.stages if name in moved]
+            of += [self._read_off, self.context.loads, self.context.friction]
+            outputs = _Wanted(of, self._ideal)
+        compiled = self.closure.compiled(len(moved.intersection(_KINEMATIC)), outputs)
+        # Where the forces have no solution, a compiled path has fewer values.
+        if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
+            return None
+        return straight(self.drive, self._drive_stages, compiled, self._running)
 
     @property
     def whole(self) -> Straight | None:
@@ -456,16 +454,6 @@ class LinkagePipeline:
         return rejection
 
 
-def _between_readings(member: SceneLinkage, named: set[str], moves_by_rates: bool) -> set[str]:
-    """Return 'jitter' and 'delay' where this scene lets them work without the crank's rates."""
-    mixing = {'jitter', 'delay'} & named
-    if moves_by_rates and 'delay' in mixing:
-        delay = module_of('delay')
-        parameters = member.effects.get('delay') or delay.PARAMETERS()
-        return set() if delay.interpolates(parameters, named) else {'delay'}
-    return set() if moves_by_rates else mixing
-
-
 def _output(
     name: str, topic: str, message: str, writer: Any, member: str, *, of_reading: bool
 ) -> AuxiliaryOutput:
@@ -490,63 +478,17 @@ def _silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable
     return within
 
 
-def _refuse_not_imported(member: SceneLinkage) -> None:
-    if member.not_imported:
-        from linkage_ros.effects.user_effects import (
-            found_in,  # local import: only where a scene has one
-        )
-
-        name = member.not_imported[0]
-        raise DefinitionError(
-            f'effects.{name}',
-            f'names a module, and what a bag names is not imported unasked; the name leads to '
-            f'{found_in(name)} here',
-            '--trust-effects imports it',
-        )
-
-
-def _refuse_idle(member: SceneLinkage, forced: bool) -> None:
-    """Refuse an effect that has nothing to act on."""
-    # With several linkages, one without forces may share an effect that another one needs.
-    section = member.content
-    for given, key in (
-        (member.loads and 'loads' in section, 'loads'),
-        ('friction' in member.effects and 'effects' in section, 'effects.friction'),
-    ):
-        if given and not forced:
-            raise DefinitionError(
-                key,
-                'acts on nothing here: no effect and no drive asks for forces',
-                f'leave it out, drive by torque, or name one of {listed(FORCE_EFFECTS)}',
-            )
-
-
-def _refuse_solver(member: SceneLinkage, forced: bool) -> None:
-    """Refuse a solver without dyad poses where the forces start from these."""
-    if forced and member.solver is not None and member.solver[0] != 'closed_form':
-        raise DefinitionError(
-            'solver',
-            f'{member.solver[0]} finds no forces, and an effect or the drive asks for them',
-            f'write closed_form, or leave {listed(FORCE_EFFECTS)} and torque out',
-        )
-
-
-def _closure(
-    member: SceneLinkage,
-    effects: Sequence[Effect],
-    given: Mapping[str, Any],
-    seed: str,
-    forced: bool,
-) -> Closure:
+def _closure(member: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
+    """Return the closure of a linkage as its effects alter it, by the solver that it names."""
     linkage = member.linkage
-    for effect in effects:
+    for effect in wanted.effects:
         if effect.alter is not None:
             random = Context.generator(seed, effect.name)
-            linkage = effect.alter(given[effect.name], linkage, random)
+            linkage = effect.alter(wanted.parameters[effect.name], linkage, random)
     if member.accuracy is not None:
         from linkage_ros.solvers import choose  # local import: only where an accuracy is asked for
 
-        if forced:
+        if wanted.computes_forces:
             return choose.only_closed_form(linkage, 'forces start from it')
         return choose.choose(linkage, member.accuracy)
     if member.solver is not None:
