@@ -23,7 +23,7 @@ import re
 import sys
 from typing import NamedTuple
 
-from linkage_ros.cli.scene import REGISTRIES, table_of
+from linkage_ros.cli.scene import parameters_of, REGISTRIES, table_of
 from linkage_ros.dynamics.loads import AppliedLoads
 from linkage_ros.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
 from linkage_ros.errors import FileError
@@ -164,11 +164,11 @@ def order() -> str:
 
 def place(kind: str, name: str) -> str:
     """Return the summary of a drive, an effect or a fault, and its place in the order."""
-    module = import_module(REGISTRIES[kind][name])
+    owner = parameters_of(kind, name)
+    module = import_module(owner.__module__ if kind == 'fault' else REGISTRIES[kind][name])
     lines = [f'*{_summary(kind, name)}*', '']
-    owners = module, module.PARAMETERS
     works_on = next(
-        (text for key, text in _WORKS_ON.items() if any(hasattr(owner, key) for owner in owners)),
+        (text for key, text in _WORKS_ON.items() if hasattr(module, key) or hasattr(owner, key)),
         '',
     )
     if kind == 'drive':
@@ -200,7 +200,7 @@ def _neighbours(name: str) -> str:
 
 
 def _summary(kind: str, name: str) -> str:
-    return summary(import_module(REGISTRIES[kind][name]).PARAMETERS)
+    return summary(parameters_of(kind, name))
 
 
 def _listed(names: tuple[str, ...]) -> str:

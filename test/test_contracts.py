@@ -32,7 +32,7 @@ from linkage_ros.effects.rate_limit import JointRateLimit, RateLimitParameters
 from linkage_ros.effects.stage import EFFECTS, NEEDS
 from linkage_ros.effects.tolerance import ToleranceParameters
 from linkage_ros.errors import FileError
-from linkage_ros.faults.fault import FAULTS
+from linkage_ros.faults import FAULTS
 from linkage_ros.files.parameters import declared
 import pytest
 
@@ -364,11 +364,19 @@ def test_an_effect_without_rows_needs_no_key(effect):
     assert effect in scene.members[0].effects
 
 
-@pytest.mark.parametrize('names', [EFFECTS, DRIVES, FAULTS], ids=['effects', 'drives', 'faults'])
+@pytest.mark.parametrize('names', [EFFECTS, DRIVES], ids=['effects', 'drives'])
 def test_each_has_its_module_and_its_parameters(names):
     for name, module in names.items():
         assert module.rpartition('.')[2] == name
         assert declared(import_module(module).PARAMETERS) is not None
+
+
+def test_each_fault_has_its_type_and_one_place():
+    places = {'clock', 'message', 'mechanism', 'sensor'}
+    for name, kind in FAULTS.items():
+        assert kind.__name__.lower() == name.replace('_', '')
+        assert declared(kind) is not None
+        assert len(places.intersection(vars(kind))) == 1
 
 
 @pytest.mark.parametrize('effect', ['velocity', 'acceleration'])

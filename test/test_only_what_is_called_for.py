@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.faults.fault import FAULTS
+from linkage_ros.faults import FAULTS
 from linkage_ros.solvers.registry import SOLVERS
 import pytest
 
@@ -158,12 +158,13 @@ class Look:
 # The closed form is in every scene; it is named in the registry itself.
 OTHER_SOLVERS = {name: module for name, module in SOLVERS.items() if name != 'closed_form'}
 COMMON = {'files', 'kinematics', 'messages'}
-OPTIONAL = {'drawing', 'dynamics', 'faults', 'robot_models', 'solvers', 'synthesis'}
+FAULTS_MODULE = 'linkage_ros.faults'
+OPTIONAL = {'drawing', 'dynamics', 'robot_models', 'solvers', 'synthesis'}
 """Packages of which nothing is in a tick, unless the scene asks for it."""
 
 
 def of_registry(names, modules):
-    """Return which effects, drives, faults or solvers have their module among some."""
+    """Return which effects, drives or solvers have their module among some."""
     return {name for name, module in names.items() if module in modules}
 
 
@@ -187,7 +188,8 @@ def test_everything_has_its_scene():
 
 def test_an_empty_scene_has_nothing(bare):
     for found in (bare.modules, bare.passed):
-        assert not of_registry(EFFECTS | FAULTS | OTHER_SOLVERS, found)
+        assert not of_registry(EFFECTS | OTHER_SOLVERS, found)
+        assert FAULTS_MODULE not in found
         assert of_registry(DRIVES, found) == {'constant_rate'}
     assert not packages(bare.passed) & OPTIONAL
     assert not bare.stages
@@ -209,7 +211,8 @@ def test_a_scene_with_one_effect_has_no_other(tmp_path, bare, effect):
     assert look.topics == list(expected.topics)
     assert packages(look.modules - bare.modules) == {'effects', *expected.packages}
     assert packages(look.passed) & OPTIONAL <= set(expected.packages)
-    assert of_registry(DRIVES | FAULTS, look.modules) == {'constant_rate'}
+    assert of_registry(DRIVES, look.modules) == {'constant_rate'}
+    assert FAULTS_MODULE not in look.modules
     assert ('numpy' in look.modules) == expected.numpy
 
 
@@ -255,11 +258,10 @@ def test_wrenches_are_made_where_they_are_asked_for_alone(tmp_path):
 
 
 @pytest.mark.parametrize('fault', FAULT_SCENES)
-def test_a_scene_with_one_fault_has_no_other(tmp_path, fault):
+def test_a_scene_with_one_fault_imports_the_faults(tmp_path, fault):
     drive = 'drive: {topic: {}}\n' if fault == 'not_a_number' else BARE
     look = Look(tmp_path, f'{drive}faults: {{mine: {{{FAULT_SCENES[fault]}}}}}')
-    assert of_registry(FAULTS, look.modules) == {fault}
-    assert of_registry(FAULTS, look.passed) <= {fault}
+    assert FAULTS_MODULE in look.modules
 
 
 def test_a_robot_model_is_made_where_it_is_asked_for_alone(tmp_path):

@@ -24,19 +24,22 @@ from pathlib import Path
 import subprocess
 import sys
 from threading import Event
+from typing import TYPE_CHECKING
 
 from linkage_ros.cli.gallery import first_sentence
 from linkage_ros.cli.plot import draw
 from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import did_you_mean, LinkageError, listed
-from linkage_ros.faults.fault import Fault
 from linkage_ros.node.real_time import stay_on_this_machine
 from linkage_ros.processes import private_domain
 from linkage_ros.resources import scene_names, shipped
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heeded
+
+if TYPE_CHECKING:
+    from linkage_ros.faults import Fault
 
 _BESIDE = {
     'topic': ('linkage_ros.node.crank_source',),

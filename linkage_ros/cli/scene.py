@@ -32,7 +32,7 @@ from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.dispatch import bringing, module_of
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, listed
-from linkage_ros.faults.fault import FAULTS
+from linkage_ros.faults import FAULTS
 from linkage_ros.files.parameters import declared, default_of, is_required, parameter_rows, summary
 from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import read_yaml
@@ -257,7 +257,7 @@ def _some(names: list[str]) -> str:
 
 # Drives, effects, faults and solvers as tables: parameters, units, defaults and bounds.
 
-REGISTRIES: Mapping[str, Mapping[str, str]] = {
+REGISTRIES: Mapping[str, Mapping[str, Any]] = {
     'drive': DRIVES,
     'effect': EFFECTS,
     'fault': FAULTS,
@@ -268,10 +268,17 @@ REGISTRIES: Mapping[str, Mapping[str, str]] = {
 _HEADS = ('parameter', 'unit', 'default', 'values', 'meaning')
 
 
+def parameters_of(what: str, name: str) -> Any:
+    """Return the parameter type of a drive, effect, fault or solver."""
+    if what == 'fault':
+        return FAULTS[name]
+    module = module_of(name) if what == 'effect' else import_module(REGISTRIES[what][name])
+    return module.PARAMETERS
+
+
 def table_of(what: str, name: str) -> Table:
     """Return the table of a drive, effect, fault or solver; ``what`` is a key of `REGISTRIES`."""
-    module = module_of(name) if what == 'effect' else import_module(REGISTRIES[what][name])
-    parameters = module.PARAMETERS
+    parameters = parameters_of(what, name)
     title = f'{what} {name}: {summary(parameters)}'
     rows = list(parameter_rows(parameters))
     return Table(title, _HEADS, rows) if rows else Table(title, ('',), [('no parameters',)])

@@ -37,7 +37,7 @@ from linkage_ros.pipeline.tick_loop import Counts, TickLoop, WrenchCounts
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 if TYPE_CHECKING:
-    from linkage_ros.faults.injection import Injection
+    from linkage_ros.faults import Injection
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,

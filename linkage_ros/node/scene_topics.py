@@ -37,7 +37,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
 
 if TYPE_CHECKING:
-    from linkage_ros.faults.injection import Change
+    from linkage_ros.faults import Change
 
 SCENE_TOPIC = '~/scene'
 

@@ -53,7 +53,7 @@ from linkage_ros.solvers.registry import SOLVERS
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.wrenches import HeldWrench
-    from linkage_ros.faults.injection import Injection
+    from linkage_ros.faults import Injection
     from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
     from linkage_ros.pipeline.wrench_topics import WrenchTopic
     from linkage_ros.solvers.solver import Choice
@@ -529,7 +529,7 @@ class Pipeline:
         if not isinstance(scene, Scene):
             raise TypeError(f'scene: {quoted(scene)} is not a Scene; load_scene() reads files')
         if injection is None and scene.faults:
-            from linkage_ros.faults.injection import Injection
+            from linkage_ros.faults import Injection
 
             injection = Injection(scene.faults)
         self.injection = injection

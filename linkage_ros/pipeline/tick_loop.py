@@ -32,7 +32,7 @@ from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline, Tick
 
 if TYPE_CHECKING:
-    from linkage_ros.faults.injection import Change, Injection
+    from linkage_ros.faults import Change, Injection
 
 
 _STEPS = 5

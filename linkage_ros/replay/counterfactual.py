@@ -49,7 +49,7 @@ from linkage_ros.replay.replay import change_text, read_change
 from linkage_ros.scene.scene import Scene, SceneLinkage
 
 if TYPE_CHECKING:
-    from linkage_ros.faults.injection import Injection
+    from linkage_ros.faults import Injection
 
 
 _TOPICS = {'topic': '/crank_states', 'torque': '/crank_commands'}
@@ -136,7 +136,7 @@ class Counterfactual:
     def _inject(self) -> Injection | None:
         if not self._scene.faults:
             return None
-        from linkage_ros.faults.injection import (
+        from linkage_ros.faults import (
             Injection,  # local import: only where a scene has faults
         )
 

@@ -44,7 +44,7 @@ from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from linkage_ros.faults.injection import Change, Injection
+    from linkage_ros.faults import Change, Injection
 
 
 _LONGEST_ANNOUNCED = 16 * 2**20

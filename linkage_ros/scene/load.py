@@ -17,7 +17,7 @@ from os import PathLike
 from os.path import isfile
 from pathlib import Path
 from re import fullmatch
-from typing import Any, Literal
+from typing import Any, Literal, TYPE_CHECKING
 from zlib import crc32
 
 from linkage_ros.drives.drive import DRIVES
@@ -25,7 +25,6 @@ from linkage_ros.dynamics.loads import AppliedLoads, GREATEST_LOAD, Loads, Sprin
 from linkage_ros.effects.dispatch import in_order, module_of
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed, quoted
-from linkage_ros.faults.fault import Fault, FAULTS
 from linkage_ros.files.linkage_file import looks_like_linkage, read_closure
 from linkage_ros.files.parameters import declared, is_required, Parts, read_parameters
 from linkage_ros.files.section import Section
@@ -45,6 +44,9 @@ from linkage_ros.scene.scene import (
     StorageParameters,
 )
 from linkage_ros.solvers.registry import SOLVERS
+
+if TYPE_CHECKING:
+    from linkage_ros.faults import Fault
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 """Names of a scene's files in a bag; further linkage files are numbered."""
@@ -574,25 +576,27 @@ def _read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str,
 
 def kinds_of_fault(name: str, kinds: Sequence[str]) -> tuple[str, str]:
     """Return reason and remedy for a fault that names no kind, or several."""
+    from linkage_ros.faults import FAULTS  # local import: only where a scene has faults
+
     if kinds:
         return f'names {len(kinds)} kinds of fault', f'leave all but one of {listed(kinds)} out'
     kind = name if name in FAULTS else 'freeze'
-    needed = declared(import_module(FAULTS[kind]).PARAMETERS)
+    needed = declared(FAULTS[kind])
     parameters = ', '.join(f'{entry.name}: …' for entry, _ in needed if is_required(entry))
     shape = f'{name}: {{{kind}: {{{parameters}}}, at: [1], seconds: 2}}'
     return 'names no kind of fault', f'write {shape}; kinds: {listed(FAULTS)}'
 
 
 def _fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
+    from linkage_ros.faults import Fault, FAULTS  # local import: as above
+
     kinds = [key for key in content if key in FAULTS]
     for key in () if kinds else content:
         if remedy := did_you_mean(key, FAULTS, ''):
             raise content.error(key, 'unknown key', remedy)
     if len(kinds) != 1:
         raise content.error('', *kinds_of_fault(name, kinds))
-    parameters: Any = read_parameters(
-        content.section(kinds[0]), import_module(FAULTS[kinds[0]]).PARAMETERS, parts
-    )
+    parameters: Any = read_parameters(content.section(kinds[0]), FAULTS[kinds[0]], parts)
     at = content.numbers('at', most=1e9) if 'at' in content else []
     if any(time < 0.0 for time in at):
         raise content.error('at', f'{at} begins before the first tick', 'write seconds from it on')

@@ -12,15 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from linkage_ros.bag.storage import COMPRESSIONS, Storage
 from linkage_ros.dynamics.loads import Loads
-from linkage_ros.faults.fault import Fault
 from linkage_ros.files.parameters import choice, number, Parts, whole
 from linkage_ros.files.section import Section
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Linkage, SlideJoint
+
+if TYPE_CHECKING:
+    from linkage_ros.faults import Fault
 
 SPLITS = {'split_bytes': 1_000_000, 'split_seconds': 1.0}
 """

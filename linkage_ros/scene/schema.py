@@ -25,7 +25,7 @@ from typing import Any
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.dynamics.loads import AppliedLoads, GREATEST_LOAD, STIFFEST
 from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.faults.fault import FAULTS
+from linkage_ros.faults import FAULTS
 from linkage_ros.files.linkage_file import FARTHEST, HEAVIEST, STRONGEST
 from linkage_ros.files.parameters import (
     CHARACTER,
@@ -106,7 +106,7 @@ def _point(description: str, unit: str, most: float) -> Schema:
 
 
 def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
-    """Return the parameter types of all drives, effects or faults in a registry."""
+    """Return the parameter types of all drives, effects or solvers in a registry."""
     return {name: import_module(module).PARAMETERS for name, module in registry.items()}
 
 
@@ -303,7 +303,7 @@ def _spring() -> Schema:
 
 
 def _fault() -> Schema:
-    kinds = {name: parameters_schema(of) for name, of in parameter_types(FAULTS).items()}
+    kinds = {name: parameters_schema(of) for name, of in FAULTS.items()}
     return {
         **mapping(
             'A fault of one kind, injected by service, or at the times that are said.',

@@ -39,7 +39,7 @@ from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import heeded
 
 if TYPE_CHECKING:
-    from linkage_ros.faults.injection import Change
+    from linkage_ros.faults import Change
 
 BEGIN = 1_000_000_000
 """Time of the first tick, in [ns]: a stamp of 0 means none in ROS."""

@@ -17,7 +17,7 @@ import sys
 
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.faults.fault import FAULTS
+from linkage_ros.faults import FAULTS
 from linkage_ros.files.linkage_file import load
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
@@ -79,7 +79,7 @@ EFFECTS_SPEC.loader.exec_module(make_effects)
 PAGE = make_effects.text_of_pages()
 SECTIONS = make_effects.sections(PAGE)
 BY_NAME = {section.name: section for section in SECTIONS}
-MODULES = {**DRIVES, **EFFECTS, **FAULTS}
+NAMES = (*DRIVES, *EFFECTS, *FAULTS)
 DRAWN = [section for section in SECTIONS if section.scene]
 PARTS_OF_TORQUE = ('Motor', 'Play')
 
@@ -96,20 +96,20 @@ def squeezed(text):
 
 def equations(name):
     """Return the equations of a module: the indented lines of its docstring."""
-    lines = inspect.getdoc(import_module(MODULES[name])).splitlines()
+    lines = inspect.getdoc(import_module(EFFECTS[name])).splitlines()
     return [squeezed(line) for line in lines if line.startswith('    ') and '=' in line]
 
 
 def test_everything_has_its_section_in_physical_order():
-    names = [section.name for section in SECTIONS if section.name in MODULES]
-    assert names == [*DRIVES, *EFFECTS, *FAULTS]
+    names = [section.name for section in SECTIONS if section.name in NAMES]
+    assert names == [*NAMES]
 
 
 def test_what_is_made_of_the_code_is_as_the_code_is_now():
     assert make_effects.filled(PAGE) == PAGE, 'make effects makes it anew'
 
 
-@pytest.mark.parametrize('name', MODULES)
+@pytest.mark.parametrize('name', NAMES)
 def test_a_section_says_what_a_reader_wants_to_know(name):
     text = BY_NAME[name].text
     assert '**Not modelled.**' in text

@@ -10,9 +10,7 @@
 
 from math import isnan
 
-from linkage_ros.faults.fault import Fault
-from linkage_ros.faults.freeze import FreezeParameters
-from linkage_ros.faults.injection import Change, Injection
+from linkage_ros.faults import Change, Fault, Freeze, Injection
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -156,7 +154,7 @@ def test_windows_that_touch_are_two():
     ],
 )
 def test_of_windows_that_overlap_the_later_end_holds(at, seconds, on, times):
-    injection = Injection({'hang': Fault('freeze', FreezeParameters(), tuple(at), seconds)})
+    injection = Injection({'hang': Fault('freeze', Freeze(), tuple(at), seconds)})
     seen = []
     for ms in range(15):
         injection.advance(BEGIN + ms * MS)

@@ -31,7 +31,7 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.faults.fault import FAULTS
+from linkage_ros.faults import FAULTS
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.replay.replay import recorded_scene, replay
 from linkage_ros.scene.load import load_scene

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import FileError
-from linkage_ros.faults.fault import FAULTS
+from linkage_ros.faults import FAULTS
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.parameters import (
     Choice,
@@ -118,8 +118,8 @@ def test_all_that_scenes_can_name_is_in_the_schema():
     assert list(own['effects']['properties']) == list(EFFECTS)
     fault = schema['properties']['faults']['additionalProperties']['properties']
     assert list(fault) == [*FAULTS, 'at', 'seconds']
-    for registry in (DRIVES, EFFECTS, FAULTS):
-        for of in parameter_types(registry).values():
+    for types in (parameter_types(DRIVES), parameter_types(EFFECTS), FAULTS):
+        for of in types.values():
             assert list(parameters_schema(of)['properties']) == [f.name for f, _ in declared(of)]
 
 
@@ -441,8 +441,12 @@ TYPES = {
     'all kinds': AllKinds,
     **{
         f'{what} {name_}': of
-        for what, registry in (('drive', DRIVES), ('effect', EFFECTS), ('fault', FAULTS))
-        for name_, of in parameter_types(registry).items()
+        for what, types in (
+            ('drive', parameter_types(DRIVES)),
+            ('effect', parameter_types(EFFECTS)),
+            ('fault', FAULTS),
+        )
+        for name_, of in types.items()
     },
 }
 
