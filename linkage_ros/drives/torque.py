@@ -37,6 +37,7 @@ from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.layout import NANOSECONDS
 
 if TYPE_CHECKING:
+    from linkage_ros.dynamics.mechanics import Mechanics
     from linkage_ros.dynamics.motor import Motor
     from linkage_ros.dynamics.winding import Winding
     from linkage_ros.dynamics.wrenches import HeldWrench
@@ -207,8 +208,38 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         the brake is not specified.
 
     """
-    closure = context.closure
-    n_inputs = len(closure.linkage.inputs)
+    _refuse_useless(parameters, context)
+    motion = _build_motion(parameters, context)
+    given = context.closure.linkage.inputs[0]
+    most = given.limits.effort
+    motor = None
+    if parameters.motor is not None:
+        motor = _motor(parameters.motor, most)
+        motion = motor.mounted(motion)
+        if parameters.motor.command != 'effort':
+            most = LARGEST
+    start = motion.at(parameters.start, parameters.rate)
+    if start is None:
+        raise DefinitionError(
+            'drive.torque.start',
+            f'at {parameters.start:g} {given.unit} nothing can be moved: a toggle, or no inertia',
+            'start elsewhere',
+        )
+    mechanics = context.mechanics
+    low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
+    _check_step(parameters, mechanics, motor, (low, high))
+    period = round(NANOSECONDS / context.rate) if context.rate else 0
+    wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
+    # An effect of the user's may ask for it.
+    exerts = any(name == 'effort' or '.' in name for name in context.effects)
+    return TorqueDrive(
+        motion, start, parameters, period, min(most, LARGEST), motor, wrenches, exerts
+    )
+
+
+def _refuse_useless(parameters: TorqueParameters, context: Context) -> None:
+    """Refuse a linkage that the drive cannot move, and a brake that does nothing."""
+    n_inputs = len(context.closure.linkage.inputs)
     if n_inputs > 1:
         raise DefinitionError(
             'drive.torque',
@@ -226,8 +257,12 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         raise DefinitionError(
             'drive.torque.brake', 'the brake is never applied', 'add on_timeout: brake'
         )
+
+
+def _build_motion(parameters: TorqueParameters, context: Context) -> Any:
+    """Build the motion of the mechanism between its stops, and of a motor beyond a play."""
     mechanics = context.mechanics
-    motion: Any = OneFreedom(
+    motion = OneFreedom(
         mechanics.equation,
         METHODS[parameters.method].step,
         _stops(context.hard_limited, parameters.start, parameters.stop_margin),
@@ -235,27 +270,23 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         mechanics.laws,
         context.reactions.resisting if mechanics.friction.loaded else None,
     )
-    if parameters.play is not None:
-        from linkage_ros.dynamics.two_masses import TwoMasses  # local import: only with play
+    if parameters.play is None:
+        return motion
+    from linkage_ros.dynamics.two_masses import TwoMasses  # local import: only with play
 
-        play = parameters.play
-        motion = TwoMasses.of(motion, play.inertia, play.width, play.restitution)
-    most = closure.linkage.inputs[0].limits.effort
-    motor = None
-    if parameters.motor is not None:
-        motor = _motor(parameters.motor, most)
-        motion = motor.mounted(motion)
-        if parameters.motor.command != 'effort':
-            most = LARGEST
-    start = motion.at(parameters.start, parameters.rate)
-    if start is None:
-        raise DefinitionError(
-            'drive.torque.start',
-            f'at {parameters.start:g} {closure.linkage.inputs[0].unit} nothing can be moved: '
-            'a toggle, or no inertia',
-            'start elsewhere',
-        )
-    low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
+    play = parameters.play
+    return TwoMasses.of(motion, play.inertia, play.width, play.restitution)
+
+
+def _check_step(
+    parameters: TorqueParameters,
+    mechanics: Mechanics,
+    motor: Motor | Winding | None,
+    ends: tuple[float, float],
+) -> None:
+    """Refuse a step too long for the curves, the motor or the loads between two inputs."""
+    low, high = ends
+    moved = []
     if motor or mechanics.curved:
         places = (low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
         moved = [terms for terms in map(mechanics.equation, places) if terms]
@@ -269,17 +300,10 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     if mechanics.applied:
         mechanics.applied.check_step(
             lambda value: terms.inertia if (terms := mechanics.equation(value)) else 0.0,
-            (low, high),
+            ends,
             parameters.method,
             parameters.step,
         )
-    period = round(NANOSECONDS / context.rate) if context.rate else 0
-    wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
-    # An effect of the user's may ask for it.
-    exerts = any(name == 'effort' or '.' in name for name in context.effects)
-    return TorqueDrive(
-        motion, start, parameters, period, min(most, LARGEST), motor, wrenches, exerts
-    )
 
 
 def writer(parameters: TorqueParameters, context: Context, drive: TorqueDrive) -> Any:
