@@ -344,23 +344,37 @@ def _assembly(dyad: Dyad, side: str) -> str:
 def tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[Table]:
     """Yield the tables that describe a linkage."""
     yield Table(account['file'], ('', ''), list(_facts(account, angles)))
-    yield Table(
-        'Solved in this order',
-        ('>', 'group', 'links', 'how', 'assembly'),
-        [
-            (
-                str(number),
-                group['kind'],
-                ', '.join(group['links']),
-                group['method'],
-                group['assembly'],
-            )
-            for number, group in enumerate(account['groups'], 1)
-        ],
-    )
-    for group in account['other_assemblies']:
-        yield _assemblies_table(group)
-    bars = [
+    yield _order_table(account)
+    yield from map(_assemblies_table, account['other_assemblies'])
+    for table in (
+        _four_bars_table(account),
+        _transmission_table(account, angles),
+        _conditioning_table(account, angles),
+    ):
+        if table.rows:
+            yield table
+    if 'branches' in account:
+        yield _branches_table(account, angles)
+
+
+def _order_table(account: Mapping[str, Any]) -> Table:
+    heads = ('>', 'group', 'links', 'how', 'assembly')
+    rows = [
+        (
+            str(number),
+            group['kind'],
+            ', '.join(group['links']),
+            group['method'],
+            group['assembly'],
+        )
+        for number, group in enumerate(account['groups'], 1)
+    ]
+    return Table('Solved in this order', heads, rows)
+
+
+def _four_bars_table(account: Mapping[str, Any]) -> Table:
+    heads = ('>', 'links', 'lengths [m]', '>Grashof margin [m]', 'Barker', 'name')
+    rows = [
         (
             str(bar['group']),
             ', '.join(bar['links']),
@@ -371,13 +385,13 @@ def tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[Table]:
         )
         for bar in account['four_bars']
     ]
-    if bars:
-        yield Table(
-            'Four-bars: input, coupler, output and the frame that they are seen from',
-            ('>', 'links', 'lengths [m]', '>Grashof margin [m]', 'Barker', 'name'),
-            bars,
-        )
+    title = 'Four-bars: input, coupler, output and the frame that they are seen from'
+    return Table(title, heads, rows)
+
+
+def _transmission_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
     turning = account['inputs'][0]['unit'] == 'rad'
+    heads = ('>', 'links', '>least', 'at', '>greatest', 'at')
     rows = [
         (
             str(one['group']),
@@ -393,9 +407,12 @@ def tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[Table]:
         )
         for one in account['transmission_angles']
     ]
-    if rows:
-        heads = ['>', 'links', '>least', 'at', '>greatest', 'at']
-        yield Table('Transmission angles over the range, acute', heads, rows)
+    return Table('Transmission angles over the range, acute', heads, rows)
+
+
+def _conditioning_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
+    turning = account['inputs'][0]['unit'] == 'rad'
+    heads = ('>', 'links', '>least', 'at')
     rows = [
         (
             str(one['group']),
@@ -405,11 +422,7 @@ def tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[Table]:
         )
         for one in account['conditioning']
     ]
-    if rows:
-        heads = ['>', 'links', '>least', 'at']
-        yield Table('Conditioning over the range, of what is iterated', heads, rows)
-    if 'branches' in account:
-        yield _branches_table(account, angles)
+    return Table('Conditioning over the range, of what is iterated', heads, rows)
 
 
 def _branches_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
