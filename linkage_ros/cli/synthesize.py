@@ -169,6 +169,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_tasks(parser: argparse.ArgumentParser) -> None:
+    _add_pairs(parser)
+    _add_function(parser)
+    _add_curve(parser)
+    _add_dead_centres(parser)
+    _add_poses(parser)
+
+
+def _add_pairs(parser: argparse.ArgumentParser) -> None:
     pairs = parser.add_argument_group('pairs of crank and rocker angles')
     pairs.add_argument(
         '--pair',
@@ -184,6 +192,9 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
     pairs.add_argument(
         '--ground', type=float, default=1.0, metavar='M', help='length of the ground (default: 1)'
     )
+
+
+def _add_function(parser: argparse.ArgumentParser) -> None:
     function = parser.add_argument_group('a function')
     function.add_argument('--function', metavar='FORMULA', help='of x, such as "log10(x)"')
     function.add_argument('--range', nargs=2, type=float, metavar=('X0', 'X1'), help='of x')
@@ -205,6 +216,9 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
     function.add_argument(
         '--at', nargs='+', type=float, metavar='X', help='points of your own, instead'
     )
+
+
+def _add_curve(parser: argparse.ArgumentParser) -> None:
     path = parser.add_argument_group('a traced curve')
     path.add_argument(
         '--point', nargs=2, type=float, action='append', metavar=('X', 'Y'), help='in metres'
@@ -223,6 +237,9 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         metavar='CRANK',
         help="the crank's angle at each point",
     )
+
+
+def _add_dead_centres(parser: argparse.ArgumentParser) -> None:
     rocker = parser.add_argument_group('the dead centres of a crank-rocker')
     rocker.add_argument('--swing', type=float, metavar='ANGLE', help='of the rocker')
     rocker.add_argument(
@@ -231,6 +248,9 @@ def _add_tasks(parser: argparse.ArgumentParser) -> None:
         metavar='RATIO',
         help='longer stroke to shorter one, as 10/9 or 1.2',
     )
+
+
+def _add_poses(parser: argparse.ArgumentParser) -> None:
     motion = parser.add_argument_group('poses of the coupler')
     motion.add_argument(
         '--pose',
