@@ -103,6 +103,27 @@ def page(
 
 def _body(title: str, mode: str, can_save: bool) -> Iterator[str]:
     editing = mode == 'edit'
+    yield from _header(title, editing, can_save)
+    yield '<p id="lost" role="status" hidden>Not connected: <span id="lost-why"></span>. '
+    yield 'The linkage still moves; it is tried again.</p>'
+    yield '<p id="wrong" role="alert" hidden></p>'
+    yield '<noscript><p class="warnings">This page needs JavaScript.</p></noscript>'
+    yield '<main><section class="player" aria-label="The linkage">'
+    yield from _player()
+    if editing:
+        yield from _tool_choice()
+    yield '<dl class="readout" id="readout" aria-live="off"></dl>'
+    yield '<ul class="warnings" id="warnings" hidden></ul>'
+    yield '</section><section>'
+    yield from _plots()
+    yield '<div class="forms"><div><h2>Lengths [<span id="unit-of-length"></span>]</h2>'
+    yield '<table><tbody id="lengths"></tbody></table></div>'
+    yield '<div><h2>Assembly</h2><table><tbody id="choices"></tbody></table></div>'
+    yield '<div><h2>Traced points</h2><div id="traced"></div></div></div>'
+    yield '</section></main>'
+
+
+def _header(title: str, editing: bool, can_save: bool) -> Iterator[str]:
     yield '<header class="bar">'
     yield f'<h1 id="title">{escape(title)}</h1>'
     if editing:
@@ -118,11 +139,10 @@ def _body(title: str, mode: str, can_save: bool) -> Iterator[str]:
             yield f'<option value="{kind}">{what}</option>'
         yield '</select>'
     yield '</header>'
-    yield '<p id="lost" role="status" hidden>Not connected: <span id="lost-why"></span>. '
-    yield 'The linkage still moves; it is tried again.</p>'
-    yield '<p id="wrong" role="alert" hidden></p>'
-    yield '<noscript><p class="warnings">This page needs JavaScript.</p></noscript>'
-    yield '<main><section class="player" aria-label="The linkage">'
+
+
+def _player() -> Iterator[str]:
+    """Yield the drawing and its controls."""
     yield '<figure><canvas id="drawing" tabindex="0" role="application" aria-label="The linkage; '
     yield 'n and p choose a pin, the arrows move it, or turn the crank"></canvas></figure>'
     yield '<p id="status" role="status"></p>'
@@ -137,20 +157,24 @@ def _body(title: str, mode: str, can_save: bool) -> Iterator[str]:
         on = '' if what == 'centres' else ' checked'
         yield f'<label><input type="checkbox" id="{what}"{on}> {checked}</label>'
     yield '</div><div id="inputs"></div>'
-    if editing:
-        yield '<div class="controls"><fieldset><legend hidden>tool</legend>'
-        for tool, what in _TOOLS.items():
-            on = ' checked' if tool == 'shape' else ''
-            yield f'<label><input type="radio" name="tool" class="edit" value="{tool}"{on}> '
-            yield f'{what}</label>'
-        yield '</fieldset><label>snap to <select id="snap" class="edit">'
-        yield '<option value="0">nothing</option>'
-        for step in ('0.001', '0.005', '0.01', '0.1', '1', '5', '10'):
-            yield f'<option>{step}</option>'
-        yield '</select></label></div>'
-    yield '<dl class="readout" id="readout" aria-live="off"></dl>'
-    yield '<ul class="warnings" id="warnings" hidden></ul>'
-    yield '</section><section>'
+
+
+def _tool_choice() -> Iterator[str]:
+    """Yield the choice of what the hand does on the drawing."""
+    yield '<div class="controls"><fieldset><legend hidden>tool</legend>'
+    for tool, what in _TOOLS.items():
+        on = ' checked' if tool == 'shape' else ''
+        yield f'<label><input type="radio" name="tool" class="edit" value="{tool}"{on}> '
+        yield f'{what}</label>'
+    yield '</fieldset><label>snap to <select id="snap" class="edit">'
+    yield '<option value="0">nothing</option>'
+    for step in ('0.001', '0.005', '0.01', '0.1', '1', '5', '10'):
+        yield f'<option>{step}</option>'
+    yield '</select></label></div>'
+
+
+def _plots() -> Iterator[str]:
+    """Yield the figures of the curves over the input."""
     yield '<div id="plots">'
     for key, what in _CURVES.items():
         yield f'<figure data-key="{key}"><figcaption>{what}</figcaption><div class="plot"></div>'
@@ -165,8 +189,3 @@ def _body(title: str, mode: str, can_save: bool) -> Iterator[str]:
             yield '<div><canvas id="band" role="img" aria-label="transmission angle over the '
             yield 'input"></canvas></div></figure>'
     yield '</div>'
-    yield '<div class="forms"><div><h2>Lengths [<span id="unit-of-length"></span>]</h2>'
-    yield '<table><tbody id="lengths"></tbody></table></div>'
-    yield '<div><h2>Assembly</h2><table><tbody id="choices"></tbody></table></div>'
-    yield '<div><h2>Traced points</h2><div id="traced"></div></div></div>'
-    yield '</section></main>'
