@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import MISSING, replace
+from dataclasses import dataclass, MISSING, replace
 from importlib import import_module
 from os import PathLike
 from os.path import isfile
@@ -69,6 +69,18 @@ Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
 
 
+@dataclass(frozen=True)
+class _SceneSource:
+    """Where a scene comes from."""
+
+    name: str
+    folder: str
+    open_linkage: Open
+    seed: int | None = None  # Seed if the scene names none; None to derive it from the name
+    trust_effects: bool = True  # Whether user-defined effects are imported
+    closed: Closure | None = None  # Closure of its only linkage, if there is one already
+
+
 def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene:
     """
     Read a scene and the linkages that it names; for a linkage file, a default scene.
@@ -110,7 +122,7 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
             )
         return read_yaml(linkage)
 
-    return _scene(name, content, open_linkage, data, folder, settings=settings)
+    return _scene(content, data, _SceneSource(name, folder, open_linkage), settings)
 
 
 def kind_of(content: Section) -> Literal['scene', 'linkage']:
@@ -161,7 +173,7 @@ def _stand_in(
     scene = parse_yaml(text, f'{content.file}, as a scene')
     # A drive moves one input, which is then published; several inputs come from a topic.
     closed = closure if len(closure.linkage.inputs) == 1 and not settings else None
-    return _scene(name, scene, open_linkage, text, folder, closed=closed, settings=settings)
+    return _scene(scene, text, _SceneSource(name, folder, open_linkage, closed=closed), settings)
 
 
 def parse_scene(
@@ -213,16 +225,8 @@ def parse_scene(
             raise within.error('linkage', 'is not among the files', 'name another bag')
         return parse_yaml(files[part], f'{where}: {part}'), files[part]
 
-    scene = _scene(
-        name,
-        content,
-        open_linkage,
-        files[SCENE_FILE],
-        folder,
-        seed,
-        trust_effects=trust_effects,
-        settings=settings,
-    )
+    source = _SceneSource(name, folder, open_linkage, seed, trust_effects=trust_effects)
+    scene = _scene(content, files[SCENE_FILE], source, settings)
     if not solvers or any(setting.startswith('accuracy=') for setting in settings):
         return scene
     return replace(scene, members=tuple(_as_chosen(one, solvers) for one in scene.members))
@@ -242,70 +246,34 @@ def seed_of(name: str) -> int:
 
 
 def _scene(
-    name: str,
-    content: Section,
-    open_linkage: Open,
-    scene_bytes: bytes,
-    folder: str,
-    seed: int | None = None,
-    *,
-    trust_effects: bool = True,
-    closed: Closure | None = None,
-    settings: Sequence[str] = (),
+    content: Section, data: bytes, source: _SceneSource, settings: Sequence[str] = ()
 ) -> Scene:
-    if settings:
-        from linkage_ros.scene import settings as given  # local import: few scenes need it
+    """Read a scene with settings beside its file."""
+    if not settings:
+        return _read_scene(content, data, source)
+    from linkage_ros.scene import settings as given  # local import: few scenes need it
 
-        scene_bytes = given.apply_settings(content, settings)
-        try:
-            return _scene(
-                name, content, open_linkage, scene_bytes, folder, seed, trust_effects=trust_effects
-            )
-        except FileError as error:
-            raise given.blamed(error, content, settings) from None
+    data = given.apply_settings(content, settings)
+    try:
+        return _read_scene(content, data, source)
+    except FileError as error:
+        raise given.blamed(error, content, settings) from None
+
+
+def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
     wrapped = _read_units(content)
-    files = {SCENE_FILE: scene_bytes}
-    members: list[SceneLinkage] = []
-    if 'linkages' in content:
-        if 'linkage' in content:
-            raise content.error('linkage', 'stands beside linkages', 'write one of the two')
-        entries = content.sections('linkages')
-        if len(entries) > _MOST_LINKAGES:
-            raise content.error(
-                'linkages', f'there are {len(entries)}', f'write at most {_MOST_LINKAGES}'
-            )
-        for entry in entries:
-            linkage_content, data = open_linkage(entry)
-            files[f'linkage_{len(files)}.yaml'] = data
-            member_name = entry.ros_name(entry.text('name'))
-            if member_name in [member.name for member in members]:
-                raise entry.error('name', f'{quoted(member_name)} is taken', 'give each its own')
-            taken = {joint for member in members for joint in member.joints}
-            members.append(
-                _member(member_name, linkage_content, entry, content, folder, trust_effects)
-            )
-            if twice := taken.intersection(members[-1].joints):
-                raise entry.error(
-                    'prefix' if 'prefix' in entry else '',
-                    f'a second linkage publishes {listed(sorted(twice))}',
-                    'give each linkage its own prefix, or its joints names of their own',
-                )
-            entry.finish(_OF_A_MEMBER)
-    else:
-        linkage_content, files[LINKAGE_FILE] = open_linkage(content)
-        members.append(
-            _member('', linkage_content, content, content, folder, trust_effects, closed)
-        )
+    members, linkage_files = _read_linkages(content, source)
+    seed = seed_of(source.name) if source.seed is None else source.seed
     scene = Scene(
-        name=name,
+        name=source.name,
         members=tuple(members),
         rate=_rate(content),
         wrapped=wrapped,
-        seed=content.whole('seed', seed_of(name) if seed is None else seed, least=0, most=2**53),
+        seed=content.whole('seed', seed, least=0, most=2**53),
         faults=_read_faults(content, members),
         record=_record(content.section('record')) if 'record' in content else None,
-        files=files,
-        folder=folder,
+        files={SCENE_FILE: data, **linkage_files},
+        folder=source.folder,
         robot_description=content.flag('robot_description', False),
     )
     for key in _OF_A_MEMBER:
@@ -321,6 +289,40 @@ def _scene(
                 'name a rate',
             )
     return scene
+
+
+def _read_linkages(
+    content: Section, source: _SceneSource
+) -> tuple[list[SceneLinkage], dict[str, bytes]]:
+    """Return the linkages of a scene, and their files."""
+    if 'linkages' not in content:
+        linkage_content, data = source.open_linkage(content)
+        member = _member('', linkage_content, content, content, source, source.closed)
+        return [member], {LINKAGE_FILE: data}
+    if 'linkage' in content:
+        raise content.error('linkage', 'stands beside linkages', 'write one of the two')
+    entries = content.sections('linkages')
+    if len(entries) > _MOST_LINKAGES:
+        raise content.error(
+            'linkages', f'there are {len(entries)}', f'write at most {_MOST_LINKAGES}'
+        )
+    members: list[SceneLinkage] = []
+    files = {}
+    for index, entry in enumerate(entries, 1):
+        linkage_content, files[f'linkage_{index}.yaml'] = source.open_linkage(entry)
+        name = entry.ros_name(entry.text('name'))
+        if name in [member.name for member in members]:
+            raise entry.error('name', f'{quoted(name)} is taken', 'give each its own')
+        taken = {joint for member in members for joint in member.joints}
+        members.append(_member(name, linkage_content, entry, content, source))
+        if twice := taken.intersection(members[-1].joints):
+            raise entry.error(
+                'prefix' if 'prefix' in entry else '',
+                f'a second linkage publishes {listed(sorted(twice))}',
+                'give each linkage its own prefix, or its joints names of their own',
+            )
+        entry.finish(_OF_A_MEMBER)
+    return members, files
 
 
 _OF_A_MEMBER = (
@@ -344,61 +346,35 @@ def _member(
     linkage_content: Section,
     own: Section,
     scene: Section,
-    folder: str,
-    trust_effects: bool,
+    source: _SceneSource,
     closure: Closure | None = None,
 ) -> SceneLinkage:
     def where(key: str) -> Section:
         return own if key in own else scene
 
     drives = where('drive').section('drive', required=False)
-    named = list(drives) or ['topic']
-    if len(named) > 1:
-        raise drives.error(named[1], 'is a second drive', f'leave it, or {named[0]}, out')
-    drive = named[0]
-    if drive not in DRIVES:
-        drives.finish(tuple(DRIVES))
+    drive = _drive_name(drives)
     effects = where('effects').section('effects', required=False)
     loads = where('loads').section('loads') if 'loads' in where('loads') else None
-
-    published = where('publish_input').flag(
-        'publish_input', drive != 'topic' or 'effort' in effects
-    )
+    default = drive != 'topic' or 'effort' in effects
+    published = where('publish_input').flag('publish_input', default)
     if closure is None:
         closure = read_closure(linkage_content, publish_inputs=published)
     linkage = closure.linkage
-    if 'effort' in effects and not published:
-        raise effects.error(
-            'effort', 'is that of the input joint', 'set publish_input: true, or name pin_forces'
-        )
-    if drive == 'torque' and 'backlash' in effects:
-        raise effects.error(
-            'backlash',
-            'is a play without masses, and torque moves masses',
-            'write drive.torque.play: {width: …, inertia: …} instead',
-        )
+    _refuse_effects(effects, drive, published)
     parts = parts_of(linkage)
-    kinds = {bool(given.slider) for given in linkage.inputs}
-    slides = kinds.pop() if len(kinds) == 1 else None
-    for section in (drives, effects, *([] if loads is None else [loads]), own, scene):
-        section.units = replace(section.units, slides=slides)
-    not_imported = () if trust_effects else tuple(name for name in effects if '.' in name)
+    _set_slide_units((drives, effects, *([] if loads is None else [loads]), own, scene), linkage)
+    not_imported = () if source.trust_effects else tuple(name for name in effects if '.' in name)
     for effect in not_imported:
         effects.section(effect)
     types = _effects(effects, not_imported)
+    parameters = import_module(DRIVES[drive]).PARAMETERS
+    driven = drives.section(drive, required=False)
     member = SceneLinkage(
         name=name,
         linkage=linkage,
         closure=closure,
-        drive=(
-            drive,
-            read_parameters(
-                drives.section(drive, required=False),
-                import_module(DRIVES[drive]).PARAMETERS,
-                parts,
-                folder,
-            ),
-        ),
+        drive=(drive, read_parameters(driven, parameters, parts, source.folder)),
         effects={e: read_parameters(effects.section(e), of, parts) for e, of in types.items()},
         loads=_read_loads(loads, parts) if loads is not None else None,
         prefix=_prefix(where('prefix'), f'{name}_' if name else ''),
@@ -410,6 +386,38 @@ def _member(
     )
     effects.finish(tuple(EFFECTS))
     return member
+
+
+def _drive_name(drives: Section) -> str:
+    """Return the name of the drive in its section."""
+    named = list(drives) or ['topic']
+    if len(named) > 1:
+        raise drives.error(named[1], 'is a second drive', f'leave it, or {named[0]}, out')
+    if named[0] not in DRIVES:
+        drives.finish(tuple(DRIVES))
+    return named[0]
+
+
+def _refuse_effects(effects: Section, drive: str, published: bool) -> None:
+    """Refuse effects that do not fit to the drive, or to what is published."""
+    if 'effort' in effects and not published:
+        raise effects.error(
+            'effort', 'is that of the input joint', 'set publish_input: true, or name pin_forces'
+        )
+    if drive == 'torque' and 'backlash' in effects:
+        raise effects.error(
+            'backlash',
+            'is a play without masses, and torque moves masses',
+            'write drive.torque.play: {width: …, inertia: …} instead',
+        )
+
+
+def _set_slide_units(sections: Collection[Section], linkage: Linkage) -> None:
+    """Tell sections whether the inputs slide or turn; None where some do this and some that."""
+    kinds = {bool(given.slider) for given in linkage.inputs}
+    slides = kinds.pop() if len(kinds) == 1 else None
+    for section in sections:
+        section.units = replace(section.units, slides=slides)
 
 
 def _prefix(content: Section, default: str) -> str:
