@@ -27,7 +27,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.effects.stage import SensorReading
-from linkage_ros.generated_code import written
+from linkage_ros.generated_code import Lines, written
 
 if TYPE_CHECKING:
     from linkage_ros.drives.drive import Drive
@@ -91,18 +91,8 @@ def straight(
     """
     Write the usual tick of a linkage.
 
-    Parameters
-    ----------
-    drive
-        Source of the crank state.
-    drive_stages
-        Stages between the drive and the crank.
-    compiled
-        The compiled linkage, which closes for at least one input. It returns the values of a
-        `Straight`, as far as the scene asks for them.
-    angles
-        Unwraps the published angles; None if that is not needed.
-
+    The compiled linkage closes for at least one input; it returns the values of a `Straight`, as
+    far as the scene asks for them. ``angles`` unwraps the published angles; None if not needed.
     """
     crank = drive.straight(compiled.driven, 'return plain(now, None)')
     lines, bound = [*crank.lines], {**crank.bound}
@@ -114,14 +104,31 @@ def straight(
         lines.append(f'crank = {_CRANK}, = stage{number}({state})')
         state = 'crank'
     leave = f'return plain(now, {state})'
+    mechanism, groups = _mechanism_lines(compiled, leave)
+    lines += mechanism.lines
+    bound |= mechanism.bound
+    joints, rates, accelerations, efforts, reactions = groups + [[]] * (5 - len(groups))
+    if efforts and drive_stages:
+        # Within its play, the motor moves alone and carries only itself.
+        lines += _leave_unless("{*getattr(crank, 'free_motors', ())} <= {None}", leave)
+    if efforts and exerts:
+        # As `linkage_ros.effects.effort` for an input at rest.
+        effort = efforts[0]
+        lines.append("bearing = getattr(crank, 'bearing', ())")
+        lines.append(f'if bearing: {effort} = min(max({effort}, bearing[0]), bearing[1])')
+    if angles is not None:
+        bound['running'] = angles
+        lines += _unwrap_lines(angles.places, joints, leave)
+    crank_text = 'crank' if exerts else f'({_CRANK})'
+    return Straight(lines, bound, crank_text, joints, rates, accelerations, efforts, reactions)
 
-    def leave_unless(condition: str) -> None:
-        lines.extend((f'if not ({condition}):', f'    {leave}'))
 
+def _mechanism_lines(compiled: Compiled, leave: str) -> tuple[Lines, list[list[str]]]:
+    """Write the motion of a compiled linkage; also return the names of its values, in groups."""
     path, *more_paths = compiled.paths
     inputs = [one.name for one in path.inputs]
     given = iter(inputs)
-    lines += [
+    lines = [
         f'{", ".join(islice(given, compiled.driven))}, = {field}'
         for field in CrankState._fields[: 1 + compiled.derivatives]
     ]
@@ -131,40 +138,36 @@ def straight(
     ]
     numbers = [*chain(*groups)]
     if more_paths:
-        bound |= {'solve': compiled.fast, 'chain': chain}
+        bound = {'solve': compiled.fast, 'chain': chain}
         lines.append(f'values = solve({", ".join(inputs)})')
-        leave_unless('values is not None')
+        lines += _leave_unless('values is not None', leave)
         lines.append(f'{", ".join(numbers)}, = chain(*values)')
-    else:
-        body = compiled.body(leave)
-        bound |= body.bound
-        lines += body.lines
-        outputs = chain(*body.outputs)
-        lines += [f'{name} = {output}' for name, output in zip(numbers, outputs, strict=True)]
-    joints, rates, accelerations, efforts, reactions = groups + [[]] * (5 - len(groups))
-    if efforts and drive_stages:
-        # Within its play, the motor moves alone and carries only itself.
-        leave_unless("{*getattr(crank, 'free_motors', ())} <= {None}")
-    if efforts and exerts:
-        # As `linkage_ros.effects.effort` for an input at rest.
-        effort = efforts[0]
-        lines.append("bearing = getattr(crank, 'bearing', ())")
-        lines.append(f'if bearing: {effort} = min(max({effort}, bearing[0]), bearing[1])')
-    if angles is not None:
-        bound['running'] = angles
-        lines.append('last = running.raw')
-        leave_unless('last')
-        lasts = [f'l{i}' for i in range(len(joints))]
-        lines.append(f'{", ".join(lasts)}, = last')
-        near = [f'{-pi!r} < {lasts[i]} - {joints[i]} < {pi!r}' for i in angles.places]
-        if near:
-            leave_unless(' and '.join(near))
-        lines.append(f'running.raw = {_tuple(joints)}')
-        turns = [f'n{i}' for i in range(len(joints))]
-        lines.append(f'{", ".join(turns)}, = running.added')
-        lines += [f'{joint} += {turn}' for joint, turn in zip(joints, turns, strict=True)]
-    crank_text = 'crank' if exerts else f'({_CRANK})'
-    return Straight(lines, bound, crank_text, joints, rates, accelerations, efforts, reactions)
+        return Lines(lines, bound), groups
+    body = compiled.body(leave)
+    outputs = chain(*body.outputs)
+    lines += body.lines
+    lines += [f'{name} = {output}' for name, output in zip(numbers, outputs, strict=True)]
+    return Lines(lines, body.bound), groups
+
+
+def _unwrap_lines(places: Sequence[int], joints: Sequence[str], leave: str) -> list[str]:
+    """Write the unwrapping of the published angles, of which none may have wrapped."""
+    lasts = [f'l{i}' for i in range(len(joints))]
+    turns = [f'n{i}' for i in range(len(joints))]
+    near = [f'{-pi!r} < {lasts[i]} - {joints[i]} < {pi!r}' for i in places]
+    return [
+        'last = running.raw',
+        *_leave_unless('last', leave),
+        f'{", ".join(lasts)}, = last',
+        *(_leave_unless(' and '.join(near), leave) if near else ()),
+        f'running.raw = {_tuple(joints)}',
+        f'{", ".join(turns)}, = running.added',
+        *[f'{joint} += {turn}' for joint, turn in zip(joints, turns, strict=True)],
+    ]
+
+
+def _leave_unless(condition: str, leave: str) -> tuple[str, str]:
+    return f'if not ({condition}):', f'    {leave}'
 
 
 def straight_look(
