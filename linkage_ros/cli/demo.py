@@ -97,9 +97,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if bag is not None:
         picture = Path(f'{bag}.png')
         try:
-            find_tool('plot').draw(
-                bag, picture, Event()
-            )  # Ctrl-C ended the run; it must not stop the drawing
+            # Ctrl-C ended the run; it must not stop the drawing.
+            find_tool('plot').draw(bag, picture, Event())
         except LinkageError as error:
             # The run ended before it began, or matplotlib is missing: the run itself succeeded.
             print(f'picture   none: {error}')
