@@ -76,6 +76,7 @@ TOOLS = (
     'pages',
     'node.live_bridge',
     'node.followed_run',
+    'files.linkage_rewriting',
     # Design
     'synthesis',
     # Models
