@@ -26,18 +26,12 @@ import sys
 from linkage_ros.cli.arguments import angle_text, fixed
 from linkage_ros.cli.check import describe_group
 from linkage_ros.drawing.animation import animate, range_motion
-from linkage_ros.drawing.figure import (
-    all_places,
-    paint_background,
-    picture,
-    symbol_size,
-    View,
-    view,
-)
-from linkage_ros.drawing.painting import corners, outline, paint, save, set_plane, settings
-from linkage_ros.drawing.shapes import shapes
+from linkage_ros.drawing.figure import paint_background, picture
+from linkage_ros.drawing.painting import paint, save, set_plane, settings
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.pose_view import all_places, symbol_size, View, view
+from linkage_ros.kinematics.shapes import corners, outline, shapes
 from linkage_ros.kinematics.sides import sides_at
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,

@@ -23,7 +23,7 @@ from linkage_ros.cli.main import main
 from linkage_ros.drawing import painting
 from linkage_ros.drawing.animation import animate, range_motion
 from linkage_ros.drawing.dxf import links_dxf
-from linkage_ros.drawing.figure import assemblies_picture, picture, view
+from linkage_ros.drawing.figure import assemblies_picture, picture
 from linkage_ros.drawing.svg import svg
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.linkage_text import linkage_text
@@ -32,6 +32,7 @@ from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.languages import LANGUAGES
 from linkage_ros.kinematics.compiling.source import source, Subject
+from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.robot_models.mjcf import mjcf
 from linkage_ros.robot_models.part import Part

@@ -68,7 +68,7 @@ SCENES = {
     'rate_limit': Expected('{rate: 100}'),
     'dropout': Expected('{probability: 0.1}'),
     'delay': Expected('{seconds: 0.002}', ('velocity',)),
-    'markers': Expected('{}', (), (), ('drawing',), ('~/markers',)),
+    'markers': Expected('{}', (), (), (), ('~/markers',)),
 }
 ALTERING = {'tolerance', 'friction'}
 """Effects that change what is built, and have no part in a tick."""
@@ -268,8 +268,8 @@ def test_a_robot_model_is_made_where_it_is_asked_for_alone(tmp_path):
     """Neither building a scene nor the node's own modules bring it: configuring the node does."""
     for scene in ('', 'robot_description: true\n'):
         look = Look(tmp_path, BARE + scene)
-        assert 'models' not in packages(look.modules | look.passed)
+        assert 'robot_models' not in packages(look.modules | look.passed)
     pytest.importorskip('rclpy')
     loaded = run_python('import sys, linkage_ros.node.node; print(*sys.modules)').split()
     assert 'linkage_ros.node.node' in loaded
-    assert 'models' not in packages(loaded)
+    assert 'robot_models' not in packages(loaded)

@@ -14,7 +14,8 @@ from collections.abc import Mapping, Sequence
 from math import isnan, nan
 from pathlib import Path
 
-from linkage_ros.drawing.painting import COLOURS, INK, save, settings
+from linkage_ros.drawing.painting import save, settings
+from linkage_ros.kinematics.shapes import COLOURS, INK
 
 _LINKS = ('crank', 'coupler', 'rocker')
 

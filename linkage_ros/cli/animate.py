@@ -26,8 +26,8 @@ from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.part_of_run import add_window, read_part, window_of
 from linkage_ros.cli.terminal import progress
 from linkage_ros.drawing.animation import animate, check_kind, KINDS, Motion, range_motion
-from linkage_ros.drawing.figure import view
 from linkage_ros.files.linkage_file import load
+from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.run_motion import run_motion
 from linkage_ros.signals import StoppedError

@@ -27,7 +27,6 @@ from threading import Event
 from typing import TYPE_CHECKING
 
 from linkage_ros.cli.gallery import first_sentence
-from linkage_ros.cli.plot import draw
 from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import did_you_mean, LinkageError, listed
@@ -37,6 +36,7 @@ from linkage_ros.resources import scene_names, shipped
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heeded
+from linkage_ros.workbench import find_tool
 
 if TYPE_CHECKING:
     from linkage_ros.faults import Fault
@@ -100,7 +100,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if bag is not None:
         picture = Path(f'{bag}.png')
         try:
-            draw(bag, picture, Event())  # Ctrl-C ended the run; it must not stop the drawing
+            # Ctrl-C ended the run; it must not stop the drawing.
+            find_tool('plot').draw(bag, picture, Event())
         except LinkageError as error:
             # The run ended before it began, or matplotlib is missing: the run itself succeeded.
             print(f'picture   none: {error}')

@@ -28,7 +28,7 @@ from linkage_ros.cli.arguments import (
     PICTURES,
 )
 from linkage_ros.drawing.dxf import links_dxf
-from linkage_ros.drawing.figure import assemblies_picture, picture, view
+from linkage_ros.drawing.figure import assemblies_picture, picture
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import assemblies, load, written_linkage
@@ -36,6 +36,7 @@ from linkage_ros.files.linkage_text import pose_text
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.drawn_pose import drawn_pose
+from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.resources import named_file
 

@@ -32,6 +32,7 @@ from linkage_ros.errors import (
     quoted,
 )
 from linkage_ros.signals import end_soon, has_raised, raising, stop_on_signals, StoppedError
+from linkage_ros.workbench import find_tool, TOOLS
 
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
@@ -63,15 +64,12 @@ COMMANDS = {
     'synthesize': 'design a four-bar: from pairs of angles, a function, a curve, poses, its swing',
     'completion': 'print the completion script of a shell: bash, zsh or fish',
 }
-"""Each subcommand, usually also the name of its module in this folder, and its description."""
-
-_MODULES = {'import': 'import_urdf', 'urdf': 'robot_model', 'mjcf': 'robot_model'}
-"""Modules with another name than their command: a keyword of Python, and one for two commands."""
+"""Each subcommand and its description."""
 
 
 def module_of(command: str) -> str:
-    """Return the module name of a subcommand."""
-    return f'linkage_ros.cli.{_MODULES.get(command, command)}'
+    """Return the module name of a subcommand: a tool's, or one in this folder."""
+    return TOOLS.get(command, f'linkage_ros.cli.{command}')
 
 
 EXIT_CODES = {
@@ -193,7 +191,7 @@ def _run(arguments: Sequence[str], stop: Event) -> int:
     name = top_parser().parse_args(arguments[:1]).command
     try:
         with missing_packages_reported():
-            module = import_module(module_of(name))
+            module = find_tool(name) if name in TOOLS else import_module(module_of(name))
             parser = parser_of(name, module)
             typed = parser.parse_args(arguments[1:])
             # A local import: signals are to be handled before anything large is imported.

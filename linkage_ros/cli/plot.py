@@ -22,11 +22,11 @@ from threading import Event
 
 from linkage_ros.cli.arguments import add_bag, add_output, output_or, PICTURES
 from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
-from linkage_ros.drawing.curves import Curve, sweep
 from linkage_ros.drawing.figure import joint_axes, label_joints, plot_joints
 from linkage_ros.drawing.painting import save, settings, show_lengths
 from linkage_ros.errors import BagError
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.curves import Curve, sweep
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep

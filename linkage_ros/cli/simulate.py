@@ -50,6 +50,7 @@ from linkage_ros.simulation.study import (
     Sweep,
     sweep_of,
 )
+from linkage_ros.workbench import find_tool
 
 EXAMPLE = 'linkage simulate torque_crank --seconds 1 -o my_run.csv'
 
@@ -191,9 +192,7 @@ def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) 
     pictures = [file for file in (output, arguments.picture) if file and file.suffix not in KINDS]
     if pictures:
         check_output_name(pictures[-1], PICTURES)
-        from linkage_ros.drawing.painting import settings  # local import: only for a picture
-
-        settings()  # without matplotlib, say so before the study is run
+        find_tool('spread').settings()  # without matplotlib, say so before the study is run
     if output.suffix in KINDS:
         check_kind(output)
     scene = _loaded(arguments)
@@ -302,13 +301,13 @@ def _headings(scene: Scene, columns: Sequence[str]) -> Iterator[str]:
 
 def _draw(scene: Scene, seconds: float, found: Mapping[int, Outcome], picture: Path) -> None:
     """Draw the spread of the runs that succeeded."""
-    from linkage_ros.simulation.spread import draw_spread, JointSpread  # local import: matplotlib
-    import numpy as np  # local import: as above
+    import numpy as np  # local import: only for a picture
 
+    spread = find_tool('spread')
     good = [found[number] for number in sorted(found) if not found[number].failure]
     turning = _turning(scene)
     joints = [
-        JointSpread(
+        spread.JointSpread(
             joint,
             'rad' if turning[joint] else 'm',
             np.array([outcome.positions[number] for outcome in good]),
@@ -316,4 +315,4 @@ def _draw(scene: Scene, seconds: float, found: Mapping[int, Outcome], picture: P
         for number, joint in enumerate(scene.joints)
     ]
     title = f'{scene.name}: {len(good)} runs of {seconds:g} s'
-    draw_spread(title, seconds, joints, picture)
+    spread.draw_spread(title, seconds, joints, picture)

@@ -38,11 +38,11 @@ from linkage_ros.cli.arguments import (
     wrapped,
 )
 from linkage_ros.cli.terminal import progress, show, Table, text
-from linkage_ros.drawing.curves import traced_carriers
 from linkage_ros.errors import LinkageError, listed
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.curves import traced_carriers
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.kinematics.topology import assur_groups, Iterated
 from linkage_ros.names import csv_text

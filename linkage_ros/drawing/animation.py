@@ -25,30 +25,27 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.drawing.curves import Curve
 from linkage_ros.drawing.figure import (
     joint_axes,
     label_across,
     label_joints,
     moved_input,
     plot_joints,
-    symbol_size,
-    View,
 )
-from linkage_ros.drawing.painting import (
-    COLOURS,
-    corners,
-    LAYERS,
-    outline,
-    paint,
-    plot_places,
-    set_plane,
-    settings,
-)
-from linkage_ros.drawing.shapes import carried_shapes, link_frames, Shape
+from linkage_ros.drawing.painting import LAYERS, paint, plot_places, set_plane, settings
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.files.file_access import atomic_write, check_output_name
+from linkage_ros.kinematics.curves import Curve
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.pose_view import symbol_size, View
+from linkage_ros.kinematics.shapes import (
+    carried_shapes,
+    COLOURS,
+    corners,
+    link_frames,
+    outline,
+    Shape,
+)
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.names import picture_text
 import numpy as np

@@ -21,7 +21,6 @@ from math import degrees, remainder, tau
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.drawing.curves import drawn_once
 from linkage_ros.drawing.design_curves import (
     Branch,
     branches,
@@ -35,14 +34,10 @@ from linkage_ros.drawing.design_curves import (
     poses,
 )
 from linkage_ros.drawing.painting import (
-    bar_size,
-    corners,
-    INK,
     LAYERS,
     Names,
     OTHER,
     OTHER_TEXT,
-    outline,
     paint,
     plot_places,
     save,
@@ -51,8 +46,9 @@ from linkage_ros.drawing.painting import (
     TRACE,
     WANTED,
 )
-from linkage_ros.drawing.shapes import shapes, skeleton
+from linkage_ros.kinematics.curves import drawn_once
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.shapes import bar_size, corners, INK, outline, shapes, skeleton
 from linkage_ros.names import picture_text
 from linkage_ros.synthesis.design import COUPLER, CRANK, Design, FourBar, ROCKER
 from numpy.typing import ArrayLike

@@ -14,10 +14,11 @@ from collections.abc import Sequence
 from math import degrees, pi, tau
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing.painting import degree_step, INK, Names, OTHER, OTHER_TEXT, WANTED
+from linkage_ros.drawing.painting import degree_step, Names, OTHER, OTHER_TEXT, WANTED
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import InputRange, Position
+from linkage_ros.kinematics.shapes import INK
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.synthesis.design import Assembly, COUPLER, Design, Wanted
 from linkage_ros.synthesis.proof import closed_position, closure_of, Met, prove, SIDES

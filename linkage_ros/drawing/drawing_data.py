@@ -14,19 +14,20 @@ from cmath import rect
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from linkage_ros.drawing.curves import traced_carriers
-from linkage_ros.drawing.figure import all_places, symbol_size, View
-from linkage_ros.drawing.painting import corners, outline
-from linkage_ros.drawing.shapes import (
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.curves import traced_carriers
+from linkage_ros.kinematics.pose_view import all_places, symbol_size, View
+from linkage_ros.kinematics.results import Position
+from linkage_ros.kinematics.shapes import (
     carried_shapes,
     Circle,
+    corners,
     link_frames,
     LinkFrame,
+    outline,
     Segment,
     Shape,
 )
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.results import Position
 
 _DIGITS = 6
 """Significant digits of places: a thousandth of a pixel."""
@@ -37,8 +38,8 @@ def drawn_in_frames(shown: View) -> dict[str, Any]:
     Return the drawing of a linkage as JSON data; lengths are in [m].
 
     ``shapes`` come in the order in which they are painted. Each has the ``link`` of its frame, its
-    ``role`` (see `linkage_ros.drawing.shapes`), and ``points``, x and y in turn: of a circle its
-    centre, with a ``radius``; of a segment its ends; of an area its corners, with ``closed``.
+    ``role`` (see `linkage_ros.kinematics.shapes`), and ``points``, x and y in turn: of a circle
+    its centre, with a ``radius``; of a segment its ends; of an area its corners, with ``closed``.
     ``frame`` is the lower left and upper right corner of the drawing, ``size`` half the width of a
     bar, ``paths`` the curves of the traced points over the range of the input.
     """

@@ -23,12 +23,11 @@ from itertools import islice
 from math import tan, tau
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing.figure import symbol_size, View, view
-from linkage_ros.drawing.painting import corners
-from linkage_ros.drawing.shapes import hull, link_frames
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import carriers
+from linkage_ros.kinematics.pose_view import symbol_size, View, view
+from linkage_ros.kinematics.shapes import corners, hull, link_frames
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.names import dxf_text
 

@@ -11,24 +11,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil, degrees, remainder, sqrt, tau
+from math import ceil, degrees, sqrt
 from pathlib import Path
 from textwrap import fill
-from typing import Any, NamedTuple
+from typing import Any
 
-from linkage_ros.drawing.curves import Curve, Sweep, sweep
 from linkage_ros.drawing.painting import (
-    bar_size,
-    COLOURS,
-    corners,
     degree_step,
     GHOST,
-    INK,
     label_ends,
     LAYERS,
     NAME_INK,
     Names,
-    outline,
     paint,
     plot_places,
     save,
@@ -36,135 +30,26 @@ from linkage_ros.drawing.painting import (
     settings,
     show_lengths,
 )
-from linkage_ros.drawing.shapes import Circle, Polygon, Shape, shapes, skeleton
-from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.curves import Curve
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.results import InputRange, Position
-from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics.pose_view import all_places, pose_text, SAME_ANGLE, symbol_size, View
+from linkage_ros.kinematics.shapes import (
+    Circle,
+    COLOURS,
+    corners,
+    INK,
+    outline,
+    Polygon,
+    Shape,
+    shapes,
+    skeleton,
+)
 from linkage_ros.names import picture_text
-
-_GHOSTS = 5
-_SAME = 1e-9
-"""Largest difference of angles that counts as rounding, in [rad]."""
-
-
-class View(NamedTuple):
-    """The content of a picture."""
-
-    closure: Closure  # The linkage
-    # The pose to draw.
-    inputs: tuple[float, ...]
-    position: Position
-    ghosts: tuple[Position, ...]  # Poses in the background
-    interval: InputRange  # Range of the first input around the pose, with the others held
-    mark: float  # The first input, less the whole turns by which it lies outside of that range
-    sweep: Sweep  # The motion through that range
-
-
-def view(
-    closure: Closure, inputs: tuple[float, ...], ghosts: Sequence[tuple[float, ...]] = ()
-) -> View:
-    """
-    Prepare a picture of a pose, with others in the background.
-
-    By default those are some over the whole range. A LinkageError says that a pose does not close.
-    """
-    position = _closed(closure, inputs)
-    way = InputSweep(closure, inputs)
-    value = inputs[0]
-    # A pose beyond the limits lies in no range; show the widest one.
-    about = way.range_about(value) or way.widest_range
-    about = about or InputRange(value, value, way.turning)
-    interval = _listed(way, about)
-    shift = about.shift(value) if about.whole else interval.lowest - about.lowest
-    if ghosts:
-        behind = [_closed(closure, given) for given in ghosts]
-    elif interval.whole:
-        turn = interval.highest - interval.lowest
-        behind = [way.position(value + turn * i / (_GHOSTS + 1)) for i in range(1, _GHOSTS + 1)]
-    else:
-        low, high = interval.lowest, interval.highest
-        behind = [way.position(low + (high - low) * i / (_GHOSTS - 1)) for i in range(_GHOSTS)]
-    return View(
-        closure,
-        inputs,
-        position,
-        tuple(ghost for ghost in behind if ghost.joints),
-        interval,
-        value + shift,
-        sweep(way, interval),
-    )
-
-
-def _listed(way: InputSweep, about: InputRange) -> InputRange:
-    """Return a range with the turns with which it is among the ranges."""
-    if about in way.ranges:
-        return about
-    for interval in way.ranges:
-        period = tau * interval.turns
-        if period and abs(remainder(about.lowest - interval.lowest, period)) < _SAME:
-            return interval
-    return about
-
-
-def _closed(closure: Closure, inputs: tuple[float, ...]) -> Position:
-    position = closure.position(*inputs)
-    if not position.joints:
-        ranges = InputSweep(closure, inputs).ranges
-        near = ' or '.join(_ends_text(interval) for interval in ranges)
-        held = ', the others held' if near and len(inputs) > 1 else ''
-        raise LinkageError(
-            _pose_text(closure, inputs),
-            f'{position.status.value}, the links miss each other by {position.gap:.3g} m',
-            f'closes from {near}{held}' if near else 'name another pose',
-        )
-    return position
-
-
-def _ends_text(interval: InputRange) -> str:
-    low, high = interval.lowest, interval.highest
-    if interval.turning:
-        return f'{degrees(low):.6g} to {degrees(high):.6g}°'
-    return f'{low:.6g} to {high:.6g} m'
-
-
-def _pose_text(closure: Closure, inputs: tuple[float, ...]) -> str:
-    return ', '.join(
-        f'{given.joint} {value:.4g} m' if given.slider else f'{given.joint} {degrees(value):.4g}°'
-        for given, value in zip(closure.linkage.inputs, inputs, strict=True)
-    )
-
-
-def all_places(shown: View) -> list[complex]:
-    """Return all places that any part passes, in [m]."""
-    places = [place for path in shown.sweep.paths.values() for place in path]
-    for position in (shown.position, *shown.ghosts):
-        for line in skeleton(shown.closure, position):
-            places += (line.start, line.end)
-    return places
-
-
-def symbol_size(shown: View) -> float:
-    """Return half the width of a bar, in [m], for the picture and its shortest link."""
-    low, high = corners(all_places(shown))
-    picture = abs(high - low)
-    points = shown.closure.points(shown.position)
-    bars = [
-        abs(points[link, one] - points[link, other])
-        for link, named in shown.closure.linkage.links.items()
-        if link != GROUND
-        for one in named
-        for other in named
-        if one < other and points[link, one] != points[link, other]
-    ]
-    shortest = min(bars, default=picture)
-    return bar_size(picture, shortest)
 
 
 def _turns_text(shown: View) -> str:
     """Return where the mark is, if that is not the angle that was named."""
-    if abs(shown.mark - shown.inputs[0]) < _SAME:
+    if abs(shown.mark - shown.inputs[0]) < SAME_ANGLE:
         return ''
     return f' ({degrees(shown.mark):.4g}° on the axis)'
 
@@ -196,7 +81,7 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
         left, joints = figure.add_subplot(grid[0]), shown.sweep.joints
         panels = joint_axes(grid[1], joints)
         heading = (
-            f'{title}, {_pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}'
+            f'{title}, {pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}'
             f'{_beyond_text(shown)}'
         )
         left.set_title(picture_text(heading, 120), loc='left', fontsize=9)
@@ -244,7 +129,7 @@ def assemblies_picture(views: Mapping[str, View], file: Path) -> None:
             axes = figure.add_subplot(rows, columns, number)
             title = fill(picture_text(text, 200), round(15.0 * wide), subsequent_indent='  ')
             if shown.inputs != first.inputs:
-                title += f'\nat {picture_text(_pose_text(shown.closure, shown.inputs))}'
+                title += f'\nat {picture_text(pose_text(shown.closure, shown.inputs))}'
             axes.set_title(title, loc='left', fontsize=7.5, family='monospace')
             set_plane(axes, low - margin, high + margin)
             axes.set_axis_off()

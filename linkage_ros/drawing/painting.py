@@ -21,9 +21,9 @@ from statistics import fmean
 from typing import Any, NamedTuple
 from warnings import catch_warnings, filterwarnings
 
-from linkage_ros.drawing.shapes import Circle, Polygon, Segment, Shape
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.files.file_access import atomic_write
+from linkage_ros.kinematics.shapes import Circle, COLOURS, FACES, INK, Polygon, Shape
 from linkage_ros.names import picture_text
 
 _DIRECTIONS = 16
@@ -143,28 +143,16 @@ def _outside(centre: complex, width: float, height: float, frame: tuple[complex,
     )
 
 
-COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000')
-"""Colours of Okabe and Ito, which colour-blind readers can distinguish."""
-
 WANTED, TRACE, OTHER = COLOURS[0], COLOURS[2], COLOURS[4]
 """Colours in a design: wanted values, path of a point, other assembly."""
 
 OTHER_TEXT = '#a86b00'
 """Colour of text about the other assembly, dark enough to read."""
 
-INK = '#1f2d3a'
 NAME_INK = '#35608a'
 GHOST = '#cfcfcf'
 LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
 
-FACES = {
-    'link': '#c3d3e2',
-    'plate': '#d3e0ecc0',
-    'input': '#f0a07a',
-    'block': '#fff6d6',
-    'tube': '#e8edf2',
-    'ground': '#ffffff',
-}
 _STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
 STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
 _SETTINGS: Any = {
@@ -203,26 +191,6 @@ def save(figure: Any, file: Path) -> None:
             file, f'cannot be written ({error})', 'name another picture with -o'
         ) from None
     atomic_write(file, picture.getvalue())
-
-
-def corners(places: Iterable[complex]) -> tuple[complex, complex]:
-    """Return the lower left and the upper right corner of the bounding box of places."""
-    xs, ys = zip(*((p.real, p.imag) for p in places), strict=True)
-    return complex(min(xs), min(ys)), complex(max(xs), max(ys))
-
-
-def outline(shape: Shape) -> tuple[complex, ...]:
-    """Return the corners of a shape's edge."""
-    if isinstance(shape, Segment):
-        return shape.start, shape.end
-    if isinstance(shape, Polygon):
-        return (*shape.corners, shape.corners[0])
-    return tuple(shape.centre + shape.radius * way for way in (1, 1j, -1, -1j, 1))
-
-
-def bar_size(picture: float, shortest: float) -> float:
-    """Return half the width of a bar, in [m], for a picture and its shortest link."""
-    return min(0.013 * picture, max(0.26 * shortest, 0.006 * picture))
 
 
 def spread(places: Sequence[float], gap: float) -> list[float]:

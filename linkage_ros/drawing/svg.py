@@ -13,12 +13,22 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.sax.saxutils import escape
 
-from linkage_ros.drawing.figure import all_places, symbol_size, view
-from linkage_ros.drawing.painting import COLOURS, corners, FACES, GHOST, INK, outline, STROKES
-from linkage_ros.drawing.shapes import Circle, Polygon, shapes, skeleton
+from linkage_ros.drawing.painting import GHOST, STROKES
 from linkage_ros.errors import quoted
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.pose_view import all_places, symbol_size, view
 from linkage_ros.kinematics.results import Position
+from linkage_ros.kinematics.shapes import (
+    Circle,
+    COLOURS,
+    corners,
+    FACES,
+    INK,
+    outline,
+    Polygon,
+    shapes,
+    skeleton,
+)
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 _LONGER_SIDE = 420.0

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Shapes of a linkage's markers, from the shapes of `linkage_ros.drawing`, packed once.
+Shapes of a linkage's markers, from those of `linkage_ros.kinematics.shapes`, packed once.
 
 The shape of a link has its own frame, at a point of the link and turned with it, so only positions
 and angles change from message to message. Shapes that lie on top in the drawing get a greater z,
@@ -23,12 +23,22 @@ from itertools import pairwise
 from math import log1p, pi
 from typing import NamedTuple
 
-from linkage_ros.drawing.figure import all_places, symbol_size, view
-from linkage_ros.drawing.painting import COLOURS, corners, FACES, INK, outline
-from linkage_ros.drawing.shapes import carried_shapes, Circle, Polygon, Segment, Shape
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import carriers, GROUND, Input
+from linkage_ros.kinematics.pose_view import all_places, symbol_size, view
 from linkage_ros.kinematics.results import Position
+from linkage_ros.kinematics.shapes import (
+    carried_shapes,
+    Circle,
+    COLOURS,
+    corners,
+    FACES,
+    INK,
+    outline,
+    Polygon,
+    Segment,
+    Shape,
+)
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.messages.marker_array import (
     ARROW,

@@ -26,6 +26,7 @@ from linkage_ros.replay.replay import announced_text, change_text
 from linkage_ros.replay.run_files import EXTRA, scene_files
 from linkage_ros.replay.topic_description import message_type
 from linkage_ros.scene.scene import Scene
+from linkage_ros.workbench import find_tool
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -169,11 +170,8 @@ class SceneTopics:
             The published joints do not determine the pose of every link.
 
         """
-        from linkage_ros.robot_models.urdf import urdf  # local import: few scenes need it
-        from linkage_ros.scene.robot_model import scene_model  # local import: as above
-
         text_type = message_type('std_msgs/msg/String', 'robot_description')
-        model = scene_model(scene, pipeline.closures, urdf).decode()
+        model = find_tool('robot_description').scene_urdf(scene, pipeline.closures).decode()
         self._description = self._node.create_publisher(
             text_type, 'robot_description', _DESCRIPTION_QOS
         )

@@ -29,15 +29,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from linkage_ros.drawing.drawing_data import drawn_in_frames
-from linkage_ros.drawing.figure import view
-from linkage_ros.drawing.painting import COLOURS, FACES, INK
-from linkage_ros.drawing.shapes import (
-    link_frames,
-)
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.link_frames import blocks
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.shapes import COLOURS, FACES, INK, link_frames
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
 from linkage_ros.report.labels import LANES, QUANTITIES, short, size_in_json

@@ -11,9 +11,9 @@
 from __future__ import annotations
 
 from linkage_ros.drawing.animation import count_of, Motion
-from linkage_ros.drawing.curves import continuous, Curve
-from linkage_ros.drawing.figure import view
 from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.curves import continuous, Curve
+from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.data import poses
 from linkage_ros.report.decimation import Numbers

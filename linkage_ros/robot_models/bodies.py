@@ -21,10 +21,10 @@ from collections.abc import Mapping
 from statistics import median
 from typing import NamedTuple
 
-from linkage_ros.drawing.shapes import hull
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, SlideJoint
 from linkage_ros.kinematics.ranges import link_lengths, reach
+from linkage_ros.kinematics.shapes import hull
 from linkage_ros.robot_models.orientation import named_joints, Span
 
 _COLOURS = (

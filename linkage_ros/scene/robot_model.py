@@ -14,10 +14,16 @@ from collections.abc import Callable, Sequence
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.robot_models.part import Part, PartError
+from linkage_ros.robot_models.urdf import urdf
 from linkage_ros.scene.scene import Scene
 
 Write = Callable[[str, Sequence[Part]], bytes]
 """Writes the robot model of some linkages, with a name."""
+
+
+def scene_urdf(scene: Scene, closures: Sequence[Closure]) -> bytes:
+    """Return the URDF of a scene; see `scene_model`."""
+    return scene_model(scene, closures, urdf)
 
 
 def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> bytes:

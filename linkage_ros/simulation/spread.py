@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing.painting import COLOURS, save, settings
+from linkage_ros.drawing.painting import save, settings
+from linkage_ros.kinematics.shapes import COLOURS
 from linkage_ros.names import picture_text
 import numpy as np
 from numpy.typing import NDArray

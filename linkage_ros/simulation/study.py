@@ -282,7 +282,7 @@ def outcomes(
     """
     work = partial(_numbered, study)
     if dask:
-        from linkage_ros.synthesis.study import results_of  # local import: only with Dask
+        from linkage_ros.dask_workers import results_of  # local import: only with Dask
 
         with closing(results_of(work, lambda _threads: iter(runs), dask)) as results:
             yield from (result for _, result in results)

@@ -16,11 +16,12 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from linkage_ros.drawing.animation import animate, range_motion
-from linkage_ros.drawing.figure import picture, View, view
+from linkage_ros.drawing.figure import picture
 from linkage_ros.errors import did_you_mean, LinkageError, listed, quoted
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.languages import c_name, LANGUAGES
 from linkage_ros.kinematics.compiling.source import source, Subject
+from linkage_ros.kinematics.pose_view import View, view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 _SECONDS = 4.0

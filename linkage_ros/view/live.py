@@ -24,7 +24,7 @@ import json
 from typing import Any, Protocol
 
 from aiohttp import web, WSMsgType
-from linkage_ros.drawing.painting import COLOURS, FACES, INK
+from linkage_ros.kinematics.shapes import COLOURS, FACES, INK
 from linkage_ros.pages.document import document
 from linkage_ros.view.page import SERVED_POLICY
 from linkage_ros.view.server import SERVER_KEY

@@ -20,8 +20,6 @@ from math import degrees, dist, inf, isfinite, radians
 from typing import Any, NamedTuple
 
 from linkage_ros.drawing.drawing_data import drawn_in_frames, pose_in_frames
-from linkage_ros.drawing.figure import view
-from linkage_ros.drawing.shapes import driven_links
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.files.linkage_file import closable, closures, written_linkage
 from linkage_ros.files.section import Section
@@ -31,7 +29,9 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.javascript import JavaScript
 from linkage_ros.kinematics.compiling.source import source, STATUSES, Subject
 from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage
+from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.shapes import driven_links
 from linkage_ros.kinematics.sides import assembly_sides, written_sides
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs

@@ -14,8 +14,8 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
-from linkage_ros.drawing.painting import COLOURS, FACES, INK
 from linkage_ros.errors import clean
+from linkage_ros.kinematics.shapes import COLOURS, FACES, INK
 from linkage_ros.pages.document import document, POLICY
 
 SERVED_POLICY = POLICY.replace(

@@ -16,10 +16,10 @@ from xml.etree import ElementTree as ET
 
 from linkage_ros.cli.main import main
 from linkage_ros.drawing.animation import animate, check_kind, range_motion, RATE
-from linkage_ros.drawing.figure import view
-from linkage_ros.drawing.shapes import link_frames
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import load
+from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.shapes import link_frames
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.run import Window
 from linkage_ros.report.run_motion import run_motion

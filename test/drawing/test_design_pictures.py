@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 
 from linkage_ros.drawing import design as drawing
 from linkage_ros.drawing.design import draw_design
-from linkage_ros.drawing.painting import INK, OTHER, WANTED
+from linkage_ros.drawing.painting import OTHER, WANTED
 from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.shapes import INK
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
 import numpy as np
 import pytest

@@ -16,10 +16,11 @@ from typing import Any
 
 from linkage_ros.cli.main import main
 from linkage_ros.drawing import figure as drawing
-from linkage_ros.drawing.figure import picture, view
+from linkage_ros.drawing.figure import picture
 from linkage_ros.drawing.painting import degree_step
 from linkage_ros.errors import FileError
 from linkage_ros.files.linkage_file import assemblies, load
+from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.resources import linkage_names, named_file
 import pytest

@@ -15,13 +15,13 @@ import random
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drawing.curves import continuous, drawn_once, sweep
 from linkage_ros.drawing.painting import Label, place_labels
-from linkage_ros.drawing.shapes import Circle, hull, Polygon, rounded, Segment, shapes, skeleton
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.curves import continuous, drawn_once, sweep
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.shapes import Circle, hull, Polygon, rounded, Segment, shapes, skeleton
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 import pytest
 

@@ -15,9 +15,8 @@ from math import acos, cos, hypot, log, pi, radians, remainder, tau
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.drawing.painting import outline
-from linkage_ros.drawing.shapes import carried_shapes, Polygon
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.shapes import carried_shapes, outline, Polygon
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline

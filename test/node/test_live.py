@@ -26,8 +26,8 @@ from urllib.request import urlopen
 
 from linkage_ros import load
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.drawing.shapes import link_frames
 from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.shapes import link_frames
 from linkage_ros.node.live_bridge import LiveBridge
 from linkage_ros.view.live import add_live, live_page
 import pytest

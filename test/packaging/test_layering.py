@@ -13,6 +13,7 @@ from collections import defaultdict
 from graphlib import CycleError, TopologicalSorter
 import sys
 
+from linkage_ros import workbench
 import pytest
 
 PACKAGE = 'linkage_ros'
@@ -20,7 +21,16 @@ PACKAGE = 'linkage_ros'
 # Packages by height: a package may import from lower ones, and from its neighbours as long as no
 # two import each other.
 HEIGHTS = (
-    ('errors', 'names', 'signals', 'generated_code', 'measuring', 'processes'),
+    (
+        'errors',
+        'names',
+        'signals',
+        'generated_code',
+        'measuring',
+        'processes',
+        'dask_workers',
+        'workbench',
+    ),
     ('kinematics', 'resources', 'messages'),
     ('files',),
     ('bag', 'pages', 'synthesis', 'dynamics', 'drawing', 'solvers', 'robot_models'),
@@ -54,6 +64,52 @@ ROS = (
     'trajectory_msgs',
     'visualization_msgs',
 )
+
+# The two halves: what runs on a robot, and the workbench. The core finds a tool by name, in
+# linkage_ros.workbench. Packages and modules that are not here are core.
+TOOLS = (
+    'study',
+    'measuring',
+    # View
+    'view',
+    'report',
+    'pages',
+    'node.live_bridge',
+    'node.followed_run',
+    'files.linkage_rewriting',
+    # Design
+    'synthesis',
+    # Models
+    'robot_models',
+    'scene.robot_model',
+    'fmu',
+    'kinematics.compiling.c',
+    'kinematics.compiling.javascript',
+    'kinematics.compiling.languages',
+    'kinematics.compiling.python_module',
+    'kinematics.compiling.source',
+    # Drawing
+    'drawing',
+    'simulation.spread',
+    # Commands
+    'cli.accuracy',
+    'cli.animate',
+    'cli.compare',
+    'cli.compile',
+    'cli.draw',
+    'cli.fmu',
+    'cli.import_urdf',
+    'cli.part_of_run',
+    'cli.plot',
+    'cli.report',
+    'cli.robot_model',
+    'cli.synthesis_tasks',
+    'cli.synthesize',
+    'cli.view',
+)
+
+# Where the core names tools: the table of them, and the public API, which imports what is used.
+NAMING_TOOLS = ('linkage_ros.workbench', 'linkage_ros.__init__')
 
 # Imports of our own modules within functions: pipeline/pipeline.py imports only what a scene
 # needs, and the command line starts fast. Elsewhere the line gives its reason.
@@ -99,6 +155,28 @@ def _package(name):
     """Return the package or module at the top that a name of ours lies in; '' for none."""
     top = name.split('.')[1:2]
     return top[0] if top and top[0] in HEIGHT else ''
+
+
+def _trees(root):
+    """Yield (module, syntax tree) of all of linkage_ros."""
+    for path in sorted((root / PACKAGE).rglob('*.py')):
+        module = '.'.join(path.relative_to(root).with_suffix('').parts)
+        yield module, ast.parse(path.read_text('utf-8'), str(path))
+
+
+def _named(module, node):
+    """Yield what a node of a module imports, or may import later: names and texts of ours."""
+    if isinstance(node, ast.Import | ast.ImportFrom):
+        for name in _imported(module, node):
+            yield name
+            yield from (f'{name}.{alias.name}' for alias in node.names)
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+
+
+def _is_tool(name):
+    """Return whether a name of ours lies in the workbench."""
+    return any(f'{name}.'.startswith(f'{PACKAGE}.{tool}.') for tool in TOOLS)
 
 
 @pytest.fixture(scope='module')
@@ -149,6 +227,27 @@ def test_packages_do_not_import_each_other(our_imports):
         TopologicalSorter(graph).prepare()
     except CycleError as error:
         pytest.fail(' imports '.join(reversed(error.args[1])), pytrace=False)
+
+
+def test_the_core_imports_no_tool(root):
+    found = [
+        f'{module} imports {name}'
+        for module, tree in _trees(root)
+        for node in ast.walk(tree)
+        for name in _named(module, node)
+        if _is_tool(name) and not _is_tool(module) and module not in NAMING_TOOLS
+    ]
+    assert not found
+
+
+def test_every_tool_is_there(root):
+    modules = [f'{module}.' for module, _ in _trees(root)]
+    assert not [
+        tool
+        for tool in TOOLS
+        if not any(module.startswith(f'{PACKAGE}.{tool}.') for module in modules)
+    ]
+    assert all(map(_is_tool, workbench.TOOLS.values()))
 
 
 def test_bag_needs_only_errors_and_files(our_imports):

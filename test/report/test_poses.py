@@ -15,11 +15,11 @@ import json
 
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.drawing.drawing_data import drawn_in_frames
-from linkage_ros.drawing.figure import view
-from linkage_ros.drawing.shapes import carried_shapes, Circle, link_frames, shapes
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.shapes import carried_shapes, Circle, link_frames, shapes
 from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import sys
 import tracemalloc
 
+from linkage_ros.dask_workers import distributed
 from linkage_ros.errors import LinkageError
-from linkage_ros.synthesis.study import CHUNK, distributed, Found, scipy_optimize, search
+from linkage_ros.synthesis.study import CHUNK, Found, scipy_optimize, search
 import numpy as np
 import pytest
 

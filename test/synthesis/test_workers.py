@@ -14,9 +14,9 @@ import socket
 import sys
 
 import linkage_ros
+from linkage_ros import dask_workers
+from linkage_ros.dask_workers import results_of
 from linkage_ros.errors import LinkageError
-from linkage_ros.synthesis import study
-from linkage_ros.synthesis.study import results_of
 import pytest
 
 distributed = pytest.importorskip('distributed')
@@ -55,7 +55,7 @@ def cluster():
 
 @pytest.fixture
 def impatient(monkeypatch):
-    monkeypatch.setattr(study, '_PATIENCE', 1.0)
+    monkeypatch.setattr(dask_workers, '_PATIENCE', 1.0)
 
 
 def numbers(count):
@@ -87,7 +87,7 @@ def test_parts_are_asked_for_as_they_are_done(cluster):
             yield part
 
     for done, _ in enumerate(results_of(abs, parts, cluster.scheduler_address)):
-        assert len(asked) <= done + 2 * study._AHEAD
+        assert len(asked) <= done + 2 * dask_workers._AHEAD
 
 
 def test_the_client_is_closed_where_nobody_asks_for_more(cluster):

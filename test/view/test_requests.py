@@ -14,9 +14,9 @@ import json
 from typing import Any
 
 import linkage_ros as lr
-from linkage_ros.drawing.shapes import link_frames
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import Position
+from linkage_ros.kinematics.shapes import link_frames
 from linkage_ros.resources import shipped
 from linkage_ros.view import requests
 from linkage_ros.view.requests import Answers, LARGEST, read_request, RequestError

@@ -33,6 +33,22 @@ Role = Literal[
 Travels = Mapping[str, tuple[float, float]]
 """Lowest and highest slide of each slider in the drawing, in [m]."""
 
+COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000')
+"""Colours of Okabe and Ito, which colour-blind readers can distinguish."""
+
+INK = '#1f2d3a'
+"""Colour of edges."""
+
+FACES = {
+    'link': '#c3d3e2',
+    'plate': '#d3e0ecc0',
+    'input': '#f0a07a',
+    'block': '#fff6d6',
+    'tube': '#e8edf2',
+    'ground': '#ffffff',
+}
+"""Colour of a filled area, by its role."""
+
 _FLAT = 1e-6
 """Largest distance of collinear points from their line, relative to its length."""
 
@@ -72,6 +88,26 @@ class Circle(NamedTuple):
 
 
 Shape = Polygon | Segment | Circle
+
+
+def corners(places: Iterable[complex]) -> tuple[complex, complex]:
+    """Return the lower left and the upper right corner of the bounding box of places."""
+    xs, ys = zip(*((p.real, p.imag) for p in places), strict=True)
+    return complex(min(xs), min(ys)), complex(max(xs), max(ys))
+
+
+def outline(shape: Shape) -> tuple[complex, ...]:
+    """Return the corners of a shape's edge."""
+    if isinstance(shape, Segment):
+        return shape.start, shape.end
+    if isinstance(shape, Polygon):
+        return (*shape.corners, shape.corners[0])
+    return tuple(shape.centre + shape.radius * way for way in (1, 1j, -1, -1j, 1))
+
+
+def bar_size(picture: float, shortest: float) -> float:
+    """Return half the width of a bar, in [m], for a picture and its shortest link."""
+    return min(0.013 * picture, max(0.26 * shortest, 0.006 * picture))
 
 
 class _Pose(NamedTuple):

@@ -1,0 +1,51 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+r"""
+The tools of the workbench, found by name where they are asked for.
+
+What runs on a robot imports no tool; a command, or a key of a scene, finds its own here.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from linkage_ros.errors import LinkageError
+
+TOOLS = {
+    # Commands; those of the other half are in linkage_ros.cli, each by its own name.
+    'accuracy': 'linkage_ros.cli.accuracy',
+    'view': 'linkage_ros.cli.view',
+    'report': 'linkage_ros.cli.report',
+    'compare': 'linkage_ros.cli.compare',
+    'plot': 'linkage_ros.cli.plot',
+    'draw': 'linkage_ros.cli.draw',
+    'animate': 'linkage_ros.cli.animate',
+    'synthesize': 'linkage_ros.cli.synthesize',
+    'compile': 'linkage_ros.cli.compile',
+    'fmu': 'linkage_ros.cli.fmu',
+    'urdf': 'linkage_ros.cli.robot_model',
+    'mjcf': 'linkage_ros.cli.robot_model',
+    'import': 'linkage_ros.cli.import_urdf',
+    # What commands and scenes ask for.
+    'robot_description': 'linkage_ros.scene.robot_model',
+    'spread': 'linkage_ros.simulation.spread',
+}
+"""The module of each tool, by its name."""
+
+
+def find_tool(name: str) -> ModuleType:
+    """Return the module of a tool; a LinkageError says that it is not installed."""
+    try:
+        return import_module(TOOLS[name])
+    except ModuleNotFoundError as error:
+        if not TOOLS[name].startswith(error.name or TOOLS[name]):
+            raise  # a package that the tool needs
+        raise LinkageError(name, 'is not installed', 'install the whole of linkage_ros') from None
