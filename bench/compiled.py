@@ -32,8 +32,8 @@ from linkage_ros.kinematics.batch import Array
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.c import C
 from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.source import source, Subject
-from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.compiling.source import Subject, write_source
+from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.processes import MeasurementError
 import numpy as np
 
@@ -53,14 +53,17 @@ def measure_gallery(rounds: int, states: int) -> Table:
     )
     for file in sorted((ROOT / 'config' / 'linkages').glob('*.yaml')):
         closure = load(file)
-        slow = iterated(closure)
+        slow = is_iterated(closure)
         count = min(states, _ITERATED_STATES) if slow else states
         inputs = list(islice(_closed_states(closure), count))
         begun = time.perf_counter()
         compiled = Compiled(closure, 2)
         took = 1e3 * (time.perf_counter() - begun)
         found = in_turn(
-            {'compiled': _over(compiled.fast, inputs), 'plain': _over(compiled.plain, inputs)},
+            {
+                'compiled': _over(compiled.fast, inputs),
+                'plain': _over(compiled.run_interpreted, inputs),
+            },
             rounds,
         )
         fast, plain = ([1e6 * s / count for s in found[name]] for name in ('compiled', 'plain'))
@@ -213,7 +216,7 @@ def measure_arrays(folder: Path, rounds: int, states: int) -> Table:
         return table
     for file in sorted((ROOT / 'config' / 'linkages').glob('*.yaml')):
         closure = load(file)
-        if not iterated(closure):
+        if not is_iterated(closure):
             target = '≥ 0.9' if file.stem == 'four_bar' else '≥ 0.5'
             cells = _measured(folder, closure, file, rounds, states)
             table.rows.append((file.stem, *cells, target))
@@ -262,7 +265,7 @@ def _compiled(folder: Path, closure: Closure, file: Path) -> _Solve:
     """Return the generated C code of a linkage, in a loop over states."""
     name, joints = file.stem, tuple(closure.linkage.joints)
     driven = len(closure.linkage.inputs)
-    header = source(Subject(closure, name, file.name, 2, joints), C(name, header=True))
+    header = write_source(Subject(closure, name, file.name, 2, joints), C(name, header=True))
     (folder / f'{name}.h').write_text(header, encoding='utf-8')
     loop, library = folder / f'{name}.c', folder / f'{name}.so'
     loop.write_text(_LOOP.format(name=name, inputs=driven, joints=len(joints)), encoding='utf-8')

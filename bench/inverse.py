@@ -34,15 +34,17 @@ def measure_inverse(rounds: int, states: int) -> Table:
     )
     for name, joint in INVERTED:
         closure = load(named_file(name, 'linkages'))
-        fast = closure.compiled(1).fast
+        fast = closure.compile_linkage(1).fast
         begun = time.perf_counter()
         branch = closure.branches(joint)[0]
         took = 1e3 * (time.perf_counter() - begun)
         height = branch.high - branch.low
         values = [branch.low + height * (i + 0.5) / states for i in range(states)]
-        cranks = [branch.find(value)[0] for value in values]
+        cranks = [branch.find_crank(value)[0] for value in values]
 
-        def find(find: Callable[..., object] = branch.find, values: list[float] = values) -> None:
+        def find(
+            find: Callable[..., object] = branch.find_crank, values: list[float] = values
+        ) -> None:
             for value in values:
                 find(value)
 

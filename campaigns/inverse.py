@@ -31,7 +31,7 @@ from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.crank_branches import CrankBranch
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
-from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.resources import linkage_names, named_file
 import numpy as np
 
@@ -58,7 +58,7 @@ def linkages() -> Iterator[tuple[str, Closure]]:
     """Yield the shipped linkages of one input that are solved by dyads."""
     for name in linkage_names():
         closure = load(named_file(name, 'linkages'))
-        if len(closure.input_names) == 1 and not iterated(closure):
+        if len(closure.input_names) == 1 and not is_iterated(closure):
             yield name, closure
 
 
@@ -78,7 +78,7 @@ def errors_of(
     """Return the greatest error of cranks, in units of what is allowed, and of the joint."""
     shares = [_AT_ENDS, 1.0 - _AT_ENDS, *(rng.random() for _ in range(count))]
     wanted = np.array([branch.low + share * (branch.high - branch.low) for share in shares])
-    cranks = np.array([branch.find(y)[0] for y in wanted.tolist()])
+    cranks = np.array([branch.find_crank(y)[0] for y in wanted.tolist()])
     batch = closure.solve(cranks, derivatives=1)
     assert batch.velocities is not None
     row = closure.joint_names.index(joint)

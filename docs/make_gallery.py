@@ -34,7 +34,7 @@ from linkage_ros.kinematics.pose_view import all_places, symbol_size, View, view
 from linkage_ros.kinematics.shapes import corners, outline, shapes
 from linkage_ros.kinematics.sides import sides_at
 from linkage_ros.kinematics.sweep_analysis import (
-    conditionings,
+    conditioning_curves,
     InputSweep,
     transmission_angles,
     usual_inputs,
@@ -178,7 +178,7 @@ def _sequence(closure: Closure) -> str:
     for number, group in enumerate(closure.structure.groups):
         kind, links, how, assembly = describe_group(closure, number, sides)
         if isinstance(group, Driven):
-            driven = closure.linkage.driven[group.index].joint
+            driven = closure.linkage.driven_joints[group.index].joint
             steps.append(f'{kind} {driven}')
         else:
             beside = assembly if how == 'closed form' else how
@@ -192,7 +192,7 @@ def _range(closure: Closure) -> str:
     sweep = InputSweep(closure)
     intervals = []
     for interval in sweep.ranges:
-        if interval.whole:
+        if interval.is_whole:
             return 'the input turns fully'
         low, high = interval.lowest, interval.highest
         intervals.append(
@@ -213,7 +213,9 @@ def _worst(closure: Closure) -> str:
         group, extremes = min(angles.items(), key=lambda item: item[1].lowest.value)
         text = f'Least transmission angle: {angle_text(extremes.lowest.value, 1)}'
     else:
-        group, extremes = min(conditionings(sweep).items(), key=lambda item: item[1].lowest.value)
+        group, extremes = min(
+            conditioning_curves(sweep).items(), key=lambda item: item[1].lowest.value
+        )
         text = f'Worst conditioning: {extremes.lowest.value:.3f}'
     links = ', '.join(links_of(closure.structure.groups[group]))
     at = extremes.lowest.at

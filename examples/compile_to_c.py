@@ -14,11 +14,11 @@ import subprocess
 
 import linkage_ros as lr
 from linkage_ros.kinematics.compiling.c import C
-from linkage_ros.kinematics.compiling.source import source, Subject
+from linkage_ros.kinematics.compiling.source import Subject, write_source
 
 closure = lr.load('four_bar')
 subject = Subject(closure, 'four_bar', 'four_bar.yaml', 0, closure.joint_names)
-Path('four_bar.c').write_text(source(subject, C('four_bar', header=False)))
+Path('four_bar.c').write_text(write_source(subject, C('four_bar', header=False)))
 compile_it = 'cc -O2 -ffp-contract=off -shared -fPIC four_bar.c -o four_bar.so -lm'
 subprocess.run(compile_it.split(), check=True)
 

@@ -31,7 +31,7 @@ from linkage_ros.files.tables import table_file
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.languages import LANGUAGES
-from linkage_ros.kinematics.compiling.source import source, Subject
+from linkage_ros.kinematics.compiling.source import Subject, write_source
 from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.robot_models.mjcf import mjcf
@@ -107,7 +107,7 @@ def subject(closure: Closure) -> Subject:
 
 def code(closure: Closure, suffix: str) -> str:
     made = subject(closure)
-    return source(made, LANGUAGES[suffix](made))
+    return write_source(made, LANGUAGES[suffix](made))
 
 
 def check_comment(text: str, closure: Closure) -> None:
@@ -185,7 +185,7 @@ def test_the_name_of_a_file_is_no_encoding_of_a_python_module(
     closure = four_bar((*HOSTILE[14:25], name))
     made = subject(closure)._replace(name=name)
     file = tmp_path / 'a.py'
-    file.write_text(source(made, LANGUAGES['.py'](made)), 'utf-8')
+    file.write_text(write_source(made, LANGUAGES['.py'](made)), 'utf-8')
     run_python(file)
 
 

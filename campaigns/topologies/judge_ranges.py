@@ -76,7 +76,7 @@ def judge_ranges(
         inside = any(low - same <= value <= high + same for low, high in travel.parts)
         well_inside = any(low + same <= value <= high - same for low, high in travel.parts)
         in_range = any(
-            interval.whole or interval.lowest - same <= value + turn <= interval.highest + same
+            interval.is_whole or interval.lowest - same <= value + turn <= interval.highest + same
             for interval in ranges
             for turn in ((-2 * tau, -tau, 0.0, tau, 2 * tau) if turning else (0.0,))
         )
@@ -169,13 +169,13 @@ def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: 
         (interval, turn)
         for turn in turns
         for interval in ranges
-        if interval.whole or interval.lowest <= start + turn <= interval.highest
+        if interval.is_whole or interval.lowest <= start + turn <= interval.highest
     ]
     if not about:
         findings.find('range: a part is missing', f'the pose at {start:.9g} is not in {ranges}')
         return
     interval, turn = about[0]
-    if interval.whole:
+    if interval.is_whole:
         if down.end + up.end < tau - _SAME:
             findings.find(
                 'range: too wide', f'all, but {start - down.end:.9g} to {start + up.end:.9g}'

@@ -33,10 +33,10 @@ from campaigns.accuracy.random_families import add_random, Builder
 from campaigns.topologies.constraints import Array, Equations, Real
 from campaigns.topologies.geometry import DrivenLink, DrivenRRR, Group, Passing
 from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
     GROUND,
     Input,
     Linkage,
-    Pose,
     RevoluteJoint,
     Side,
     SlideJoint,
@@ -282,7 +282,7 @@ class TopologyBuilder(Builder):
         joints |= {f's_{name}': SlideJoint(name) for name in self._sliders}
         iterated = None in self._groups
         points = {name: (z.real, z.imag) for name, z in self._pose_points.items()}
-        pose = Pose(tuple(self._start), points)
+        pose = AssemblyPose(tuple(self._start), points)
         with_pose = iterated or len(self.inputs) > 1 or self.rng.random() < 0.5
         return Topology(
             Linkage(

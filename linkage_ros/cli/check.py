@@ -25,14 +25,14 @@ from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.linkage_file import linkage_content, read_closure
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
-from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.sides import closes_in_two_ways, closing_name, sides_at
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
-    conditionings,
+    conditioning_curves,
     Extreme,
     InputSweep,
-    MinMaxCurve,
+    SweptCurve,
     transmission_angles,
     usual_inputs,
     worst_residual,
@@ -104,7 +104,7 @@ def account_of(
     way = InputSweep(closure) if len(linkage.inputs) == 1 else None
     # Most of the time goes by here.
     parts = (_reach, _residual, _other_assemblies, _transmission, _conditioning)
-    sides = sides_at(closure, closure.posed(*usual_inputs(closure)))
+    sides = sides_at(closure, closure.close_unlimited(*usual_inputs(closure)))
     examined: dict[str, Any] = {}
     for number, part in enumerate(parts):
         advance(number, len(parts))
@@ -116,7 +116,7 @@ def account_of(
         'shared_pins': any(named.count(point) > 2 for point in named),
         'sliders': len(structure.joints) - pins,
         'loops': len(structure.joints) - moving,
-        'degrees_of_freedom': structure.freedom,
+        'degrees_of_freedom': structure.mobility,
         'inputs': [
             {
                 'joint': given.joint,
@@ -185,7 +185,7 @@ def _counts_turns(closure: Closure) -> bool:
         return False
     parts = (getattr(step, 'diagonal', getattr(step, 'rail', None)) for step in closure.steps)
     crossed = (sum(getattr(part, 'crosses', ())) for part in parts)
-    return iterated(closure) or any(number == 1 for number in crossed)
+    return is_iterated(closure) or any(number == 1 for number in crossed)
 
 
 def _group(closure: Closure, number: int, sides: Mapping[str, str]) -> dict[str, Any]:
@@ -206,7 +206,7 @@ def _reach(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
             {
                 'low': interval.lowest,
                 'high': interval.highest,
-                'whole': interval.whole,
+                'whole': interval.is_whole,
                 'turns': interval.turns,
                 'limited': list(interval.limited),
                 'limited_by': [by or None for by in interval.by],
@@ -274,11 +274,11 @@ def _transmission(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
 
 
 def _conditioning(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
-    found = conditionings(way) if way is not None else {}
+    found = conditioning_curves(way) if way is not None else {}
     return {'conditioning': _curves(closure, found, 'conditioning')}
 
 
-def _curves(closure: Closure, found: Mapping[int, MinMaxCurve], key: str) -> list[dict[str, Any]]:
+def _curves(closure: Closure, found: Mapping[int, SweptCurve], key: str) -> list[dict[str, Any]]:
     """Return the extreme values by group, and the inputs where they occur; none if constant."""
 
     def extreme(one: Extreme) -> dict[str, Any]:
@@ -301,7 +301,7 @@ def describe_group(
     """Return kind, links, solution method and assembly of a group; sides as `sides_at`."""
     group: Group = closure.structure.groups[number]
     if isinstance(group, Driven):
-        given = closure.linkage.driven[group.index]
+        given = closure.linkage.driven_joints[group.index]
         place = f'{"pin" if group.joint.kind == "R" else "slider"} {group.joint.name}'
         ratio = closure.linkage.ratios.get(given.joint)
         follows = f' follows {ratio.of} by {ratio.ratio:g}' if ratio else ''

@@ -26,7 +26,7 @@ from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import linkage_content, read_closure
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.languages import C_NAME, c_name, LANGUAGES
-from linkage_ros.kinematics.compiling.source import source, Subject
+from linkage_ros.kinematics.compiling.source import Subject, write_source
 from linkage_ros.resources import named_file
 
 EXAMPLE = 'linkage compile four_bar -o four_bar.c'
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         _joints(closure, arguments.joints),
     )
     try:
-        text = source(subject, language(subject))
+        text = write_source(subject, language(subject))
     except DefinitionError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
     atomic_write(output, text.encode())

@@ -240,8 +240,8 @@ def _unreached(
     """Return the error for a value of a joint that no input within the limits reaches."""
     free = closure.branches(joint, limited=False)
     for branch in free:
-        if not branch.beyond(value):
-            beyond = closure.beyond(closure.position(branch.find(value)[0]))
+        if not branch.distance_beyond(value):
+            beyond = closure.limit_exceeded(closure.position(branch.find_crank(value)[0]))
             reason = f'is reached only beyond limits: {beyond}'
             return LinkageError(option, reason, 'ask for another value, or widen the limits')
     within = closure.branches(joint)

@@ -134,7 +134,7 @@ def range_motion(shown: View, title: str, seconds: float) -> Motion:
     """
     count = count_of(seconds)
     low, high = shown.interval.lowest, shown.interval.highest
-    if shown.interval.whole:
+    if shown.interval.is_whole:
         start = shown.inputs[0]
         x = [start + (high - low) * i / count for i in range(count)]
         x = [value + shown.interval.shift(value) for value in x]
@@ -144,7 +144,7 @@ def range_motion(shown: View, title: str, seconds: float) -> Motion:
     links = tuple(link for link in link_frames(shown.closure, shown.position) if link != GROUND)
     frames = np.full((count, len(links), 3), nan)
     for i, value in enumerate(x):
-        position = way.position(min(max(value, low), high))
+        position = way.position_at(min(max(value, low), high))
         if not position.joints:
             continue
         found = link_frames(shown.closure, position)

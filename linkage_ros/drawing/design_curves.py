@@ -115,7 +115,7 @@ def _ranges(way: InputSweep, cranks: Sequence[float]) -> list[InputRange]:
         interval = way.range_about(crank)
         if interval is None:
             continue
-        if interval.whole:
+        if interval.is_whole:
             low, high = min(cranks), max(cranks)
             half = max(pi, 0.5 * (high - low))
             return [InputRange(0.5 * (low + high) - half, 0.5 * (low + high) + half, True, _TURNS)]
@@ -133,7 +133,7 @@ def _branch(way: InputSweep, interval: InputRange, side: Assembly, own: Assembly
         part = 0.5 - 0.5 * np.cos(pi * part)
     crank, joints, trace = [], [], []
     for value in (low + (high - low) * part).tolist():
-        position = way.position(min(max(value, low), high))
+        position = way.position_at(min(max(value, low), high))
         if position.joints:
             crank.append(value)
             joints.append(position.joints)

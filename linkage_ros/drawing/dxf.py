@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import carriers
+from linkage_ros.kinematics.linkage import links_by_point
 from linkage_ros.kinematics.pose_view import symbol_size, View, view
 from linkage_ros.kinematics.shapes import corners, hull, link_frames
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
@@ -112,7 +112,7 @@ def _parts(shown: View) -> list[_Part]:
     """Return the links as parts."""
     closure = shown.closure
     linkage = closure.linkage
-    shared = {name for name, links in carriers(linkage.links).items() if len(links) > 1}
+    shared = {name for name, links in links_by_point(linkage.links).items() if len(links) > 1}
     shared |= {slider.point for slider in linkage.sliders.values()}
     parts = []
     for link, points in linkage.links.items():

@@ -55,7 +55,7 @@ def _turns_text(shown: View) -> str:
 
 
 def _beyond_text(shown: View) -> str:
-    beyond = shown.closure.beyond(shown.position)
+    beyond = shown.closure.limit_exceeded(shown.position)
     return f' (limited: {beyond})' if beyond else ''
 
 

@@ -59,7 +59,7 @@ def refuse_beyond(
     unit = given.unit
     goes = f'takes {quoted(given.joint)} from {low:.6g} {unit} to {high:.6g} {unit}'
     for bound in closure.bounds.inputs:
-        if bound.number == number and (bound.beyond(low) or bound.beyond(high)):
+        if bound.number == number and (bound.is_beyond(low) or bound.is_beyond(high)):
             raise DefinitionError(
                 where,
                 f'{goes}, beyond its limits {given.limits} {unit}',
@@ -70,7 +70,7 @@ def refuse_beyond(
     way = InputSweep(closure)
     interval = way.range_about(start)
     if interval is None:
-        if beyond := closure.beyond(way.position(start)):
+        if beyond := closure.limit_exceeded(way.position_at(start)):
             raise DefinitionError(
                 where,
                 f'starts at {start:.6g} {unit}, beyond limits: {beyond}',

@@ -44,7 +44,7 @@ def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure
 
 def crank_of(branch: CrankBranch, value: float, rate: float) -> tuple[float, float]:
     """Return the crank and its rate for a value of the joint that is reached, and its rate."""
-    crank, slope = branch.find(value)
+    crank, slope = branch.find_crank(value)
     if abs(slope) < branch.flat:
         return crank, nan
     return crank, rate / (branch.evaluate(crank)[1] if isfinite(slope) else slope)
@@ -89,7 +89,7 @@ class DependentSampleReader:
         stamp, (value,), rates = sample
         if not -LARGEST <= value <= LARGEST:
             return sample  # The drive says why not.
-        if self._branch.beyond(value):
+        if self._branch.distance_beyond(value):
             return Rejection.NO_CRANK
         crank, rate = crank_of(self._branch, value, rates[0] if rates else nan)
         return CrankSample(stamp, (crank,), (rate,) if rates else None)

@@ -31,7 +31,7 @@ from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.parameters import choice, number, option, whole
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.ranges import describe
+from linkage_ros.kinematics.ranges import describe_ranges
 from linkage_ros.messages.joint_state import EffortCommand, JointEffortReader, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.layout import NANOSECONDS
@@ -358,9 +358,9 @@ def _motor(given: MotorParameters, most: float) -> Motor | Winding:
 def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]:
     """Return the stops of the input, in [rad] or [m]: at limits, or before a toggle."""
     # If the input has limits, its angle is not reduced by whole turns.
-    counted = closure.linkage.inputs[0].limits.bounded
+    counted = closure.linkage.inputs[0].limits.is_bounded
     for each in closure.input_ranges:
-        if each.whole:
+        if each.is_whole:
             return -inf, inf
         turns = 0.0 if counted else each.shift(start)
         low, high = each.lowest - turns, each.highest - turns
@@ -376,7 +376,7 @@ def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]
     raise DefinitionError(
         'drive.torque.start',
         f'{start:g} {closure.linkage.inputs[0].unit} is not between the stops; '
-        f'reachable: {describe(closure.input_ranges)}',
+        f'reachable: {describe_ranges(closure.input_ranges)}',
         f'start there, {margin:g} of the range or more from its ends',
     )
 

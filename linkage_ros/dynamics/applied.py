@@ -27,7 +27,7 @@ from linkage_ros.dynamics import longest_step
 from linkage_ros.dynamics.laws import Contact, Law, LawTerm, Table
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, JointSpring, PointLoad, SoftStop
 from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
-from linkage_ros.kinematics.arithmetic import called, facing, remainder
+from linkage_ros.kinematics.arithmetic import call, remainder, unit_vector
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
 from linkage_ros.kinematics.results import Position, Velocity
@@ -101,7 +101,7 @@ class LoadedPoint(NamedTuple):
         """Return the direction in the frame of the ground."""
         if not self.coordinate:
             return self.unit
-        return facing(position.state.coordinates[self.coordinate]) * self.unit
+        return unit_vector(position.state.coordinates[self.coordinate]) * self.unit
 
     def lever(self, _velocity: Velocity, position: Position, moved: Sequence[complex]) -> float:
         """Return the velocity of the point along the direction, in [m/s]."""
@@ -369,10 +369,10 @@ class AppliedForces:
         yield from self._constant
         for at, of, force in self._lawful:
             rate = of.lever(velocity, position, ())
-            yield at, called(force, of.value(position), rate, *now)[0]
+            yield at, call(force, of.value(position), rate, *now)[0]
         for at, component in self._components:
             # A compiled program asks for the wrench each time that it runs.
-            yield at, called(component.acting, position.state.coordinates[1])[0]
+            yield at, call(component.acting, position.state.coordinates[1])[0]
 
     def work(
         self,
@@ -413,7 +413,7 @@ def _check(closure: Closure, applied: AppliedLoads) -> None:
     linkage = closure.linkage
     for name in applied.stops:
         limits = linkage.limits.get(name)
-        if limits is None or not limits.bounded:
+        if limits is None or not limits.is_bounded:
             raise DefinitionError(
                 f'loads.stops.{name}',
                 'the joint has no limits',

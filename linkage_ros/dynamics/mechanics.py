@@ -44,10 +44,10 @@ from linkage_ros.dynamics.loads import (
 )
 from linkage_ros.dynamics.longest_step import check_step, EXACT
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.arithmetic import all_finite, called, copysign, where
+from linkage_ros.kinematics.arithmetic import all_finite, call, copysign, where
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
+from linkage_ros.kinematics.compiling.trace import TracedMotion as CompiledMotion
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
 if TYPE_CHECKING:
@@ -455,7 +455,7 @@ def resistance(rubbing: Rubbing, v: list[float]) -> float:
     stands = _stands(v, rubbing.one, rubbing.other)
     dry = where(stands, 0.0, copysign(coulomb, slip)) if coulomb else 0.0
     if rubbing.law:
-        dry -= where(stands, 0.0, called(rubbing.law.at, slip)[0])
+        dry -= where(stands, 0.0, call(rubbing.law.at, slip)[0])
     return rubbing.friction.viscous * slip + dry
 
 

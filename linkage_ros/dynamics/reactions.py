@@ -36,10 +36,10 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.mechanics import Mechanics, resistance, Rubbing, sense, stretched
 from linkage_ros.errors import DefinitionError, listed
-from linkage_ros.kinematics.arithmetic import called, facing, is_found, vector
+from linkage_ros.kinematics.arithmetic import call, has_result, make_vector, unit_vector
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
+from linkage_ros.kinematics.compiling.trace import TracedMotion as CompiledMotion
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.status import Status
@@ -73,7 +73,7 @@ class Line(NamedTuple):
 
     def direction(self, coordinates: Sequence[float]) -> complex:
         """Return the direction in the frame of the ground, a unit vector."""
-        return facing(coordinates[self.coordinate]) * self.unit
+        return unit_vector(coordinates[self.coordinate]) * self.unit
 
 
 class JointMatrix:
@@ -168,7 +168,7 @@ class JointMatrix:
                 lever = (places[place] - places[center]) / self._scale
                 moment = lever.real * force.imag - lever.imag * force.real
                 values += (sign * force.real, sign * force.imag, sign * moment)
-        matrix: Array = called(self._fill, *values)
+        matrix: Array = call(self._fill, *values)
         return matrix
 
     def _plan_pins(
@@ -357,7 +357,7 @@ class Reactions:
             one, other = forces[2 * number], forces[2 * number + 1]
             resisting = resistances[number]
             if number in lines:
-                force = vector(-resisting, one) * lines[number].direction(x)
+                force = make_vector(-resisting, one) * lines[number].direction(x)
                 reaction = Reaction(force.real, force.imag, other * self._scale)
             else:
                 reaction = Reaction(one, other, 0.0 - resisting)
@@ -444,8 +444,8 @@ class Reactions:
         more, _ = self._sides(position, velocity, pulled, places, None)
         by_pull = [one - other for one, other in zip(more[:size], sides[:size], strict=True)]
         columns = [*sides[:size], *by_pull, *sides[size:]]
-        forces = called(self._forces_in, self._matrix.at(x, places), *columns)
-        if not is_found(forces):
+        forces = call(self._forces_in, self._matrix.at(x, places), *columns)
+        if not has_result(forces):
             return []
         v = velocity.state.coordinates
         unit = self._scale if closure.linkage.inputs[0].slider else 1.0
@@ -492,8 +492,8 @@ class Reactions:
                 gaps[2 * number] = offset.real * across.real + offset.imag * across.imag
             else:
                 gaps[2 * number], gaps[2 * number + 1] = offset.real, offset.imag
-        moved = called(_turned_solved, matrix, *gaps)
-        if not is_found(moved):
+        moved = call(_turned_solved, matrix, *gaps)
+        if not has_result(moved):
             return None
         shifts: tuple[float, ...] = ()
         for published in self._published:
@@ -512,7 +512,7 @@ class Reactions:
         place, slid = places[self._places[number]], 0.0
         for row, center, sign in self._matrix.sides[number]:
             lever = (place - places[center]) / self._scale
-            way = vector(moved[row], moved[row + 1]) + 1j * moved[row + 2] * lever
+            way = make_vector(moved[row], moved[row + 1]) + 1j * moved[row + 2] * lever
             slid += sign * (way.real * along.real + way.imag * along.imag)
         return slid
 
@@ -528,8 +528,8 @@ class Reactions:
             return None
         x, places = position.state.coordinates, self._follower.places(position)
         sides, resistances = self._sides(position, velocity, acceleration, places, seconds)
-        forces = called(self._solved, self._matrix.at(x, places), *sides)
-        if not is_found(forces):
+        forces = call(self._solved, self._matrix.at(x, places), *sides)
+        if not has_result(forces):
             return None
         v = velocity.state.coordinates
         for i, rubbing in enumerate(self._pressed):

@@ -92,7 +92,7 @@ def beginnings(closure: Closure) -> dict[int, Begin]:
     """
     bounds, joints = closure.bounds, list(closure.linkage.joints)
     found: dict[int, Begin] = {
-        bound.number: bound.turned for bound in bounds.joints if bound.middle is not None
+        bound.number: bound.turn_to_middle for bound in bounds.joints if bound.middle is not None
     }
     for bound in bounds.inputs:
         if bound.name in joints and closure.turning[joints.index(bound.name)]:

@@ -38,7 +38,7 @@ from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import MechanismState, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.files.parameters import each, Number
-from linkage_ros.kinematics.arithmetic import called, vector
+from linkage_ros.kinematics.arithmetic import call, make_vector
 
 _SMALLEST = 1e-12
 """Below this fraction of the largest force, a force is rounding error without a direction."""
@@ -90,14 +90,14 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
         reactions = motion.reactions
         if not reactions:
             return motion
-        sizes = [called(hypot, fx, fy) for fx, fy, _ in reactions]
-        smallest = _SMALLEST * called(max, *sizes)
+        sizes = [call(hypot, fx, fy) for fx, fy, _ in reactions]
+        smallest = _SMALLEST * call(max, *sizes)
         offsets = list(centred)
         for joint, play in plays:
             size = sizes[joint]
             if size > smallest:
                 fx, fy, _ = reactions[joint]
-                offsets[joint] = vector(-play * (fx / size), -play * (fy / size))
+                offsets[joint] = make_vector(-play * (fx / size), -play * (fy / size))
         moved = shift_of(motion.position, offsets)
         return motion if moved is None else yielding(motion, moved)
 

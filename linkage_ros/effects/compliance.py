@@ -33,7 +33,7 @@ from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import MechanismState, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.files.parameters import each, Number
-from linkage_ros.kinematics.arithmetic import facing
+from linkage_ros.kinematics.arithmetic import unit_vector
 from linkage_ros.kinematics.topology import Joint
 
 _STIFFEST = 1e15
@@ -87,7 +87,7 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
         x = position.state.coordinates
         offsets = list(rigid)
         for coordinate, axis, halves, far, softness in bars:
-            along = facing(x[coordinate]) * axis
+            along = unit_vector(x[coordinate]) * axis
             tension = 0.0
             for joint, half in halves:
                 fx, fy, _ = reactions[joint]

@@ -24,7 +24,7 @@ from math import log1p, pi
 from typing import NamedTuple
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import carriers, GROUND, Input
+from linkage_ros.kinematics.linkage import GROUND, Input, links_by_point
 from linkage_ros.kinematics.pose_view import all_places, symbol_size, view
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.shapes import (
@@ -259,7 +259,7 @@ def _still(drawn: Sequence[Shape], size: float, lifetime: int) -> list[Marker]:
 
 def _traced(closure: Closure) -> dict[str, Key]:
     """Return the key of each traced point."""
-    links = carriers(closure.linkage.links)
+    links = links_by_point(closure.linkage.links)
     return {point: Key(links[point][0], point) for point in closure.linkage.traced}
 
 

@@ -24,18 +24,18 @@ from linkage_ros.files.units import ANGLES, LENGTHS, Units
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
     GROUND,
     Input,
     Limits,
     Linkage,
     Mass,
-    Pose,
     Ratio,
     RevoluteJoint,
     SlideJoint,
     Slider,
 )
-from linkage_ros.kinematics.sides import assembly_sides, undrawn
+from linkage_ros.kinematics.sides import assembly_sides, without_drawn_pose
 from linkage_ros.kinematics.sweep_analysis import check_closes, check_limits, check_turns
 from linkage_ros.kinematics.topology import assur_groups
 from linkage_ros.resources import linkage_names, named_file
@@ -262,14 +262,14 @@ def _limits(content: Section, *, slides: bool = False) -> Limits:
     )
 
 
-def _pose(content: Section, driven: Sequence[Input]) -> Pose:
+def _pose(content: Section, driven: Sequence[Input]) -> AssemblyPose:
     # A wrong number of values is refused with the other parts that do not match.
     values = content.numbers('inputs', most=FARTHEST)
     units = chain((given.unit for given in driven), repeat(''))
     inputs = tuple(map(content.units.read, values, units))
     points = content.section('points', required=False)
     angles = content.section('angles', required=False)
-    pose = Pose(
+    pose = AssemblyPose(
         inputs,
         {name: points.point(name, most=FARTHEST, unit='m') for name in points},
         {name: angles.number(name, least=-FARTHEST, most=FARTHEST, unit='rad') for name in angles},
@@ -393,7 +393,7 @@ def _posed(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
     """Return an expanded shorthand with the pose that it gives; a drawn one tells the side."""
     if 'pose' in content:
         pose = _pose(content.section('pose'), [_DRIVEN_CRANK])
-        if pose.drawn and 'assembly' not in content:
+        if pose.is_drawn and 'assembly' not in content:
             del written_out['assembly']
         written_out['pose'] = {
             'inputs': [*pose.inputs],
@@ -498,7 +498,7 @@ def closures(content: Section, name: str) -> dict[str, Closure]:
         raise content.error('assembly', reason, f'leave out only {_MOST_SIDES} of them')
     found = {}
     errors = []
-    written = undrawn(written, structure)
+    written = without_drawn_pose(written, structure)
     for chosen in product(*(sides[name] for name in free)):
         assembly = dict(written.assembly) | dict(zip(free, chosen, strict=True))
         one = replace(written, assembly=assembly)  # type: ignore[arg-type]  # sides, as above

@@ -34,16 +34,16 @@ from linkage_ros.files.units import Units
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
     Input,
     Limits,
     Linkage,
-    Pose,
     Ratio,
     RevoluteJoint,
     SlideJoint,
     Slider,
 )
-from linkage_ros.kinematics.ranges import describe
+from linkage_ros.kinematics.ranges import describe_ranges
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep, starts_at_pose, usual_inputs
 
@@ -161,14 +161,14 @@ def _ratio(given: Ratio) -> dict[str, Content]:
 
 
 def _limits(limits: Limits) -> dict[str, Content]:
-    bounds: dict[str, Content] = {'limits': [limits.low, limits.high]} if limits.bounded else {}
+    bounds: dict[str, Content] = {'limits': [limits.low, limits.high]} if limits.is_bounded else {}
     for key in ('velocity', 'effort'):
         if isfinite(value := getattr(limits, key)):
             bounds[key] = value
     return bounds
 
 
-def _pose(pose: Pose | None) -> dict[str, Content]:
+def _pose(pose: AssemblyPose | None) -> dict[str, Content]:
     if pose is None:
         return {}
     content: dict[str, Content] = {'inputs': [*pose.inputs]}
@@ -179,14 +179,14 @@ def _pose(pose: Pose | None) -> dict[str, Content]:
     return content
 
 
-def pose_text(linkage: Linkage, pose: Pose, units: Units) -> str:
+def pose_text(linkage: Linkage, pose: AssemblyPose, units: Units) -> str:
     """Return the line of a pose for a linkage file in some units, with seven digits."""
 
     def shown(value: float, unit: str) -> float:
         return float(f'{units.shown(value, unit):.7g}') + 0.0
 
     driven = zip(pose.inputs, linkage.inputs, strict=True)
-    rounded = Pose(
+    rounded = AssemblyPose(
         tuple(shown(value, given.unit) for value, given in driven),
         {name: (shown(x, 'm'), shown(y, 'm')) for name, (x, y) in pose.points.items()},
         {link: shown(angle, 'rad') for link, angle in pose.angles.items()},
@@ -262,7 +262,7 @@ def _drive(closure: Closure) -> str:
     if len(closure.linkage.inputs) > 1:
         return '{topic: {}}'
     start, interval = _start(closure)
-    if interval.whole:
+    if interval.is_whole:
         return f'{{constant_rate: {{rate: 1, start: {number_text(start)}}}}}'
     left_out = 0.5 * (1.0 - _PART) * (interval.highest - interval.lowest)
     low, high = (
@@ -296,11 +296,11 @@ def _start(closure: Closure) -> tuple[float, InputRange]:
     for value in (start, start - near, start + near):
         interval = way.range_about(value)
         if interval is not None:
-            if not interval.whole:
+            if not interval.is_whole:
                 start = min(max(start, interval.lowest), interval.highest)
             return start, interval
     raise DefinitionError(
         'pose.inputs',
         f'no loop closes at {start:g} {"rad" if way.turning else "m"}',
-        f'start within {describe(way.ranges)}',
+        f'start within {describe_ranges(way.ranges)}',
     )

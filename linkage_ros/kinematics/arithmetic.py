@@ -31,7 +31,7 @@ def sin(angle: float) -> float:
     try:
         return math.sin(angle)
     except TypeError:
-        return _real(angle, 'sin')
+        return _real_symbol(angle, 'sin')
 
 
 def cos(angle: float) -> float:
@@ -39,7 +39,7 @@ def cos(angle: float) -> float:
     try:
         return math.cos(angle)
     except TypeError:
-        return _real(angle, 'cos')
+        return _real_symbol(angle, 'cos')
 
 
 def sqrt(square: float) -> float:
@@ -47,7 +47,7 @@ def sqrt(square: float) -> float:
     try:
         return math.sqrt(square)
     except TypeError:
-        return _real(square, 'sqrt')
+        return _real_symbol(square, 'sqrt')
 
 
 def atan2(y: float, x: float) -> float:
@@ -55,7 +55,7 @@ def atan2(y: float, x: float) -> float:
     try:
         return math.atan2(y, x)
     except TypeError:
-        return _real(y if hasattr(y, 'apply') else x, 'atan2', y, x)
+        return _real_symbol(y if hasattr(y, 'apply') else x, 'atan2', y, x)
 
 
 def copysign(size: float, sign: float) -> float:
@@ -63,7 +63,7 @@ def copysign(size: float, sign: float) -> float:
     try:
         return math.copysign(size, sign)
     except TypeError:
-        return _real(sign, 'copysign', size, sign)
+        return _real_symbol(sign, 'copysign', size, sign)
 
 
 def remainder(number: float, period: float) -> float:
@@ -71,15 +71,15 @@ def remainder(number: float, period: float) -> float:
     try:
         return math.remainder(number, period)
     except TypeError:
-        return _real(number, 'remainder', number, period)
+        return _real_symbol(number, 'remainder', number, period)
 
 
-def facing(angle: float) -> complex:
+def unit_vector(angle: float) -> complex:
     """Return the unit vector e^{iθ} at an angle, in [rad]."""
     try:
         return cmath.rect(1.0, angle)
     except TypeError:
-        return _complex(angle, 'facing')
+        return _complex_symbol(angle, 'facing')
 
 
 def phase(vector: complex) -> float:
@@ -87,15 +87,15 @@ def phase(vector: complex) -> float:
     try:
         return cmath.phase(vector)
     except TypeError:
-        return _real(vector, 'phase')
+        return _real_symbol(vector, 'phase')
 
 
-def vector(x: float, y: float) -> complex:
+def make_vector(x: float, y: float) -> complex:
     """Return the vector of two coordinates."""
     try:
         return complex(x, y)
     except TypeError:
-        return _complex(x if hasattr(x, 'apply') else y, 'vector', x, y)
+        return _complex_symbol(x if hasattr(x, 'apply') else y, 'vector', x, y)
 
 
 def all_finite(numbers: Sequence[float]) -> bool:
@@ -106,7 +106,7 @@ def all_finite(numbers: Sequence[float]) -> bool:
         symbols = [number for number in numbers if hasattr(number, 'apply')]
         if not symbols:
             raise
-        return bool(_real(symbols[0], 'finite', *numbers))
+        return bool(_real_symbol(symbols[0], 'finite', *numbers))
 
 
 def where(condition: bool, one: float, other: float) -> float:
@@ -117,11 +117,11 @@ def where(condition: bool, one: float, other: float) -> float:
     a condition that decides about the linkage.
     """
     if hasattr(condition, 'apply'):
-        return _real(condition, 'where', condition, one, other)
+        return _real_symbol(condition, 'where', condition, one, other)
     return one if condition else other
 
 
-def called(function: Callable[..., Any], *arguments: Any) -> Any:
+def call(function: Callable[..., Any], *arguments: Any) -> Any:
     """
     Call a function that takes numbers only, such as an iteration or a library function.
 
@@ -133,34 +133,34 @@ def called(function: Callable[..., Any], *arguments: Any) -> Any:
     return function(*arguments)
 
 
-def is_found(result: Any) -> bool:
+def has_result(result: Any) -> bool:
     """Return whether the result of a function that was `called` is not None."""
-    return bool(_real(result, 'found')) if hasattr(result, 'apply') else result is not None
+    return bool(_real_symbol(result, 'found')) if hasattr(result, 'apply') else result is not None
 
 
-def _real(symbol: Any, name: str, *arguments: Any) -> float:
+def _real_symbol(symbol: Any, name: str, *arguments: Any) -> float:
     """Return the symbol of an operation, typed as the number that it stands for."""
     result: float = symbol.apply(name, *(arguments or (symbol,)))
     return result
 
 
-def _complex(symbol: Any, name: str, *arguments: Any) -> complex:
+def _complex_symbol(symbol: Any, name: str, *arguments: Any) -> complex:
     result: complex = symbol.apply(name, *(arguments or (symbol,)))
     return result
 
 
-def cross(one: complex, other: complex) -> float:
+def cross_product(one: complex, other: complex) -> float:
     """Return the z component of the cross product of two vectors."""
     return one.real * other.imag - one.imag * other.real
 
 
-def resolved(vector: complex, unit: complex) -> tuple[float, float]:
+def resolve_along(vector: complex, unit: complex) -> tuple[float, float]:
     """Return the components of a vector along a unit vector and to the left of it."""
     turned = vector * unit.conjugate()
     return turned.real, turned.imag
 
 
-def folded(angle: float) -> float:
+def acute_angle(angle: float) -> float:
     """Return the acute angle between two lines, given any angle between them, in [rad]."""
     return abs(math_remainder(angle, pi))
 
@@ -174,7 +174,7 @@ ROUNDING = 16.0 * UNIT_ROUNDOFF
 """Bound of the error of a reach, relative to the size of its terms."""
 
 
-def margin(*lengths: float) -> float:
+def exact_sum(*lengths: float) -> float:
     """
     Return a sum of signed lengths that is a constant of a linkage, correctly rounded.
 
@@ -194,7 +194,7 @@ class Root(NamedTuple):
     status: Status = Status.CLOSED
 
 
-def reach(constant: float, part: float, square: float) -> Root:
+def signed_root(constant: float, part: float, square: float) -> Root:
     """
     Return the root of ``constant + part²``, given the square.
 

@@ -57,18 +57,20 @@ def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
         for step, owner in zip(closure.steps, closure.step_groups, strict=True)
         if owner == number and isinstance(step, Iteration)
     )
-    solutions = _search(step)
+    solutions = _search_solutions(step)
     if not solutions:
         return []
     first, *others = solutions
     return [
-        Assembly(_places(closure, group, unknowns), _turns(closure, group, step, unknowns))
+        Assembly(
+            _pose_points(closure, group, unknowns), _turns_to_reach(closure, group, step, unknowns)
+        )
         for unknowns in others
-        if not _same(unknowns, first)
+        if not _are_same(unknowns, first)
     ]
 
 
-def _search(step: Iteration) -> list[Array]:
+def _search_solutions(step: Iteration) -> list[Array]:
     """Return the solutions at the pose's inputs, that of the pose first."""
     first = step.solution()
     if first is None:
@@ -78,18 +80,18 @@ def _search(step: Iteration) -> list[Array]:
     for _ in range(STARTS):
         angles = rng.uniform(-np.pi, np.pi, len(first) // 3)
         solution = step.solution_from(angles)
-        if solution is not None and not any(_same(solution, one) for one in solutions):
+        if solution is not None and not any(_are_same(solution, one) for one in solutions):
             solutions.append(solution)
     return solutions
 
 
-def _same(one: Array, other: Array) -> bool:
+def _are_same(one: Array, other: Array) -> bool:
     away = one - other
     away[0::3] -= tau * np.round(away[0::3] / tau)
     return bool(np.abs(away).max() < _SAME)
 
 
-def _places(closure: Closure, group: Iterated, unknowns: Array) -> dict[str, complex]:
+def _pose_points(closure: Closure, group: Iterated, unknowns: Array) -> dict[str, complex]:
     """Return the places of the points of the group that the pose names."""
     pose = closure.linkage.pose
     assert pose is not None
@@ -105,7 +107,7 @@ def _places(closure: Closure, group: Iterated, unknowns: Array) -> dict[str, com
     return places
 
 
-def _turns(closure: Closure, group: Iterated, step: Iteration, unknowns: Array) -> int:
+def _turns_to_reach(closure: Closure, group: Iterated, step: Iteration, unknowns: Array) -> int:
     """Return the number of turns after which the pose's branch reaches a solution; 0 if never."""
     if len(step.inputs) > 1 or closure.linkage.inputs[0].slider:
         return 0
@@ -118,6 +120,6 @@ def _turns(closure: Closure, group: Iterated, step: Iteration, unknowns: Array) 
     first = 0 if turns else -int((x - low) // tau)
     for k in range(first, last + 1):
         solution = step.solution_at(x + k * tau)
-        if k and solution is not None and _same(unknowns, solution):
+        if k and solution is not None and _are_same(unknowns, solution):
             return k
     return 0

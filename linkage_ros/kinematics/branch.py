@@ -40,13 +40,13 @@ from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.equations import (
     Array,
+    bound_jacobian_change,
     Constraint,
-    derivative,
-    equations,
+    differentiate_constraints,
+    evaluate_constraints,
     is_meshed,
-    spread,
 )
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 import numpy as np
 
 _CONTRACTS = 0.6
@@ -72,14 +72,14 @@ _TOOTH = 1.0 / 16.0
 """Largest residual of a ratio at the start of a step, relative to its period; a step that is twice
 as long is off by four times as much, and so is refused before it could reach the next tooth."""
 
-KnownAt = Callable[[float], State | None]
+KnownAt = Callable[[float], LinkState | None]
 """State of the links solved before, at an input; None where they do not close."""
 
-RatesAt = Callable[[float], tuple[State, State] | None]
+RatesAt = Callable[[float], tuple[LinkState, LinkState] | None]
 """State of the links solved before and its derivatives by the input; None if there are none."""
 
 
-class Node(NamedTuple):
+class BranchNode(NamedTuple):
     """A point of the curve: the unknowns followed by the input, and the unit tangent there."""
 
     place: Array
@@ -90,26 +90,26 @@ class Cell(NamedTuple):
     """A piece of the curve, from one node to the next."""
 
     # The nodes.
-    begin: Node
-    end: Node
+    begin: BranchNode
+    end: BranchNode
     width: float  # Distance of the end along the tangent at the begin
     folds: bool = False  # Whether the curve turns back in x at the end
 
-    def control(self) -> Array:
+    def control_points(self) -> Array:
         """Return the four control points of the cubic, as rows."""
         (z, t), (z_end, t_end), h = self.begin, self.end, self.width
         ahead = t_end * (h / 3.0 / float(t @ t_end))
         return np.array([z, z + t * (h / 3.0), z_end - ahead, z_end])
 
-    def at(self, part: float) -> Array:
+    def point_at(self, part: float) -> Array:
         """Return the point of the cubic at a fraction of the width, from 0 to 1."""
         p, r = part, 1.0 - part
         weights = np.array([r * r * r, 3.0 * r * r * p, 3.0 * r * p * p, p * p * p])
-        return weights @ self.control()
+        return weights @ self.control_points()
 
     def part_of(self, x: float) -> float:
         """Return the fraction of the width at which the cubic has an input."""
-        a, b, c, d = (float(value) - x for value in self.control()[:, -1])
+        a, b, c, d = (float(value) - x for value in self.control_points()[:, -1])
         low, high = 0.0, 1.0
         rising = d > a
         part = a / (a - d) if a != d else 0.0
@@ -141,33 +141,33 @@ class Continuation:
     known_at: KnownAt
     rates_at: RatesAt
 
-    def first(self, unknowns: Array, x: float) -> Node | None:
+    def first_node(self, unknowns: Array, x: float) -> BranchNode | None:
         """Return the node at a solution, with its tangent towards larger inputs."""
-        system = self._system(np.append(unknowns, x))
+        system = self._evaluate_system(np.append(unknowns, x))
         if system is None:
             return None
         _, slopes = system
         tangent = np.linalg.svd(slopes)[2][-1]
-        return Node(np.append(unknowns, x), tangent if tangent[-1] >= 0.0 else -tangent)
+        return BranchNode(np.append(unknowns, x), tangent if tangent[-1] >= 0.0 else -tangent)
 
-    def alone(self, node: Node, away: Array) -> bool:
+    def is_isolated(self, node: BranchNode, away: Array) -> bool:
         """Return whether a node's solution is the only one at its input within a distance."""
-        known = self.known_at(float(node.place[-1]))
-        if known is None:
+        solved = self.known_at(float(node.place[-1]))
+        if solved is None:
             return False
         unknowns = node.place[:-1]
-        still = State([0.0] * len(known[0]), [0j] * len(known[1]))
-        slopes = np.array(equations(self.constraints, unknowns.tolist(), known)[1])
+        still = LinkState([0.0] * len(solved[0]), [0j] * len(solved[1]))
+        slopes = np.array(evaluate_constraints(self.constraints, unknowns.tolist(), solved)[1])
         if not is_meshed(self.constraints, (np.abs(slopes) @ away).tolist(), 0.25):
             return False
         try:
             inverse = np.linalg.inv(slopes)
         except np.linalg.LinAlgError:
             return False
-        change = spread(self.constraints, unknowns, known, away, still)
-        return _radius(np.abs(inverse) @ change) < 1.0
+        change = bound_jacobian_change(self.constraints, unknowns, solved, away, still)
+        return _spectral_bound(np.abs(inverse) @ change) < 1.0
 
-    def cells(self, node: Node, sign: float, last: float) -> Iterator[Cell]:
+    def follow_cells(self, node: BranchNode, sign: float, last: float) -> Iterator[Cell]:
         """
         Yield cell after cell, up to a toggle or to an input that must not be passed.
 
@@ -175,7 +175,7 @@ class Continuation:
         The sign is +1 towards larger inputs.
         """
         if node.tangent[-1] * sign < 0.0:
-            node = Node(node.place, -node.tangent)
+            node = BranchNode(node.place, -node.tangent)
         step = 2.0**-5
         count = 0
         while sign * (last - node.place[-1]) > 0.0 and count < _MOST_CELLS:
@@ -186,7 +186,7 @@ class Continuation:
             left = sign * (last - node.place[-1])
             slope = sign * float(node.tangent[-1])
             whole = slope > 0.0 and step * slope >= 0.9 * left
-            cell, growth = self._cell(node, step, last if whole else None)
+            cell, growth = self._next_cell(node, step, last if whole else None)
             if cell is not None and sign * (cell.end.place[-1] - last) > 0.0:
                 cell, growth = None, 0.5
             if cell is None:
@@ -195,14 +195,16 @@ class Continuation:
                     return
                 continue
             if sign * float(cell.end.tangent[-1]) <= 0.0:
-                yield self._folded(cell)
+                yield self._fold_cell(cell)
                 return
             yield cell
             count += 1
             node = cell.end
             step = cell.width * growth
 
-    def _cell(self, node: Node, step: float, last: float | None) -> tuple[Cell | None, float]:
+    def _next_cell(
+        self, node: BranchNode, step: float, last: float | None
+    ) -> tuple[Cell | None, float]:
         """
         Return the next cell or None, and the factor by which to change the step.
 
@@ -217,31 +219,31 @@ class Continuation:
             row[-1] = 1.0
             start = z + tangent * ((last - z[-1]) / tangent[-1])
             start[-1] = last
-        place = self._corrected(start, row, goal)
+        place = self._correct_onto(start, row, goal)
         if place is None:
             return None, 0.25
-        end = self._node(place, tangent)
+        end = self._make_node(place, tangent)
         if end is None:
             return None, 0.25
         cell = Cell(node, end, float(tangent @ (place - z)))
         facing = float(tangent @ end.tangent)
-        if facing < 0.5 or cell.width <= 0.0 or not self._straight(cell):
+        if facing < 0.5 or cell.width <= 0.0 or not self._turns_at_most_once(cell):
             return None, 0.5
-        contraction = self._contraction(cell)
+        contraction = self._contraction_factor(cell)
         if not contraction <= _CONTRACTS:
             return None, max(0.1, min(0.5, 0.6 * _CONTRACTS / contraction))
         return cell, min(2.0, 0.67 * _CONTRACTS / max(contraction, 1e-3))
 
-    def _straight(self, cell: Cell) -> bool:
+    def _turns_at_most_once(self, cell: Cell) -> bool:
         """Return whether x changes in one direction within a cell, or turns back only once."""
-        a, b, c, d = cell.control()[:, -1].tolist()
+        a, b, c, d = cell.control_points()[:, -1].tolist()
         begin, middle, end = b - a, c - b, d - c
         most = max(min(abs(begin), abs(end)), abs(begin - end))
         return bool(abs(middle - 0.5 * (begin + end)) <= _STRAIGHT * most)
 
-    def _contraction(self, cell: Cell) -> float:
+    def _contraction_factor(self, cell: Cell) -> float:
         """Return q of a cell; infinite where its middle is a poor approximation."""
-        control = cell.control()
+        control = cell.control_points()
         middle = 0.125 * (control[0] + control[3]) + 0.375 * (control[1] + control[2])
         moved = np.abs(control - middle).max(axis=0)
         at = float(middle[-1])
@@ -250,7 +252,7 @@ class Continuation:
             return inf
         known, speeds = known_rates
         n = len(middle) - 1
-        errors, slopes = self._slopes(middle, known, speeds)
+        errors, slopes = self._evaluate_constraints(middle, known, speeds)
         matrix = np.vstack([slopes, cell.begin.tangent])
         try:
             inverse = np.linalg.inv(matrix)
@@ -260,25 +262,27 @@ class Continuation:
         moved += 5.0 * off.max()
         change = np.zeros((n + 1, n + 1))
         ends = [self.known_at(float(node.place[-1])) for node in cell[:2]]
-        ways = [_apart(known, end) for end in ends if end is not None]
+        ways = [_state_distances(known, end) for end in ends if end is not None]
         if len(ways) < 2:
             return inf
-        way = State(
+        largest_change = LinkState(
             np.max([w[0] for w in ways], axis=0).tolist(),
             np.max([w[1] for w in ways], axis=0).tolist() if ways[0][1] else [],
         )
-        change[:n, :n] = spread(self.constraints, middle[:n], known, moved[:n], way)
+        change[:n, :n] = bound_jacobian_change(
+            self.constraints, middle[:n], known, moved[:n], largest_change
+        )
         for node in cell[:2]:
-            system = self._system(node.place)
+            system = self._evaluate_system(node.place)
             if system is None:
                 return inf
             slope = system[1][:, -1]
             change[:n, -1] = np.maximum(change[:n, -1], np.abs(slope - slopes[:, -1]))
         if off.max() > 0.1 * float(np.abs(control[3] - control[0]).max()):
             return inf
-        return _radius(np.abs(inverse) @ change)
+        return _spectral_bound(np.abs(inverse) @ change)
 
-    def _folded(self, cell: Cell) -> Cell:
+    def _fold_cell(self, cell: Cell) -> Cell:
         """Return the part of a cell before the point where x turns back."""
         z, tangent = cell.begin
         low, high = (0.0, float(tangent[-1])), (cell.width, float(cell.end.tangent[-1]))
@@ -287,10 +291,10 @@ class Continuation:
             width = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
             if not low[0] < width < high[0]:
                 width = 0.5 * (low[0] + high[0])
-            place = self._corrected(
-                cell.at(width / cell.width), tangent, float(tangent @ z) + width
+            place = self._correct_onto(
+                cell.point_at(width / cell.width), tangent, float(tangent @ z) + width
             )
-            node = self._node(place, tangent) if place is not None else None
+            node = self._make_node(place, tangent) if place is not None else None
             if node is None:
                 break
             end, slope = node, float(node.tangent[-1])
@@ -303,8 +307,8 @@ class Continuation:
                 low, high = (low[0], 0.5 * low[1]), (width, slope)
         return Cell(cell.begin, end, float(tangent @ (end.place - z)), True)
 
-    def _node(self, place: Array, ahead: Array) -> Node | None:
-        system = self._system(place)
+    def _make_node(self, place: Array, ahead: Array) -> BranchNode | None:
+        system = self._evaluate_system(place)
         if system is None:
             return None
         right = np.zeros(len(place))
@@ -313,14 +317,14 @@ class Continuation:
             tangent = np.linalg.solve(np.vstack([system[1], ahead]), right)
         except np.linalg.LinAlgError:
             return None
-        return Node(place, tangent / sqrt(float(tangent @ tangent)))
+        return BranchNode(place, tangent / sqrt(float(tangent @ tangent)))
 
-    def _corrected(self, start: Array, row: Array, goal: float) -> Array | None:
+    def _correct_onto(self, start: Array, row: Array, goal: float) -> Array | None:
         """Return the solution at which a linear combination of the coordinates has a value."""
         place, last = start, inf
         size = 1.0 + float(np.abs(start).max())
         for _ in range(12):
-            system = self._system(place)
+            system = self._evaluate_system(place)
             if system is None:
                 return None
             errors, slopes = system
@@ -340,27 +344,31 @@ class Continuation:
             place, last = place + step, length
         return None
 
-    def _system(self, place: Array) -> tuple[Array, Array] | None:
+    def _evaluate_system(self, place: Array) -> tuple[Array, Array] | None:
         """Return the residuals, and their derivatives by the unknowns and the input."""
         known_rates = self.rates_at(float(place[-1]))
-        return None if known_rates is None else self._slopes(place, *known_rates)
+        return None if known_rates is None else self._evaluate_constraints(place, *known_rates)
 
-    def _slopes(self, place: Array, known: State, speeds: State) -> tuple[Array, Array]:
+    def _evaluate_constraints(
+        self, place: Array, solved: LinkState, velocities: LinkState
+    ) -> tuple[Array, Array]:
         unknowns = place[:-1].tolist()
-        errors, jacobian = equations(self.constraints, unknowns, known)
+        errors, jacobian = evaluate_constraints(self.constraints, unknowns, solved)
         still = [0.0] * len(unknowns)
-        drift = derivative(self.constraints, unknowns, known, speeds, still, None, still)
+        drift = differentiate_constraints(
+            self.constraints, unknowns, solved, velocities, still, None, still
+        )
         return np.array(errors), np.column_stack([jacobian, drift])
 
 
-def _apart(one: State, other: State) -> tuple[list[float], list[float]]:
+def _state_distances(one: LinkState, other: LinkState) -> tuple[list[float], list[float]]:
     return (
         [abs(a - b) for a, b in zip(one[0], other[0], strict=True)],
         [abs(a - b) for a, b in zip(one[1], other[1], strict=True)],
     )
 
 
-def _radius(matrix: Array) -> float:
+def _spectral_bound(matrix: Array) -> float:
     """Return an upper bound of the spectral radius of a non-negative matrix."""
     weights = np.ones(len(matrix))
     bound = inf
@@ -405,7 +413,7 @@ class Interval(NamedTuple):
     turns: int  # Number of whole turns of the input after which it starts again; 0 if it does not
 
     @property
-    def period(self) -> int:
+    def period_turns(self) -> int:
         """Return how many whole turns of the input change nothing; 0 if each turn differs."""
         return self.turns or int(self.high - self.low < tau)
 
@@ -415,11 +423,11 @@ class Start(NamedTuple):
 
     unknowns: Array  # Near the solution; at an end of the branch, the solution
     farthest: float  # Largest distance of the solution from them
-    turned: Array  # Change of the unknowns' angles by the turns before, in [rad]
-    ends: bool  # Whether this is the end of the branch, within the last few floats: a toggle
+    turned_angles: Array  # Change of the unknowns' angles by the turns before, in [rad]
+    is_end: bool  # Whether this is the end of the branch, within the last few floats: a toggle
 
 
-class _Side:
+class _BranchSide:
     """
     One side of the pose, followed as far as was needed.
 
@@ -429,7 +437,7 @@ class _Side:
 
     __slots__ = ('cells', 'end', 'inputs', 'laps', 'node', 'sign')
 
-    def __init__(self, node: Node, sign: float) -> None:
+    def __init__(self, node: BranchNode, sign: float) -> None:
         self.sign = sign
         self.node = node
         self.cells: list[Cell] = []
@@ -462,13 +470,13 @@ class Branch:
         self._turning = turning
         self._far = far
         self._x = x
-        node = continuation.first(unknowns, x)
-        self._sides = tuple(_Side(node, sign) for sign in (-1.0, 1.0)) if node else ()
+        node = continuation.first_node(unknowns, x)
+        self._sides = tuple(_BranchSide(node, sign) for sign in (-1.0, 1.0)) if node else ()
         self._turns = 0
         self._gained = np.zeros_like(unknowns)
-        self.interval = self._followed(node, x)
+        self.interval = self._follow(node, x)
 
-    def start(self, x: float) -> Start | None:
+    def find_start(self, x: float) -> Start | None:
         """Return the start of Newton's method at an input; None outside the branch."""
         turned = 0.0
         low, high, _, turns = self.interval
@@ -478,15 +486,15 @@ class Branch:
             period = turns * tau
             turned = floor((x - low) / period)
             x = min(max(x - turned * period, low), high)
-        elif self._turning and not low <= x <= high and self.interval.period:
+        elif self._turning and not low <= x <= high and self.interval.period_turns:
             x -= tau * round((x - 0.5 * (low + high)) / tau)
         side = self._sides[int(x >= self._x)]
-        if side.sign * x > self._reached(side):
+        if side.sign * x > self._reach_of(side):
             with BUILD_LOCK:
-                while side.end is None and side.sign * x > self._reached(side):
-                    if not self._lap(side):
+                while side.end is None and side.sign * x > self._reach_of(side):
+                    if not self._follow_lap(side):
                         break
-        if side.sign * x > self._reached(side):
+        if side.sign * x > self._reach_of(side):
             return None
         gained = turned * self._gained
         inputs = side.inputs
@@ -498,36 +506,36 @@ class Branch:
         if cell.folds and abs(x - cell.end.place[-1]) <= _LAST_FLOATS * max(1.0, abs(x)):
             return Start(cell.end.place[:-1], inf, gained, True)
         size = float(np.abs(cell.end.place - cell.begin.place).max())
-        return Start(cell.at(cell.part_of(x))[:-1], 0.2 * size, gained, False)
+        return Start(cell.point_at(cell.part_of(x))[:-1], 0.2 * size, gained, False)
 
     def nearest_end(self, x: float) -> Array | None:
         """Return the unknowns at the end of the branch that an input lies behind."""
         return self._sides[int(x >= self._x)].node.place[:-1] if self._sides else None
 
-    def _followed(self, node: Node | None, x: float) -> Interval:
+    def _follow(self, node: BranchNode | None, x: float) -> Interval:
         """Follow the branch to its ends, or until it comes back."""
         if node is None:
             return Interval(x, x, (True, True), 0)
         back, ahead = self._sides
         if not self._turning:
-            self._lap(back)
-            self._lap(ahead)
+            self._follow_lap(back)
+            self._follow_lap(ahead)
         else:
-            while self._lap(ahead):
+            while self._follow_lap(ahead):
                 if self._comes_back(node, ahead):
                     return Interval(x, x + self._turns * tau, (False, False), self._turns)
-            while self._lap(back):
+            while self._follow_lap(back):
                 pass
-        ends = -self._reached(back), self._reached(ahead)
+        ends = -self._reach_of(back), self._reach_of(ahead)
         return Interval(*ends, (back.end is not None, ahead.end is not None), 0)
 
-    def _reached(self, side: _Side) -> float:
+    def _reach_of(self, side: _BranchSide) -> float:
         """Return how far a side was followed, times its sign."""
         if side.end is not None:
             return side.sign * side.end
         return side.inputs[-1] if side.inputs else side.sign * self._x
 
-    def _lap(self, side: _Side) -> bool:
+    def _follow_lap(self, side: _BranchSide) -> bool:
         """Follow a side for another turn, or twice as far; return whether it continues."""
         if side.end is not None or side.laps >= (_MOST_TURNS if self._turning else _MOST_LAPS):
             return False
@@ -536,7 +544,7 @@ class Branch:
             last = self._x + side.sign * side.laps * tau
         else:
             last = side.sign * max(self._far, side.sign * self._x) * 2.0 ** (side.laps - 1)
-        found = list(self._continuation.cells(side.node, side.sign, last))
+        found = list(self._continuation.follow_cells(side.node, side.sign, last))
         cells, node = side.cells + found, found[-1].end if found else side.node
         at = float(node.place[-1])
         end = None
@@ -569,7 +577,7 @@ class Branch:
                 inside = middle
         return inside
 
-    def _comes_back(self, first: Node, side: _Side) -> bool:
+    def _comes_back(self, first: BranchNode, side: _BranchSide) -> bool:
         """Return whether a side has come back; if so, set the turns and the angles gained."""
         begun, now = self._known_at(self._x), self._known_at(float(side.node.place[-1]))
         if begun is None or now is None:
@@ -585,7 +593,7 @@ class Branch:
         gained = np.zeros_like(moved)
         gained[0::3] = tau * np.round(moved[0::3] / tau)
         away = np.abs(moved - gained)
-        if not self._continuation.alone(first, away):
+        if not self._continuation.is_isolated(first, away):
             return False
         self._turns, self._gained = side.laps, gained
         return True

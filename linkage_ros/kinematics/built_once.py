@@ -57,7 +57,7 @@ def keep_results(build: Callable[P, T]) -> Callable[P, T]:
     """Return a function that keeps its results; each is built once, positional arguments only."""
     kept: dict[Any, T] = {}
 
-    def get(*arguments: P.args, **_: P.kwargs) -> T:
+    def get_result(*arguments: P.args, **_: P.kwargs) -> T:
         try:
             return kept[arguments]
         except KeyError:
@@ -66,4 +66,4 @@ def keep_results(build: Callable[P, T]) -> Callable[P, T]:
                     kept[arguments] = build(*arguments)  # type: ignore[call-arg]
                 return kept[arguments]
 
-    return get
+    return get_result

@@ -31,7 +31,7 @@ _LEAST_RATIO = 1e-30
 """Least distance of two pins relative to the linkage; in a shorter one no digit would be left."""
 
 
-def check(linkage: Linkage) -> None:
+def check_linkage(linkage: Linkage) -> None:
     """
     Refuse a linkage whose parts do not match.
 

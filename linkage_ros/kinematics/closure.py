@@ -23,9 +23,9 @@ from typing import Any, ClassVar, overload, TYPE_CHECKING
 from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
-from linkage_ros.kinematics.checks import check
+from linkage_ros.kinematics.checks import check_linkage
 from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_double
-from linkage_ros.kinematics.limits import Bounds, limited, without_mirrored, zero_length
+from linkage_ros.kinematics.limits import Bounds, limit_status, without_mirrored, zero_length
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.plan import SolutionPlan
 from linkage_ros.kinematics.ranges import closing_ranges, input_ranges
@@ -40,15 +40,15 @@ from linkage_ros.kinematics.results import (
 )
 from linkage_ros.kinematics.singularity_margin import singular_inputs, singularity_margin
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import Pose, State
+from linkage_ros.kinematics.step import LinkState, StepPose
 from linkage_ros.kinematics.topology import assur_groups, Structure
 
 if TYPE_CHECKING:
     from linkage_ros import InverseClosure, LinkagePage
     from linkage_ros.kinematics.batch import Batch
     from linkage_ros.kinematics.compiling.linkage import Compiled
-    from linkage_ros.kinematics.compiling.solve import Solver
-    from linkage_ros.kinematics.compiling.trace import Wanted
+    from linkage_ros.kinematics.compiling.solve import SolverOutline
+    from linkage_ros.kinematics.compiling.trace import OutputSelection
     from linkage_ros.kinematics.crank_branches import CrankBranch, Inverse
     from linkage_ros.kinematics.link_frames import LinkFrames
     from linkage_ros.kinematics.point_tracker import PointTracker
@@ -61,12 +61,14 @@ def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueErro
     return ValueError(f'{what}: {list(given)} is not finite')
 
 
-def _multiplied(found: Velocity | Acceleration, factor: float) -> tuple[tuple[float, ...], State]:
+def _multiply(
+    found: Velocity | Acceleration, factor: float
+) -> tuple[tuple[float, ...], LinkState]:
     """Return joints and state of a velocity or an acceleration times a factor."""
     coordinates, pins = found.state
     return (
         tuple(value * factor for value in found.joints),
-        State(
+        LinkState(
             [value * factor for value in coordinates],
             [complex(pin.real * factor, pin.imag * factor) for pin in pins],
         ),
@@ -111,7 +113,7 @@ class Closure:
     def __init__(self, linkage: Linkage, name: str = '') -> None:
         if not isinstance(linkage, Linkage):
             raise TypeError(f'linkage: {quoted(linkage)} is not a Linkage; load() reads files')
-        check(linkage)
+        check_linkage(linkage)
         self.linkage = linkage
         self.name = name
         self.input_names = tuple(given.joint for given in linkage.inputs)
@@ -131,10 +133,10 @@ class Closure:
         """For each coordinate that is a sum of inputs, how often each input is in it."""
         self.ratio_turns = planner.ratio_turns
         """Whole turns of a single input after which its ratios repeat; 0 if they never do."""
-        self._terms = tuple(self._term(joint) for joint in linkage.joints.values())
+        self._terms = tuple(self._joint_term(joint) for joint in linkage.joints.values())
         self._rate_terms = tuple((i, j, factor) for i, j, factor, _ in self._terms)
         self._point_index = {
-            (link, name): planner.place(link, point)
+            (link, name): planner.place_point(link, point)
             for link, points in planner.points.items()
             for name, point in points.items()
         }
@@ -182,7 +184,7 @@ class Closure:
         """Let `position` check the limits; without limits it checks nothing."""
         vars(self).pop('position', None)
         if self.bounds:
-            self.position = limited(self.position, self.bounds)  # type: ignore[method-assign]
+            self.position = limit_status(self.position, self.bounds)  # type: ignore[method-assign]
 
     def position(self, *inputs: float) -> Position:
         """
@@ -207,13 +209,13 @@ class Closure:
             If an input is not a number.
 
         """
-        x = self._coordinates('inputs', inputs, 0.0, inf)
+        x = self._input_coordinates('inputs', inputs, 0.0, inf)
         if x is None:
-            numbers = self._doubles('inputs', inputs)
-            state = State([0.0, *self._scaled(numbers)], [])
+            numbers = self._as_doubles('inputs', inputs)
+            state = LinkState([0.0, *self._scale_inputs(numbers)], [])
             return Position(Status.INDETERMINATE, 0.0, (), state, [], self)
-        state = State(x, [])
-        poses: list[Pose] = []
+        state = LinkState(x, [])
+        poses: list[StepPose] = []
         status = Status.CLOSED
         for step in self.steps:
             pose = step.close(state)
@@ -229,11 +231,11 @@ class Closure:
             joints += (factor * (x[i] - x[j]) + constant,)
         return Position(status, 0.0, joints, state, poses, self)
 
-    def known(self, *inputs: float) -> State:
+    def initial_state(self, *inputs: float) -> LinkState:
         """Return the state before the first step: the coordinates of the ground and the inputs."""
-        return State(self._coordinates('inputs', inputs, 0.0, inf) or [], [])
+        return LinkState(self._input_coordinates('inputs', inputs, 0.0, inf) or [], [])
 
-    def posed(self, *inputs: float) -> Position:
+    def close_unlimited(self, *inputs: float) -> Position:
         """Close the loops as `position` does, without limits."""
         return type(self).position(self, *inputs)
 
@@ -259,14 +261,14 @@ class Closure:
         """
         if getattr(position, 'closure', None) is not self:
             self._check_own('position', position)
-        v = self._coordinates('rates', rates)
+        v = self._input_coordinates('rates', rates)
         if v is None or not position.status.has_rates:
-            return self._huge_velocity(position, self._doubles('rates', rates))
-        speeds = State(v, [])
+            return self._huge_velocity(position, self._as_doubles('rates', rates))
+        velocities = LinkState(v, [])
         found = []
         for step, pose in zip(self.steps, position.poses, strict=True):
-            found.append(step.rates(pose, position.state, speeds))
-        return Velocity(self._joints(v), speeds, found, self)
+            found.append(step.rates(pose, position.state, velocities))
+        return Velocity(self._joint_rates(v), velocities, found, self)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -289,21 +291,21 @@ class Closure:
         """
         if getattr(velocity, 'closure', None) is not self:
             self._check_own('velocity', velocity)
-        a = self._coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
+        a = self._input_coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
         if a is None or type(velocity.rates) is Velocity:
-            numbers = self._doubles('accelerations', accelerations)
+            numbers = self._as_doubles('accelerations', accelerations)
             return self._huge_acceleration(position, velocity, numbers)
-        changes = State(a, [])
+        state_accelerations = LinkState(a, [])
         for step, pose, rate in zip(self.steps, position.poses, velocity.rates, strict=True):
-            step.accelerations(pose, rate, position.state, velocity.state, changes)
-        return Acceleration(self._joints(a), changes, self)
+            step.accelerations(pose, rate, position.state, velocity.state, state_accelerations)
+        return Acceleration(self._joint_rates(a), state_accelerations, self)
 
     def _huge_velocity(self, position: Position, rates: tuple[float, ...]) -> Velocity:
         """Return the velocity at rates of which one is huge: infinite where it overflows."""
         if not (position.status.has_rates and all_finite(rates)):
             raise _no_motion('rates', rates, position.status)
         found = self.velocity(position, *(rate * SHRINK for rate in rates))
-        return Velocity(*_multiplied(found, 1.0 / SHRINK), found, self)
+        return Velocity(*_multiply(found, 1.0 / SHRINK), found, self)
 
     def _huge_acceleration(
         self, position: Position, velocity: Velocity, accelerations: tuple[float, ...]
@@ -316,10 +318,10 @@ class Closure:
             scaled = self.velocity(position, *(rate * SHRINK for rate in rates))
         changes = (change * SHRINK * SHRINK for change in accelerations)
         found = self.acceleration(position, scaled, *changes)
-        once = Acceleration(*_multiplied(found, 1.0 / SHRINK), self)
-        return Acceleration(*_multiplied(once, 1.0 / SHRINK), self)
+        once = Acceleration(*_multiply(found, 1.0 / SHRINK), self)
+        return Acceleration(*_multiply(once, 1.0 / SHRINK), self)
 
-    def compiled(self, derivatives: int, wanted: Wanted | None = None) -> Compiled:
+    def compile_linkage(self, derivatives: int, wanted: OutputSelection | None = None) -> Compiled:
         """
         Return the linkage compiled; for the same numbers it is compiled once.
 
@@ -336,7 +338,7 @@ class Closure:
             trace,  # local import: they trace
         )
 
-        wanted = wanted or trace.joints
+        wanted = wanted or trace.published_joints
         with BUILD_LOCK:
             for compiled in self._compiled:
                 if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
@@ -388,10 +390,12 @@ class Closure:
         return self._solver.solve(inputs, rates, accelerations, derivatives, out)
 
     @BuiltProperty
-    def _solver(self) -> Solver:
-        from linkage_ros.kinematics.compiling.solve import Solver  # local import: needs numpy
+    def _solver(self) -> SolverOutline:
+        from linkage_ros.kinematics.compiling.solve import (
+            SolverOutline,  # local import: needs numpy
+        )
 
-        return Solver(self, len(self.linkage.joints))
+        return SolverOutline(self, len(self.linkage.joints))
 
     @overload
     def driven_by(
@@ -436,8 +440,8 @@ class Closure:
             return Closure(exchange_inputs(self, joints, Closure), self.name)
         from linkage_ros import InverseClosure  # local import: only few ask for it
 
-        inverse = self._inverse(*joints)
-        return InverseClosure(self, inverse, inverse.branch(branch, near))
+        inverse = self._joint_inverse(*joints)
+        return InverseClosure(self, inverse, inverse.find_branch(branch, near))
 
     def cranks(self, joint: str, value: float) -> list[tuple[int, float]]:
         """
@@ -461,7 +465,7 @@ class Closure:
             As `driven_by`.
 
         """
-        return self._inverse(joint).cranks(to_double('value', value))
+        return self._joint_inverse(joint).find_cranks(to_double('value', value))
 
     def branches(self, joint: str, *, limited: bool = True) -> Sequence[CrankBranch]:
         """
@@ -484,9 +488,9 @@ class Closure:
             inverse_of,  # local import: only few ask for it
         )
 
-        return (self._inverse(joint) if limited else inverse_of(self, joint, False)).branches
+        return (self._joint_inverse(joint) if limited else inverse_of(self, joint, False)).branches
 
-    def _inverse(self, joint: str) -> Inverse:
+    def _joint_inverse(self, joint: str) -> Inverse:
         """Return a joint with its branches over the crank; they are made once."""
         from linkage_ros.kinematics.crank_branches import (
             inverse_of,  # local import: only few ask for it
@@ -514,21 +518,23 @@ class Closure:
         """
         if not position.status.has_pose:
             raise ValueError(f'points: {position!r} has none; check its status first')
-        places = self._all(position).pins
+        places = self._with_all_points(position).pins
         return {key: places[i] * self.scale for key, i in self._point_index.items()}
 
     def point_motion(
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> dict[tuple[str, str], PointMotion]:
         """Return place, velocity and acceleration of every point of every link."""
-        state = self._all(position)
-        speeds = State(velocity.state.coordinates, list(velocity.state.pins))
-        changes = State(acceleration.state.coordinates, list(acceleration.state.pins))
+        state = self._with_all_points(position)
+        velocities = LinkState(velocity.state.coordinates, list(velocity.state.pins))
+        accelerations = LinkState(acceleration.state.coordinates, list(acceleration.state.pins))
         for step in self._more_steps:
-            rates = step.rates((), state, speeds)
-            step.accelerations((), rates, state, speeds, changes)
+            rates = step.rates((), state, velocities)
+            step.accelerations((), rates, state, velocities, accelerations)
         return {
-            key: PointMotion(*(values.pins[i] * self.scale for values in (state, speeds, changes)))
+            key: PointMotion(
+                *(values.pins[i] * self.scale for values in (state, velocities, accelerations))
+            )
             for key, i in self._point_index.items()
         }
 
@@ -570,22 +576,22 @@ class Closure:
             for name, slide in self.slides.items()
         }
 
-    def beyond(self, position: Position) -> str:
+    def limit_exceeded(self, position: Position) -> str:
         """Return which joint of a pose is beyond its limits, as text; '' if none is."""
         inputs = position.inputs
         joints = position.joints or self.position(*inputs).joints
-        bound = self.bounds.exceeded(inputs, joints) if joints else None
+        bound = self.bounds.first_exceeded(inputs, joints) if joints else None
         if bound is None:
             return ''
         driven_one = bound in self.bounds.inputs
         number = bound.number
-        value = bound.turned((inputs if driven_one else joints)[number])
+        value = bound.turn_to_middle((inputs if driven_one else joints)[number])
         turns = not self.linkage.inputs[number].slider if driven_one else self.turning[number]
         unit = 'rad' if turns else 'm'
         limits = self.linkage.limits[bound.name]
         return f'{bound.name} at {value:.6g} {unit}, limits {limits} {unit}'
 
-    def inputs_of(self, state: State) -> tuple[float, ...]:
+    def inputs_of(self, state: LinkState) -> tuple[float, ...]:
         """Return the driven joints in a state, or their rates, in [rad] or [m]."""
         factors = self._factors or [1.0] * len(self.input_names)
         driven = zip(state.coordinates[1:], factors, strict=False)
@@ -647,14 +653,14 @@ class Closure:
         """Return how near a closed position is to a singularity."""
         return singularity_margin(self, position)
 
-    def _all(self, position: Position) -> State:
+    def _with_all_points(self, position: Position) -> LinkState:
         """Return a position with all points placed, also those that no loop needs."""
-        state = State(position.state.coordinates, list(position.state.pins))
+        state = LinkState(position.state.coordinates, list(position.state.pins))
         for step in self._more_steps:
             step.close(state)
         return state
 
-    def _coordinates(
+    def _input_coordinates(
         self, what: str, values: tuple[float, ...], zero: float = -0.0, most: float = HUGE
     ) -> list[float] | None:
         """
@@ -670,13 +676,13 @@ class Closure:
         if len(values) != len(self.input_names):
             names = listed(self.input_names)
             raise ValueError(f'{what}: {len(values)} given; give {len(self.input_names)}: {names}')
-        numbers = self._doubles(what, values)
-        x = [0.0, *self._scaled([number + zero for number in numbers])]
+        numbers = self._as_doubles(what, values)
+        x = [0.0, *self._scale_inputs([number + zero for number in numbers])]
         if any(hasattr(number, 'apply') for number in numbers):
             return x if all_finite(numbers) else None
         return x if all(-most < number < most for number in (*numbers, *x)) else None
 
-    def _doubles(self, what: str, values: tuple[float, ...]) -> tuple[float, ...]:
+    def _as_doubles(self, what: str, values: tuple[float, ...]) -> tuple[float, ...]:
         """Return values of any type as doubles; symbols as they are."""
         return tuple(
             value
@@ -685,7 +691,7 @@ class Closure:
             for value in values
         )
 
-    def _scaled(self, values: Sequence[float]) -> Iterable[float]:
+    def _scale_inputs(self, values: Sequence[float]) -> Iterable[float]:
         """Return values of the inputs, or their rates, in the unit of the steps."""
         factors = self._factors
         return values if factors is None else map(mul, values, factors)
@@ -698,15 +704,15 @@ class Closure:
             message = f'{what}: {quoted(found)} is not of {self!r}; give what that returned'
             raise TypeError(message)
 
-    def _joints(self, values: list[float]) -> tuple[float, ...]:
+    def _joint_rates(self, values: list[float]) -> tuple[float, ...]:
         """Return the derivatives of the published joints."""
         joints: tuple[float, ...] = ()
         for i, j, factor in self._rate_terms:
             joints += (factor * (values[i] - values[j]),)
         return joints
 
-    def _term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
+    def _joint_term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
         """Return a published joint as factor·(x[i] − x[j]) + constant, in [rad] or [m]."""
-        i, j, factor, constant = self._known.term(joint)
+        i, j, factor, constant = self._known.joint_term(joint)
         unit = self.scale if isinstance(joint, SlideJoint) else 1.0
         return i, j, factor * unit, constant * unit

@@ -31,11 +31,11 @@ from typing import NamedTuple
 from linkage_ros.errors import DefinitionError, did_you_mean, listed
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.trace import Motion, Wanted
+from linkage_ros.kinematics.compiling.trace import OutputSelection, TracedMotion
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.ranges import golden, last_inside
+from linkage_ros.kinematics.ranges import golden_section, last_inside
 from linkage_ros.kinematics.results import InputRange, LoopClosure
-from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
+from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs
 
 _CELLS = 32
 """Cells of a table, for each turn of the crank."""
@@ -72,7 +72,7 @@ class Output(NamedTuple):
 
     name: str
     turning: bool
-    wanted: Wanted  # Its value, rate and acceleration, each in a group
+    wanted: OutputSelection  # Its value, rate and acceleration, each in a group
     joint: RevoluteJoint | SlideJoint | None  # None for a coordinate
 
     @property
@@ -88,11 +88,11 @@ def output_named(closure: LoopClosure, name: str) -> Output:
     if name in closure.joint_names:
         number = closure.joint_names.index(name)
 
-        def joint(motion: Motion) -> Sequence[Sequence[float]]:
+        def joint_values(motion: TracedMotion) -> Sequence[Sequence[float]]:
             end = number + 1
             return [part.joints[number:end] for part in motion if part is not None]
 
-        return Output(name, closure.turning[number], joint, closure.linkage.joints[name])
+        return Output(name, closure.turning[number], joint_values, closure.linkage.joints[name])
     point, _, axis = name.rpartition('.')
     traced = [f'{each}.{way}' for each in closure.linkage.traced for way in 'xy']
     if name not in traced:
@@ -104,7 +104,7 @@ def output_named(closure: LoopClosure, name: str) -> Output:
         )
     key = next((link, point) for link, at in closure.linkage.links.items() if point in at)
 
-    def coordinate(motion: Motion) -> Sequence[Sequence[float]]:
+    def coordinate_values(motion: TracedMotion) -> Sequence[Sequence[float]]:
         position, velocity, acceleration = motion
         if not position.status.has_pose:
             return []
@@ -116,7 +116,7 @@ def output_named(closure: LoopClosure, name: str) -> Output:
         groups = 3 if acceleration else 2
         return [[place.real if axis == 'x' else place.imag] for place in places[:groups]]
 
-    return Output(name, False, coordinate, None)
+    return Output(name, False, coordinate_values, None)
 
 
 class CrankBranch:
@@ -178,9 +178,9 @@ class CrankBranch:
         self._highest = self.high - rounding * high_back
         self.flat = _FLAT_SLOPE * (self.high - self.low) / width
         """With a smaller slope the output stands, and the crank has no rate."""
-        self._tabulate(piece, near)
+        self._make_table(piece, near)
 
-    def _tabulate(
+    def _make_table(
         self, piece: Sequence[tuple[float, float]], near: Sequence[Sequence[float]]
     ) -> None:
         """Make the table of cranks and their slopes at equal steps of s."""
@@ -200,12 +200,12 @@ class CrankBranch:
         way, height = (1.0 if self.last > self.first else -1.0), self.high - self.low
         k = 0
         for i in range(1, cells):
-            y, rise = self._at_share(i / cells)
+            y, rise = self._output_at(i / cells)
             while k < len(piece) - 2 and piece[k + 1][1] < y:
                 k += 1
             (below, less), (above, more) = piece[k], piece[k + 1]
             start = below + (above - below) * ((y - less) / (more - less))
-            crank, slope = self._narrow(y, below, above, start)
+            crank, slope = self._refine_crank(y, below, above, start)
             self.cranks.append(crank)
             slopes.append(rise / abs(slope) if slope else inf)
         self.cranks.append(self.last)
@@ -218,7 +218,7 @@ class CrankBranch:
                 bend = far / (_NEAR * (self.most - self.least))
                 slopes[i] = sqrt((0.5 * pi * pi if both else 2.0) * height / bend)
             elif not self.steep[number]:
-                slopes[i] = self._at_share(i / cells)[1] / nearer if nearer else inf
+                slopes[i] = self._output_at(i / cells)[1] / nearer if nearer else inf
         tangents = []
         for i, slope in enumerate(slopes):
             # Within three times the slopes beside it, the table rises or falls everywhere.
@@ -232,7 +232,7 @@ class CrankBranch:
         ]
         self._known = self._evaluate.fast, self.turning, self._greatest_last, self.least, self.most
 
-    def _at_share(self, s: float) -> tuple[float, float]:
+    def _output_at(self, s: float) -> tuple[float, float]:
         """Return the output at s, and its derivative by s."""
         height = self.high - self.low
         if all(self.turns_back):
@@ -243,7 +243,7 @@ class CrankBranch:
             return self.high - height * (1.0 - s) ** 2, 2.0 * height * (1.0 - s)
         return self.low + height * s, height
 
-    def _share(self, y: float) -> float:
+    def _table_parameter(self, y: float) -> float:
         """Return s of a value between the ends."""
         low, high = y - self.low, self.high - y
         if self.turns_back[0]:
@@ -254,7 +254,7 @@ class CrankBranch:
             return 1.0 - sqrt(high / (self.high - self.low))
         return low / (self.high - self.low)
 
-    def beyond(self, y: float) -> float:
+    def distance_beyond(self, y: float) -> float:
         """Return how much a value is beyond the branch, in its unit; 0 if it is reached."""
         y -= self._turns_before(y)
         away = max(self.low - y, y - self.high)
@@ -270,7 +270,7 @@ class CrankBranch:
             return tau * round((y - 0.5 * (self.low + self.high)) / tau)
         return 0.0
 
-    def find(self, y: float) -> tuple[float, float]:
+    def find_crank(self, y: float) -> tuple[float, float]:
         """
         Return the crank at a value that is reached, and nearly the slope of the output there.
 
@@ -287,7 +287,7 @@ class CrankBranch:
         if y >= self._highest:
             return self.last + turns, 0.0 if self.turns_back[1] else inf
         cells = self._cells
-        place = self._share(y) * cells
+        place = self._table_parameter(y) * cells
         i = min(int(place), cells - 1)
         t = place - i
         p, s, bend, twist = self._cubics[i]
@@ -315,14 +315,14 @@ class CrankBranch:
             if (way := abs(y - value)) < moved:
                 # So near the toggle the closed form has too few digits: the crank goes as y².
                 return end + (beside - end) * (way / moved) ** 2 + turns, inf
-        crank, slope = self._narrow(y, p, self.cranks[i + 1], crank)
+        crank, slope = self._refine_crank(y, p, self.cranks[i + 1], crank)
         return crank + turns, slope
 
     def evaluate(self, crank: float) -> tuple[float, float]:
         """Return the output at a crank of the branch, and its slope there."""
         return self._evaluate(crank)
 
-    def _narrow(
+    def _refine_crank(
         self, y: float, below: float, above: float, start: float = nan
     ) -> tuple[float, float]:
         """Return the crank at a value between two others, to the last bit, and the slope."""
@@ -367,7 +367,7 @@ class OutputFunction:
         """Return the output and its slope at a crank."""
         values = self.fast(crank, 1.0)
         if values is None:
-            values = self._compiled.plain(crank, 1.0).values
+            values = self._compiled.run_interpreted(crank, 1.0).values
         (value,), (slope,) = ((*group, nan)[:1] for group in values)
         return value, slope
 
@@ -397,8 +397,8 @@ def crank_branches(
     ranges = InputSweep(closure).ranges if limited else closure.closing_ranges
     branches: list[CrankBranch] = []
     for interval in ranges:
-        period = interval.highest - interval.lowest if interval.whole else 0.0
-        for piece, turns_on in _pieces(evaluate, interval):
+        period = interval.highest - interval.lowest if interval.is_whole else 0.0
+        for piece, turns_on in _monotonic_pieces(evaluate, interval):
             if abs(piece[-1][1] - piece[0][1]) > _SAME * evaluate.size:
                 by = dict(zip(interval[:2], interval.by, strict=True))
                 ends = by.get(piece[0][0], ''), by.get(piece[-1][0], '')
@@ -409,7 +409,7 @@ def crank_branches(
     return branches
 
 
-def _pieces(
+def _monotonic_pieces(
     evaluate: OutputFunction, interval: InputRange
 ) -> Iterator[tuple[list[tuple[float, float]], bool]]:
     """
@@ -425,18 +425,18 @@ def _pieces(
     count = _SAMPLES
     if interval.turning:
         count = min(_MOST_SAMPLES, _SAMPLES * max(1, ceil((high - low) / tau)))
-    cranks = samples(interval, count)
-    if interval.whole:
+    cranks = sample_inputs(interval, count)
+    if interval.is_whole:
         # Symmetric linkages turn back at round angles, where the slope has no sign.
         cranks = [crank + (high - low) * 0.307 / count for crank in cranks]
     sampled = [(crank, *evaluate(crank)) for crank in cranks]
     turns = list(_turning_points(evaluate, sampled))
-    if interval.whole:
+    if interval.is_whole:
         turns = sorted(low + (turn - low) % (high - low) for turn in turns)
     turns = _real_turns(evaluate, turns, interval)
     known = [(crank, value) for crank, value, _ in sampled if isfinite(value)]
     begin, end = low, high
-    if interval.whole:
+    if interval.is_whole:
         if turns:
             begin, end = turns[0], turns[0] + (high - low)
         known = sorted((begin + (crank - begin) % (high - low), value) for crank, value in known)
@@ -453,7 +453,7 @@ def _pieces(
         ]
         piece = [(end, evaluate(end)[0]) for end in ends]
         piece[1:1] = inner
-        yield _unwrapped(piece) if evaluate.turning else piece, interval.whole and not turns
+        yield _unwrap_piece(piece) if evaluate.turning else piece, interval.is_whole and not turns
 
 
 def _turning_points(
@@ -462,26 +462,26 @@ def _turning_points(
     """Yield the cranks at which the slope changes its sign, also twice between samples."""
     known = [(crank, slope) for crank, _, slope in sampled if isfinite(slope) and slope]
 
-    def signed(sign: float) -> Callable[[float], float]:
+    def signed_slope(sign: float) -> Callable[[float], float]:
         return lambda crank: evaluate(crank)[1] * sign
 
-    def within(sign: float) -> Callable[[float], bool]:
+    def keeps_sign(sign: float) -> Callable[[float], bool]:
         return lambda crank: evaluate(crank)[1] * sign > 0.0
 
     for i in range(1, len(known)):
         (before, slope_before), (here, slope) = known[i - 1], known[i]
         if slope_before * slope < 0.0:
-            yield last_inside(within(slope_before), before, here)
+            yield last_inside(keeps_sign(slope_before), before, here)
         elif i + 1 < len(known):
             after, slope_after = known[i + 1]
             sign = 1.0 if slope > 0.0 else -1.0
             sides = sign * slope_before, sign * slope_after
             # A valley that is shallow beside its height does not reach zero.
             if min(sides) >= abs(slope) and _DEEPER * (sum(sides) - 2.0 * abs(slope)) > abs(slope):
-                least, at = golden(signed(sign), before, after)
+                least, at = golden_section(signed_slope(sign), before, after)
                 if least < 0.0:
-                    yield last_inside(within(slope), before, at)
-                    yield last_inside(within(slope), after, at)
+                    yield last_inside(keeps_sign(slope), before, at)
+                    yield last_inside(keeps_sign(slope), after, at)
 
 
 def _real_turns(
@@ -500,7 +500,7 @@ def _real_turns(
             kept.pop()
         else:
             kept.append(end)
-    if not interval.whole:
+    if not interval.is_whole:
         outer = (interval.lowest, interval.highest)
         return [
             end
@@ -512,7 +512,7 @@ def _real_turns(
     return kept
 
 
-def _unwrapped(piece: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def _unwrap_piece(piece: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Return a piece with angles that go on through whole turns, its middle in (−π, π]."""
     (first, value), *others = piece
     found = [(first, value)]
@@ -528,7 +528,7 @@ class Inverse(NamedTuple):
     output: Output
     branches: Sequence[CrankBranch]
 
-    def cranks(self, value: float) -> list[tuple[int, float]]:
+    def find_cranks(self, value: float) -> list[tuple[int, float]]:
         """Return the cranks at which the output has a value, each after its branch."""
         found = []
         for branch in self.branches:
@@ -540,14 +540,18 @@ class Inverse(NamedTuple):
                 lowest, highest = branch.low - branch.slack, branch.high + branch.slack
                 turns = range(ceil((lowest - value) / tau), floor((highest - value) / tau) + 1)
                 values = [value + tau * k for k in turns]
-            found += [(branch.number, branch.find(y)[0]) for y in values if not branch.beyond(y)]
+            found += [
+                (branch.number, branch.find_crank(y)[0])
+                for y in values
+                if not branch.distance_beyond(y)
+            ]
         return found
 
-    def branch(self, number: int | None = None, near: float | None = None) -> CrankBranch:
+    def find_branch(self, number: int | None = None, near: float | None = None) -> CrankBranch:
         """Return the branch of a number, or the one nearest a crank, or the only one."""
         name, branches = self.output.name, self.branches
         if number is None and near is not None:
-            return min(branches, key=lambda branch: _distance(branch, near))
+            return min(branches, key=lambda branch: _crank_distance(branch, near))
         for branch in branches:
             if branch.number == number or (number is None and len(branches) == 1):
                 return branch
@@ -566,7 +570,7 @@ class Inverse(NamedTuple):
         )
 
 
-def _distance(branch: CrankBranch, crank: float) -> float:
+def _crank_distance(branch: CrankBranch, crank: float) -> float:
     """Return how far a crank is from a branch; one that turns is compared modulo a turn."""
     if branch.crank_turns:
         crank -= tau * round((crank - 0.5 * (branch.least + branch.most)) / tau)

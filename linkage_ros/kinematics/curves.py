@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
+from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs
 
 _SAME_PATH = 0.01
 """Largest distance of paths that are drawn as one, relative to their length."""
@@ -65,8 +65,8 @@ def sweep(way: InputSweep, interval: InputRange) -> Sweep:
     values: list[tuple[float, ...]] = []
     paths: dict[str, list[complex]] = {point: [] for point in carriers}
     slides: dict[str, list[float]] = {name: [] for name in linkage.sliders}
-    for value in samples(interval):
-        position = way.position(value)
+    for value in sample_inputs(interval):
+        position = way.position_at(value)
         if not position.joints:
             continue
         x.append(value)

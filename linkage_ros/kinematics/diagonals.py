@@ -28,16 +28,16 @@ from linkage_ros.kinematics.arithmetic import (
     cos,
     passes_zero,
     phase,
-    reach,
     Root,
     root_of,
+    signed_root,
     sin,
     SMALLEST,
     sqrt,
     where,
 )
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 
 class Diagonal(NamedTuple):
@@ -51,8 +51,8 @@ class Diagonal(NamedTuple):
     stretch: float
     gap: float  # Length by which A and D are too near or too far; 0 where the dyad closes
     # 2·√(ad)·sin(φ/2) and 2·√(ad)·cos(φ/2) of a `CrankDiagonal`, else 0.
-    near: float
-    far: float
+    near_root: float
+    far_root: float
     excess: float  # s² minus its constant part, ``least``
     status: Status  # Status of the dyad, as far as the diagonal decides it
 
@@ -66,11 +66,11 @@ class DiagonalRate(NamedTuple):
     point growth, fold and stretch are 0, but lean is not.
     """
 
-    growth: float
-    turn: float
-    swing: float
-    base: float
-    lean: float
+    log_length_rate: float
+    direction_rate: float
+    relative_rate: float
+    base_rate: float
+    growth_over_height: float
 
 
 class DiagonalAcceleration(NamedTuple):
@@ -85,11 +85,11 @@ class DiagonalAcceleration(NamedTuple):
     `CrankDiagonal` gives it in closed form; for all others it is None and the dyad computes it.
     """
 
-    pull: float
-    swirl: float
-    change: float
-    base: float
-    bend: float | None
+    length_curvature: float
+    direction_curvature: float
+    relative_acceleration: float
+    base_acceleration: float
+    curvature_over_height: float | None
 
 
 class AnyDiagonal(Protocol):
@@ -97,19 +97,21 @@ class AnyDiagonal(Protocol):
 
     least: Fraction
 
-    def at(self, known: State, /) -> Diagonal:
+    def diagonal_at(self, solved: LinkState, /) -> Diagonal:
         """Return the diagonal."""
 
-    def rates(self, diagonal: Diagonal, known: State, speeds: State, /) -> DiagonalRate:
+    def rates(
+        self, diagonal: Diagonal, solved: LinkState, velocities: LinkState, /
+    ) -> DiagonalRate:
         """Return the rates of the diagonal's length and direction."""
 
     def accelerations(
         self,
         diagonal: Diagonal,
-        growth: DiagonalRate,
-        known: State,
-        speeds: State,
-        changes: State,
+        rate: DiagonalRate,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
         /,
     ) -> DiagonalAcceleration:
         """Return the derivative of `rates`."""
@@ -202,10 +204,10 @@ class CrankDiagonal:
         self.offset = offset
         self._half_turn = (math.sin(0.5 * offset), math.cos(0.5 * offset))
 
-    def at(self, known: State) -> Diagonal:
+    def diagonal_at(self, solved: LinkState) -> Diagonal:
         first, second = self.arms
-        base = known.coordinates[second]
-        half = 0.5 * (known.coordinates[first] - base)
+        base = solved.coordinates[second]
+        half = 0.5 * (solved.coordinates[first] - base)
         half_sine, half_cosine = sin(half), cos(half)
         if self.offset:
             # The offset is not added to the angle, which may have turned a thousand times.
@@ -227,14 +229,14 @@ class CrankDiagonal:
             -2.0 * a * half_sine * half_cosine, d - a + 2.0 * a * half_sine * half_sine
         )
         fold_bracket, stretch_bracket = self.brackets
-        fold, stretch = reach(fold_bracket, near, excess), Root(1.0)
+        fold, stretch = signed_root(fold_bracket, near, excess), Root(1.0)
         if fold.status is Status.OPEN:
             gap = fold.missing / (sqrt(square) + lower)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
         if self.short_pair:
             stretch = root_of(self._whole - excess, abs(self._whole) + excess)
         elif upper != inf:
-            stretch = reach(stretch_bracket, far, rest)
+            stretch = signed_root(stretch_bracket, far, rest)
         if stretch.status is Status.OPEN:
             gap = stretch.missing / (sqrt(square) + upper)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
@@ -262,7 +264,7 @@ class CrankDiagonal:
                 status = self._at_change_point
         return Diagonal(square, direction, root_fold, root_stretch, 0.0, near, far, excess, status)
 
-    def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> DiagonalRate:
+    def rates(self, diagonal: Diagonal, _solved: LinkState, velocities: LinkState) -> DiagonalRate:
         """
         Return the growth q and the turn −p for φ̇, and the rate of OD as base.
 
@@ -275,29 +277,29 @@ class CrankDiagonal:
         their ratio is 1.
         """
         first, second = self.arms
-        square, near, far = diagonal.square, diagonal.near, diagonal.far
+        square, near, far = diagonal.square, diagonal.near_root, diagonal.far_root
         p = (self.along - 0.5 * diagonal.excess) / square
         q = 0.5 * near * far / square
-        fold_ratio, stretch_ratio = self.ratios(diagonal)
-        base = speeds.coordinates[second]
+        fold_ratio, stretch_ratio = self.root_ratios(diagonal)
+        base = velocities.coordinates[second]
         lean = 0.5 * fold_ratio * stretch_ratio / square
-        return DiagonalRate(q, -p, speeds.coordinates[first] - base, base, lean)
+        return DiagonalRate(q, -p, velocities.coordinates[first] - base, base, lean)
 
-    def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
+    def root_ratios(self, diagonal: Diagonal) -> tuple[float, float]:
         """Return near/fold and far/stretch; the ratio is 1 where its bracket is 0."""
         fold_bracket, stretch_bracket = self.brackets
         return (
-            diagonal.near / diagonal.fold if fold_bracket else 1.0,
-            diagonal.far / diagonal.stretch if stretch_bracket else 1.0,
+            diagonal.near_root / diagonal.fold if fold_bracket else 1.0,
+            diagonal.far_root / diagonal.stretch if stretch_bracket else 1.0,
         )
 
     def accelerations(
         self,
         diagonal: Diagonal,
-        growth: DiagonalRate,
-        _known: State,
-        _speeds: State,
-        changes: State,
+        rate: DiagonalRate,
+        _solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
     ) -> DiagonalAcceleration:
         """
         Return the derivative of `rates`.
@@ -314,17 +316,24 @@ class CrankDiagonal:
         """
         first, second = self.arms
         a, d = self.sides
-        swirl = growth.growth * ((d - a) * (d + a) / diagonal.square)
-        pull = -growth.turn * (1.0 - growth.turn)
-        base = changes.coordinates[second]
-        change = changes.coordinates[first] - base
-        return DiagonalAcceleration(pull, swirl, change, base, self.bend(diagonal))
+        swirl = rate.log_length_rate * ((d - a) * (d + a) / diagonal.square)
+        pull = -rate.direction_rate * (1.0 - rate.direction_rate)
+        base = accelerations.coordinates[second]
+        change = accelerations.coordinates[first] - base
+        return DiagonalAcceleration(
+            pull, swirl, change, base, self.curvature_over_height(diagonal)
+        )
 
-    def bend(self, diagonal: Diagonal) -> float:
+    def curvature_over_height(self, diagonal: Diagonal) -> float:
         """Return the bend, as `accelerations` defines it."""
-        near, far, fold, stretch = diagonal.near, diagonal.far, diagonal.fold, diagonal.stretch
+        near, far, fold, stretch = (
+            diagonal.near_root,
+            diagonal.far_root,
+            diagonal.fold,
+            diagonal.stretch,
+        )
         fold_bracket, stretch_bracket = self.brackets
-        fold_ratio, stretch_ratio = self.ratios(diagonal)
+        fold_ratio, stretch_ratio = self.root_ratios(diagonal)
         bend = 0.0
         if fold_bracket:
             bend = fold_bracket * (far / fold) / fold * (stretch_ratio / fold)
@@ -373,12 +382,12 @@ class UnsignedDiagonal(CrankDiagonal):
     def crosses(self) -> tuple[bool, bool]:
         return False, False
 
-    def at(self, known: State) -> Diagonal:
-        signed = super().at(known)
+    def diagonal_at(self, solved: LinkState) -> Diagonal:
+        signed = super().diagonal_at(solved)
         return signed._replace(fold=abs(signed.fold), stretch=abs(signed.stretch))
 
-    def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
-        return diagonal.near / diagonal.fold, diagonal.far / diagonal.stretch
+    def root_ratios(self, diagonal: Diagonal) -> tuple[float, float]:
+        return diagonal.near_root / diagonal.fold, diagonal.far_root / diagonal.stretch
 
 
 class NearlyCrossingDiagonal(CrankDiagonal):
@@ -417,12 +426,12 @@ class NearlyCrossingDiagonal(CrankDiagonal):
     def crosses(self) -> tuple[bool, bool]:
         return self._crosses
 
-    def at(self, known: State) -> Diagonal:
-        found = super().at(known)
+    def diagonal_at(self, solved: LinkState) -> Diagonal:
+        found = super().diagonal_at(solved)
         folds, stretches = self._crosses
         return found._replace(
-            fold=copysign(found.fold, found.near) if folds else found.fold,
-            stretch=copysign(found.stretch, found.far) if stretches else found.stretch,
+            fold=copysign(found.fold, found.near_root) if folds else found.fold,
+            stretch=copysign(found.stretch, found.far_root) if stretches else found.stretch,
         )
 
 
@@ -481,28 +490,30 @@ class FreeDiagonal:
         self._ends = ends
         self._limits = (*limits, limits[1] != inf)
 
-    def at(self, known: State) -> Diagonal:
-        start, end = (known.pins[i] for i in self._ends)
+    def diagonal_at(self, solved: LinkState) -> Diagonal:
+        start, end = (solved.pins[i] for i in self._ends)
         return free_diagonal(end - start, abs(start) + abs(end), *self._limits)
 
-    def rates(self, diagonal: Diagonal, known: State, speeds: State) -> DiagonalRate:
+    def rates(self, diagonal: Diagonal, solved: LinkState, velocities: LinkState) -> DiagonalRate:
         """Return the velocity of D against A, divided by AD."""
         first, second = self._ends
-        vector = known.pins[second] - known.pins[first]
-        return free_diagonal_rate(diagonal, vector, speeds.pins[second] - speeds.pins[first])
+        vector = solved.pins[second] - solved.pins[first]
+        return free_diagonal_rate(
+            diagonal, vector, velocities.pins[second] - velocities.pins[first]
+        )
 
     def accelerations(
         self,
         _diagonal: Diagonal,
-        growth: DiagonalRate,
-        known: State,
-        _speeds: State,
-        changes: State,
+        rate: DiagonalRate,
+        solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
     ) -> DiagonalAcceleration:
         first, second = self._ends
-        vector = known.pins[second] - known.pins[first]
+        vector = solved.pins[second] - solved.pins[first]
         return free_diagonal_acceleration(
-            growth, vector, changes.pins[second] - changes.pins[first]
+            rate, vector, accelerations.pins[second] - accelerations.pins[first]
         )
 
 
@@ -545,9 +556,9 @@ def free_diagonal_rate(diagonal: Diagonal, vector: complex, velocity: complex) -
 
 
 def free_diagonal_acceleration(
-    growth: DiagonalRate, vector: complex, pull: complex
+    rate: DiagonalRate, vector: complex, acceleration: complex
 ) -> DiagonalAcceleration:
     """Return the derivative of `free_diagonal_rate`; ``pull`` is the vector's acceleration."""
-    square = pull / vector
-    square += growth.turn * (growth.turn - 2j * growth.growth)
+    square = acceleration / vector
+    square += rate.direction_rate * (rate.direction_rate - 2j * rate.log_length_rate)
     return DiagonalAcceleration(square.real, square.imag, 0.0, 0.0, None)

@@ -24,14 +24,14 @@ from math import remainder, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, listed
-from linkage_ros.kinematics.linkage import Linkage, Pose
+from linkage_ros.kinematics.linkage import AssemblyPose, Linkage
 from linkage_ros.kinematics.point_tracker import PointTracker
 from linkage_ros.kinematics.sides import closes_in_two_ways, telling_part, TwoWays
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.topology import Dyad, Iterated, links_of
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.known_links import KnownLinks
+    from linkage_ros.kinematics.known_links import SolvedLinks
     from linkage_ros.kinematics.results import LoopClosure, Position
 
 _SAME = 1e-9
@@ -58,7 +58,7 @@ class _Sight(NamedTuple):
     constant: float = 0.0
     length: float = 0.0
 
-    def at(self, state: State) -> complex:
+    def place_at(self, state: LinkState) -> complex:
         """Return the place in a state, in [m]."""
         if self.tracker is not None:
             return self.tracker.places_in(state)[self.tracker.indices[0]]
@@ -72,27 +72,27 @@ class _Target(NamedTuple):
     drawn: complex
 
 
-class _Assembly(NamedTuple):
+class _DrawnAssembly(NamedTuple):
     """An assembly, as far as its dyads are closed."""
 
-    state: State
+    state: LinkState
     square: float = 0.0  # Sum of the squares of the distances from the drawing, in [m²]
     places: tuple[complex, ...] = ()  # What the pose names
     # Of each dyad that closes in two ways the sign of its step, and the sign of its side.
     signs: tuple[int, ...] = ()
     sides: tuple[float, ...] = ()
 
-    def seen(self, targets: Sequence[_Target]) -> _Assembly:
+    def add_targets(self, targets: Sequence[_Target]) -> _DrawnAssembly:
         """Return it with further things that the pose names."""
-        places = tuple(target.sight.at(self.state) for target in targets)
+        places = tuple(target.sight.place_at(self.state) for target in targets)
         away = [abs(at - target.drawn) for at, target in zip(places, targets, strict=True)]
         square = self.square + sum(one * one for one in away)
         return self._replace(square=square, places=self.places + places)
 
-    def on_both_sides(self, step: Any) -> Iterator[_Assembly]:
+    def on_both_sides(self, step: Any) -> Iterator[_DrawnAssembly]:
         """Yield it with a dyad on each of its sides, as far as it closes."""
         for sign in (1, -1):
-            state = State([*self.state.coordinates], [*self.state.pins])
+            state = LinkState([*self.state.coordinates], [*self.state.pins])
             way = step.with_sign(sign)
             pose = way.close(state)
             if pose.status.has_pose:
@@ -110,7 +110,7 @@ class _Assembly(NamedTuple):
 
 
 def drawn_signs(
-    linkage: Linkage, plan: KnownLinks, ways: Sequence[TwoWays]
+    linkage: Linkage, plan: SolvedLinks, ways: Sequence[TwoWays]
 ) -> list[tuple[TwoWays, int]]:
     """
     Return the signs with which dyads close as drawn; none if the pose says nothing of them.
@@ -132,12 +132,12 @@ def drawn_signs(
     """
     pose = linkage.pose
     assert pose is not None, 'the caller has one'
-    groups = [_targets(plan, pose, one.dyad) for one in ways]
+    groups = [_pose_targets(plan, pose, one.dyad) for one in ways]
     targets = [target for group in groups for target in group]
     missing = any(not one.written for one in ways)
     if not targets and (missing or not any(one.crosses for one in ways)):
         return []
-    found = sorted(_closed(linkage, plan, ways, groups), key=lambda one: one.square)
+    found = sorted(_closing_assemblies(linkage, plan, ways, groups), key=lambda one: one.square)
     written = [one for one in found if one.is_written(ways)]
     if not targets:
         # Where it starts, the linkage need not close: then the sides hold as without a pose.
@@ -150,15 +150,15 @@ def drawn_signs(
         )
     drawn = [target.drawn for target in targets]
     if not written or _is_nearer(found[0], written[0], drawn, plan.scale):
-        raise _contradiction(ways, found[0])
+        raise _contradiction_error(ways, found[0])
     best, *others = written
     alike = [one for one in others if not _is_nearer(best, one, drawn, plan.scale)]
     if alike:
-        raise _not_told(plan, ways, [best, *alike])
+        raise _ambiguity_error(plan, ways, [best, *alike])
     return list(zip(ways, best.signs, strict=True))
 
 
-def _targets(plan: KnownLinks, pose: Pose, dyad: Dyad) -> list[_Target]:
+def _pose_targets(plan: SolvedLinks, pose: AssemblyPose, dyad: Dyad) -> list[_Target]:
     """Return what a pose names of the links of a dyad."""
     links = links_of(dyad)
     known = list(plan.angles)
@@ -167,38 +167,38 @@ def _targets(plan: KnownLinks, pose: Pose, dyad: Dyad) -> list[_Target]:
     for name, place in pose.points.items():
         carrier = next((link for link in links if name in plan.points[link]), None)
         if carrier and not any(name in plan.points[link] for link in before):
-            found.append(_Target(_point(plan, carrier, name), complex(*place)))
+            found.append(_Target(_point_sight(plan, carrier, name), complex(*place)))
     for link, angle in pose.angles.items():
         if link in links:
-            sight = _angle(plan, link)
+            sight = _angle_sight(plan, link)
             found.append(_Target(sight, rect(sight.length, angle)))
     return found
 
 
-def _point(plan: KnownLinks, link: str, name: str) -> _Sight:
+def _point_sight(plan: SolvedLinks, link: str, name: str) -> _Sight:
     return _Sight(PointTracker(plan, [(link, plan.points[link][name] * plan.scale)]))
 
 
-def _angle(plan: KnownLinks, link: str) -> _Sight:
+def _angle_sight(plan: SolvedLinks, link: str) -> _Sight:
     first, *others = plan.points[link].values()
     length = max((abs(other - first) for other in others), default=1.0)
     angle = plan.angles[link]
     return _Sight(None, angle.coordinate, angle.constant, length * plan.scale)
 
 
-def _closed(
+def _closing_assemblies(
     linkage: Linkage,
-    plan: KnownLinks,
+    plan: SolvedLinks,
     ways: Sequence[TwoWays],
     groups: Sequence[Sequence[_Target]],
-) -> list[_Assembly]:
+) -> list[_DrawnAssembly]:
     """Return the assemblies in which the loops close, those near to the drawing."""
     assert linkage.pose is not None, 'the caller has one'
     inputs = (
         value / plan.scale if given.slider else value
         for value, given in zip(linkage.pose.inputs, linkage.inputs, strict=True)
     )
-    found = [_Assembly(State([0.0, *inputs], []))]
+    found = [_DrawnAssembly(LinkState([0.0, *inputs], []))]
     both = len(ways) <= _MOST_EXPLORED
     numbers = {one.step: number for number, one in enumerate(ways)}
     closed: Sequence[_Target] = ()
@@ -207,13 +207,13 @@ def _closed(
             found = [one for one in found if way.close(one.state).status.has_pose]
             continue
         # Steps behind a dyad have placed the other links of its bodies, which inputs hold.
-        found = [one.seen(closed) for one in found]
+        found = [one.add_targets(closed) for one in found]
         number = numbers[step]
         closed = groups[number]
         if len(found) > _MOST_KEPT:
             found.sort(key=lambda one: one.square)
             if found[_MOST_KEPT].square <= _CLEARLY * _CLEARLY * found[0].square:
-                names = listed(repr(one.name) for one in ways[:number])
+                names = listed(repr(one.assembly_key) for one in ways[:number])
                 raise DefinitionError(
                     'pose', f'does not tell the sides of {names}', 'name a point of each'
                 )
@@ -224,10 +224,12 @@ def _closed(
             for other in one.on_both_sides(way)
             if both or other.is_written(ways)
         ]
-    return [one.seen(closed) for one in found]
+    return [one.add_targets(closed) for one in found]
 
 
-def _is_nearer(one: _Assembly, other: _Assembly, drawn: Sequence[complex], size: float) -> bool:
+def _is_nearer(
+    one: _DrawnAssembly, other: _DrawnAssembly, drawn: Sequence[complex], size: float
+) -> bool:
     """Return whether an assembly is clearly nearer to the drawing, where the two differ."""
     near = far = 0.0
     for place, elsewhere, target in zip(one.places, other.places, drawn, strict=True):
@@ -237,21 +239,21 @@ def _is_nearer(one: _Assembly, other: _Assembly, drawn: Sequence[complex], size:
     return _CLEARLY * _CLEARLY * near < far
 
 
-def _contradiction(ways: Sequence[TwoWays], drawn: _Assembly) -> DefinitionError:
+def _contradiction_error(ways: Sequence[TwoWays], drawn: _DrawnAssembly) -> DefinitionError:
     """Return the error for the first side that is not the drawn one."""
     for one, side in zip(ways, drawn.sides, strict=True):
         if one.written * side < 0.0:
             break
-    words = one.word(one.written), one.word(side)
+    words = one.side_word(one.written), one.side_word(side)
     return DefinitionError(
-        f'assembly.{one.name}',
+        f'assembly.{one.assembly_key}',
         f'is {words[0]!r}, and {words[1]!r} as pose draws it',
-        f'leave {one.name} out of assembly, write {words[1]}, or draw the other pose',
+        f'leave {one.assembly_key} out of assembly, write {words[1]}, or draw the other pose',
     )
 
 
-def _not_told(
-    plan: KnownLinks, ways: Sequence[TwoWays], alike: Sequence[_Assembly]
+def _ambiguity_error(
+    plan: SolvedLinks, ways: Sequence[TwoWays], alike: Sequence[_DrawnAssembly]
 ) -> DefinitionError:
     """Return the error for a pose that fits several assemblies."""
     first = alike[0]
@@ -262,7 +264,10 @@ def _not_told(
     ]
     sides = []
     for one in alike[:_MOST_LISTED]:
-        words = [f'{ways[i].name}: {ways[i].word(one.sides[i] or one.signs[i])}' for i in differ]
+        words = [
+            f'{ways[i].assembly_key}: {ways[i].side_word(one.sides[i] or one.signs[i])}'
+            for i in differ
+        ]
         sides.append(f'{{{listed(words)}}}')
     if len(alike) > _MOST_LISTED:
         sides.append(f'{len(alike) - _MOST_LISTED} more')
@@ -275,19 +280,19 @@ def _not_told(
     )
 
 
-def _telling_text(plan: KnownLinks, dyad: Dyad, states: Sequence[State]) -> str:
+def _telling_text(plan: SolvedLinks, dyad: Dyad, states: Sequence[LinkState]) -> str:
     """Return what tells the side of a dyad, with its value in two states."""
     link, point = telling_part(plan.points, dyad)
     if point:
-        places = [_point(plan, link, point).at(state) for state in states]
+        places = [_point_sight(plan, link, point).place_at(state) for state in states]
         texts = [f'[{place.real + 0.0:.4g}, {place.imag + 0.0:.4g}] m' for place in places]
     else:
-        turned = [phase(_angle(plan, link).at(state)) for state in states]
+        turned = [phase(_angle_sight(plan, link).place_at(state)) for state in states]
         texts = [f'{angle:.4g} rad' for angle in turned]
     return f'{point or f"the angle of {link}"}: {texts[0]} or {texts[1]}'
 
 
-def drawn_pose(closure: LoopClosure, position: Position) -> Pose:
+def drawn_pose(closure: LoopClosure, position: Position) -> AssemblyPose:
     """
     Return the pose that tells the assembly of a position.
 
@@ -298,7 +303,7 @@ def drawn_pose(closure: LoopClosure, position: Position) -> Pose:
     points: dict[str, tuple[float, float]] = {}
     turned: dict[str, float] = {}
 
-    def name(link: str, point: str) -> None:
+    def add_point(link: str, point: str) -> None:
         place = places[link, point]
         points[point] = (place.real + 0.0, place.imag + 0.0)
 
@@ -309,13 +314,13 @@ def drawn_pose(closure: LoopClosure, position: Position) -> Pose:
             for link in group.links:
                 for point in links[link]:
                     if point in given.points:
-                        name(link, point)
+                        add_point(link, point)
                 if link in given.angles:
                     turned[link] = remainder(angles[link], tau)
         elif closes_in_two_ways(group):
             link, point = telling_part(closure.structure.links, group)
             if point:
-                name(link, point)
+                add_point(link, point)
             else:
                 turned[link] = remainder(angles[link], tau)
-    return Pose(position.inputs, points, turned)
+    return AssemblyPose(position.inputs, points, turned)

@@ -21,16 +21,16 @@ from collections.abc import Iterator, Sequence
 from math import hypot, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.arithmetic import facing, remainder, vector
+from linkage_ros.kinematics.arithmetic import make_vector, remainder, unit_vector
 from linkage_ros.kinematics.known_links import count_turns
 from linkage_ros.kinematics.linkage import Linkage, Ratio, RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.topology import Joint
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.known_links import KnownLinks
+    from linkage_ros.kinematics.known_links import SolvedLinks
 
 Array = NDArray[np.floating[Any]]
 
@@ -43,7 +43,7 @@ class End(NamedTuple):
     pin: int = -1
 
 
-class Facing(NamedTuple):
+class BodyDirection(NamedTuple):
     """A direction: the angle of ``body``, or a coordinate, plus a constant, in [rad]."""
 
     body: int
@@ -51,7 +51,7 @@ class Facing(NamedTuple):
     direction: float
 
 
-class Meeting(NamedTuple):
+class CoincidentPoints(NamedTuple):
     """Two points coincide."""
 
     one: End
@@ -61,8 +61,8 @@ class Meeting(NamedTuple):
 class Parallel(NamedTuple):
     """An angle between two links: a constant plus the input with index ``turn``, if not 0."""
 
-    one: Facing
-    other: Facing
+    one: BodyDirection
+    other: BodyDirection
     angle: float
     turn: int = 0
 
@@ -72,32 +72,32 @@ class OnLine(NamedTuple):
 
     point: End
     through: End
-    line: Facing
+    line: BodyDirection
     slide: int = 0
 
 
 class Geared(NamedTuple):
     """A sum of factors times angles or slides, and a constant, is a multiple of the period."""
 
-    terms: tuple[tuple[float, Facing | OnLine], ...]
+    terms: tuple[tuple[float, BodyDirection | OnLine], ...]
     constant: float
     period: float  # Infinite if the sum is 0
 
 
-Constraint = Meeting | Parallel | OnLine | Geared
+Constraint = CoincidentPoints | Parallel | OnLine | Geared
 
 
-def equations(
-    constraints: Sequence[Constraint], unknowns: Sequence[float], known: State
+def evaluate_constraints(
+    constraints: Sequence[Constraint], unknowns: Sequence[float], solved: LinkState
 ) -> tuple[list[float], list[list[float]]]:
     """Return the residuals of the constraints, and their derivatives by the unknowns, as rows."""
     n = len(unknowns)
     errors: list[float] = []
     rows: list[list[float]] = []
-    x = known.coordinates
+    x = solved.coordinates
     for constraint in constraints:
-        if isinstance(constraint, Meeting):
-            (one, turn), (other, back) = (_place(e, unknowns, known) for e in constraint)
+        if isinstance(constraint, CoincidentPoints):
+            (one, turn), (other, back) = (_point_and_arm(e, unknowns, solved) for e in constraint)
             errors += [one.real - other.real, one.imag - other.imag]
             across, along = [0.0] * n, [0.0] * n
             for end, arm, sign in (
@@ -113,7 +113,9 @@ def equations(
             rows += [across, along]
         elif isinstance(constraint, Parallel):
             turned = x[constraint.turn] if constraint.turn else 0.0
-            angle = _angle(constraint.one, unknowns, x) - _angle(constraint.other, unknowns, x)
+            angle = _direction_angle(constraint.one, unknowns, x) - _direction_angle(
+                constraint.other, unknowns, x
+            )
             errors.append(remainder(angle - constraint.angle - turned, tau))
             row = [0.0] * n
             for end_facing, sign in ((constraint.one, 1.0), (constraint.other, -1.0)):
@@ -123,18 +125,18 @@ def equations(
         elif isinstance(constraint, Geared):
             total, row = constraint.constant, [0.0] * n
             for factor, of in constraint.terms:
-                if isinstance(of, Facing):
-                    total += factor * _angle(of, unknowns, x)
+                if isinstance(of, BodyDirection):
+                    total += factor * _direction_angle(of, unknowns, x)
                     slopes = {3 * of.body: 1.0 + 0j} if of.body >= 0 else {}
                 else:
-                    place, slopes = _line_slopes(of, unknowns, known)
+                    place, slopes = _line_slopes(of, unknowns, solved)
                     total += factor * place.real
                 for column, slope in slopes.items():
                     row[column] += factor * slope.real
             errors.append(remainder(total, constraint.period) if constraint.period else total)
             rows.append(row)
         else:
-            place, slopes = _line_slopes(constraint, unknowns, known)
+            place, slopes = _line_slopes(constraint, unknowns, solved)
             row = [0.0] * n
             for column, slope in slopes.items():
                 row[column] = slope.real if constraint.slide else slope.imag
@@ -151,16 +153,16 @@ def is_meshed(constraints: Sequence[Constraint], off: Sequence[float], part: flo
         period = constraint.period if isinstance(constraint, Geared) else 0.0
         if period and not off[row] < part * period:
             return False
-        row += 2 if isinstance(constraint, Meeting) else 1
+        row += 2 if isinstance(constraint, CoincidentPoints) else 1
     return True
 
 
-def spread(
+def bound_jacobian_change(
     constraints: Sequence[Constraint],
     unknowns: Array,
-    known: State,
+    solved: LinkState,
     moved: Array,
-    known_moved: State,
+    known_moved: LinkState,
 ) -> Array:
     """
     Return a bound of the change of the derivatives by the unknowns, entry by entry.
@@ -179,12 +181,12 @@ def spread(
     rows = []
     values, ways = unknowns.tolist(), moved.tolist()
     for constraint in constraints:
-        if isinstance(constraint, Meeting):
+        if isinstance(constraint, CoincidentPoints):
             across, along = [0.0] * n, [0.0] * n
             for end in constraint:
                 if end.body >= 0:
                     k = 3 * end.body
-                    turn, arm = ways[k], _place(end, values, known)[1]
+                    turn, arm = ways[k], _point_and_arm(end, values, solved)[1]
                     # |d(r·sin)| ≤ |r·cos|·|dφ| + |r|·dφ²/2, and likewise for the cosine.
                     curved = 0.5 * abs(end.arm) * turn * turn
                     across[k] += abs(arm.real) * turn + curved
@@ -197,16 +199,20 @@ def spread(
             for factor, of in constraint.terms:
                 if isinstance(of, OnLine):
                     row += abs(factor) * np.array(
-                        _line_spread(of, values, known, ways, known_moved)
+                        _line_spread(of, values, solved, ways, known_moved)
                     )
             rows.append(row.tolist())
         else:
-            rows.append(_line_spread(constraint, values, known, ways, known_moved))
+            rows.append(_line_spread(constraint, values, solved, ways, known_moved))
     return np.array(rows)
 
 
 def _line_spread(
-    line: OnLine, values: Sequence[float], known: State, ways: Sequence[float], moved: State
+    line: OnLine,
+    values: Sequence[float],
+    solved: LinkState,
+    ways: Sequence[float],
+    moved: LinkState,
 ) -> list[float]:
     row = [0.0] * len(values)
     rail = line.line
@@ -223,45 +229,55 @@ def _line_spread(
         row[k + 1] += turn
         row[k + 2] += turn
     if rail.body >= 0:
-        row[3 * rail.body] += abs(along(line, known, values)) * turn + far
+        row[3 * rail.body] += abs(point_in_line_frame(line, solved, values)) * turn + far
     return row
 
 
-def derivative(
+def differentiate_constraints(
     constraints: Sequence[Constraint],
     unknowns: Sequence[float],
-    known: State,
-    speeds: State,
+    solved: LinkState,
+    solved_velocities: LinkState,
     rates: Sequence[float],
-    changes: State | None,
+    solved_accelerations: LinkState | None,
     accelerations: Sequence[float],
 ) -> list[float]:
     """Return the first derivative of the constraints; the second if changes are given."""
-    order = 1 if changes is None else 2
+    order = 1 if solved_accelerations is None else 2
     derivatives: list[float] = []
     for constraint in constraints:
-        if isinstance(constraint, Meeting):
+        if isinstance(constraint, CoincidentPoints):
             one, other = (
-                _point_motion(e, unknowns, known, speeds, rates, changes, accelerations)[order]
+                _point_motion(
+                    e,
+                    unknowns,
+                    solved,
+                    solved_velocities,
+                    rates,
+                    solved_accelerations,
+                    accelerations,
+                )[order]
                 for e in constraint
             )
             derivatives += [one.real - other.real, one.imag - other.imag]
         elif isinstance(constraint, Parallel):
-            state = speeds if changes is None else changes
-            values = rates if changes is None else accelerations
-            one, other = (_turn(f, values, state) for f in (constraint.one, constraint.other))
+            state = solved_velocities if solved_accelerations is None else solved_accelerations
+            values = rates if solved_accelerations is None else accelerations
+            one, other = (
+                _direction_rate(f, values, state) for f in (constraint.one, constraint.other)
+            )
             driven = state.coordinates[constraint.turn] if constraint.turn else 0.0
             derivatives.append(one - other - driven)
         elif isinstance(constraint, Geared):
-            state = speeds if changes is None else changes
-            values = rates if changes is None else accelerations
-            given = unknowns, known, speeds, rates, changes, accelerations
+            state = solved_velocities if solved_accelerations is None else solved_accelerations
+            values = rates if solved_accelerations is None else accelerations
+            given = unknowns, solved, solved_velocities, rates, solved_accelerations, accelerations
             derivatives.append(
                 sum(
                     factor
                     * (
-                        _turn(of, values, state)
-                        if isinstance(of, Facing)
+                        _direction_rate(of, values, state)
+                        if isinstance(of, BodyDirection)
                         else line_motion(of, *given)[order].real
                     )
                     for factor, of in constraint.terms
@@ -269,51 +285,61 @@ def derivative(
             )
         else:
             moved = line_motion(
-                constraint, unknowns, known, speeds, rates, changes, accelerations
+                constraint,
+                unknowns,
+                solved,
+                solved_velocities,
+                rates,
+                solved_accelerations,
+                accelerations,
             )[order]
             if constraint.slide:
-                state = speeds if changes is None else changes
+                state = solved_velocities if solved_accelerations is None else solved_accelerations
                 derivatives.append(moved.real - state.coordinates[constraint.slide])
             else:
                 derivatives.append(moved.imag)
     return derivatives
 
 
-def _angle(of: Facing, unknowns: Sequence[float], x: Sequence[float]) -> float:
+def _direction_angle(of: BodyDirection, unknowns: Sequence[float], x: Sequence[float]) -> float:
     base = unknowns[3 * of.body] if of.body >= 0 else x[of.coordinate]
     return base + of.direction
 
 
-def _turn(of: Facing, values: Sequence[float], state: State) -> float:
+def _direction_rate(of: BodyDirection, values: Sequence[float], state: LinkState) -> float:
     return values[3 * of.body] if of.body >= 0 else state.coordinates[of.coordinate]
 
 
-def _place(end: End, unknowns: Sequence[float], known: State) -> tuple[complex, complex]:
+def _point_and_arm(
+    end: End, unknowns: Sequence[float], solved: LinkState
+) -> tuple[complex, complex]:
     """Return a point, and its arm in the frame of the ground."""
     if end.body < 0:
-        return known.pins[end.pin], 0j
+        return solved.pins[end.pin], 0j
     k = 3 * end.body
-    arm = end.arm * facing(unknowns[k])
-    return vector(unknowns[k + 1], unknowns[k + 2]) + arm, arm
+    arm = end.arm * unit_vector(unknowns[k])
+    return make_vector(unknowns[k + 1], unknowns[k + 2]) + arm, arm
 
 
-def along(line: OnLine, known: State, unknowns: Any) -> complex:
+def point_in_line_frame(line: OnLine, solved: LinkState, unknowns: Any) -> complex:
     """Return a point in the frame of its line."""
-    point, through = (_place(e, unknowns, known)[0] for e in (line.point, line.through))
-    return (point - through) * facing(-_angle(line.line, unknowns, known.coordinates))
+    point, through = (_point_and_arm(e, unknowns, solved)[0] for e in (line.point, line.through))
+    return (point - through) * unit_vector(
+        -_direction_angle(line.line, unknowns, solved.coordinates)
+    )
 
 
 def _line_slopes(
-    line: OnLine, unknowns: Sequence[float], known: State
+    line: OnLine, unknowns: Sequence[float], solved: LinkState
 ) -> tuple[complex, dict[int, complex]]:
     """Return a point in the frame of its line, and its derivatives by the unknowns."""
-    back = facing(-_angle(line.line, unknowns, known.coordinates))
-    place = along(line, known, unknowns)
+    back = unit_vector(-_direction_angle(line.line, unknowns, solved.coordinates))
+    place = point_in_line_frame(line, solved, unknowns)
     columns: dict[int, complex] = {}
     for end, sign in ((line.point, 1.0), (line.through, -1.0)):
         if end.body >= 0:
             k = 3 * end.body
-            arm = _place(end, unknowns, known)[1]
+            arm = _point_and_arm(end, unknowns, solved)[1]
             for column, slope in ((k, 1j * arm), (k + 1, 1.0 + 0j), (k + 2, 1j)):
                 columns[column] = columns.get(column, 0j) + sign * slope * back
     if line.line.body >= 0:
@@ -325,45 +351,51 @@ def _line_slopes(
 def _point_motion(
     end: End,
     unknowns: Sequence[float],
-    known: State,
-    speeds: State,
+    solved: LinkState,
+    solved_velocities: LinkState,
     rates: Sequence[float],
-    changes: State | None,
+    solved_accelerations: LinkState | None,
     accelerations: Sequence[float],
 ) -> tuple[complex, complex, complex]:
     """Return place, velocity and acceleration of a point."""
     if end.body < 0:
-        pull = changes.pins[end.pin] if changes is not None else 0j
-        return known.pins[end.pin], speeds.pins[end.pin], pull
+        pull = solved_accelerations.pins[end.pin] if solved_accelerations is not None else 0j
+        return solved.pins[end.pin], solved_velocities.pins[end.pin], pull
     k = 3 * end.body
-    place, arm = _place(end, unknowns, known)
+    place, arm = _point_and_arm(end, unknowns, solved)
     turn = rates[k]
-    velocity = vector(rates[k + 1], rates[k + 2]) + vector(0.0, turn) * arm
-    pull = vector(accelerations[k + 1], accelerations[k + 2])
-    return place, velocity, pull + vector(-turn * turn, accelerations[k]) * arm
+    velocity = make_vector(rates[k + 1], rates[k + 2]) + make_vector(0.0, turn) * arm
+    pull = make_vector(accelerations[k + 1], accelerations[k + 2])
+    return place, velocity, pull + make_vector(-turn * turn, accelerations[k]) * arm
 
 
 def line_motion(
     line: OnLine,
     unknowns: Sequence[float],
-    known: State,
-    speeds: State,
+    solved: LinkState,
+    solved_velocities: LinkState,
     rates: Sequence[float],
-    changes: State | None,
+    solved_accelerations: LinkState | None,
     accelerations: Sequence[float],
 ) -> tuple[complex, complex, complex]:
     """Return place, velocity and acceleration of a point in the frame of its line."""
     point, through = (
-        _point_motion(e, unknowns, known, speeds, rates, changes, accelerations)
+        _point_motion(
+            e, unknowns, solved, solved_velocities, rates, solved_accelerations, accelerations
+        )
         for e in (line.point, line.through)
     )
-    back = facing(-_angle(line.line, unknowns, known.coordinates))
-    turn = _turn(line.line, rates, speeds)
-    change = _turn(line.line, accelerations, changes) if changes is not None else 0.0
+    back = unit_vector(-_direction_angle(line.line, unknowns, solved.coordinates))
+    turn = _direction_rate(line.line, rates, solved_velocities)
+    change = (
+        _direction_rate(line.line, accelerations, solved_accelerations)
+        if solved_accelerations is not None
+        else 0.0
+    )
     place = (point[0] - through[0]) * back
-    velocity = (point[1] - through[1]) * back - vector(0.0, turn) * place
+    velocity = (point[1] - through[1]) * back - make_vector(0.0, turn) * place
     pull = (point[2] - through[2]) * back
-    pull -= vector(0.0, 2.0 * turn) * velocity + vector(-turn * turn, change) * place
+    pull -= make_vector(0.0, 2.0 * turn) * velocity + make_vector(-turn * turn, change) * place
     return place, velocity, pull
 
 
@@ -391,14 +423,16 @@ class Constraints:
         linkage: Linkage,
         joints: Sequence[Joint],
         links: Sequence[str],
-        planner: KnownLinks,
+        planner: SolvedLinks,
         ratios: Sequence[str] = (),
     ) -> None:
         self._linkage = linkage
         self._planner = planner
         self._links = links
         self._bodies = {link: i for i, link in enumerate(links)}
-        self.all: list[Constraint] = []  # The constraints: as many equations as there are unknowns
+        self.constraints: list[
+            Constraint
+        ] = []  # The constraints: as many equations as there are unknowns
         # Indices of the pins that links solved before the group have in it, by name.
         self.known_pins: dict[str, int] = {}
         self.slides: dict[str, OnLine] = {}  # The sliders of the group, by name
@@ -410,30 +444,36 @@ class Constraints:
 
     def _add_joint(self, joint: Joint) -> None:
         if joint.kind == 'R':
-            self.all.append(
-                Meeting(self._end(joint.link, joint.name), self._end(joint.to, joint.name))
+            self.constraints.append(
+                CoincidentPoints(
+                    self._end_point(joint.link, joint.name), self._end_point(joint.to, joint.name)
+                )
             )
             return
         slider = self._linkage.sliders[joint.name]
-        block, rail = self._facing(joint.link, 0.0), self._facing(joint.to, 0.0)
-        self.all.append(Parallel(block, rail, slider.angle))
+        block, rail = self._body_direction(joint.link, 0.0), self._body_direction(joint.to, 0.0)
+        self.constraints.append(Parallel(block, rail, slider.angle))
         self.slides[joint.name] = OnLine(
-            self._end(joint.link, slider.point),
-            self._end(joint.to, slider.through),
-            self._facing(joint.to, phase(complex(*slider.direction))),
+            self._end_point(joint.link, slider.point),
+            self._end_point(joint.to, slider.through),
+            self._body_direction(joint.to, phase(complex(*slider.direction))),
         )
-        self.all.append(self.slides[joint.name])
+        self.constraints.append(self.slides[joint.name])
 
     def _add_drives(self) -> None:
-        for i, given in enumerate(self._linkage.driven):
+        for i, given in enumerate(self._linkage.driven_joints):
             if not self._planner.has_drive(i):
                 continue
             if given.slider in self.slides:
                 line = self.slides[given.slider]
-                self.all.append(line._replace(slide=self._planner.drive_coordinate(i)))
+                self.constraints.append(line._replace(slide=self._planner.drive_coordinate(i)))
             elif given.child in self._bodies or given.parent in self._bodies:
-                child, parent = (self._facing(end, 0.0) for end in (given.child, given.parent))
-                self.all.append(Parallel(child, parent, 0.0, self._planner.drive_coordinate(i)))
+                child, parent = (
+                    self._body_direction(end, 0.0) for end in (given.child, given.parent)
+                )
+                self.constraints.append(
+                    Parallel(child, parent, 0.0, self._planner.drive_coordinate(i))
+                )
 
     def _add_ratio(self, name: str, given: Ratio) -> None:
         joints = self._linkage.joints[name], self._linkage.joints[given.of]
@@ -446,30 +486,30 @@ class Constraints:
         period = tau if slides[1] else abs(ratio) * tau if slides[0] else tau / max(turns, 1)
         if all(slides) or not turns:
             period = 0.0
-        terms = (*self._terms(joints[0], 1.0), *self._terms(joints[1], -ratio))
-        self.all.append(Geared(terms, -given.offset / unit, period))
+        terms = (*self._ratio_terms(joints[0], 1.0), *self._ratio_terms(joints[1], -ratio))
+        self.constraints.append(Geared(terms, -given.offset / unit, period))
 
-    def _terms(
+    def _ratio_terms(
         self, joint: RevoluteJoint | SlideJoint, factor: float
-    ) -> Iterator[tuple[float, Facing | OnLine]]:
+    ) -> Iterator[tuple[float, BodyDirection | OnLine]]:
         if isinstance(joint, RevoluteJoint):
-            yield factor, self._facing(joint.child, 0.0)
-            yield -factor, self._facing(joint.parent, 0.0)
+            yield factor, self._body_direction(joint.child, 0.0)
+            yield -factor, self._body_direction(joint.parent, 0.0)
         elif joint.slider in self.slides:
             yield factor, self.slides[joint.slider]
         else:
-            coordinate, _, sign, constant = self._planner.term(joint)
-            yield factor * sign, Facing(-1, coordinate, sign * constant)
+            coordinate, _, sign, constant = self._planner.joint_term(joint)
+            yield factor * sign, BodyDirection(-1, coordinate, sign * constant)
 
-    def _end(self, link: str, name: str) -> End:
+    def _end_point(self, link: str, name: str) -> End:
         points = self._planner.points[link]
         if link in self._bodies:
             return End(self._bodies[link], points[name] - next(iter(points.values())))
-        self.known_pins[name] = self._planner.place(link, points[name])
+        self.known_pins[name] = self._planner.place_point(link, points[name])
         return End(-1, 0j, self.known_pins[name])
 
-    def _facing(self, link: str, direction: float) -> Facing:
+    def _body_direction(self, link: str, direction: float) -> BodyDirection:
         if link in self._bodies:
-            return Facing(self._bodies[link], 0, direction)
-        angle = self._planner.angles[link].plus(direction)
-        return Facing(-1, angle.coordinate, angle.constant)
+            return BodyDirection(self._bodies[link], 0, direction)
+        angle = self._planner.angles[link].rotate_by(direction)
+        return BodyDirection(-1, angle.coordinate, angle.constant)

@@ -17,8 +17,8 @@ from math import sin
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, did_you_mean, listed
-from linkage_ros.kinematics.checks import check
-from linkage_ros.kinematics.linkage import Input, Linkage, Pose, RevoluteJoint
+from linkage_ros.kinematics.checks import check_linkage
+from linkage_ros.kinematics.linkage import AssemblyPose, Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.sides import assembly_sides
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import assur_groups, Iterated
@@ -76,7 +76,7 @@ def exchange_inputs(
     exchanged = replace(
         linkage, inputs=tuple(inputs), joints=joints, assembly={}, pose=None, nominal=None
     )
-    check(exchanged)
+    check_linkage(exchanged)
     structure = assur_groups(exchanged)
     iterated = {
         link for group in structure.groups if isinstance(group, Iterated) for link in group.links
@@ -88,7 +88,7 @@ def exchange_inputs(
             if link in iterated
         }
         start = tuple(values[name] for name in names)
-        exchanged = replace(exchanged, pose=Pose(start, points))
+        exchanged = replace(exchanged, pose=AssemblyPose(start, points))
     sides = assembly_sides(structure)
     for words in islice(product(*sides.values()), _MOST):
         assembly: Any = dict(zip(sides, words, strict=True))

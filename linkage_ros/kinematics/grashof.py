@@ -15,7 +15,7 @@ from itertools import product
 from math import fsum
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import margin
+from linkage_ros.kinematics.arithmetic import exact_sum
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.topology import Dyad, links_of, Structure
 
@@ -90,8 +90,8 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     """
     sides = (a, b, c, d)
     shortest, p, q, longest = sorted(sides)
-    excess = margin(p, q, -shortest, -longest)
-    if fsum((shortest, p, q, -longest)) < 0.0 and margin(shortest, p, q, -longest):
+    excess = exact_sum(p, q, -shortest, -longest)
+    if fsum((shortest, p, q, -longest)) < 0.0 and exact_sum(shortest, p, q, -longest):
         return FourBarType('', 'no loop (one link is longer than the others together)', excess)
     nearly = nearly_paired(*sides)
     almost = f'{nearly.name} to within {nearly.deviation:.2g} m; else a ' if nearly else ''
@@ -102,8 +102,10 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
             else TRIPLE_ROCKERS[sides.index(longest)]
         )
         return FourBarType(code, almost + name, excess)
-    opposite = margin(a, -c) == margin(b, -d) == 0.0
-    beside = margin(a, -b) == margin(c, -d) == 0.0 or margin(a, -d) == margin(b, -c) == 0.0
+    opposite = exact_sum(a, -c) == exact_sum(b, -d) == 0.0
+    beside = (
+        exact_sum(a, -b) == exact_sum(c, -d) == 0.0 or exact_sum(a, -d) == exact_sum(b, -c) == 0.0
+    )
     if opposite and beside:
         return FourBarType('S3X', 'rhombus (change point, all links equal)', 0.0)
     if opposite:
@@ -124,7 +126,7 @@ def nearly_paired(a: float, b: float, c: float, d: float) -> Paired | None:
 
     None too if the lengths make a change point exactly: then these lengths were meant.
     """
-    exact = (margin(b, c, -a, -d), margin(max(a, d), -min(a, d), -max(b, c), min(b, c)))
+    exact = (exact_sum(b, c, -a, -d), exact_sum(max(a, d), -min(a, d), -max(b, c), min(b, c)))
     if 0.0 in exact:
         return None
     opposite, beside, across = ((a, c), (b, d)), ((a, b), (c, d)), ((a, d), (b, c))
@@ -138,7 +140,7 @@ def nearly_paired(a: float, b: float, c: float, d: float) -> Paired | None:
     return Paired(name, deviation, (True, found[0] is not across))
 
 
-class FourBar(NamedTuple):
+class FourBarLengths(NamedTuple):
     """A loop of four links and four pins: a dyad on two links that are pinned together."""
 
     group: int  # Number of the dyad among the groups
@@ -149,7 +151,7 @@ class FourBar(NamedTuple):
     kind: FourBarType  # Type after Grashof, seen from the frame
 
 
-def four_bars(structure: Structure) -> Iterator[FourBar]:
+def four_bars(structure: Structure) -> Iterator[FourBarLengths]:
     """Yield the four-bars of a linkage, in the order in which they are solved."""
     known = [GROUND]
     for number, group in enumerate(structure.groups):
@@ -160,7 +162,9 @@ def four_bars(structure: Structure) -> Iterator[FourBar]:
         known += links_of(group)
 
 
-def _four_bar(structure: Structure, known: list[str], number: int, dyad: Dyad) -> FourBar | None:
+def _four_bar(
+    structure: Structure, known: list[str], number: int, dyad: Dyad
+) -> FourBarLengths | None:
     if dyad.kind != 'RRR' or any(len(body) > 1 for body in dyad.bodies):
         return None
     start, end = (outer.name for outer in dyad.outer)
@@ -184,5 +188,5 @@ def _four_bar(structure: Structure, known: list[str], number: int, dyad: Dyad) -
             )
         )
         kind = four_bar_type(a, b, c, d)
-        return FourBar(number, (arm, coupler, output, frame), (a, b, c, d), kind)
+        return FourBarLengths(number, (arm, coupler, output, frame), (a, b, c, d), kind)
     return None

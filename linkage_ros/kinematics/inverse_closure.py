@@ -25,11 +25,11 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.trace import Motion
+from linkage_ros.kinematics.compiling.trace import TracedMotion
 from linkage_ros.kinematics.crank_branches import CrankBranch, Inverse, Output
 from linkage_ros.kinematics.doubles import to_doubles
 from linkage_ros.kinematics.limits import Bounds
-from linkage_ros.kinematics.linkage import Input, Pose
+from linkage_ros.kinematics.linkage import AssemblyPose, Input
 from linkage_ros.kinematics.results import (
     Acceleration,
     InputRange,
@@ -39,7 +39,7 @@ from linkage_ros.kinematics.results import (
     Velocity,
 )
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Batch
@@ -48,13 +48,13 @@ _INSIDE = 1e-8
 """Distance from a toggle of the crank at which rates are taken, of the branch's width."""
 
 
-class _GivenState(State):
+class _GivenState(LinkState):
     """A state of the linkage with the joint that is the input, or its rate."""
 
     given: tuple[float, ...]
 
 
-def _given(value: float, coordinates: list[float], pins: list[complex]) -> _GivenState:
+def _given_state(value: float, coordinates: list[float], pins: list[complex]) -> _GivenState:
     state = _GivenState(coordinates, pins)
     state.given = (value,)
     return state
@@ -91,7 +91,7 @@ class InverseClosure(Closure):
             closed.linkage,
             inputs=(_as_input(output),),
             joints=joints,
-            pose=Pose((0.5 * (branch.low + branch.high),), {}),
+            pose=AssemblyPose((0.5 * (branch.low + branch.high),), {}),
         )
         self.name = closed.name
         for same in (
@@ -117,13 +117,13 @@ class InverseClosure(Closure):
         A value that the joint does not reach is open; the gap is how much it is beyond, in its
         unit.
         """
-        (y,) = self._numbers('inputs', inputs)
+        (y,) = self._single_number('inputs', inputs)
         if not isfinite(y):
-            return Position(Status.INDETERMINATE, 0.0, (), _given(y, [0.0], []), [], self)
+            return Position(Status.INDETERMINATE, 0.0, (), _given_state(y, [0.0], []), [], self)
         branch = self.branch
-        if beyond := branch.beyond(y):
-            return Position(Status.OPEN, beyond, (), _given(y, [0.0], []), [], self)
-        crank, slope = branch.find(y)
+        if beyond := branch.distance_beyond(y):
+            return Position(Status.OPEN, beyond, (), _given_state(y, [0.0], []), [], self)
+        crank, slope = branch.find_crank(y)
         found = self.closed.position(crank)
         status = found.status
         if abs(slope) < branch.flat:
@@ -131,21 +131,26 @@ class InverseClosure(Closure):
         elif status is Status.TOGGLE and self._beside_toggle(found, crank):
             status = Status.CLOSED
         joints = self._joints_with(crank, found.joints)
-        return Position(status, found.gap, joints, _given(y, *found.state), found.poses, self)
+        return Position(
+            status, found.gap, joints, _given_state(y, *found.state), found.poses, self
+        )
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
         if getattr(position, 'closure', None) is not self:
             self._check_own('position', position)
-        (rate,) = self._numbers('rates', rates)
+        (rate,) = self._single_number('rates', rates)
         if not (position.status.has_rates and isfinite(rate)):
             return self._huge_velocity(position, (rate,))
         places = self._beside_toggle(position, position.joints[0])
-        found = [self._rates(place, rate) for place in places or [self._forward(position)]]
+        found = [
+            self._crank_velocity(place, rate)
+            for place in places or [self._crank_position(position)]
+        ]
         (crank,) = self.closed.inputs_of(found[-1].state)
         joints = found[-1].joints
         if places:  # The crank stands there; the others are extrapolated.
-            crank, joints = 0.0, _extrapolated(*(one.joints for one in found))
-        state = _given(rate, *found[-1].state)
+            crank, joints = 0.0, _extrapolate(*(one.joints for one in found))
+        state = _given_state(rate, *found[-1].state)
         return Velocity(self._joints_with(crank, joints), state, found[-1].rates, self)
 
     def acceleration(
@@ -153,21 +158,21 @@ class InverseClosure(Closure):
     ) -> Acceleration:
         if getattr(velocity, 'closure', None) is not self:
             self._check_own('velocity', velocity)
-        (change,) = self._numbers('accelerations', accelerations)
+        (change,) = self._single_number('accelerations', accelerations)
         (rate,) = self.inputs_of(velocity.state)
         places = self._beside_toggle(position, position.joints[0])
         found = []
-        for place in places or [self._forward(position)]:
-            moving = self._rates(place, rate)
+        for place in places or [self._crank_position(position)]:
+            moving = self._crank_velocity(place, rate)
             bent = self.closed.acceleration(place, moving, 0.0)
-            _, (slope,), (bend,) = self._outputs(place, moving, bent)
+            _, (slope,), (bend,) = self._output_groups(place, moving, bent)
             # Not the slope itself: the output has the rate that is given.
             (turn,) = self.closed.inputs_of(moving.state)
-            slope = slope / turn if turn else self._slope(place)
+            slope = slope / turn if turn else self._output_slope(place)
             found.append(self.closed.acceleration(place, moving, (change - bend) / slope))
         ends = [(*self.closed.inputs_of(one.state), *one.joints) for one in found]
-        crank, *joints = _extrapolated(*ends) if places else ends[0]
-        state = _given(change, *found[-1].state)
+        crank, *joints = _extrapolate(*ends) if places else ends[0]
+        state = _given_state(change, *found[-1].state)
         return Acceleration(self._joints_with(crank, joints), state, self)
 
     def solve(
@@ -182,7 +187,7 @@ class InverseClosure(Closure):
         from linkage_ros.kinematics.batch import Batch, CODES  # local import: it loads numpy
         import numpy as np  # local import: the batch alone needs it
 
-        (given,) = self._one('inputs', inputs)
+        (given,) = self._single_input('inputs', inputs)
         values = to_doubles('inputs', given)
         speeds = np.broadcast_to(
             to_doubles('rates', 1.0 if rates is None else rates), values.shape
@@ -211,7 +216,7 @@ class InverseClosure(Closure):
             theirs[...] = mine
         return out
 
-    def inputs_of(self, state: State) -> tuple[float, ...]:
+    def inputs_of(self, state: LinkState) -> tuple[float, ...]:
         """Return the joint that is the input, or its rate, in [rad] or [m]."""
         assert isinstance(state, _GivenState), 'it makes all its states'
         return state.given
@@ -245,22 +250,22 @@ class InverseClosure(Closure):
         """Return how near a closed position is to a singularity, of the crank or of the joint."""
         (y,) = position.inputs
         distance = min((abs(y - one.value) for one in self.singular_inputs), default=inf)
-        margin = self.closed.singularity_margin(self._forward(position))
+        margin = self.closed.singularity_margin(self._crank_position(position))
         return margin._replace(toggle_distance=distance)
 
-    def _one(self, what: str, values: tuple[Any, ...]) -> tuple[Any, ...]:
+    def _single_input(self, what: str, values: tuple[Any, ...]) -> tuple[Any, ...]:
         if len(values) != 1:
             name = self.input_names[0]
             raise ValueError(f'{what}: {len(values)} given; give 1: {name}')
         return values
 
-    def _numbers(self, what: str, values: tuple[float, ...]) -> tuple[float, ...]:
-        return self._doubles(what, self._one(what, values))
+    def _single_number(self, what: str, values: tuple[float, ...]) -> tuple[float, ...]:
+        return self._as_doubles(what, self._single_input(what, values))
 
     def _joints_with(self, crank: float, joints: Sequence[float]) -> tuple[float, ...]:
         return (crank, *(joints[number] for number in self._others)) if joints else ()
 
-    def _forward(self, position: Position) -> Position:
+    def _crank_position(self, position: Position) -> Position:
         """Return a position of this closure as one of the linkage with its crank as the input."""
         closed, status = self.closed, position.status
         return Position(status, position.gap, (), position.state, position.poses, closed)
@@ -276,15 +281,15 @@ class InverseClosure(Closure):
         way = (branch.last - branch.first) * (-1.0 if end else 1.0)
         return [self.closed.position(crank + way * _INSIDE * part) for part in (1.0, 0.25)]
 
-    def _outputs(self, *motion: Any) -> Any:
-        return self.inverse.output.wanted(Motion(*motion))
+    def _output_groups(self, *motion: Any) -> Any:
+        return self.inverse.output.wanted(TracedMotion(*motion))
 
-    def _slope(self, forward: Position) -> float:
-        _, (slope,) = self._outputs(forward, self.closed.velocity(forward, 1.0), None)
+    def _output_slope(self, forward: Position) -> float:
+        _, (slope,) = self._output_groups(forward, self.closed.velocity(forward, 1.0), None)
         return float(slope)
 
-    def _rates(self, forward: Position, rate: float) -> Velocity:
-        return self.closed.velocity(forward, rate / self._slope(forward))
+    def _crank_velocity(self, forward: Position, rate: float) -> Velocity:
+        return self.closed.velocity(forward, rate / self._output_slope(forward))
 
 
 def _as_input(output: Output) -> Input:
@@ -293,6 +298,6 @@ def _as_input(output: Output) -> Input:
     return Input(output.name, slider=output.name)  # It slides, though along no line of a link.
 
 
-def _extrapolated(far: Sequence[float], near: Sequence[float]) -> tuple[float, ...]:
+def _extrapolate(far: Sequence[float], near: Sequence[float]) -> tuple[float, ...]:
     """Return values at a toggle from those at a distance and a quarter of it: √ distance."""
     return tuple(2.0 * b - a for a, b in zip(far, near, strict=True))

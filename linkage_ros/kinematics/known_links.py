@@ -30,7 +30,7 @@ from linkage_ros.kinematics.linkage import (
     RevoluteJoint,
     SlideJoint,
 )
-from linkage_ros.kinematics.step import FixedPoint, Following, PointOnLink, PointOnRail, Step
+from linkage_ros.kinematics.step import FixedPoint, FollowerJoint, PointOnLink, PointOnRail, Step
 from linkage_ros.kinematics.topology import find_followed_links, Joint, Structure
 
 _MOST_TEETH = 1000
@@ -51,14 +51,14 @@ class Angle:
     constant: float
     unit: complex
 
-    def plus(self, angle: float, unit: complex | None = None) -> Angle:
+    def rotate_by(self, angle: float, unit: complex | None = None) -> Angle:
         """Return the angle of a direction at a constant angle to the link."""
         turned = rect(1.0, angle) if unit is None else unit
         return Angle(self.coordinate, self.constant + angle, self.unit * turned)
 
-    def along(self, vector: complex) -> Angle:
+    def vector_angle(self, vector: complex) -> Angle:
         """Return the angle of a vector fixed to the link."""
-        return self.plus(phase(vector), vector / abs(vector))
+        return self.rotate_by(phase(vector), vector / abs(vector))
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class Slide:
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class Attachment:
     """
     How a link is held: its ``point``, in its own frame, coincides with ``at`` of ``link``.
 
@@ -81,14 +81,14 @@ class Held:
 
     point: complex
     link: str
-    at: complex = 0j
+    link_point: complex = 0j
     slide: Slide | None = None
     direction: complex = 1 + 0j
     pin: int = -1
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class SlideLine:
     """
     The line of a point of one link along a slider, in the frame of the link that it slides on.
 
@@ -102,7 +102,7 @@ class Line:
     sign: float
 
 
-class KnownLinks:
+class SolvedLinks:
     """
     The known links of a linkage; at first the ground.
 
@@ -118,7 +118,7 @@ class KnownLinks:
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
         self._linkage = linkage
         self.blocks = structure.blocks  # For each slider the link that slides
-        self.scale = _scale(structure.links.values())  # Metres in the unit of the lengths
+        self.scale = _find_scale(structure.links.values())  # Metres in the unit of the lengths
         # Points of every link, in its own frame and in the unit of the lengths.
         self.points = {
             link: {
@@ -132,7 +132,9 @@ class KnownLinks:
         # Of the known links and sliders, in terms of the coordinates.
         self.angles = {GROUND: Angle(0, 0.0, 1 + 0j)}
         self.slides: dict[str, Slide] = {}
-        self.held: dict[str, Held] = {}  # How each known link except the ground is held
+        self.attachments: dict[
+            str, Attachment
+        ] = {}  # How each known link except the ground is held
         self.group = 0
         count = len(linkage.inputs)
         self.coordinate_count = 1 + count
@@ -148,33 +150,33 @@ class KnownLinks:
         self.pin_count = 0
         self._pins: dict[tuple[str, complex], int] = {}
 
-    def place(self, link: str, point: complex) -> int:
+    def place_point(self, link: str, point: complex) -> int:
         """Return the index of the pin at a known link's point, and add the steps that place it."""
         index = self._pins.get((link, point))
         if index is not None:
             return index
         if link == GROUND:
-            self.add(FixedPoint(point))
+            self.add_step(FixedPoint(point))
         else:
-            held = self.held[link]
-            if held.point == point:
-                index = self._place_held(held)
+            attachment = self.attachments[link]
+            if attachment.point == point:
+                index = self._place_attachment(attachment)
                 self._pins[link, point] = index
                 return index
-            base = self.place(link, held.point)
-            arm, angle = point - held.point, self.angles[link]
-            self.add(PointOnLink(base, angle.coordinate, angle.unit * arm))
+            base = self.place_point(link, attachment.point)
+            arm, angle = point - attachment.point, self.angles[link]
+            self.add_step(PointOnLink(base, angle.coordinate, angle.unit * arm))
         return self._new_pin(link, point)
 
-    def _place_held(self, held: Held) -> int:
-        if held.pin >= 0:
-            return held.pin
-        base = self.place(held.link, held.at)
-        if held.slide is None:
+    def _place_attachment(self, attachment: Attachment) -> int:
+        if attachment.pin >= 0:
+            return attachment.pin
+        base = self.place_point(attachment.link, attachment.link_point)
+        if attachment.slide is None:
             return base
-        angle, slide = self.angles[held.link], held.slide
-        unit = angle.unit * (slide.sign * held.direction)
-        self.add(PointOnRail(base, angle.coordinate, slide.coordinate, unit))
+        angle, slide = self.angles[attachment.link], attachment.slide
+        unit = angle.unit * (slide.sign * attachment.direction)
+        self.add_step(PointOnRail(base, angle.coordinate, slide.coordinate, unit))
         self.pin_count += 1
         return self.pin_count - 1
 
@@ -183,7 +185,7 @@ class KnownLinks:
         self.pin_count += 1
         return self.pin_count - 1
 
-    def add(self, step: Step) -> None:
+    def add_step(self, step: Step) -> None:
         self.steps.append(step)
         self.step_groups.append(self.group)
 
@@ -209,22 +211,22 @@ class KnownLinks:
             return 1 + index
         if index not in self._followers:
             name, ratio = tuple(self._linkage.ratios.items())[index - count]
-            self._follow(name, ratio)
+            self._add_follower(name, ratio)
             self._followers[index] = self.new_coordinates(1)
         return self._followers[index]
 
-    def _follow(self, name: str, given: Ratio) -> None:
+    def _add_follower(self, name: str, given: Ratio) -> None:
         slides = isinstance(self._linkage.joints[name], SlideJoint)
         number = self._number_of(given.of)
         if number >= 0 and self.has_drive(number):
-            turning = not self._linkage.driven[number].slider
+            turning = not self._linkage.driven_joints[number].slider
             one, other, sign, constant = self.drive_coordinate(number), 0, 1.0, 0.0
         else:
             turning = isinstance(self._linkage.joints[given.of], RevoluteJoint)
-            one, other, sign, constant = self.term(self._linkage.joints[given.of])
+            one, other, sign, constant = self.joint_term(self._linkage.joints[given.of])
         unit = self.scale if slides else 1.0
         ratio = given.ratio * (1.0 if turning else self.scale) / unit
-        step = Following(name, one, other, sign * constant, sign * ratio, given.offset / unit)
+        step = FollowerJoint(name, one, other, sign * constant, sign * ratio, given.offset / unit)
         turns, back = self.turns_with.get(one), self.turns_with.get(other)
         if turns is not None and back is not None:
             # The turns of a sum of inputs are known.
@@ -233,16 +235,16 @@ class KnownLinks:
             self.ratio_turns = lcm(self.ratio_turns, 0 if slides else count_turns(with_input[0]))
         elif turning and (slides or not given.ratio.is_integer()):
             limits = self._linkage.joints[given.of].limits
-            middle = 0.5 * (limits.low + limits.high) if limits.bounded else 0.0
+            middle = 0.5 * (limits.low + limits.high) if limits.is_bounded else 0.0
             step = replace(step, middle=middle)
-        self.add(step)
+        self.add_step(step)
 
     def _number_of(self, joint: str) -> int:
         """Return the number of a joint among `Linkage.driven`; -1 if it is not driven."""
-        names = [given.joint for given in self._linkage.driven]
+        names = [given.joint for given in self._linkage.driven_joints]
         return names.index(joint) if joint in names else -1
 
-    def term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
+    def joint_term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
         """Return a known joint as factor·(x[i] − x[j]) + constant, in the unit of the lengths."""
         if isinstance(joint, SlideJoint):
             slide = self.slides[joint.slider]
@@ -250,23 +252,25 @@ class KnownLinks:
         child, parent = self.angles[joint.child], self.angles[joint.parent]
         return child.coordinate, parent.coordinate, 1.0, child.constant - parent.constant
 
-    def pin_to(self, link: str, joint: Joint) -> None:
+    def attach_to_pin(self, link: str, joint: Joint) -> None:
         """Hold a link by a known pin."""
-        self.held[link] = Held(
+        self.attachments[link] = Attachment(
             self.points[link][joint.name], joint.to, self.points[joint.to][joint.name]
         )
 
-    def ride(self, link: str, point: complex, on: str, line: Line, slide: Slide) -> None:
+    def attach_to_slider(
+        self, link: str, point: complex, on: str, line: SlideLine, slide: Slide
+    ) -> None:
         """Hold a link by a slider that keeps its angle."""
-        self.angles[link] = self.angles[on].plus(line.angle)
-        self.held[link] = Held(point, on, line.start, slide, line.direction)
+        self.angles[link] = self.angles[on].rotate_by(line.angle)
+        self.attachments[link] = Attachment(point, on, line.start, slide, line.direction)
 
     def point_of(self, slider: str, link: str) -> complex:
         """Return the point of a link in a slider."""
         given = self._linkage.sliders[slider]
         return self.points[link][given.through if link == given.along else given.point]
 
-    def line(self, name: str, on: str, point: complex) -> Line:
+    def slider_line(self, name: str, on: str, point: complex) -> SlideLine:
         """Return the line of a point of one link of a slider, in the frame of the other."""
         slider = self._linkage.sliders[name]
         through = self.points[slider.along][slider.through]
@@ -274,11 +278,11 @@ class KnownLinks:
         direction = slider.unit
         if on == slider.along:
             start = through + rect(1.0, slider.angle) * (point - sliding)
-            return Line(start, direction, slider.angle, 1.0)
+            return SlideLine(start, direction, slider.angle, 1.0)
         start = sliding + rect(1.0, -slider.angle) * (point - through)
-        return Line(start, direction * rect(1.0, -slider.angle), -slider.angle, -1.0)
+        return SlideLine(start, direction * rect(1.0, -slider.angle), -slider.angle, -1.0)
 
-    def arm(self, link: str, start: str, end: str) -> complex:
+    def pin_vector(self, link: str, start: str, end: str) -> complex:
         """Return the vector from one pin of a link to another."""
         arm = self.points[link][end] - self.points[link][start]
         if not arm:  # different in the file, but equal at the size of the linkage
@@ -287,15 +291,15 @@ class KnownLinks:
             )
         return arm
 
-    def carriers(self, point: str) -> list[str]:
+    def carrying_links(self, point: str) -> list[str]:
         """Return the known links that carry a point, the ground first."""
         return [link for link in self.angles if point in self.points[link]]
 
     def place_pin(self, point: str) -> int:
-        link = self.carriers(point)[0]
-        return self.place(link, self.points[link][point])
+        link = self.carrying_links(point)[0]
+        return self.place_point(link, self.points[link][point])
 
-    def common(self, one: str, other: str, apart: tuple[str, ...]) -> str | None:
+    def common_pin(self, one: str, other: str, apart: tuple[str, ...]) -> str | None:
         """Return the common pin of two links other than the given points, or None."""
         if one == other:
             return None
@@ -309,7 +313,7 @@ def count_turns(ratio: float) -> int:
     return near.denominator if abs(near - Fraction(ratio)) <= _ROUNDED * abs(ratio) else 0
 
 
-def _scale(links: Iterable[Mapping[str, Point]]) -> float:
+def _find_scale(links: Iterable[Mapping[str, Point]]) -> float:
     """Return the power of two above the longest distance on a link."""
     longest = 0.0
     for points in links:

@@ -49,21 +49,21 @@ class Bound(NamedTuple):
     # Middle of the limits of a published angle, in [rad]; None if whole turns count.
     middle: float | None
 
-    def beyond(self, value: float) -> bool:
+    def is_beyond(self, value: float) -> bool:
         """Return whether a value of the joint is beyond the limits."""
         if self.low <= value <= self.high:
             return False
         if self.middle is None:
             return True
-        return not self.low <= self.turned(value) <= self.high
+        return not self.low <= self.turn_to_middle(value) <= self.high
 
-    def turned(self, value: float) -> float:
+    def turn_to_middle(self, value: float) -> float:
         """Return a value plus the whole turns with which it is compared."""
         if self.middle is None:
             return value
         return value - tau * round((value - self.middle) / tau)
 
-    def margin(self, value: float) -> float:
+    def limit_margin(self, value: float) -> float:
         """Return the distance of a value from the limits, negative beyond them; continuous."""
         if self.middle is None:
             return min(value - self.low, self.high - value)
@@ -74,15 +74,15 @@ class Bounds:
     """The limits of a linkage's driven joints, and of its published ones."""
 
     def __init__(self, linkage: Linkage) -> None:
-        limits = {name: of for name, of in linkage.limits.items() if of.bounded}
+        limits = {name: of for name, of in linkage.limits.items() if of.is_bounded}
         driven = [given.joint for given in linkage.inputs]
         self.inputs = tuple(
-            _bound(name, number, limits[name])
+            _make_bound(name, number, limits[name])
             for number, name in enumerate(driven)
             if name in limits
         )
         self.joints = tuple(
-            _bound(name, number, limits[name], turning=isinstance(joint, RevoluteJoint))
+            _make_bound(name, number, limits[name], turning=isinstance(joint, RevoluteJoint))
             for number, (name, joint) in enumerate(linkage.joints.items())
             if name in limits and name not in driven
         )
@@ -91,17 +91,17 @@ class Bounds:
         """Whether there are any."""
         return bool(self.inputs or self.joints)
 
-    def exceeded(self, inputs: Sequence[float], joints: Sequence[float]) -> Bound | None:
+    def first_exceeded(self, inputs: Sequence[float], joints: Sequence[float]) -> Bound | None:
         """Return the first limits that a state is beyond, or None."""
         for bound in self.inputs:
-            if bound.beyond(inputs[bound.number]):
+            if bound.is_beyond(inputs[bound.number]):
                 return bound
         for bound in self.joints:
-            if bound.beyond(joints[bound.number]):
+            if bound.is_beyond(joints[bound.number]):
                 return bound
         return None
 
-    def beyond(self, inputs: Sequence[Array], joints: Array) -> Mask:
+    def are_beyond(self, inputs: Sequence[Array], joints: Array) -> Mask:
         """Return which of many states are beyond; inputs (N,) each, and joints (joints, N)."""
         import numpy as np  # local import: the batch alone needs it
 
@@ -119,21 +119,21 @@ class Bounds:
         return found
 
 
-def limited(position: Callable[..., Position], bounds: Bounds) -> Callable[..., Position]:
+def limit_status(position: Callable[..., Position], bounds: Bounds) -> Callable[..., Position]:
     """Return a function that closes the loops, with the status limited beyond the limits."""
-    exceeded = bounds.exceeded
+    exceeded = bounds.first_exceeded
 
     @wraps(position)
-    def close(*inputs: float) -> Position:
+    def close_limited(*inputs: float) -> Position:
         found = position(*inputs)
         if found.status in _UNDISTURBED and exceeded(found.inputs, found.joints) is not None:
             return replace(found, status=Status.LIMITED)
         return found
 
-    return close
+    return close_limited
 
 
-def _bound(name: str, number: int, limits: Limits, *, turning: bool = False) -> Bound:
+def _make_bound(name: str, number: int, limits: Limits, *, turning: bool = False) -> Bound:
     low, high = limits.low, limits.high
     slack = _ROUNDINGS * UNIT_ROUNDOFF * max(abs(end) for end in (low, high) if abs(end) < inf)
     if not turning:

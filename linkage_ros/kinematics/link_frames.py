@@ -16,7 +16,7 @@ from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.kinematics.point_tracker import PointTracker
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.known_links import KnownLinks
+    from linkage_ros.kinematics.known_links import SolvedLinks
     from linkage_ros.kinematics.results import Position, Velocity
     from linkage_ros.kinematics.topology import Structure
 
@@ -45,20 +45,20 @@ class LinkFrames:
 
     """
 
-    def __init__(self, linkage: Linkage, structure: Structure, known: KnownLinks) -> None:
+    def __init__(self, linkage: Linkage, structure: Structure, known: SolvedLinks) -> None:
         carriers = {link: (link, 0j, link) for link in linkage.links if link != GROUND} | {
             block.name: (
                 block.link,
                 complex(*linkage.links[block.link][block.point]),
                 block.along,
             )
-            for block in blocks(linkage, structure)
+            for block in separate_blocks(linkage, structure)
         }
         self.links = tuple(carriers)  # Names of the links and blocks, in the order of the frames
         self._tracker = PointTracker(known, [(link, at) for link, at, _ in carriers.values()])
         self._angles = [known.angles[turning] for _, _, turning in carriers.values()]
 
-    def at(self, position: Position) -> list[tuple[Any, Any]]:
+    def frames_at(self, position: Position) -> list[tuple[Any, Any]]:
         """Return the origin of each frame, as x + iy in [m], and its angle, in [rad]."""
         places = self._tracker.places(position)
         x = position.state.coordinates
@@ -67,7 +67,7 @@ class LinkFrames:
             for index, angle in zip(self._tracker.indices, self._angles, strict=True)
         ]
 
-    def rates(self, position: Position, velocity: Velocity) -> list[tuple[Any, Any]]:
+    def frame_rates(self, position: Position, velocity: Velocity) -> list[tuple[Any, Any]]:
         """Return the velocity of each origin, in [m/s], and the rate of the angle, in [rad/s]."""
         places = self._tracker.places(position)
         velocities = self._tracker.velocities(position, velocity, places)
@@ -78,7 +78,7 @@ class LinkFrames:
         ]
 
 
-def blocks(linkage: Linkage, structure: Structure) -> list[Block]:
+def separate_blocks(linkage: Linkage, structure: Structure) -> list[Block]:
     """Return the blocks that are not links."""
     links = linkage.links
     carriers = {point: link for link in reversed(list(links)) for point in links[link]}

@@ -87,7 +87,7 @@ class Limits:
     effort: float = inf
 
     @property
-    def bounded(self) -> bool:
+    def is_bounded(self) -> bool:
         """Whether the range of the joint is limited on any side."""
         return self.low > -inf or self.high < inf
 
@@ -176,7 +176,7 @@ class Ratio:
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class AssemblyPose:
     """
     The linkage as drawn, at some inputs; what it names tells the assembly.
 
@@ -197,7 +197,7 @@ class Pose:
     angles: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def drawn(self) -> bool:
+    def is_drawn(self) -> bool:
         """Whether it says where links lie."""
         return bool(self.points or self.angles)
 
@@ -260,13 +260,13 @@ class Linkage:
     joints: Mapping[str, RevoluteJoint | SlideJoint]
     sliders: Mapping[str, Slider]
     traced: tuple[str, ...] = ()
-    pose: Pose | None = None
+    pose: AssemblyPose | None = None
     masses: Mapping[str, Mass] = field(default_factory=dict)
     ratios: Mapping[str, Ratio] = field(default_factory=dict)
     nominal: Linkage | None = field(default=None, compare=False, repr=False)
 
     @property
-    def driven(self) -> tuple[Input, ...]:
+    def driven_joints(self) -> tuple[Input, ...]:
         """Return the inputs, then the joints that follow others, as if they were inputs."""
         followers = (Input.from_joint(name, self.joints[name]) for name in self.ratios)
         return (*self.inputs, *followers)
@@ -284,19 +284,19 @@ class Linkage:
 def without_limits(linkage: Linkage, joints: Collection[str]) -> Linkage:
     """Return a linkage in which the ranges of some joints have no limits."""
 
-    def free(name: str, part: Any) -> Any:
+    def remove_limits(name: str, part: Any) -> Any:
         if name not in joints:
             return part
         return replace(part, limits=replace(part.limits, low=-inf, high=inf))
 
     return replace(
         linkage,
-        inputs=tuple(free(given.joint, given) for given in linkage.inputs),
-        joints={name: free(name, joint) for name, joint in linkage.joints.items()},
+        inputs=tuple(remove_limits(given.joint, given) for given in linkage.inputs),
+        joints={name: remove_limits(name, joint) for name, joint in linkage.joints.items()},
     )
 
 
-def carriers(links: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:
+def links_by_point(links: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:
     """Return the links that carry each point, in the order of the file."""
     found: dict[str, list[str]] = {}
     for link, points in links.items():

@@ -31,27 +31,27 @@ from operator import add, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, listed
-from linkage_ros.kinematics.arithmetic import called, is_found, UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import call, has_result, UNIT_ROUNDOFF
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
 from linkage_ros.kinematics.built_once import keep_results
-from linkage_ros.kinematics.compiling.python import straight
+from linkage_ros.kinematics.compiling.python import compile_function
 from linkage_ros.kinematics.equations import (
-    along,
     Array,
     Constraint,
     Constraints,
-    derivative,
-    equations,
+    differentiate_constraints,
+    evaluate_constraints,
     line_motion,
     OnLine,
+    point_in_line_frame,
 )
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State, Step
+from linkage_ros.kinematics.step import LinkState, Step
 import numpy as np
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.known_links import KnownLinks
+    from linkage_ros.kinematics.known_links import SolvedLinks
 
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 """Largest residual of a constraint at a solution, relative to the size of the coordinates."""
@@ -123,9 +123,9 @@ class Iteration:
         self._sliding = sliding
         self._far = far
         self._start = np.array(start)
-        self._straight: _StraightSystem | None = None
+        self._straight: _CompiledSystem | None = None
         # Returns the branch of a single input; None if the pose leads to no solution.
-        self.branch = keep_results(self._followed_branch)
+        self.branch = keep_results(self._follow_branch)
         # Returns the unknowns at the pose's inputs; None if the pose leads to no solution.
         self.solution = keep_results(self._solution_of_pose)
         # Bound of the last correction, in [rad] and in the unit of the lengths; 0 for full
@@ -143,17 +143,22 @@ class Iteration:
         stopped.tolerance = tolerance
         return stopped
 
-    def close(self, known: State) -> IteratedPose:
+    def close(self, solved_state: LinkState) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
-        early = self._closed_early(known) if self.tolerance else None
+        early = self._closed_early(solved_state) if self.tolerance else None
         if early is not None:
             return early
-        solved = called(self._closed_at, len(known.coordinates), *known.coordinates, *known.pins)
-        if not is_found(solved):
-            return self._not_closed(known)
+        solved = call(
+            self._closed_at,
+            len(solved_state.coordinates),
+            *solved_state.coordinates,
+            *solved_state.pins,
+        )
+        if not has_result(solved):
+            return self._not_closed(solved_state)
         n, bodies = self.equation_count, self.equation_count // 3
         unknowns = [solved[i] for i in range(n)]
-        self._place(known, unknowns, [solved[n + i] for i in range(bodies)])
+        self._append_solution(solved_state, unknowns, [solved[n + i] for i in range(bodies)])
         return IteratedPose(Status.CLOSED, 0.0, unknowns, solved[n + bodies])
 
     def _closed_at(self, count: int, *numbers: Any) -> tuple[Any, ...] | None:
@@ -168,28 +173,28 @@ class Iteration:
             The known coordinates, then the known pins.
 
         """
-        known = State(list(numbers[:count]), list(numbers[count:]))
-        inputs = self._inputs_of(known)
+        solved = LinkState(list(numbers[:count]), list(numbers[count:]))
+        inputs = self._inputs_of(solved)
         start = self._start_at(inputs)
-        if start is None or start.ends:
+        if start is None or start.is_end:
             return None
-        corrected = self._correct(known, start.unknowns, start.farthest)
+        corrected = self._solve_newton(solved, start.unknowns, start.farthest)
         if corrected is None:
             return None
         unknowns, jacobian = corrected
-        if len(inputs) > 1 and _conditioning(jacobian) <= _SINGULAR:
+        if len(inputs) > 1 and _reciprocal_condition(jacobian) <= _SINGULAR:
             return None
-        return (*unknowns.tolist(), *(unknowns + start.turned)[0::3].tolist(), jacobian)
+        return (*unknowns.tolist(), *(unknowns + start.turned_angles)[0::3].tolist(), jacobian)
 
-    def _closed_early(self, known: State) -> IteratedPose | None:
+    def _closed_early(self, solved: LinkState) -> IteratedPose | None:
         """Append a solution within the tolerance; None if the first steps do not contract."""
-        inputs = self._inputs_of(known)
+        inputs = self._inputs_of(solved)
         start = self._start_at(inputs) if len(inputs) == 1 else None
-        if start is None or start.ends:
+        if start is None or start.is_end:
             return None
         unknowns, last = start.unknowns, start.farthest
         for _ in range(_EARLY_STEPS):
-            errors, jacobian = self._system(known, unknowns)
+            errors, jacobian = self._evaluate_system(solved, unknowns)
             try:
                 step = np.linalg.solve(jacobian, -errors)
             except np.linalg.LinAlgError:
@@ -199,36 +204,38 @@ class Iteration:
                 return None
             unknowns, last = unknowns + step, length
             if length <= self.tolerance:
-                if _conditioning(jacobian) <= _EARLY_SINGULAR:
+                if _reciprocal_condition(jacobian) <= _EARLY_SINGULAR:
                     return None
                 values = unknowns.tolist()
-                self._place(known, values, (unknowns + start.turned)[0::3].tolist())
+                self._append_solution(
+                    solved, values, (unknowns + start.turned_angles)[0::3].tolist()
+                )
                 return IteratedPose(Status.CLOSED, 0.0, values, jacobian)
         return None
 
-    def _not_closed(self, known: State) -> IteratedPose:
+    def _not_closed(self, solved: LinkState) -> IteratedPose:
         """Return the pose at a toggle, or the nearest one where the links are open."""
-        inputs = self._inputs_of(known)
+        inputs = self._inputs_of(solved)
         start = self._start_at(inputs)
         if start is None:
-            return self._open(known, inputs)
-        if start.ends:
+            return self._nearest_open_pose(solved, inputs)
+        if start.is_end:
             # The Jacobian is singular here, so Newton's method would come no nearer.
-            unknowns, jacobian = start.unknowns, self._system(known, start.unknowns)[1]
+            unknowns, jacobian = start.unknowns, self._evaluate_system(solved, start.unknowns)[1]
         else:
-            corrected = self._correct(known, start.unknowns, start.farthest)
+            corrected = self._solve_newton(solved, start.unknowns, start.farthest)
             if corrected is None:
-                return self._open(known, inputs)
+                return self._nearest_open_pose(solved, inputs)
             unknowns, jacobian = corrected
         values = unknowns.tolist()
-        self._place(known, values, (unknowns + start.turned)[0::3].tolist())
+        self._append_solution(solved, values, (unknowns + start.turned_angles)[0::3].tolist())
         return IteratedPose(Status.TOGGLE, 0.0, values, jacobian)
 
-    def _inputs_of(self, known: State) -> list[float]:
+    def _inputs_of(self, solved: LinkState) -> list[float]:
         end = 1 + len(self.inputs)
-        return known.coordinates[1:end]
+        return solved.coordinates[1:end]
 
-    def _followed_branch(self) -> Branch | None:
+    def _follow_branch(self) -> Branch | None:
         solution = self.solution()
         if solution is None:
             return None
@@ -245,36 +252,47 @@ class Iteration:
         )
 
     def _solution_of_pose(self) -> Array | None:
-        known = self._known_at(self.inputs)
-        corrected = self._correct(known, self._start, inf) if known is not None else None
+        solved = self._known_at(self.inputs)
+        corrected = self._solve_newton(solved, self._start, inf) if solved is not None else None
         return corrected[0] if corrected is not None else None
 
-    def rates(self, pose: IteratedPose, known: State, speeds: State) -> list[float]:
+    def rates(self, pose: IteratedPose, solved: LinkState, velocities: LinkState) -> list[float]:
         """Append the rates of the coordinates and pins that `close` appended."""
         still = [0.0] * len(pose.unknowns)
-        drift = derivative(self._constraints, pose.unknowns, known, speeds, still, None, still)
-        rates = _solved(pose, drift)
-        self._append(speeds, rates)
+        drift = differentiate_constraints(
+            self._constraints, pose.unknowns, solved, velocities, still, None, still
+        )
+        rates = _cancel_drift(pose, drift)
+        self._append_rates(velocities, rates)
         for slide in self._slides:
-            _, rate, _ = line_motion(slide, pose.unknowns, known, speeds, rates, None, still)
-            speeds.coordinates.append(rate.real)
+            _, rate, _ = line_motion(slide, pose.unknowns, solved, velocities, rates, None, still)
+            velocities.coordinates.append(rate.real)
         return rates
 
     def accelerations(
-        self, pose: IteratedPose, rates: list[float], known: State, speeds: State, changes: State
+        self,
+        pose: IteratedPose,
+        rates: list[float],
+        solved_state: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append the accelerations of the coordinates and pins that `close` appended."""
         still = [0.0] * len(rates)
-        drift = derivative(self._constraints, pose.unknowns, known, speeds, rates, changes, still)
-        solved = _solved(pose, drift)
-        self._append(changes, solved)
+        drift = differentiate_constraints(
+            self._constraints, pose.unknowns, solved_state, velocities, rates, accelerations, still
+        )
+        solved = _cancel_drift(pose, drift)
+        self._append_rates(accelerations, solved)
         for slide in self._slides:
-            _, _, change = line_motion(slide, pose.unknowns, known, speeds, rates, changes, solved)
-            changes.coordinates.append(change.real)
+            _, _, change = line_motion(
+                slide, pose.unknowns, solved_state, velocities, rates, accelerations, solved
+            )
+            accelerations.coordinates.append(change.real)
 
     def conditioning(self, pose: IteratedPose) -> float:
         """Return the ratio of the Jacobian's smallest singular value to its largest."""
-        return _conditioning(pose.jacobian)
+        return _reciprocal_condition(pose.jacobian)
 
     def solution_from(self, angles: Array) -> Array | None:
         """
@@ -282,15 +300,15 @@ class Iteration:
 
         The constraints are linear in the places, which start at the least-squares solution.
         """
-        known = self._known_at(self.inputs)
-        if known is None:
+        solved = self._known_at(self.inputs)
+        if solved is None:
             return None
         start = np.zeros_like(self._start)
         start[0::3] = angles
-        errors, jacobian = self._system(known, start)
+        errors, jacobian = self._evaluate_system(solved, start)
         places = np.arange(len(start)) % 3 > 0
         start[places] = np.linalg.lstsq(jacobian[:, places], -errors, rcond=None)[0]
-        corrected = self._correct(known, start, _AROUND)
+        corrected = self._solve_newton(solved, start, _AROUND)
         return None if corrected is None else corrected[0]
 
     def solution_at(self, x: float) -> Array | None:
@@ -298,48 +316,50 @@ class Iteration:
         start, known = self._start_at((x,)), self._known_at((x,))
         if start is None or known is None:
             return None
-        corrected = self._correct(known, start.unknowns, start.farthest)
+        corrected = self._solve_newton(known, start.unknowns, start.farthest)
         return None if corrected is None else corrected[0]
 
-    def _place(self, known: State, unknowns: list[float], angles: list[float]) -> None:
+    def _append_solution(
+        self, solved: LinkState, unknowns: list[float], angles: list[float]
+    ) -> None:
         """Append a solution; its angles include the turns made before."""
-        known.coordinates.extend(angles)
-        known.pins.extend(_places(unknowns))
+        solved.coordinates.extend(angles)
+        solved.pins.extend(_body_places(unknowns))
         for slide in self._slides:
-            known.coordinates.append(along(slide, known, unknowns).real)
+            solved.coordinates.append(point_in_line_frame(slide, solved, unknowns).real)
 
-    def _append(self, state: State, values: list[float]) -> None:
+    def _append_rates(self, state: LinkState, values: list[float]) -> None:
         state.coordinates.extend(values[0::3])
-        state.pins.extend(_places(values))
+        state.pins.extend(_body_places(values))
 
-    def _system(self, known: State, unknowns: Array) -> tuple[Array, Array]:
+    def _evaluate_system(self, solved: LinkState, unknowns: Array) -> tuple[Array, Array]:
         """Return the residuals, and their derivatives by the unknowns."""
-        errors, jacobian = self._listed_system(known, unknowns.tolist())
+        errors, jacobian = self._evaluate_lists(solved, unknowns.tolist())
         return np.array(errors), jacobian
 
-    def _listed_system(
-        self, known: State, unknowns: Sequence[float]
+    def _evaluate_lists(
+        self, solved: LinkState, unknowns: Sequence[float]
     ) -> tuple[tuple[float, ...], Array]:
-        numbers = [*known.coordinates, *known.pins, *unknowns]
+        numbers = [*solved.coordinates, *solved.pins, *unknowns]
         if self._straight is None:
-            self._straight = _StraightSystem(
-                self._constraints, numbers, len(known.coordinates), len(unknowns)
+            self._straight = _CompiledSystem(
+                self._constraints, numbers, len(solved.coordinates), len(unknowns)
             )
-        return self._straight.at(numbers)
+        return self._straight.residuals_at(numbers)
 
-    def _known_at(self, inputs: Sequence[float]) -> State | None:
+    def _known_at(self, inputs: Sequence[float]) -> LinkState | None:
         """Return the state of the links solved before this step, or None."""
-        known = State([0.0, *inputs], [])
+        solved = LinkState([0.0, *inputs], [])
         for step in self._before:
-            if not step.close(known).status.has_pose:
+            if not step.close(solved).status.has_pose:
                 return None
-        return known
+        return solved
 
     def _moving_at(
         self, inputs: Sequence[float], rates: Sequence[float] = (1.0,)
-    ) -> tuple[State, State] | None:
+    ) -> tuple[LinkState, LinkState] | None:
         """Return the state of the links solved before and its rates, or None."""
-        known, speeds = State([0.0, *inputs], []), State([0.0, *rates], [])
+        known, speeds = LinkState([0.0, *inputs], []), LinkState([0.0, *rates], [])
         for step in self._before:
             pose = step.close(known)
             if not pose.status.has_rates:
@@ -352,7 +372,7 @@ class Iteration:
         if len(inputs) > 1:
             return self._along_a_line(inputs)
         branch = self.branch()
-        return None if branch is None else branch.start(inputs[0])
+        return None if branch is None else branch.find_start(inputs[0])
 
     def _along_a_line(self, inputs: Sequence[float]) -> Start | None:
         """Return the start on the straight line from the pose's inputs to several inputs."""
@@ -366,19 +386,19 @@ class Iteration:
             return Start(solution, inf, still, False)
         rates = [way / length for way in ways]
 
-        def place(x: float) -> list[float]:
+        def inputs_at(x: float) -> list[float]:
             return [begin + x * rate for begin, rate in zip(self.inputs, rates, strict=True)]
 
         continuation = Continuation(
             self._constraints,
-            lambda x: self._known_at(place(x)),
-            lambda x: self._moving_at(place(x), rates),
+            lambda x: self._known_at(inputs_at(x)),
+            lambda x: self._moving_at(inputs_at(x), rates),
         )
-        node = continuation.first(solution, 0.0)
+        node = continuation.first_node(solution, 0.0)
         if node is None:
             return None
         cell = None
-        for cell in continuation.cells(node, 1.0, length):
+        for cell in continuation.follow_cells(node, 1.0, length):
             if cell.folds:
                 return None
         if cell is None or cell.end.place[-1] < length:
@@ -386,28 +406,30 @@ class Iteration:
         size = float(np.abs(cell.end.place - cell.begin.place).max())
         return Start(cell.end.place[:-1], 0.2 * size, still, False)
 
-    def _correct(self, known: State, start: Array, farthest: float) -> tuple[Array, Array] | None:
+    def _solve_newton(
+        self, solved: LinkState, start: Array, farthest: float
+    ) -> tuple[Array, Array] | None:
         """Return the solution within a distance of a start, and its Jacobian."""
         # Lists: for so few numbers the overhead of an array exceeds the arithmetic.
         begin = start.tolist()
         unknowns, last = begin, inf
-        size = 1.0 + _greatest(begin)
+        size = 1.0 + _greatest_magnitude(begin)
         for _ in range(30):
-            errors, jacobian = self._listed_system(known, unknowns)
+            errors, jacobian = self._evaluate_lists(solved, unknowns)
             try:
                 step = np.linalg.solve(jacobian, np.negative(errors)).tolist()
             except np.linalg.LinAlgError:
                 return None
-            length = _greatest(step)
+            length = _greatest_magnitude(step)
             if length >= last or length <= 4.0 * UNIT_ROUNDOFF * size:
-                good = _greatest(errors) <= _ACCEPTED * size
+                good = _greatest_magnitude(errors) <= _ACCEPTED * size
                 return (np.array(unknowns), jacobian) if good else None
             unknowns, last = list(map(add, unknowns, step)), length
-            if not _greatest(list(map(sub, unknowns, begin))) <= farthest:
+            if not _greatest_magnitude(list(map(sub, unknowns, begin))) <= farthest:
                 return None
         return None
 
-    def _open(self, known: State, inputs: Sequence[float]) -> IteratedPose:
+    def _nearest_open_pose(self, solved: LinkState, inputs: Sequence[float]) -> IteratedPose:
         """
         Return how near the links come, descending from the end of their assembly.
 
@@ -417,12 +439,12 @@ class Iteration:
         branch = self.branch() if len(inputs) == 1 else None
         end = None if branch is None else branch.nearest_end(inputs[0])
         unknowns = self._start if end is None else end
-        errors, jacobian = self._system(known, unknowns)
+        errors, jacobian = self._evaluate_system(solved, unknowns)
         first = float(np.abs(errors).max())
         for _ in range(20):
             step = np.linalg.lstsq(jacobian, -errors, rcond=1e-6)[0]
             step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
-            trial, slope = self._system(known, unknowns + step)
+            trial, slope = self._evaluate_system(solved, unknowns + step)
             if np.abs(trial).max() >= np.abs(errors).max():
                 break
             unknowns, errors, jacobian = unknowns + step, trial, slope
@@ -432,7 +454,7 @@ class Iteration:
         )
 
 
-class _StraightSystem:
+class _CompiledSystem:
     """
     The constraints and their derivatives as straight-line code.
 
@@ -456,55 +478,55 @@ class _StraightSystem:
         coordinates: int,
         unknowns: int,
     ) -> None:
-        def listed(*values: Any) -> list[float]:
-            state = State(list(values[:coordinates]), list(values[coordinates:-unknowns]))
-            errors, rows = equations(constraints, values[-unknowns:], state)
+        def list_constants(*values: Any) -> list[float]:
+            state = LinkState(list(values[:coordinates]), list(values[coordinates:-unknowns]))
+            errors, rows = evaluate_constraints(constraints, values[-unknowns:], state)
             return [*errors, *(slope for row in rows for slope in row)]
 
-        self._line = straight(listed, numbers)
+        self._function = compile_function(list_constants, numbers)
         self._count = unknowns
-        self._constants = np.array(self._line.results[unknowns:])
-        self._places = np.array([place - unknowns for place in self._line.places[unknowns:]])
+        self._constants = np.array(self._function.results[unknowns:])
+        self._places = np.array([place - unknowns for place in self._function.places[unknowns:]])
 
-    def at(self, numbers: Sequence[complex]) -> tuple[tuple[float, ...], Array]:
+    def residuals_at(self, numbers: Sequence[complex]) -> tuple[tuple[float, ...], Array]:
         """Return the residuals, all of which vary, and the Jacobian."""
         n = self._count
-        varying = self._line.varying(*numbers)
+        varying = self._function.varying(*numbers)
         jacobian = self._constants.copy()
         jacobian[self._places] = varying[n:]
         return varying[:n], jacobian.reshape(n, n)
 
 
-def _greatest(values: Sequence[float]) -> float:
+def _greatest_magnitude(values: Sequence[float]) -> float:
     """Return the greatest absolute value; NaN if any value is NaN."""
     return nan if isnan(sum(values)) else max(map(abs, values))
 
 
-def _places(values: Sequence[float]) -> list[complex]:
+def _body_places(values: Sequence[float]) -> list[complex]:
     return [x + 1j * y for x, y in zip(values[1::3], values[2::3], strict=True)]
 
 
-def _conditioning(jacobian: Array) -> float:
+def _reciprocal_condition(jacobian: Array) -> float:
     values = np.linalg.svd(jacobian, compute_uv=False)
     return float(values[-1] / values[0])
 
 
-def _solved(pose: IteratedPose, drift: Sequence[float]) -> list[float]:
+def _cancel_drift(pose: IteratedPose, drift: Sequence[float]) -> list[float]:
     """Return the rates of the unknowns that cancel the drift of the constraints."""
-    rates = called(_solve, pose.jacobian, *drift)
+    rates = call(_solve_linear, pose.jacobian, *drift)
     return [rates[i] for i in range(len(drift))]
 
 
-def _solve(jacobian: Array, *drift: float) -> list[float]:
+def _solve_linear(jacobian: Array, *drift: float) -> list[float]:
     rates: list[float] = np.linalg.solve(jacobian, np.negative(drift)).tolist()
     return rates
 
 
-def iteration(
+def make_iteration(
     linkage: Linkage,
     links: Sequence[str],
     constraints: Constraints,
-    planner: KnownLinks,
+    planner: SolvedLinks,
     before: tuple[Step, ...],
 ) -> Iteration:
     """
@@ -525,15 +547,15 @@ def iteration(
         value / scale if slides else value
         for value, slides in zip(pose.inputs, sliding, strict=True)
     )
-    known = State([0.0, *inputs], [])
+    solved = LinkState([0.0, *inputs], [])
     for step in before:
-        if not step.close(known).status.has_pose:
+        if not step.close(solved).status.has_pose:
             raise DefinitionError(
                 'pose.inputs',
                 'what comes before the iterated links does not close there',
                 'give inputs that the linkage can have',
             )
-    x, pins = known
+    x, pins = solved
     places = {name: complex(*place) / scale for name, place in pose.points.items()}
     places |= {name: pins[i] for name, i in constraints.known_pins.items()}
     angles = {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()}
@@ -544,13 +566,13 @@ def iteration(
         for points in planner.points.values()
     )
     slides = tuple(constraints.slides.values())
-    return Iteration(tuple(constraints.all), slides, inputs, start, before, sliding, far)
+    return Iteration(tuple(constraints.constraints), slides, inputs, start, before, sliding, far)
 
 
 def _initial_guess(
     linkage: Linkage,
     links: Sequence[str],
-    planner: KnownLinks,
+    planner: SolvedLinks,
     given: Mapping[str, complex],
     angles: dict[str, float],
 ) -> list[float]:

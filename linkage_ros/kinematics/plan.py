@@ -17,7 +17,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, listed, quoted
-from linkage_ros.kinematics.arithmetic import cross, resolved, ROUNDING, UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import cross_product, resolve_along, ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.diagonals import AnyDiagonal, CrankDiagonal, FreeDiagonal
 from linkage_ros.kinematics.dyads.prp import CrankPRPDyad, PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
@@ -27,13 +27,13 @@ from linkage_ros.kinematics.dyads.rrr import (
     crank_diagonal,
     DrivenOffset,
     DrivenRRRDyad,
+    DyadSide,
     FoldingRRRDyad,
     RRRDyad,
-    Side,
 )
 from linkage_ros.kinematics.dyads.two_sided import TwoSided
 from linkage_ros.kinematics.grashof import nearly_paired
-from linkage_ros.kinematics.known_links import Angle, Held, KnownLinks, Line, Slide
+from linkage_ros.kinematics.known_links import Angle, Attachment, Slide, SlideLine, SolvedLinks
 from linkage_ros.kinematics.linkage import Input, Linkage
 from linkage_ros.kinematics.rail import (
     CrankRail,
@@ -69,7 +69,7 @@ class _Hinge(NamedTuple):
     # Whether the link of A is the crank, that is the one of the two that is known later.
     crank_first: bool
 
-    def upright(self, diagonal: CrankDiagonal) -> int:
+    def upright_sign(self, diagonal: CrankDiagonal) -> int:
         """
         Return the sign of a dyad on the side +1 for a crank between 0 and π from the ground.
 
@@ -79,7 +79,7 @@ class _Hinge(NamedTuple):
         return -1 if diagonal.crosses[0] and not self.crank_first else 1
 
 
-class SolutionPlan(KnownLinks):
+class SolutionPlan(SolvedLinks):
     """Makes the steps of a linkage, Assur group after Assur group."""
 
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
@@ -92,27 +92,29 @@ class SolutionPlan(KnownLinks):
         self._nominal: dict[str, TwoSided] = {}
         if linkage.nominal is not None:
             nominal = SolutionPlan(linkage.nominal, assur_groups(linkage.nominal))
-            self._nominal = {one.name: nominal.two_sided(one) for one in nominal.two_ways}
+            self._nominal = {
+                one.assembly_key: nominal.two_sided_step(one) for one in nominal.two_ways
+            }
         self._missing: dict[str, str] = {}
-        self._driven = linkage.driven
+        self._driven = linkage.driven_joints
         for self.group, group in enumerate(structure.groups):
             if isinstance(group, Driven):
-                self._drive(group)
+                self._add_driven(group)
             elif isinstance(group, Dyad):
-                self._close(group)
+                self._add_dyad(group)
             else:
                 self._choose_sides()  # the iteration starts from the links before it
-                self._iterate(group)
+                self._add_iteration(group)
         self._choose_sides()
         for name in self._assembly:
-            keys = listed(repr(one.name) for one in self.two_ways)
+            keys = listed(repr(one.assembly_key) for one in self.two_ways)
             raise DefinitionError(
                 f'assembly.{name}',
                 f'{quoted(name)} does not close a dyad that has two assemblies',
                 f'name {keys}' if keys else 'leave it out',
             )
 
-    def two_sided(self, one: TwoWays) -> Any:
+    def two_sided_step(self, one: TwoWays) -> Any:
         """Return the step of a dyad that closes in two ways, a `TwoSided`."""
         return self.steps[one.step]
 
@@ -124,18 +126,20 @@ class SolutionPlan(KnownLinks):
             return
         pose = self._linkage.pose
         crosses = any(one.crosses and one.written for one in new)
-        if pose is not None and new and (pose.drawn or crosses):
+        if pose is not None and new and (pose.is_drawn or crosses):
             from linkage_ros.kinematics.drawn_pose import (
                 drawn_signs,  # local import: few linkages need it
             )
 
             for one, sign in drawn_signs(self._linkage, self, new):
-                self.steps[one.step] = self.two_sided(one).with_sign(sign)
-                self._missing.pop(one.name, None)
+                self.steps[one.step] = self.two_sided_step(one).with_sign(sign)
+                self._missing.pop(one.assembly_key, None)
         if self._missing:
             verb = 'is' if len(self._missing) == 1 else 'are'
             remedy = f'write {listed(self._missing.values())}'
-            drawn = [one for one in self.two_ways if one.crosses and one.name in self._missing]
+            drawn = [
+                one for one in self.two_ways if one.crosses and one.assembly_key in self._missing
+            ]
             if drawn:
                 parts = (telling_part(self.points, one.dyad) for one in drawn)
                 points = listed(f'{point}: [x, y]' for _, point in parts if point)
@@ -147,14 +151,14 @@ class SolutionPlan(KnownLinks):
                 'assembly', f'{listed(map(repr, self._missing))} {verb} missing', remedy
             )
 
-    def _drive(self, driven: Driven) -> None:
+    def _add_driven(self, driven: Driven) -> None:
         joint, index = driven.joint, self.drive_coordinate(driven.index)
         angle = self.angles[joint.to]
         if joint.kind == 'R':
             sign = 1.0 if self._driven[driven.index].child == joint.link else -1.0
             coordinate = index
             if angle.coordinate or sign < 0.0:
-                self.add(RelativeAngle(angle.coordinate, index, sign))
+                self.add_step(RelativeAngle(angle.coordinate, index, sign))
                 coordinate = self.new_coordinates(1)
                 before = self.turns_with.get(angle.coordinate)
                 with_input = self.turns_with.get(index)
@@ -163,134 +167,136 @@ class SolutionPlan(KnownLinks):
                         one + sign * other for one, other in zip(before, with_input, strict=True)
                     )
             self.angles[joint.link] = Angle(coordinate, angle.constant, angle.unit)
-            self.pin_to(joint.link, joint)
+            self.attach_to_pin(joint.link, joint)
             return
         point = self.point_of(joint.name, joint.link)
-        line = self.line(joint.name, joint.to, point)
-        self.ride(joint.link, point, joint.to, line, Slide(index, line.sign))
+        line = self.slider_line(joint.name, joint.to, point)
+        self.attach_to_slider(joint.link, point, joint.to, line, Slide(index, line.sign))
         self.slides[joint.name] = Slide(index, 1.0)
 
-    def _close(self, dyad: Dyad) -> None:
+    def _add_dyad(self, dyad: Dyad) -> None:
         if len(dyad.bodies[0]) > 1 or len(dyad.bodies[1]) > 1:
-            self._driven_rrr(dyad)
+            self._add_driven_rrr(dyad)
             return
         {
-            'RRR': self._rrr,
-            'RRP': self._rrp,
-            'RPR': self._rpr,
-            'PRP': self._prp,
-            'RPP': self._rpp,
+            'RRR': self._add_rrr,
+            'RRP': self._add_rrp,
+            'RPR': self._add_rpr,
+            'PRP': self._add_prp,
+            'RPP': self._add_rpp,
         }[dyad.kind](dyad)
 
-    def _rrr(self, dyad: Dyad) -> None:
+    def _add_rrr(self, dyad: Dyad) -> None:
         (one,), (other,) = dyad.bodies
         first, second = dyad.outer
         closing = dyad.inner.name
-        one_arm = self.arm(one, first.name, closing)
-        other_arm = self.arm(other, second.name, closing)
+        one_arm = self.pin_vector(one, first.name, closing)
+        other_arm = self.pin_vector(other, second.name, closing)
         b, c = abs(one_arm), abs(other_arm)
 
-        def crank(
+        def make_diagonal(
             a: float, d: float, arms: tuple[int, int], angle: float, turns_known: bool
         ) -> CrankDiagonal:
-            crosses = self._crosses(dyad, (a, b, c, d))
+            crosses = self._change_points(dyad, (a, b, c, d))
             return crank_diagonal(a, b, c, d, arms, angle, turns_known, crosses)
 
-        diagonal, base, upright = self._diagonal(dyad, (abs(b - c), b + c, 4.0 * b * c), crank)
-        kind: type[RRRDyad] = FoldingRRRDyad if FoldingRRRDyad.fits(diagonal) else RRRDyad
+        diagonal, base, upright = self._make_diagonal(
+            dyad, (abs(b - c), b + c, 4.0 * b * c), make_diagonal
+        )
+        kind: type[RRRDyad] = FoldingRRRDyad if FoldingRRRDyad.passes_fold(diagonal) else RRRDyad
         self._add_two_sided(dyad, kind(diagonal, b, c, 1), diagonal, upright)
         k = self.new_coordinates(2)
-        self.angles[one] = _facing(k, base, one_arm)
-        self.angles[other] = _facing(k + 1, base, other_arm)
-        self.pin_to(one, first)
-        self.pin_to(other, second)
+        self.angles[one] = _link_angle(k, base, one_arm)
+        self.angles[other] = _link_angle(k + 1, base, other_arm)
+        self.attach_to_pin(one, first)
+        self.attach_to_pin(other, second)
 
-    def _rpr(self, dyad: Dyad) -> None:
+    def _add_rpr(self, dyad: Dyad) -> None:
         (rail,), (block,) = dyad.bodies
         first, second = dyad.outer
         name = dyad.inner.name
         start = self.points[rail][first.name]
-        line = self.line(name, rail, self.points[block][second.name])
+        line = self.slider_line(name, rail, self.points[block][second.name])
         foot = (line.start - start) * line.direction.conjugate()
         offset = foot.imag
         if abs(offset) <= 4.0 * UNIT_ROUNDOFF * (abs(line.start) + abs(start)):
             offset = 0.0
 
-        def crank(
+        def make_diagonal(
             a: float, d: float, arms: tuple[int, int], angle: float, turns_known: bool
         ) -> CrankDiagonal:
-            crosses = self._crosses(dyad)
+            crosses = self._change_points(dyad)
             return swivel_diagonal(a, d, offset, arms, angle, turns_known, crosses)
 
-        diagonal, base, upright = self._diagonal(dyad, (abs(offset), inf, inf), crank)
+        diagonal, base, upright = self._make_diagonal(dyad, (abs(offset), inf, inf), make_diagonal)
         self._add_two_sided(dyad, RPRDyad(diagonal, offset, 1), diagonal, upright)
         k = self.new_coordinates(2)
-        self.angles[rail] = _facing(k, base, line.direction)
-        self.angles[block] = self.angles[rail].plus(line.angle)
+        self.angles[rail] = _link_angle(k, base, line.direction)
+        self.angles[block] = self.angles[rail].rotate_by(line.angle)
         self.slides[name] = Slide(k + 1, 1.0, -foot.real)
-        self.pin_to(rail, first)
-        self.pin_to(block, second)
+        self.attach_to_pin(rail, first)
+        self.attach_to_pin(block, second)
 
-    def _rrp(self, dyad: Dyad) -> None:
+    def _add_rrp(self, dyad: Dyad) -> None:
         (link,), (block,) = dyad.bodies
         first, second = dyad.outer
         closing, name = dyad.inner.name, second.name
-        arm = self.arm(link, first.name, closing)
+        arm = self.pin_vector(link, first.name, closing)
         point = self.points[block][closing]
-        line = self.line(name, second.to, point)
-        base = self.angles[second.to].along(line.direction)
-        rail = self._rail(dyad, first.name, second.to, line, abs(arm))
+        line = self.slider_line(name, second.to, point)
+        base = self.angles[second.to].vector_angle(line.direction)
+        rail = self._make_rail(dyad, first.name, second.to, line, abs(arm))
         self._add_two_sided(dyad, RRPDyad(rail, 1), rail)
         k = self.new_coordinates(2)
-        self.angles[link] = _facing(k, base, arm)
-        self.pin_to(link, first)
-        self.ride(block, point, second.to, line, Slide(k + 1, 1.0))
+        self.angles[link] = _link_angle(k, base, arm)
+        self.attach_to_pin(link, first)
+        self.attach_to_slider(block, point, second.to, line, Slide(k + 1, 1.0))
         self.slides[name] = Slide(k + 1, line.sign)
 
-    def _prp(self, dyad: Dyad) -> None:
+    def _add_prp(self, dyad: Dyad) -> None:
         one, other = (outer.to for outer in dyad.outer)
-        pivot = self.common(one, other, ())
+        pivot = self.common_pin(one, other, ())
         if pivot is not None:
-            self._crank_prp(dyad, pivot)
+            self._add_crank_prp(dyad, pivot)
             return
         starts, arms, units = [], [], []
         k = self.coordinate_count
         for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
             point = self.points[body][dyad.inner.name]
-            line = self.line(outer.name, outer.to, point)
-            starts.append(self.place(outer.to, line.start))
+            line = self.slider_line(outer.name, outer.to, point)
+            starts.append(self.place_point(outer.to, line.start))
             arms.append(self.angles[outer.to].coordinate)
             units.append(self.angles[outer.to].unit * line.direction)
-            self.ride(body, point, outer.to, line, Slide(k + i, 1.0))
+            self.attach_to_slider(body, point, outer.to, line, Slide(k + i, 1.0))
             self.slides[outer.name] = Slide(k + i, line.sign)
-        self.add(PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (units[0], units[1])))
+        self.add_step(PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (units[0], units[1])))
         self.new_coordinates(2)
 
-    def _crank_prp(self, dyad: Dyad, pivot: str) -> None:
+    def _add_crank_prp(self, dyad: Dyad, pivot: str) -> None:
         offsets, angles, size = [], [], 0.0
         k = self.coordinate_count
         for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
             point, center = self.points[body][dyad.inner.name], self.points[outer.to][pivot]
-            line = self.line(outer.name, outer.to, point)
-            way, offset = resolved(line.start - center, line.direction)
+            line = self.slider_line(outer.name, outer.to, point)
+            way, offset = resolve_along(line.start - center, line.direction)
             offsets.append(offset)
-            angles.append(self.angles[outer.to].along(line.direction))
+            angles.append(self.angles[outer.to].vector_angle(line.direction))
             size += abs(line.start - center)
             foot = replace(line, start=center + 1j * offset * line.direction)
-            self.ride(body, point, outer.to, foot, Slide(k + i, 1.0))
+            self.attach_to_slider(body, point, outer.to, foot, Slide(k + i, 1.0))
             self.slides[outer.name] = Slide(k + i, line.sign, -line.sign * way)
         first, second = angles
         arms = first.coordinate, second.coordinate
         across = second.unit * first.unit.conjugate()
-        self.add(CrankPRPDyad((offsets[0], offsets[1]), size, arms, across))
+        self.add_step(CrankPRPDyad((offsets[0], offsets[1]), size, arms, across))
         self.new_coordinates(2)
 
-    def _rpp(self, dyad: Dyad) -> None:
+    def _add_rpp(self, dyad: Dyad) -> None:
         (link,), (carrier,) = dyad.bodies
         first, second = dyad.outer
         point = self.point_of(second.name, carrier)
-        outer = self.line(second.name, second.to, point)
-        inner = self.line(dyad.inner.name, carrier, self.points[link][first.name])
+        outer = self.slider_line(second.name, second.to, point)
+        inner = self.slider_line(dyad.inner.name, carrier, self.points[link][first.name])
         turn = rect(1.0, outer.angle)
         direction = turn * inner.direction
         if abs((direction * outer.direction.conjugate()).imag) <= ROUNDING:
@@ -300,25 +306,28 @@ class SolutionPlan(KnownLinks):
                 'give the two sliders different directions',
             )
         constant = (inner.start - point) * turn
-        level = Line(outer.start, 1 + 0j, 0.0, 1.0)
-        rail = self._rail(dyad, first.name, second.to, level, inf)
-        offsets = cross(constant, outer.direction), cross(inner.start - point, inner.direction)
-        self.add(RPPDyad(rail, direction, outer.direction, offsets))
+        level = SlideLine(outer.start, 1 + 0j, 0.0, 1.0)
+        rail = self._make_rail(dyad, first.name, second.to, level, inf)
+        offsets = (
+            cross_product(constant, outer.direction),
+            cross_product(inner.start - point, inner.direction),
+        )
+        self.add_step(RPPDyad(rail, direction, outer.direction, offsets))
         k = self.new_coordinates(2)
-        self.ride(carrier, point, second.to, outer, Slide(k + 1, 1.0))
+        self.attach_to_slider(carrier, point, second.to, outer, Slide(k + 1, 1.0))
         self.slides[second.name] = Slide(k + 1, outer.sign)
         self.slides[dyad.inner.name] = Slide(k, inner.sign)
-        self.angles[link] = self.angles[carrier].plus(inner.angle)
-        self.pin_to(link, first)
+        self.angles[link] = self.angles[carrier].rotate_by(inner.angle)
+        self.attach_to_pin(link, first)
 
-    def _driven_rrr(self, dyad: Dyad) -> None:
+    def _add_driven_rrr(self, dyad: Dyad) -> None:
         closing = dyad.inner.name
         first, second = dyad.outer
         sides = [
-            Side(
+            DyadSide(
                 self.points[outer.link][outer.name],
                 self.points[end][closing],
-                self._carries(end, outer.link),
+                self._link_transforms(end, outer.link),
             )
             for outer, end in zip(dyad.outer, (dyad.inner.link, dyad.inner.to), strict=True)
         ]
@@ -327,50 +336,50 @@ class SolutionPlan(KnownLinks):
         k = self.new_coordinates(2)
         for i, outer in enumerate(dyad.outer):
             self.angles[outer.link] = Angle(k + i, 0.0, 1 + 0j)
-            self.pin_to(outer.link, outer)
+            self.attach_to_pin(outer.link, outer)
 
-    def _iterate(self, group: Iterated) -> None:
+    def _add_iteration(self, group: Iterated) -> None:
         from linkage_ros.kinematics.equations import Constraints  # local import: it loads numpy
-        from linkage_ros.kinematics.newton_group import iteration  # local import: likewise
+        from linkage_ros.kinematics.newton_group import make_iteration  # local import: likewise
 
         joints = self._structure.joints_of(group)
         constraints = Constraints(self._linkage, joints, group.links, self, group.ratios)
         slides = constraints.slides
-        step = iteration(self._linkage, group.links, constraints, self, tuple(self.steps))
-        self.add(step)
+        step = make_iteration(self._linkage, group.links, constraints, self, tuple(self.steps))
+        self.add_step(step)
         k = self.new_coordinates(len(group.links) + len(slides))
         for i, link in enumerate(group.links):
             self.angles[link] = Angle(k + i, 0.0, 1 + 0j)
             point = next(iter(self.points[link].values()))
-            self.held[link] = Held(point, link, pin=self.pin_count + i)
+            self.attachments[link] = Attachment(point, link, pin=self.pin_count + i)
         self.pin_count += len(group.links)
         for i, name in enumerate(slides):
             self.slides[name] = Slide(k + len(group.links) + i, 1.0)
 
-    def _carries(self, start: str, end: str) -> tuple[DrivenOffset, ...]:
+    def _link_transforms(self, start: str, end: str) -> tuple[DrivenOffset, ...]:
         """Return the transformations from one link of a body to another, by its driven joints."""
         ways: dict[str, tuple[DrivenOffset, ...]] = {start: ()}
         while end not in ways:
             for i, given in enumerate(self._driven):
-                for one, other in self._ends(i) if self.has_drive(i) else ():
+                for one, other in self._joined_links(i) if self.has_drive(i) else ():
                     if one in ways and other not in ways:
                         ways[other] = (
                             *ways[one],
-                            self._carry(self.drive_coordinate(i), given, one, other),
+                            self._link_transform(self.drive_coordinate(i), given, one, other),
                         )
         return ways[end]
 
-    def _ends(self, index: int) -> tuple[tuple[str, str], tuple[str, str]]:
+    def _joined_links(self, index: int) -> tuple[tuple[str, str], tuple[str, str]]:
         given = self._driven[index]
         one, other = given.parent, given.child
         if given.slider:
             one, other = self._linkage.sliders[given.slider].along, self.blocks[given.slider]
         return (one, other), (other, one)
 
-    def _carry(self, index: int, given: Input, inner: str, outer: str) -> DrivenOffset:
+    def _link_transform(self, index: int, given: Input, inner: str, outer: str) -> DrivenOffset:
         if given.slider:
             point = self.point_of(given.slider, inner)
-            line = self.line(given.slider, outer, point)
+            line = self.slider_line(given.slider, outer, point)
             self.slides[given.slider] = Slide(index, 1.0)
             return DrivenOffset(
                 line.start, point, line.angle, -1, index, line.sign, line.direction
@@ -381,23 +390,23 @@ class SolutionPlan(KnownLinks):
             self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j
         )
 
-    def _diagonal(
+    def _make_diagonal(
         self,
         dyad: Dyad,
         limits: tuple[float, float, float],
-        crank: Callable[..., CrankDiagonal],
+        make_diagonal: Callable[..., CrankDiagonal],
     ) -> tuple[AnyDiagonal, Angle, int]:
         """Return the diagonal of a dyad, the zero of its directions, and its upright sign."""
         first, second = (outer.name for outer in dyad.outer)
-        hinge = self._hinge(first, second)
+        hinge = self._find_hinge(first, second)
         if hinge is None:
             ends = self.place_pin(first), self.place_pin(second)
             return FreeDiagonal(ends, limits), _LEVEL, 1
         turns_known = self._driven_only(hinge.arms)
-        diagonal = crank(hinge.a, hinge.d, hinge.arms, hinge.offset, turns_known)
-        return diagonal, hinge.base, hinge.upright(diagonal)
+        diagonal = make_diagonal(hinge.a, hinge.d, hinge.arms, hinge.offset, turns_known)
+        return diagonal, hinge.base, hinge.upright_sign(diagonal)
 
-    def _crosses(
+    def _change_points(
         self, dyad: Dyad, lengths: tuple[float, float, float, float] | None = None
     ) -> tuple[bool, bool] | None:
         """
@@ -412,42 +421,48 @@ class SolutionPlan(KnownLinks):
         nearly = nearly_paired(*lengths) if lengths else None
         return nearly.crosses if nearly else None
 
-    def _hinge(self, first: str, second: str) -> _Hinge | None:
+    def _find_hinge(self, first: str, second: str) -> _Hinge | None:
         """Return the links with a common pin O that carry two pins, or None."""
         known = list(self.angles)
-        for other in self.carriers(second):
-            for one in self.carriers(first):
-                pivot = self.common(one, other, (first, second))
+        for other in self.carrying_links(second):
+            for one in self.carrying_links(first):
+                pivot = self.common_pin(one, other, (first, second))
                 if pivot:
-                    a, d = self.arm(one, pivot, first), self.arm(other, pivot, second)
-                    angle, base = self.angles[one].along(a), self.angles[other].along(d)
+                    a, d = (
+                        self.pin_vector(one, pivot, first),
+                        self.pin_vector(other, pivot, second),
+                    )
+                    angle, base = (
+                        self.angles[one].vector_angle(a),
+                        self.angles[other].vector_angle(d),
+                    )
                     offset = phase(angle.unit * base.unit.conjugate())
                     arms = angle.coordinate, base.coordinate
                     later = known.index(one) > known.index(other)
                     return _Hinge(abs(a), abs(d), arms, offset, base, later)
         return None
 
-    def _rail(self, dyad: Dyad, pin: str, on: str, line: Line, length: float) -> Rail:
+    def _make_rail(self, dyad: Dyad, pin: str, on: str, line: SlideLine, length: float) -> Rail:
         """Return a line on a known link as the rail of a known pin."""
-        base = self.angles[on].along(line.direction)
-        for link in self.carriers(pin):
-            pivot = self.common(link, on, (pin,))
+        base = self.angles[on].vector_angle(line.direction)
+        for link in self.carrying_links(pin):
+            pivot = self.common_pin(link, on, (pin,))
             if pivot:
                 angle = self.angles[link]
-                arm = self.arm(link, pivot, pin) * angle.unit * base.unit.conjugate()
+                arm = self.pin_vector(link, pivot, pin) * angle.unit * base.unit.conjugate()
                 place = (self.points[on][pivot] - line.start) * line.direction.conjugate()
                 arms = angle.coordinate, base.coordinate
                 rail = CrankRail(arm, place, length, arms)
                 # As for a parallelogram: both roots change their sign with a whole turn.
                 turns_matter = len(rail.singular_angles) < 2
-                crosses = self._crosses(dyad) if dyad.kind == 'RRP' else None
+                crosses = self._change_points(dyad) if dyad.kind == 'RRP' else None
                 if crosses is not None and crosses != rail.crosses:
                     turns_matter = not all(crosses)
                     rail = NearlyCrossingRail(arm, place, length, arms, crosses)
                 if turns_matter and not self._driven_only(arms):
                     return UnsignedRail(arm, place, length, arms)
                 return rail
-        ends = self.place(on, line.start), self.place_pin(pin)
+        ends = self.place_point(on, line.start), self.place_pin(pin)
         return FreeRail(ends, length, base.coordinate, base.unit)
 
     def _driven_only(self, arms: tuple[int, int]) -> bool:
@@ -481,10 +496,10 @@ class SolutionPlan(KnownLinks):
         written = sides[side] if side else 0
         sign = self._nominal[name].sign if self._nominal else (written or 1) * upright
         self.two_ways.append(TwoWays(dyad, len(self.steps), written, crosses, upright))
-        self.add(step.with_sign(sign))
+        self.add_step(step.with_sign(sign))
 
 
-def _facing(coordinate: int, base: Angle, vector: complex) -> Angle:
+def _link_angle(coordinate: int, base: Angle, vector: complex) -> Angle:
     """Return the angle of a link, given the coordinate of its vector, measured from a base."""
     unit = base.unit * (vector / abs(vector)).conjugate()
     return Angle(coordinate, base.constant - phase(vector), unit)

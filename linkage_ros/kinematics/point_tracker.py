@@ -22,16 +22,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.arithmetic import facing, vector
-from linkage_ros.kinematics.known_links import KnownLinks
+from linkage_ros.kinematics.arithmetic import make_vector, unit_vector
+from linkage_ros.kinematics.known_links import SolvedLinks
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
 
-class _Node(NamedTuple):
+class _TrackerNode(NamedTuple):
     """A point: index of its base, index of its angle, vector from the base, slide or −1."""
 
     base: int
@@ -57,30 +57,30 @@ class PointTracker:
 
     __slots__ = ('_fixed', '_nodes', '_pins', '_scale', '_still', 'indices')
 
-    def __init__(self, known: KnownLinks, points: Sequence[tuple[str, complex]]) -> None:
+    def __init__(self, known: SolvedLinks, points: Sequence[tuple[str, complex]]) -> None:
         walk = _Walk(known)
-        ends = [walk.to(link, point / known.scale) for link, point in points]
+        ends = [walk.reach_point(link, point / known.scale) for link, point in points]
         self._scale = known.scale
         self._fixed = [place * known.scale for place in walk.fixed]
         self._still = [0j] * len(walk.fixed)
         self._pins = tuple(walk.pins)
         self._nodes = tuple(
-            _Node(walk.number(base), arm, way * known.scale, slide)
+            _TrackerNode(walk.joined_index(base), arm, way * known.scale, slide)
             for base, arm, way, slide in walk.nodes
         )
         # For each requested point its index in the lists.
-        self.indices = tuple(walk.number(place) for place in ends)
+        self.indices = tuple(walk.joined_index(place) for place in ends)
 
     def places(self, position: Position) -> list[complex]:
         """Return the places of the points in the frame of the ground, in [m]."""
         return self.places_in(position.state)
 
-    def places_in(self, state: State) -> list[complex]:
+    def places_in(self, state: LinkState) -> list[complex]:
         """Return the places of the points as `places` does, for a state."""
         x = state.coordinates
-        places = self._started(self._fixed, state.pins)
+        places = self._initial_points(self._fixed, state.pins)
         for base, arm, way, slide in self._nodes:
-            turned = facing(x[arm]) * way
+            turned = unit_vector(x[arm]) * way
             places.append(places[base] + (turned if slide < 0 else x[slide] * turned))
         return places
 
@@ -89,11 +89,11 @@ class PointTracker:
     ) -> list[complex]:
         """Return the velocities of the points, in [m/s], given their places."""
         v = velocity.state.coordinates
-        velocities = self._started(self._still, velocity.state.pins)
+        velocities = self._initial_points(self._still, velocity.state.pins)
         for base, arm, way, slide in self._nodes:
             moved = 1j * v[arm] * (places[len(velocities)] - places[base])
             if slide >= 0:
-                moved += v[slide] * (facing(position.state.coordinates[arm]) * way)
+                moved += v[slide] * (unit_vector(position.state.coordinates[arm]) * way)
             velocities.append(velocities[base] + moved)
         return velocities
 
@@ -107,18 +107,18 @@ class PointTracker:
         """Return the accelerations of the points, in [m/s²], given their places."""
         v = velocity.state.coordinates
         a = acceleration.state.coordinates
-        accelerations = self._started(self._still, acceleration.state.pins)
+        accelerations = self._initial_points(self._still, acceleration.state.pins)
         for base, arm, way, slide in self._nodes:
             turn = v[arm]
             lever = places[len(accelerations)] - places[base]
-            moved = vector(-turn * turn, a[arm]) * lever
+            moved = make_vector(-turn * turn, a[arm]) * lever
             if slide >= 0:
-                unit = facing(position.state.coordinates[arm]) * way
-                moved += vector(a[slide], 2.0 * turn * v[slide]) * unit
+                unit = unit_vector(position.state.coordinates[arm]) * way
+                moved += make_vector(a[slide], 2.0 * turn * v[slide]) * unit
             accelerations.append(accelerations[base] + moved)
         return accelerations
 
-    def _started(self, fixed: list[complex], pins: list[complex]) -> list[complex]:
+    def _initial_points(self, fixed: list[complex], pins: list[complex]) -> list[complex]:
         """Return the points on the ground and those that an iteration has placed."""
         started = fixed.copy()
         for index in self._pins:
@@ -133,44 +133,46 @@ _Place = tuple[str, int]
 class _Walk:
     """The shortest way to the points, in the unit of the closure's lengths."""
 
-    def __init__(self, known: KnownLinks) -> None:
+    def __init__(self, known: SolvedLinks) -> None:
         self._known = known
         self._places: dict[tuple[str, complex], _Place] = {}
         self.fixed: list[complex] = []
         self.pins: list[int] = []
         self.nodes: list[tuple[_Place, int, complex, int]] = []
 
-    def number(self, place: _Place) -> int:
+    def joined_index(self, place: _Place) -> int:
         """Return the index of a point if all lists are joined."""
         kind, index = place
         before = {'fixed': 0, 'pin': len(self.fixed), 'node': len(self.fixed) + len(self.pins)}
         return before[kind] + index
 
-    def to(self, link: str, point: complex) -> _Place:
+    def reach_point(self, link: str, point: complex) -> _Place:
         """Return a point of a link, and add the way to it."""
         if (link, point) not in self._places:
-            self._places[link, point] = self._new(link, point)
+            self._places[link, point] = self._add_point(link, point)
         return self._places[link, point]
 
-    def _new(self, link: str, point: complex) -> _Place:
+    def _add_point(self, link: str, point: complex) -> _Place:
         if link == GROUND:
             self.fixed.append(point)
             return 'fixed', len(self.fixed) - 1
-        held = self._known.held[link]
+        held = self._known.attachments[link]
         if held.point != point:
             angle = self._known.angles[link]
             vector = angle.unit * (point - held.point)
-            return self._node((self.to(link, held.point), angle.coordinate, vector, -1))
+            return self._add_node(
+                (self.reach_point(link, held.point), angle.coordinate, vector, -1)
+            )
         if held.pin >= 0:
             self.pins.append(held.pin)
             return 'pin', len(self.pins) - 1
-        base = self.to(held.link, held.at)
+        base = self.reach_point(held.link, held.link_point)
         if held.slide is None:
             return base
         angle, slide = self._known.angles[held.link], held.slide
         unit = angle.unit * (slide.sign * held.direction)
-        return self._node((base, angle.coordinate, unit, slide.coordinate))
+        return self._add_node((base, angle.coordinate, unit, slide.coordinate))
 
-    def _node(self, node: tuple[_Place, int, complex, int]) -> _Place:
+    def _add_node(self, node: tuple[_Place, int, complex, int]) -> _Place:
         self.nodes.append(node)
         return 'node', len(self.nodes) - 1

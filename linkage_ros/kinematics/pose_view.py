@@ -55,15 +55,15 @@ def view(
     about = way.range_about(value) or way.widest_range
     about = about or InputRange(value, value, way.turning)
     interval = _listed(way, about)
-    shift = about.shift(value) if about.whole else interval.lowest - about.lowest
+    shift = about.shift(value) if about.is_whole else interval.lowest - about.lowest
     if ghosts:
         behind = [_closed(closure, given) for given in ghosts]
-    elif interval.whole:
+    elif interval.is_whole:
         turn = interval.highest - interval.lowest
-        behind = [way.position(value + turn * i / (_GHOSTS + 1)) for i in range(1, _GHOSTS + 1)]
+        behind = [way.position_at(value + turn * i / (_GHOSTS + 1)) for i in range(1, _GHOSTS + 1)]
     else:
         low, high = interval.lowest, interval.highest
-        behind = [way.position(low + (high - low) * i / (_GHOSTS - 1)) for i in range(_GHOSTS)]
+        behind = [way.position_at(low + (high - low) * i / (_GHOSTS - 1)) for i in range(_GHOSTS)]
     return View(
         closure,
         inputs,

@@ -24,18 +24,18 @@ from typing import NamedTuple, Protocol
 
 from linkage_ros.kinematics.arithmetic import (
     copysign,
-    facing,
-    margin,
+    exact_sum,
+    make_vector,
     passes_zero,
     phase,
-    reach,
     Root,
     root_of,
-    vector,
+    signed_root,
+    unit_vector,
     where,
 )
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 
 class PinOnRail(NamedTuple):
@@ -59,28 +59,38 @@ class PinOnRail(NamedTuple):
 class Rail(Protocol):
     """The interface of a rail to a dyad."""
 
-    def at(self, known: State, /) -> PinOnRail:
+    def pin_at(self, solved: LinkState, /) -> PinOnRail:
         """Return the pin in the frame of the rail."""
 
-    def rates(self, sight: PinOnRail, known: State, speeds: State, /) -> tuple[complex, float]:
+    def rates(
+        self, pin_on_rail: PinOnRail, solved: LinkState, velocities: LinkState, /
+    ) -> tuple[complex, float]:
         """Return the pin's velocity in that frame, and the rate of the frame, in [rad/s]."""
 
     def accelerations(
         self,
-        sight: PinOnRail,
+        pin_on_rail: PinOnRail,
         rates: tuple[complex, float],
-        known: State,
-        speeds: State,
-        changes: State,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
         /,
     ) -> tuple[complex, float]:
         """Return the pin's acceleration in that frame, and that of the frame, in [rad/s²]."""
 
-    def climb(self, sight: PinOnRail, rise: float, speeds: State, /) -> float:
+    def unsigned_link_rate(
+        self, pin_on_rail: PinOnRail, rise: float, velocities: LinkState, /
+    ) -> float:
         """Return ẏ/(below·above); ``rise`` is ẏ."""
 
-    def across(
-        self, sight: PinOnRail, pull: complex, link_rate: float, speeds: State, changes: State, /
+    def unsigned_link_acceleration(
+        self,
+        pin_on_rail: PinOnRail,
+        pin_acceleration: complex,
+        link_rate: float,
+        velocities: LinkState,
+        accelerations: LinkState,
+        /,
     ) -> float:
         """Return (ÿ + y·λ̇²)/(below·above) for a link at the rate λ̇."""
 
@@ -123,7 +133,7 @@ class CrankRail:
         below, above = (
             (inf, inf)
             if link == inf
-            else (margin(link, side, -a) for side in (-pivot.imag, pivot.imag))
+            else (exact_sum(link, side, -a) for side in (-pivot.imag, pivot.imag))
         )
         self._length, self._pivot = a, pivot
         self._below, self._above = below, above
@@ -151,28 +161,28 @@ class CrankRail:
         across = ((self._below, 0.5 * pi), (self._above, -0.5 * pi))
         return tuple(psi - phase(self._arm) for bracket, psi in across if bracket == 0.0)
 
-    def at(self, known: State) -> PinOnRail:
+    def pin_at(self, solved: LinkState) -> PinOnRail:
         first, second = self.arms
-        base = known.coordinates[second]
-        swing = known.coordinates[first] - base
-        arm = facing(swing) * self._arm
+        base = solved.coordinates[second]
+        swing = solved.coordinates[first] - base
+        arm = unit_vector(swing) * self._arm
         place = self._pivot + arm
         if self._link == inf:
             return PinOnRail(place, inf, inf, 0.0, base, arm, 0.0, Status.CLOSED)
-        eta = facing(-0.5 * swing) * self._half_turn
+        eta = unit_vector(-0.5 * swing) * self._half_turn
         sine, cosine = eta.imag, eta.real
         part, other_part = self._root_length * sine, self._root_length * cosine
         square, other_square = (2.0 * self._length * side * side for side in (sine, cosine))
-        below, above = self._root(self._below, part, square, -place.imag), Root(0.0)
+        below, above = self._limit_root(self._below, part, square, -place.imag), Root(0.0)
         if below.status is not Status.OPEN:
-            above = self._root(self._above, other_part, other_square, place.imag)
+            above = self._limit_root(self._above, other_part, other_square, place.imag)
         if Status.OPEN in (below.status, above.status):
             gap = below.missing + above.missing
             return PinOnRail(place, 0.0, 0.0, gap, base, arm, 0.0, Status.OPEN)
         lean, status = 0.0, Status.CLOSED
         if self._changes_over:
             # ẏ and the root are 0 together: computed in two forms, the zeros would not cancel.
-            arm = vector(2.0 * self._length * sine * cosine, arm.imag)
+            arm = make_vector(2.0 * self._length * sine * cosine, arm.imag)
             lean = 1.0
             if self._above:
                 lean = 0.0 if above.status is Status.TOGGLE else other_part / above.root
@@ -184,10 +194,10 @@ class CrankRail:
                 status = self._at_change_point
         return PinOnRail(place, below.root, above.root, 0.0, base, arm, lean, status)
 
-    def _root(self, bracket: float, part: float, square: float, side: float) -> Root:
+    def _limit_root(self, bracket: float, part: float, square: float, side: float) -> Root:
         """Return the root of the link's length minus the distance it has to reach."""
         if bracket == 0.0:
-            return reach(bracket, part, square)
+            return signed_root(bracket, part, square)
         size = self._link + abs(side)
         # The square has more rounding errors than the side: if as great, it is no better.
         shorter = 4.0 * (abs(bracket) + square) < size
@@ -196,34 +206,43 @@ class CrankRail:
             where(shorter, abs(bracket) + square, size),
         )
 
-    def rates(self, sight: PinOnRail, _known: State, speeds: State) -> tuple[complex, float]:
+    def rates(
+        self, pin_on_rail: PinOnRail, _solved: LinkState, velocities: LinkState
+    ) -> tuple[complex, float]:
         first, second = self.arms
-        turn, arm = speeds.coordinates[second], sight.arm
-        swing = speeds.coordinates[first] - turn
+        turn, arm = velocities.coordinates[second], pin_on_rail.arm
+        swing = velocities.coordinates[first] - turn
         return 1j * (swing * arm.real) - swing * arm.imag, turn
 
     def accelerations(
         self,
-        sight: PinOnRail,
+        pin_on_rail: PinOnRail,
         _rates: tuple[complex, float],
-        _known: State,
-        speeds: State,
-        changes: State,
+        _solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> tuple[complex, float]:
         first, second = self.arms
-        swing = speeds.coordinates[first] - speeds.coordinates[second]
-        change = changes.coordinates[second]
-        swing_change = changes.coordinates[first] - change
-        return (1j * swing_change - swing * swing) * sight.arm, change
+        swing = velocities.coordinates[first] - velocities.coordinates[second]
+        change = accelerations.coordinates[second]
+        swing_change = accelerations.coordinates[first] - change
+        return (1j * swing_change - swing * swing) * pin_on_rail.arm, change
 
-    def climb(self, sight: PinOnRail, rise: float, speeds: State) -> float:
+    def unsigned_link_rate(
+        self, pin_on_rail: PinOnRail, rise: float, velocities: LinkState
+    ) -> float:
         if not self._changes_over:
-            return rise / (sight.below * sight.above)
+            return rise / (pin_on_rail.below * pin_on_rail.above)
         first, second = self.arms
-        return (speeds.coordinates[first] - speeds.coordinates[second]) * sight.lean
+        return (velocities.coordinates[first] - velocities.coordinates[second]) * pin_on_rail.lean
 
-    def across(
-        self, sight: PinOnRail, _pull: complex, link_rate: float, speeds: State, changes: State
+    def unsigned_link_acceleration(
+        self,
+        pin_on_rail: PinOnRail,
+        _pin_acceleration: complex,
+        link_rate: float,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> float:
         """
         Return (ÿ + y·λ̇²)/(below·above).
@@ -238,20 +257,25 @@ class CrankRail:
         cancel.
         """
         first, second = self.arms
-        swing = speeds.coordinates[first] - speeds.coordinates[second]
-        change = changes.coordinates[first] - changes.coordinates[second]
-        e, y, below, above = self._pivot.imag, sight.place.imag, sight.below, sight.above
+        swing = velocities.coordinates[first] - velocities.coordinates[second]
+        change = accelerations.coordinates[first] - accelerations.coordinates[second]
+        e, y, below, above = (
+            self._pivot.imag,
+            pin_on_rail.place.imag,
+            pin_on_rail.below,
+            pin_on_rail.above,
+        )
         if self._changes_over:
             bent = 0.0
             if self._below:
                 bent = e * above / below**3
             elif self._above:
                 bent = e * below / above**3
-            return change * sight.lean + swing * swing * bent
+            return change * pin_on_rail.lean + swing * swing * bent
         left_of_line = y > 0.0
         term = e * where(left_of_line, below, above) ** 4
         other_term = y * where(left_of_line, *self._products)
-        part, other_part = -swing * swing * sight.arm.imag, y * link_rate * link_rate
+        part, other_part = -swing * swing * pin_on_rail.arm.imag, y * link_rate * link_rate
         along = below * above
         square = (swing / along) ** 2
         rest = where(
@@ -259,7 +283,7 @@ class CrankRail:
             (term - other_term) * square,
             part + other_part,
         )
-        return (change * sight.arm.real + rest) / along
+        return (change * pin_on_rail.arm.real + rest) / along
 
 
 class UnsignedRail(CrankRail):
@@ -273,8 +297,8 @@ class UnsignedRail(CrankRail):
     def crosses(self) -> tuple[bool, bool]:
         return False, False
 
-    def at(self, known: State) -> PinOnRail:
-        signed = super().at(known)
+    def pin_at(self, solved: LinkState) -> PinOnRail:
+        signed = super().pin_at(solved)
         lean = where((signed.below < 0.0) != (signed.above < 0.0), -signed.lean, signed.lean)
         return signed._replace(below=abs(signed.below), above=abs(signed.above), lean=lean)
 
@@ -309,11 +333,11 @@ class NearlyCrossingRail(CrankRail):
     def crosses(self) -> tuple[bool, bool]:
         return self._crosses
 
-    def at(self, known: State) -> PinOnRail:
-        found = super().at(known)
+    def pin_at(self, solved: LinkState) -> PinOnRail:
+        found = super().pin_at(solved)
         first, second = self.arms
-        swing = known.coordinates[first] - known.coordinates[second]
-        eta = facing(-0.5 * swing) * self._half_turn
+        swing = solved.coordinates[first] - solved.coordinates[second]
+        eta = unit_vector(-0.5 * swing) * self._half_turn
         below, above, lean = found.below, found.above, found.lean
         if self._crosses[0]:
             below = copysign(below, eta.imag)
@@ -349,10 +373,10 @@ class FreeRail:
         self._arm = arm
         self._back = unit.conjugate()
 
-    def at(self, known: State) -> PinOnRail:
-        base = known.coordinates[self._arm]
-        start, end = (known.pins[i] for i in self._ends)
-        place = (end - start) * (facing(-base) * self._back)
+    def pin_at(self, solved: LinkState) -> PinOnRail:
+        base = solved.coordinates[self._arm]
+        start, end = (solved.pins[i] for i in self._ends)
+        place = (end - start) * (unit_vector(-base) * self._back)
         link = self._link
         if link == inf:
             return PinOnRail(place, inf, inf, 0.0, base, 0j, 0.0, Status.CLOSED)
@@ -365,33 +389,42 @@ class FreeRail:
         status = Status.OPEN if is_open else Status.CLOSED
         return PinOnRail(place, below.root, above.root, gap, base, 0j, 0.0, status)
 
-    def rates(self, sight: PinOnRail, _known: State, speeds: State) -> tuple[complex, float]:
-        start, end = (speeds.pins[i] for i in self._ends)
-        turn = speeds.coordinates[self._arm]
-        back = facing(-sight.base) * self._back
-        return (end - start) * back - 1j * turn * sight.place, turn
+    def rates(
+        self, pin_on_rail: PinOnRail, _solved: LinkState, velocities: LinkState
+    ) -> tuple[complex, float]:
+        start, end = (velocities.pins[i] for i in self._ends)
+        turn = velocities.coordinates[self._arm]
+        back = unit_vector(-pin_on_rail.base) * self._back
+        return (end - start) * back - 1j * turn * pin_on_rail.place, turn
 
     def accelerations(
         self,
-        sight: PinOnRail,
+        pin_on_rail: PinOnRail,
         rates: tuple[complex, float],
-        _known: State,
-        _speeds: State,
-        changes: State,
+        _solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
     ) -> tuple[complex, float]:
-        start, end = (changes.pins[i] for i in self._ends)
+        start, end = (accelerations.pins[i] for i in self._ends)
         velocity, turn = rates
-        change = changes.coordinates[self._arm]
-        back = facing(-sight.base) * self._back
+        change = accelerations.coordinates[self._arm]
+        back = unit_vector(-pin_on_rail.base) * self._back
         # Coriolis, Euler and centrifugal terms of a frame that turns.
-        apparent = 2j * turn * velocity + (1j * change - turn * turn) * sight.place
+        apparent = 2j * turn * velocity + (1j * change - turn * turn) * pin_on_rail.place
         return (end - start) * back - apparent, change
 
-    def climb(self, sight: PinOnRail, rise: float, _speeds: State) -> float:
-        return rise / (sight.below * sight.above)
-
-    def across(
-        self, sight: PinOnRail, pull: complex, link_rate: float, _speeds: State, _changes: State
+    def unsigned_link_rate(
+        self, pin_on_rail: PinOnRail, rise: float, _velocities: LinkState
     ) -> float:
-        across = pull.imag + sight.place.imag * link_rate * link_rate
-        return across / (sight.below * sight.above)
+        return rise / (pin_on_rail.below * pin_on_rail.above)
+
+    def unsigned_link_acceleration(
+        self,
+        pin_on_rail: PinOnRail,
+        pin_acceleration: complex,
+        link_rate: float,
+        _velocities: LinkState,
+        _accelerations: LinkState,
+    ) -> float:
+        across = pin_acceleration.imag + pin_on_rail.place.imag * link_rate * link_rate
+        return across / (pin_on_rail.below * pin_on_rail.above)

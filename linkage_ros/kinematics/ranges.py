@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 _RATIO = (sqrt(5.0) - 1.0) / 2.0
 
 
-def golden(function: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
+def golden_section(
+    function: Callable[[float], float], low: float, high: float
+) -> tuple[float, float]:
     """Return the lowest value between two places, and where it is."""
     one, other = high - _RATIO * (high - low), low + _RATIO * (high - low)
     at_one, at_other = function(one), function(other)
@@ -73,15 +75,15 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     """
     if len(closure.linkage.inputs) > 1:
         return ()
-    branches = _branches(closure)
+    branches = _iterated_branches(closure)
     if branches:
         # Each branch is followed only where those before it close: the last one lies within all.
         return tuple(_on_a_branch(closure, branches[-1]))
     if closure.linkage.inputs[0].slider:
-        far = reach(closure)
+        far = slide_bound(closure)
         return tuple(
             InputRange(low, high, False, (low > -far, high < far))
-            for low, high in _searched(closure, -far, far, 4 * _SAMPLES)
+            for low, high in _search_intervals(closure, -far, far, 4 * _SAMPLES)
         )
     if closure.ratio_turns != 1:
         return tuple(_in_turns(closure, closure.ratio_turns))
@@ -99,7 +101,9 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
             exact = False
     if intervals and not exact:
         start, end = intervals[0][0], intervals[-1][1]
-        intervals = [part for ends in intervals for part in _searched(closure, *ends, _SAMPLES)]
+        intervals = [
+            part for ends in intervals for part in _search_intervals(closure, *ends, _SAMPLES)
+        ]
         if end - start >= tau:
             intervals = through_the_end(intervals, start, end)
     return tuple(InputRange(low, high) for low, high in intervals)
@@ -112,7 +116,7 @@ def _in_turns(closure: LoopClosure, turns: int) -> Iterator[InputRange]:
     low, high = -far, far
     if not turns and limits.low > -inf and limits.high < inf:
         low, high = limits.low, limits.high
-    parts = _searched(closure, low, high, _SAMPLES * ceil((high - low) / tau))
+    parts = _search_intervals(closure, low, high, _SAMPLES * ceil((high - low) / tau))
     if turns:
         parts = through_the_end(parts, low, high, turns * tau)
     for begin, end in parts:
@@ -130,34 +134,36 @@ def through_the_end(
     return [*others, (begin, end + turn)]
 
 
-def _iterations(closure: LoopClosure) -> dict[int, Any]:
+def _iterating_steps(closure: LoopClosure) -> dict[int, Any]:
     """Return the steps that iterate, by their numbers."""
     return {number: step for number, step in enumerate(closure.steps) if hasattr(step, 'branch')}
 
 
-def iterated(closure: LoopClosure) -> bool:
+def is_iterated(closure: LoopClosure) -> bool:
     """Return whether a linkage has links that only iteration solves."""
-    return bool(_iterations(closure))
+    return bool(_iterating_steps(closure))
 
 
 def whole_turns(closure: LoopClosure) -> int:
     """Return the number of whole turns after which poses repeat; 0 if each turn differs."""
     if len(closure.linkage.inputs) > 1:
-        return 0 if iterated(closure) else 1
-    periods = (branch.interval.period if branch else 1 for branch in _branches(closure))
+        return 0 if is_iterated(closure) else 1
+    periods = (
+        branch.interval.period_turns if branch else 1 for branch in _iterated_branches(closure)
+    )
     return lcm(closure.ratio_turns, *periods)
 
 
-def _branches(closure: LoopClosure) -> list[Branch | None]:
+def _iterated_branches(closure: LoopClosure) -> list[Branch | None]:
     """Return the branch of each iterated group."""
-    return [step.branch() for step in _iterations(closure).values()]
+    return [step.branch() for step in _iterating_steps(closure).values()]
 
 
 def _on_a_branch(closure: LoopClosure, branch: Branch | None) -> Iterator[InputRange]:
     """Yield the intervals of a branch in which the steps after it close too."""
     if branch is None:
         return
-    after = 1 + max(_iterations(closure))
+    after = 1 + max(_iterating_steps(closure))
     behind = [s for s in closure.steps[after:] if not isinstance(s, _CLOSE_EVERYWHERE)]
     turning = not closure.linkage.inputs[0].slider
     unit = 1.0 if turning else closure.scale
@@ -166,7 +172,7 @@ def _on_a_branch(closure: LoopClosure, branch: Branch | None) -> Iterator[InputR
     parts = [(low, high)]
     if behind:
         count = _SAMPLES * max(1, ceil((high - low) / tau)) if turning else 4 * _SAMPLES
-        parts = _searched(closure, low, high, count)
+        parts = _search_intervals(closure, low, high, count)
         if turns:
             parts = through_the_end(parts, low, high, turns * tau)
     for begin, end in parts:
@@ -176,7 +182,7 @@ def _on_a_branch(closure: LoopClosure, branch: Branch | None) -> Iterator[InputR
         yield InputRange(begin, end, turning, ends, whole_turns(closure))
 
 
-def describe(ranges: tuple[InputRange, ...]) -> str:
+def describe_ranges(ranges: tuple[InputRange, ...]) -> str:
     """Return ranges as text for a user."""
     return ' or '.join(map(str, ranges)) or 'no single range: it depends on every input'
 
@@ -217,12 +223,12 @@ def link_lengths(links: Mapping[str, Mapping[str, Point]]) -> list[float]:
     ]
 
 
-def reach(closure: LoopClosure) -> float:
+def slide_bound(closure: LoopClosure) -> float:
     """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
     return sum(link_lengths(closure.structure.links))
 
 
-def search(
+def find_intervals(
     closes: Callable[[float], bool],
     low: float,
     high: float,
@@ -273,14 +279,14 @@ def _turning_points(
     for i in range(1, len(values) - 1):
         before, here, after = margins[i - 1], margins[i], margins[i + 1]
         if 0.0 < here <= min(before, after) and here < inf:
-            yield golden(margin, values[i - 1], values[i + 1])[1]
+            yield golden_section(margin, values[i - 1], values[i + 1])[1]
         elif 0.0 > here >= max(before, after):
-            yield golden(lambda x: -margin(x), values[i - 1], values[i + 1])[1]
+            yield golden_section(lambda x: -margin(x), values[i - 1], values[i + 1])[1]
 
 
-def _margin(closure: LoopClosure, value: float) -> float:
+def _closing_margin(closure: LoopClosure, value: float) -> float:
     """Return the distance of a state from the limits of its dyads; negative if it is open."""
-    position = closure.posed(value)
+    position = closure.close_unlimited(value)
     if not position.status.has_pose:
         # Where two pins meet, or two lines are parallel, the range does not end.
         return 0.0 if not position.gap else -position.gap
@@ -292,16 +298,18 @@ def _margin(closure: LoopClosure, value: float) -> float:
     return min(angles, default=inf)
 
 
-def _searched(
+def _search_intervals(
     closure: LoopClosure, low: float, high: float, samples: int
 ) -> list[tuple[float, float]]:
     """Return the parts of an interval in which loops close, including narrow ones."""
 
-    def closes(value: float) -> bool:
-        return closure.posed(value).status.has_pose
+    def has_pose(value: float) -> bool:
+        return closure.close_unlimited(value).status.has_pose
 
     parts: list[tuple[float, float]] = []
-    for begin, end in search(closes, low, high, samples, partial(_margin, closure)):
+    for begin, end in find_intervals(
+        has_pose, low, high, samples, partial(_closing_margin, closure)
+    ):
         if parts and begin - parts[-1][1] < _POINT * (high - low):
             # Between them two pins meet, or two lines are parallel: the range does not end.
             parts[-1] = (parts[-1][0], end)
@@ -353,7 +361,7 @@ def input_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
 def within_own(closure: LoopClosure, ranges: Sequence[InputRange]) -> tuple[InputRange, ...]:
     """Return the parts of ranges within the limits of the single input itself."""
     (bound,) = closure.bounds.inputs
-    return tuple(part for one in ranges for part in _cut(closure, one, bound))
+    return tuple(part for one in ranges for part in _cut_by_limits(closure, one, bound))
 
 
 def within_published(
@@ -361,30 +369,30 @@ def within_published(
 ) -> tuple[InputRange, ...]:
     """Return the parts of ranges of the single input within limits of published joints."""
     if not closure.bounds.inputs:
-        ranges = [copy for one in ranges for copy in _assemblies(closure, one)]
+        ranges = [copy for one in ranges for copy in _range_and_copy(closure, one)]
     return tuple(part for one in ranges for part in _within_limits(closure, one, bounds))
 
 
-def _assemblies(closure: LoopClosure, interval: InputRange) -> Iterator[InputRange]:
+def _range_and_copy(closure: LoopClosure, interval: InputRange) -> Iterator[InputRange]:
     """Yield a range, and the same one turn later if the poses there differ."""
     yield interval
-    if not interval.turning or interval.whole or interval.turns != 1:
+    if not interval.turning or interval.is_whole or interval.turns != 1:
         return
     # In the middle of a symmetrical range two pins may lie in one place.
     place = 0.6 * interval.lowest + 0.4 * interval.highest
-    copy = _copied(closure, interval, tau)
-    if copy is not None and not repeats(closure, closure.position, place, tau):
+    copy = _copy_turns_later(closure, interval, tau)
+    if copy is not None and not joints_repeat(closure, closure.position, place, tau):
         yield copy
 
 
-def turns(closure: LoopClosure, position: Callable[[float], Position]) -> int:
+def turns_to_repeat(closure: LoopClosure, position: Callable[[float], Position]) -> int:
     """Return the number of turns after which all joints repeat, for an input that turns fully."""
     count = max(1, whole_turns(closure))
-    once = all(repeats(closure, position, 0.1 + i, count * tau) for i in range(6 * count))
+    once = all(joints_repeat(closure, position, 0.1 + i, count * tau) for i in range(6 * count))
     return count if once else 2 * count
 
 
-def repeats(
+def joints_repeat(
     closure: LoopClosure, position: Callable[[float], Position], value: float, shift: float
 ) -> bool:
     """Return whether all joints are the same after a shift, apart from whole turns."""
@@ -398,14 +406,16 @@ def repeats(
     )
 
 
-def _cut(closure: LoopClosure, interval: InputRange, bound: Bound) -> Iterator[InputRange]:
+def _cut_by_limits(
+    closure: LoopClosure, interval: InputRange, bound: Bound
+) -> Iterator[InputRange]:
     """Yield the parts of a range within the limits of the input; angles count with turns."""
     limits = closure.linkage.inputs[0].limits
     if not (interval.turning and interval.turns):
-        yield from _between(interval, limits.low, limits.high, bound.name)
+        yield from _clip_range(interval, limits.low, limits.high, bound.name)
         return
-    if interval.whole:
-        period = tau * turns(closure, closure.position)
+    if interval.is_whole:
+        period = tau * turns_to_repeat(closure, closure.position)
         low = limits.low if limits.low > -inf else limits.high - period
         high = limits.high if limits.high < inf else limits.low + period
         ends = limits.low > -inf, limits.high < inf
@@ -421,28 +431,30 @@ def _cut(closure: LoopClosure, interval: InputRange, bound: Bound) -> Iterator[I
     first = max(first, middle - _COPIES // 2)
     last = min(last, first + _COPIES - 1)
     for count in range(int(first), int(last) + 1):
-        copy = interval if not count else _copied(closure, interval, count * period)
+        copy = interval if not count else _copy_turns_later(closure, interval, count * period)
         if copy is not None:
-            yield from _between(copy, limits.low, limits.high, bound.name)
+            yield from _clip_range(copy, limits.low, limits.high, bound.name)
 
 
-def _copied(closure: LoopClosure, interval: InputRange, shift: float) -> InputRange | None:
+def _copy_turns_later(
+    closure: LoopClosure, interval: InputRange, shift: float
+) -> InputRange | None:
     """Return a range some turns later, or None if the linkage does not close there."""
     inside = 0.6 * interval.lowest + 0.4 * interval.highest
 
-    def closes(value: float) -> bool:
+    def is_closed(value: float) -> bool:
         return bool(closure.position(value).joints)
 
-    if not closes(inside + shift):
+    if not is_closed(inside + shift):
         return None
     low, high = (
-        end if closes(end) else last_inside(closes, inside + shift, end)
+        end if is_closed(end) else last_inside(is_closed, inside + shift, end)
         for end in (interval.lowest + shift, interval.highest + shift)
     )
     return interval._replace(lowest=low, highest=high)
 
 
-def _between(interval: InputRange, low: float, high: float, name: str) -> Iterator[InputRange]:
+def _clip_range(interval: InputRange, low: float, high: float, name: str) -> Iterator[InputRange]:
     """Yield the part of a range between two limits, if any."""
     lowest, highest = interval.lowest, interval.highest
     limited, by = list(interval.limited), list(interval.by)
@@ -464,43 +476,45 @@ def _within_limits(
 ) -> Iterator[InputRange]:
     """Yield the parts of a range in which published joints are within their limits."""
 
-    def margin(value: float) -> float:
+    def limit_margin(value: float) -> float:
         joints = closure.position(value).joints
-        return min(b.margin(joints[b.number]) for b in bounds) if joints else -inf
+        return min(b.limit_margin(joints[b.number]) for b in bounds) if joints else -inf
 
-    def within(value: float) -> bool:
+    def is_within(value: float) -> bool:
         joints = closure.position(value).joints
-        return bool(joints) and not any(b.beyond(joints[b.number]) for b in bounds)
+        return bool(joints) and not any(b.is_beyond(joints[b.number]) for b in bounds)
 
     low, high = interval.lowest, interval.highest
-    if interval.whole:
-        high = low + tau * turns(closure, closure.position)
-    parts = list(search(within, low, high, margin=margin))
+    if interval.is_whole:
+        high = low + tau * turns_to_repeat(closure, closure.position)
+    parts = list(find_intervals(is_within, low, high, margin=limit_margin))
     if parts == [(low, high)]:
         yield interval
         return
-    if interval.whole and len(parts) > 1 and parts[0][0] == low and parts[-1][1] == high:
+    if interval.is_whole and len(parts) > 1 and parts[0][0] == low and parts[-1][1] == high:
         # One part that runs through the end of the turn.
         (_, end), *others, (begin, _) = parts
         parts = [*others, (begin, end + high - low)]
     for begin, end in parts:
         limited, by = list(interval.limited), list(interval.by)
         for side, (at, outer) in enumerate(((begin, low), (end, high))):
-            if interval.whole or at != outer:
+            if interval.is_whole or at != outer:
                 limited[side] = True
-                by[side] = _by(closure, bounds, at, (begin, end)[1 - side])
+                by[side] = _limiting_joint(closure, bounds, at, (begin, end)[1 - side])
         yield interval._replace(
             lowest=begin, highest=end, limited=(limited[0], limited[1]), by=(by[0], by[1])
         )
 
 
-def _by(closure: LoopClosure, bounds: Sequence[Bound], end: float, inside: float) -> str:
+def _limiting_joint(
+    closure: LoopClosure, bounds: Sequence[Bound], end: float, inside: float
+) -> str:
     """Return the joint whose limits end a range."""
     step = 1e-9 * (end - inside)
     for outside in (end, end + step, end + 1e3 * step):
         joints = closure.position(outside).joints
         for bound in bounds if joints else ():
-            if bound.beyond(joints[bound.number]):
+            if bound.is_beyond(joints[bound.number]):
                 return bound.name
     joints = closure.position(end).joints
-    return min(bounds, key=lambda bound: bound.margin(joints[bound.number])).name
+    return min(bounds, key=lambda bound: bound.limit_margin(joints[bound.number])).name

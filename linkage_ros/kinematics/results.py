@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, Protocol
 from linkage_ros.errors import listed, quoted
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import Pose, State, Step
+from linkage_ros.kinematics.step import LinkState, Step, StepPose
 from linkage_ros.kinematics.topology import Structure
 
 
@@ -55,7 +55,7 @@ class InputRange(NamedTuple):
     by: tuple[str, str] = ('', '')
 
     @property
-    def whole(self) -> bool:
+    def is_whole(self) -> bool:
         """Whether the input turns fully, without end."""
         width = self.highest - self.lowest
         comes_round = self.turning and self.turns > 0 and self.by == ('', '')
@@ -64,7 +64,7 @@ class InputRange(NamedTuple):
     @property
     def toggles(self) -> tuple[float, ...]:
         """Return the ends at which a toggle lies: those that follow from the links' lengths."""
-        if self.whole:
+        if self.is_whole:
             return ()
         ends = zip((self.lowest, self.highest), self.limited, self.by, strict=True)
         return tuple(end for end, limited, by in ends if limited and not by)
@@ -77,7 +77,7 @@ class InputRange(NamedTuple):
         return period * round((0.5 * (self.lowest + self.highest) - value) / period)
 
     def __str__(self) -> str:
-        if self.whole:
+        if self.is_whole:
             return 'every crank angle'
         if self.limited == (False, False) and not self.turning:
             return 'every slide'
@@ -86,7 +86,7 @@ class InputRange(NamedTuple):
             return f'{low} {unit} and more' if self.limited[0] else f'{high} {unit} and less'
         return f'{low} to {high} {unit}'
 
-    def shifted(self, shift: float) -> InputRange:
+    def shift_by(self, shift: float) -> InputRange:
         """Return the range moved by a distance, in [rad] or [m]."""
         return self._replace(lowest=self.lowest + shift, highest=self.highest + shift)
 
@@ -152,12 +152,12 @@ class LoopClosure(Protocol):
     ratio_turns: int
     bounds: Any
 
-    def known(self, *inputs: float) -> State: ...
+    def initial_state(self, *inputs: float) -> LinkState: ...
     def position(self, *inputs: float) -> Position: ...
-    def posed(self, *inputs: float) -> Position: ...
+    def close_unlimited(self, *inputs: float) -> Position: ...
     def velocity(self, position: Position, *rates: float) -> Velocity: ...
     def acceleration(self, position: Position, velocity: Velocity, *a: float) -> Acceleration: ...
-    def inputs_of(self, state: State) -> tuple[float, ...]: ...
+    def inputs_of(self, state: LinkState) -> tuple[float, ...]: ...
     def points(self, position: Position) -> dict[tuple[str, str], complex]: ...
 
     def point_motion(
@@ -222,10 +222,10 @@ class _JointValues(Mapping[str, float]):
     def __repr__(self) -> str:
         values = zip(self.closure.joint_names, self.joints, strict=False)
         shown = listed(f'{name} {value:.6g}' for name, value in values)
-        return f'<{self._title}: {shown}>' if shown else f'<{self._title}>'
+        return f'<{self._repr_title}: {shown}>' if shown else f'<{self._repr_title}>'
 
     @property
-    def _title(self) -> str:
+    def _repr_title(self) -> str:
         return type(self).__name__
 
 
@@ -256,8 +256,8 @@ class Position(_JointValues):
     status: Status
     gap: float
     joints: tuple[float, ...]
-    state: State
-    poses: list[Pose]
+    state: LinkState
+    poses: list[StepPose]
     closure: LoopClosure = field(compare=False)
 
     @property
@@ -279,7 +279,7 @@ class Position(_JointValues):
         return {point: place for (_, point), place in self.closure.points(self).items()}
 
     @property
-    def _title(self) -> str:
+    def _repr_title(self) -> str:
         by = f' by {self.gap:.3g} {self.closure.gap_unit}' if self.gap else ''
         return f'Position {self.status.value}{by}'
 
@@ -307,7 +307,7 @@ class Velocity(_JointValues):
     """
 
     joints: tuple[float, ...]
-    state: State
+    state: LinkState
     rates: Any
     closure: LoopClosure = field(compare=False)
 
@@ -329,7 +329,7 @@ class Acceleration(_JointValues):
     """
 
     joints: tuple[float, ...]
-    state: State
+    state: LinkState
     closure: LoopClosure = field(compare=False)
 
 

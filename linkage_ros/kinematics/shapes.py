@@ -208,7 +208,7 @@ class LinkFrame(NamedTuple):
 def link_frames(closure: Closure, position: Position) -> dict[str, LinkFrame]:
     """Return the frames of the links, and of the blocks of sliders that are not links."""
     frames = closure.link_frames
-    moving = zip(frames.links, frames.at(position), strict=True)
+    moving = zip(frames.links, frames.frames_at(position), strict=True)
     return {GROUND: LinkFrame(0j, 0.0)} | {link: LinkFrame(*frame) for link, frame in moving}
 
 
@@ -266,7 +266,7 @@ def rounded(corners: Sequence[complex], radius: float) -> tuple[complex, ...]:
 
 def _pitch_circles(pose: _Pose) -> Iterator[tuple[str, Shape]]:
     """Yield the pitch circles of gears, and belts on pulleys: ratios of pins on a common link."""
-    driven = {given.joint: given for given in pose.closure.linkage.driven}
+    driven = {given.joint: given for given in pose.closure.linkage.driven_joints}
     for name, ratio in pose.closure.linkage.ratios.items():
         joints = [driven[name], driven.get(ratio.of) or pose.closure.linkage.joints[ratio.of]]
         ends = [(getattr(j, 'parent', ''), getattr(j, 'child', '')) for j in joints]

@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, TYPE_CHECKING, TypeGuard
 
 from linkage_ros.kinematics.dyads.two_sided import TwoSided
-from linkage_ros.kinematics.linkage import carriers, Linkage, Pose
+from linkage_ros.kinematics.linkage import AssemblyPose, Linkage, links_by_point
 from linkage_ros.kinematics.topology import Dyad, Group, Iterated, Structure
 
 if TYPE_CHECKING:
@@ -39,11 +39,11 @@ class TwoWays(NamedTuple):
     upright: int
 
     @property
-    def name(self) -> str:
+    def assembly_key(self) -> str:
         """Return its key in `assembly`."""
         return closing_name(self.dyad)
 
-    def word(self, side: float) -> str:
+    def side_word(self, side: float) -> str:
         """Return the word of a side by its sign."""
         return next(word for word, sign in SIDES[self.dyad.kind].items() if sign * side > 0)
 
@@ -83,21 +83,23 @@ def assembly_sides(structure: Structure) -> dict[str, tuple[str, ...]]:
 def written_sides(closure: LoopClosure) -> dict[str, str]:
     """Return the side of each dyad as the file writes it, or as its pose draws it."""
     pose = closure.linkage.pose
-    drawn = sides_at(closure, closure.posed(*pose.inputs)) if pose and pose.drawn else {}
+    drawn = (
+        sides_at(closure, closure.close_unlimited(*pose.inputs)) if pose and pose.is_drawn else {}
+    )
     return {**drawn, **closure.linkage.assembly}
 
 
-def undrawn(linkage: Linkage, structure: Structure) -> Linkage:
+def without_drawn_pose(linkage: Linkage, structure: Structure) -> Linkage:
     """Return a linkage whose pose says nothing of the links of dyads, so that sides tell all."""
     pose = linkage.pose
-    if pose is None or not pose.drawn:
+    if pose is None or not pose.is_drawn:
         return linkage
     groups = (group for group in structure.groups if isinstance(group, Iterated))
     iterated = {link for group in groups for link in group.links}
-    on = carriers(structure.links)
+    on = links_by_point(structure.links)
     points = {name: place for name, place in pose.points.items() if {*on[name]} <= iterated}
     angles = {link: angle for link, angle in pose.angles.items() if link in iterated}
-    return replace(linkage, pose=Pose(pose.inputs, points, angles))
+    return replace(linkage, pose=AssemblyPose(pose.inputs, points, angles))
 
 
 def sides_at(closure: LoopClosure, position: Position) -> dict[str, str]:

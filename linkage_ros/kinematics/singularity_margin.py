@@ -53,13 +53,13 @@ def singularity_margin(closure: LoopClosure, position: Position) -> SingularityM
     if len(closure.linkage.inputs) == 1:
         sliding = bool(closure.linkage.inputs[0].slider)
         unit = closure.scale if sliding else 1.0
-        value = _within(closure, position.state.coordinates[1] * unit)
+        value = _move_within(closure, position.state.coordinates[1] * unit)
         for singular in closure.singular_inputs:
-            distance = min(distance, abs(away(closure, value, singular.value)))
+            distance = min(distance, abs(signed_distance(closure, value, singular.value)))
     return SingularityMargin(angle, conditioning, distance, weakest)
 
 
-def away(closure: LoopClosure, value: float, place: float) -> float:
+def signed_distance(closure: LoopClosure, value: float, place: float) -> float:
     """
     Return the distance of a value of the single input from a place, in [rad] or [m].
 
@@ -68,7 +68,7 @@ def away(closure: LoopClosure, value: float, place: float) -> float:
     if closure.linkage.inputs[0].slider:
         return value - place
     for interval in closure.input_ranges:
-        if not interval.whole and place in interval[:2]:
+        if not interval.is_whole and place in interval[:2]:
             period = interval.turns * tau
             return remainder(value - place, period) if period else value - place
     period = closure.ratio_turns * tau
@@ -84,7 +84,9 @@ def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
     For all other dyads the zeros of the transmission angle are searched over the ranges; for a
     straight rod in a swivel, whose angle is never 0, those of the distance of its two pins.
     """
-    from linkage_ros.kinematics.sweep_analysis import zeros  # local import: it needs the closure
+    from linkage_ros.kinematics.sweep_analysis import (
+        find_zeros,  # local import: it needs the closure
+    )
 
     given = closure.linkage.inputs
     if len(given) > 1:
@@ -92,22 +94,24 @@ def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
     ends = [end for interval in closure.closing_ranges for end in interval.toggles]
     found = [SingularInput(end, Status.TOGGLE) for end in ends]
     # All dyads are evaluated at the same states.
-    posed = lru_cache(_STATES)(closure.posed)
+    posed = lru_cache(_STATES)(closure.close_unlimited)
     for number, step in enumerate(closure.steps):
         if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
             continue
         places = _turned_by_input(closure, step)
         if places is None:
-            places = zeros(partial(_distance, step, number, posed), closure.closing_ranges)
+            places = find_zeros(
+                partial(_singular_distance, step, number, posed), closure.closing_ranges
+            )
         for place in places:
-            status = _met(closure, number, place)
-            distances = (abs(away(closure, place, one.value)) for one in found)
+            status = _singular_status(closure, number, place)
+            distances = (abs(signed_distance(closure, place, one.value)) for one in found)
             if status is not None and all(apart > _SAME for apart in distances):
                 found.append(SingularInput(place, status))
     return tuple(sorted(found, key=attrgetter('value')))
 
 
-def _within(closure: LoopClosure, value: float) -> float:
+def _move_within(closure: LoopClosure, value: float) -> float:
     """Return the input of the same pose within the ranges: for a cylinder its other length."""
     zero = closure.zero_length
     ranges = closure.closing_ranges
@@ -129,10 +133,10 @@ def _turned_by_input(closure: LoopClosure, step: Any) -> list[float] | None:
     return [remainder(angle / factor, tau) for angle in part.singular_angles] if factor else []
 
 
-def _met(closure: LoopClosure, number: int, place: float) -> Status | None:
+def _singular_status(closure: LoopClosure, number: int, place: float) -> Status | None:
     """Return the kind of a dyad's singular input; None if no loop closes next to it."""
-    status = closure.posed(place).status
-    beside = [closure.posed(place + step) for step in (-_BESIDE, _BESIDE)]
+    status = closure.close_unlimited(place).status
+    beside = [closure.close_unlimited(place + step) for step in (-_BESIDE, _BESIDE)]
     if not any(position.status.has_pose for position in beside):
         return None
     if not status.has_pose or _never_toggles(closure.steps[number]):
@@ -153,7 +157,9 @@ def _never_toggles(step: Any) -> bool:
     )
 
 
-def _distance(step: Any, number: int, posed: Callable[[float], Position], value: float) -> float:
+def _singular_distance(
+    step: Any, number: int, posed: Callable[[float], Position], value: float
+) -> float:
     """Return the angle of a dyad to its singularity at an input, in [rad]; 0 without a pose."""
     position = posed(value)
     if len(position.poses) <= number or not position.status.has_pose:

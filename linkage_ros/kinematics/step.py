@@ -20,11 +20,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-from linkage_ros.kinematics.arithmetic import atan2, cos, facing, sin
+from linkage_ros.kinematics.arithmetic import atan2, cos, sin, unit_vector
 from linkage_ros.kinematics.status import Status
 
 
-class State(NamedTuple):
+class LinkState(NamedTuple):
     """
     The known coordinates and pins; or their rates; or their accelerations.
 
@@ -35,7 +35,7 @@ class State(NamedTuple):
     pins: list[complex]
 
 
-class Pose(Protocol):
+class StepPose(Protocol):
     """The result of a step, from which its rates are computed."""
 
     @property
@@ -47,27 +47,33 @@ class Pose(Protocol):
         """Return the closure error, or 0 if the step closes, in the unit of the lengths."""
 
 
-class Placed(NamedTuple):
+class PlacedPose(NamedTuple):
     """The pose of a step that cannot fail."""
 
     status: Status = Status.CLOSED
     gap: float = 0.0
 
 
-PLACED = Placed()
+PLACED = PlacedPose()
 
 
 class Step(Protocol):
     """A part of a linkage that is solved from the coordinates and pins before it."""
 
-    def close(self, known: State, /) -> Pose:
+    def close(self, solved: LinkState, /) -> StepPose:
         """Append to the known state; if that is impossible, return a status that says why."""
 
-    def rates(self, pose: Any, known: State, speeds: State, /) -> Any:
+    def rates(self, pose: Any, solved: LinkState, velocities: LinkState, /) -> Any:
         """Append to the rates; return the intermediate values that `accelerations` needs."""
 
     def accelerations(
-        self, pose: Any, rates: Any, known: State, speeds: State, changes: State, /
+        self,
+        pose: Any,
+        rates: Any,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+        /,
     ) -> None:
         """Append to the accelerations."""
 
@@ -78,20 +84,25 @@ class FixedPoint:
 
     place: complex
 
-    def close(self, known: State) -> Pose:
+    def close(self, solved: LinkState) -> StepPose:
         """Append the point."""
-        known.pins.append(self.place)
+        solved.pins.append(self.place)
         return PLACED
 
-    def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
+    def rates(self, _pose: StepPose, _solved: LinkState, velocities: LinkState) -> None:
         """Append a velocity of zero."""
-        speeds.pins.append(0j)
+        velocities.pins.append(0j)
 
     def accelerations(
-        self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
+        self,
+        _pose: StepPose,
+        _rates: None,
+        _solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append an acceleration of zero."""
-        changes.pins.append(0j)
+        accelerations.pins.append(0j)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,26 +113,31 @@ class PointOnLink:
     arm: int  # Index, among the coordinates, of the angle of the link
     vector: complex  # Vector from the pin to the point at a coordinate of 0
 
-    def close(self, known: State) -> Pose:
+    def close(self, solved: LinkState) -> StepPose:
         """Append the point."""
-        arm = facing(known.coordinates[self.arm]) * self.vector
-        known.pins.append(known.pins[self.pin] + arm)
+        arm = unit_vector(solved.coordinates[self.arm]) * self.vector
+        solved.pins.append(solved.pins[self.pin] + arm)
         return PLACED
 
-    def rates(self, _pose: Pose, known: State, speeds: State) -> complex:
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> complex:
         """Append its velocity; return the vector from the pin."""
         # Not the difference of the two places, which has few digits far from the origin.
-        arm = facing(known.coordinates[self.arm]) * self.vector
-        turn = speeds.coordinates[self.arm]
-        speeds.pins.append(speeds.pins[self.pin] + 1j * turn * arm)
+        arm = unit_vector(solved.coordinates[self.arm]) * self.vector
+        turn = velocities.coordinates[self.arm]
+        velocities.pins.append(velocities.pins[self.pin] + 1j * turn * arm)
         return arm
 
     def accelerations(
-        self, _pose: Pose, arm: complex, _known: State, speeds: State, changes: State
+        self,
+        _pose: StepPose,
+        arm: complex,
+        _solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append its acceleration."""
-        turn, change = speeds.coordinates[self.arm], changes.coordinates[self.arm]
-        changes.pins.append(changes.pins[self.pin] + (1j * change - turn * turn) * arm)
+        turn, change = velocities.coordinates[self.arm], accelerations.coordinates[self.arm]
+        accelerations.pins.append(accelerations.pins[self.pin] + (1j * change - turn * turn) * arm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,30 +149,35 @@ class PointOnRail:
     slide: int  # Index, among the coordinates, of the slide along the line
     unit: complex  # Direction in which the point travels with the slide, at a link coordinate of 0
 
-    def close(self, known: State) -> Pose:
+    def close(self, solved: LinkState) -> StepPose:
         """Append the point."""
-        unit = facing(known.coordinates[self.arm]) * self.unit
-        slide = known.coordinates[self.slide]
-        known.pins.append(known.pins[self.pin] + slide * unit)
+        unit = unit_vector(solved.coordinates[self.arm]) * self.unit
+        slide = solved.coordinates[self.slide]
+        solved.pins.append(solved.pins[self.pin] + slide * unit)
         return PLACED
 
-    def rates(self, _pose: Pose, known: State, speeds: State) -> None:
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
         """Append its velocity."""
-        x, v = known.coordinates, speeds.coordinates
-        unit = facing(x[self.arm]) * self.unit
+        x, v = solved.coordinates, velocities.coordinates
+        unit = unit_vector(x[self.arm]) * self.unit
         moved = v[self.slide] + 1j * (v[self.arm] * x[self.slide])
-        speeds.pins.append(speeds.pins[self.pin] + moved * unit)
+        velocities.pins.append(velocities.pins[self.pin] + moved * unit)
 
     def accelerations(
-        self, _pose: Pose, _rates: None, known: State, speeds: State, changes: State
+        self,
+        _pose: StepPose,
+        _rates: None,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append its acceleration."""
-        x, v, a = known.coordinates, speeds.coordinates, changes.coordinates
-        unit = facing(x[self.arm]) * self.unit
+        x, v, a = solved.coordinates, velocities.coordinates, accelerations.coordinates
+        unit = unit_vector(x[self.arm]) * self.unit
         slide, turn = x[self.slide], v[self.arm]
         across = a[self.arm] * slide + 2.0 * turn * v[self.slide]
         moved = a[self.slide] - turn * turn * slide + 1j * across
-        changes.pins.append(changes.pins[self.pin] + moved * unit)
+        accelerations.pins.append(accelerations.pins[self.pin] + moved * unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,31 +186,36 @@ class RelativeAngle:
 
     # Indices, among the coordinates, of the other link's angle and of the joint.
     arm: int
-    turn: int
+    joint: int
     sign: float  # +1 if the joint adds to that angle, −1 if it is subtracted
 
-    def close(self, known: State) -> Pose:
+    def close(self, solved: LinkState) -> StepPose:
         """Append the angle."""
-        self._append(known)
+        self._append_angle(solved)
         return PLACED
 
-    def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
+    def rates(self, _pose: StepPose, _solved: LinkState, velocities: LinkState) -> None:
         """Append its rate."""
-        self._append(speeds)
+        self._append_angle(velocities)
 
     def accelerations(
-        self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
+        self,
+        _pose: StepPose,
+        _rates: None,
+        _solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append its acceleration."""
-        self._append(changes)
+        self._append_angle(accelerations)
 
-    def _append(self, state: State) -> None:
+    def _append_angle(self, state: LinkState) -> None:
         values = state.coordinates
-        values.append(values[self.arm] + self.sign * values[self.turn])
+        values.append(values[self.arm] + self.sign * values[self.joint])
 
 
 @dataclass(frozen=True, slots=True)
-class Following:
+class FollowerJoint:
     """
     The value of a joint that follows another: ratio·(x[one] − x[other] + constant) + offset.
 
@@ -205,9 +231,9 @@ class Following:
     offset: float
     middle: float | None = None
 
-    def close(self, known: State) -> Pose:
+    def close(self, solved: LinkState) -> StepPose:
         """Append the value."""
-        x = known.coordinates
+        x = solved.coordinates
         followed = x[self.one] - x[self.other] + self.constant
         if self.middle is not None:
             # Not `remainder`, which JavaScript does not have.
@@ -216,15 +242,20 @@ class Following:
         x.append(self.ratio * followed + self.offset)
         return PLACED
 
-    def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
+    def rates(self, _pose: StepPose, _solved: LinkState, velocities: LinkState) -> None:
         """Append its rate."""
-        self._append(speeds.coordinates)
+        self._append_derivative(velocities.coordinates)
 
     def accelerations(
-        self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
+        self,
+        _pose: StepPose,
+        _rates: None,
+        _solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append its acceleration."""
-        self._append(changes.coordinates)
+        self._append_derivative(accelerations.coordinates)
 
-    def _append(self, values: list[float]) -> None:
+    def _append_derivative(self, values: list[float]) -> None:
         values.append(self.ratio * (values[self.one] - values[self.other]))

@@ -20,26 +20,26 @@ from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.limits import Bound, without_mirrored
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.kinematics.ranges import (
-    describe,
-    golden,
-    iterated,
-    reach,
-    repeats,
-    search,
+    describe_ranges,
+    find_intervals,
+    golden_section,
+    is_iterated,
+    joints_repeat,
+    slide_bound,
     through_the_end,
-    turns,
+    turns_to_repeat,
     within_own,
     within_published,
 )
 from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import Following, PLACED, Pose, State
+from linkage_ros.kinematics.step import FollowerJoint, LinkState, PLACED, StepPose
 from linkage_ros.kinematics.topology import Driven, Dyad, links_of
 
 # The pose of one step of a solution, from the steps that it starts from and no others.
 
 
-def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..., Pose]:
+def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..., StepPose]:
     """
     Return a function that gives the pose of a step at inputs, in [rad] and [m].
 
@@ -55,18 +55,18 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
         Inputs at which the linkage closes: they show where each step appends its results.
 
     """
-    needed = _needed(closure, closure.step_groups[number])
-    walked = closure.known(*inputs)
-    plan: list[tuple[Callable[[State], Pose], int, int]] = []
+    needed = _needed_groups(closure, closure.step_groups[number])
+    walked = closure.initial_state(*inputs)
+    plan: list[tuple[Callable[[LinkState], StepPose], int, int]] = []
     for step, group in zip(closure.steps[: number + 1], closure.step_groups, strict=False):
         start = len(walked.coordinates), len(walked.pins)
         # A pin is placed for the first group that needs it, and used by others.
         if step.close(walked) is PLACED or group in needed:
             plan.append((step.close, *start))
 
-    def pose(*values: float) -> Pose:
-        state = closure.known(*values)
-        found: Pose = PLACED
+    def pose_at(*values: float) -> StepPose:
+        state = closure.initial_state(*values)
+        found: StepPose = PLACED
         for close, coordinates, pins in plan:
             # Steps that are left out keep their places in the lists, which nothing reads.
             state.coordinates.extend([0.0] * (coordinates - len(state.coordinates)))
@@ -76,10 +76,10 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
                 break
         return found
 
-    return pose
+    return pose_at
 
 
-def _needed(closure: LoopClosure, number: int) -> set[int]:
+def _needed_groups(closure: LoopClosure, number: int) -> set[int]:
     """Return a group and those that it starts from, by number."""
     groups = closure.structure.groups
     owner = {link: i for i, group in enumerate(groups) for link in links_of(group)}
@@ -139,14 +139,14 @@ class Sampled(NamedTuple):
     results: list[float]
 
 
-class MinMaxCurve(NamedTuple):
+class SweptCurve(NamedTuple):
     """The lowest and the highest value of a function over the ranges of an input."""
 
     lowest: Extreme
     highest: Extreme
 
     @property
-    def constant(self) -> bool:
+    def is_constant(self) -> bool:
         """Whether it does not change."""
         return self.highest.value - self.lowest.value < _SAME
 
@@ -175,19 +175,19 @@ class InputSweep:
         self.input = closure.linkage.inputs[index]
         self.turning = not self.input.slider
 
-    def inputs(self, value: float) -> tuple[float, ...]:
+    def inputs_at(self, value: float) -> tuple[float, ...]:
         """Return the values of all inputs."""
         held = list(self._held)
         held[self._index] = value
         return tuple(held)
 
-    def position(self, value: float) -> Position:
+    def position_at(self, value: float) -> Position:
         """Return the position at a value of the input."""
-        return self.closure.position(*self.inputs(value))
+        return self.closure.position(*self.inputs_at(value))
 
-    def closes(self, value: float) -> bool:
+    def is_closed(self, value: float) -> bool:
         """Return whether every loop closes there, with no joint beyond its limits."""
-        inputs = self.inputs(value)
+        inputs = self.inputs_at(value)
         position = self.closure.position(*inputs)
         bounds = self.closure.bounds
         return bool(position.joints) and not (bounds and bounds.exceeded(inputs, position.joints))
@@ -207,22 +207,22 @@ class InputSweep:
                 self.closure.linkage,
                 self.closure.structure,
                 self._index,
-                tuple(self._named(*ends) for ends in self._searched()),
+                tuple(self._name_ends(*ends) for ends in self._search_intervals()),
             )
-        return tuple(map(self._usual, found))
+        return tuple(map(self._usual_range, found))
 
     def range_about(self, value: float) -> InputRange | None:
         """Return the range in which a value lies, or None."""
         for interval in self.ranges:
-            if interval.whole or interval.lowest <= value <= interval.highest:
+            if interval.is_whole or interval.lowest <= value <= interval.highest:
                 return interval
-            if interval.turning and not self.input.limits.bounded:
-                shift = self._shift(interval, value)
+            if interval.turning and not self.input.limits.is_bounded:
+                shift = self._turn_shift(interval, value)
                 if shift:
-                    return interval.shifted(shift)
+                    return interval.shift_by(shift)
         return None
 
-    def _shift(self, interval: InputRange, value: float) -> float:
+    def _turn_shift(self, interval: InputRange, value: float) -> float:
         """Return the turns, in [rad], that bring a range to a value in the same poses, or 0."""
         period, turns = tau * interval.turns, -interval.shift(value)
         # If the linkage repeats only after two turns, one turn leads to another pose.
@@ -231,7 +231,7 @@ class InputSweep:
             if not (shift and within):
                 continue
             limited = bool(self.closure.bounds.joints)
-            if not limited or repeats(self.closure, self.position, value, -shift):
+            if not limited or joints_repeat(self.closure, self.position_at, value, -shift):
                 return shift
         return 0.0
 
@@ -244,39 +244,41 @@ class InputSweep:
             default=None,
         )
 
-    def _usual(self, interval: InputRange) -> InputRange:
-        if not interval.turning or self.input.limits.bounded:
+    def _usual_range(self, interval: InputRange) -> InputRange:
+        if not interval.turning or self.input.limits.is_bounded:
             return interval
         if not interval.turns:
             return interval
-        if interval.whole:
-            return interval._replace(lowest=0.0, highest=tau * turns(self.closure, self.position))
+        if interval.is_whole:
+            return interval._replace(
+                lowest=0.0, highest=tau * turns_to_repeat(self.closure, self.position_at)
+            )
         middle = 0.5 * (interval.lowest + interval.highest)
         shift = -interval.shift(0.0)
-        if shift and repeats(self.closure, self.position, middle, shift):
-            return interval.shifted(shift)
+        if shift and joints_repeat(self.closure, self.position_at, middle, shift):
+            return interval.shift_by(shift)
         return interval
 
-    def _searched(self) -> list[tuple[float, float]]:
+    def _search_intervals(self) -> list[tuple[float, float]]:
         """Return the intervals in which every loop closes, for several inputs."""
-        far = pi if self.turning else reach(self.closure)
+        far = pi if self.turning else slide_bound(self.closure)
         limits = self.input.limits
-        if limits.bounded:
+        if limits.is_bounded:
             low, high = max(limits.low, -far), min(limits.high, far)
             if self.turning:
                 # Angles count with their turns.
                 low = limits.low if limits.low > -inf else limits.high - tau
                 high = limits.high if limits.high < inf else limits.low + tau
-            return list(search(self.closes, low, high)) if low < high else []
-        found = list(search(self.closes, -far, far))
+            return list(find_intervals(self.is_closed, low, high)) if low < high else []
+        found = list(find_intervals(self.is_closed, -far, far))
         return through_the_end(found, -far, far) if self.turning else found
 
-    def _named(self, low: float, high: float) -> InputRange:
+    def _name_ends(self, low: float, high: float) -> InputRange:
         """Return a range with the joints whose limits end it; the other inputs are held."""
         by = []
         whole = self.turning and high - low >= tau and not self.closure.bounds
         for end, outwards in ((low, low - high), (high, high - low)):
-            beyond = self.inputs(end + 1e-9 * outwards)
+            beyond = self.inputs_at(end + 1e-9 * outwards)
             joints = () if whole else self.closure.position(*beyond).joints
             bound = self.closure.bounds.exceeded(beyond, joints) if joints else None
             by.append(bound.name if bound else '')
@@ -288,7 +290,7 @@ def starts_at_pose(closure: LoopClosure) -> bool:
     linkage = closure.linkage
     several = len(linkage.inputs) > 1
     return linkage.pose is not None and not (
-        linkage.pose.drawn and not several and iterated(closure)
+        linkage.pose.is_drawn and not several and is_iterated(closure)
     )
 
 
@@ -311,33 +313,37 @@ def usual_inputs(closure: LoopClosure) -> tuple[float, ...]:
     if several:
         usual = (pi / 3.0,) * len(linkage.inputs)
         turning = not any(given.slider for given in linkage.inputs)
-        if turning and _ease(closure, closure.position(*usual)) > _EASY:
+        if turning and _pose_conditioning(closure, closure.position(*usual)) > _EASY:
             return usual
-        return max(grid(closure, _MANY), key=lambda found: _ease(closure, found[1]))[0]
+        return max(
+            grid_positions(closure, _MANY), key=lambda found: _pose_conditioning(closure, found[1])
+        )[0]
     interval = InputSweep(closure).widest_range
     assert interval is not None, 'reading the file has proved that it closes somewhere'
-    if interval.whole:
+    if interval.is_whole:
         return (pi / 3.0,)
     return (interval.lowest + (interval.highest - interval.lowest) * 2.0 / 3.0,)
 
 
-def _ease(closure: LoopClosure, position: Position) -> float:
+def _pose_conditioning(closure: LoopClosure, position: Position) -> float:
     if position.status is not Status.CLOSED:
         return -1.0
     return closure.singularity_margin(position).conditioning
 
 
-def grid(closure: LoopClosure, count: int = _GRID) -> Iterator[tuple[tuple[float, ...], Position]]:
+def grid_positions(
+    closure: LoopClosure, count: int = _GRID
+) -> Iterator[tuple[tuple[float, ...], Position]]:
     """Yield positions on a grid over all inputs: one turn each, or the reach of a slide."""
     ways = []
     for given in closure.linkage.inputs:
         low, high = given.limits.low, given.limits.high
         if given.slider:
-            farthest = reach(closure)
+            farthest = slide_bound(closure)
             low, high = max(low, -farthest), min(high, farthest)
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
             ways.append([middle + half * (2 * i - count) / count for i in range(count + 1)])
-        elif given.limits.bounded:
+        elif given.limits.is_bounded:
             low = low if low > -inf else high - tau
             high = high if high < inf else low + tau
             ways.append([low + (high - low) * i / count for i in range(count + 1)])
@@ -347,7 +353,7 @@ def grid(closure: LoopClosure, count: int = _GRID) -> Iterator[tuple[tuple[float
         yield inputs, closure.position(*inputs)
 
 
-def samples(interval: InputRange, count: int = _SAMPLES) -> list[float]:
+def sample_inputs(interval: InputRange, count: int = _SAMPLES) -> list[float]:
     """
     Return values from one end of a range to the other.
 
@@ -355,16 +361,16 @@ def samples(interval: InputRange, count: int = _SAMPLES) -> list[float]:
     denser.
     """
     low, high = interval.lowest, interval.highest
-    if interval.whole:
+    if interval.is_whole:
         return [low + (high - low) * i / count for i in range(count + 1)]
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     inner = [middle - half * cos(pi * i / count) for i in range(1, count)]
     return [low, *(min(max(value, low), high) for value in inner), high]
 
 
-def extremes(
+def find_extremes(
     function: Callable[[float], float], ranges: Sequence[InputRange], count: int = _SAMPLES
-) -> MinMaxCurve:
+) -> SweptCurve:
     """
     Find the lowest and the highest value of a function of the input.
 
@@ -372,26 +378,26 @@ def extremes(
     """
     sampled = []
     for interval in ranges:
-        values = samples(interval, count)
+        values = sample_inputs(interval, count)
         sampled.append(Sampled(interval, values, [function(value) for value in values]))
-    return _ends(function, sampled)
+    return _min_max_curve(function, sampled)
 
 
-def _ends(function: Callable[[float], float], sampled: Sequence[Sampled]) -> MinMaxCurve:
-    lowest = _lowest(function, sampled)
+def _min_max_curve(function: Callable[[float], float], sampled: Sequence[Sampled]) -> SweptCurve:
+    lowest = _find_lowest(function, sampled)
     upside_down = [one._replace(results=[-y for y in one.results]) for one in sampled]
-    highest = _lowest(lambda value: -function(value), upside_down)
-    return MinMaxCurve(lowest, Extreme(-highest.value, highest.at))
+    highest = _find_lowest(lambda value: -function(value), upside_down)
+    return SweptCurve(lowest, Extreme(-highest.value, highest.at))
 
 
-def _lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> Extreme:
+def _find_lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> Extreme:
     found: list[tuple[float, float]] = []
     best = min((y for one in sampled for y in one.results if isfinite(y)), default=nan)
     for interval, values, results in sampled:
         last = len(values) - 1
         for i, result in enumerate(results):
             # The ends of a full turn are one place: each continues at the other.
-            turn = values[last] - values[0] if interval.whole else 0.0
+            turn = values[last] - values[0] if interval.is_whole else 0.0
             before = values[i - 1] if i else values[last - 1] - turn if turn else values[0]
             after = values[i + 1] if i < last else values[1] + turn if turn else values[last]
             beside = (
@@ -402,7 +408,7 @@ def _lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> E
             # A valley much higher than the deepest cannot reach it, even with a kink.
             deep = result - best <= _DEEPER * (max(beside) - result) + _SAME
             if deep and result <= min(beside) and result < max(beside):
-                lowest = golden(function, before, after)
+                lowest = golden_section(function, before, after)
                 # The place of a smooth valley has half the digits; the sample may be better.
                 if result - lowest[0] > _NOISE:
                     found[-1] = lowest
@@ -415,13 +421,13 @@ def _lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> E
         return Extreme(best, ())
     at: list[float] = []
     for value in places:
-        whole = any(interval.whole for interval, _, _ in sampled)
+        whole = any(interval.is_whole for interval, _, _ in sampled)
         if all(abs(remainder(value - p, tau) if whole else value - p) > _APART for p in at):
             at.append(value)
     return Extreme(best, tuple(at))
 
 
-def zeros(function: Callable[[float], float], ranges: Sequence[InputRange]) -> list[float]:
+def find_zeros(function: Callable[[float], float], ranges: Sequence[InputRange]) -> list[float]:
     """
     Return the zeros of a function that is never negative, inside its ranges, not at their ends.
 
@@ -429,39 +435,39 @@ def zeros(function: Callable[[float], float], ranges: Sequence[InputRange]) -> l
     """
     found = []
     for interval in ranges:
-        values = samples(interval)
+        values = sample_inputs(interval)
         results = [function(value) for value in values]
         valleys = range(1, len(values) - 1)
-        if interval.whole:
+        if interval.is_whole:
             # The ends of a full turn are one place.
             step = values[1] - values[0]
             values, results = [*values, values[-1] + step], [*results, results[1]]
             valleys = range(1, len(values) - 1)
         for i in valleys:
             if results[i] <= min(results[i - 1], results[i + 1]) and results[i] < _NEAR_ZERO:
-                lowest, at = golden(function, values[i - 1], values[i + 1])
+                lowest, at = golden_section(function, values[i - 1], values[i + 1])
                 if min(lowest, results[i]) < _ZERO:
                     found.append(at if lowest <= results[i] else values[i])
     return found
 
 
-def transmission_angles(way: InputSweep) -> dict[int, MinMaxCurve]:
+def transmission_angles(sweep: InputSweep) -> dict[int, SweptCurve]:
     """
     Return the extreme transmission angles of each group over the range, by its number, in [rad].
 
     They are folded into [0, π/2]. Groups that are iterated have none.
     """
-    return _of_each_step(way, 'transmission_angle', _SAMPLES)
+    return _step_extremes(sweep, 'transmission_angle', _SAMPLES)
 
 
-def conditionings(way: InputSweep) -> dict[int, MinMaxCurve]:
+def conditioning_curves(sweep: InputSweep) -> dict[int, SweptCurve]:
     """Return the extreme conditioning of each iterated group over the range, by its number."""
-    return _of_each_step(way, 'conditioning', _SAMPLES // 4)
+    return _step_extremes(sweep, 'conditioning', _SAMPLES // 4)
 
 
-def _of_each_step(way: InputSweep, name: str, count: int) -> dict[int, MinMaxCurve]:
+def _step_extremes(sweep: InputSweep, name: str, count: int) -> dict[int, SweptCurve]:
     """Return the extremes of a method of the steps, applied to their poses, by group."""
-    closure = way.closure
+    closure = sweep.closure
     told = {
         number: getattr(step, name)
         for number, step in enumerate(closure.steps)
@@ -472,36 +478,38 @@ def _of_each_step(way: InputSweep, name: str, count: int) -> dict[int, MinMaxCur
     # One sweep for all steps: otherwise each of n loops would be closed n times.
     sampled: dict[int, list[Sampled]] = {number: [] for number in told}
     closed = nan
-    for interval in way.ranges:
-        values = samples(interval, count)
+    for interval in sweep.ranges:
+        values = sample_inputs(interval, count)
         for of_step in sampled.values():
             of_step.append(Sampled(interval, values, []))
         for value in values:
-            position = way.position(value)
+            position = sweep.position_at(value)
             if position.status.has_pose:
                 closed = value
             for number, method in told.items():
                 result = method(position.poses[number]) if position.status.has_pose else nan
                 sampled[number][-1].results.append(result)
     if closed != closed:
-        return {closure.step_groups[number]: _ends(lambda _: nan, []) for number in told}
+        return {closure.step_groups[number]: _min_max_curve(lambda _: nan, []) for number in told}
     return {
-        closure.step_groups[number]: _ends(_of_pose(way, number, method, closed), sampled[number])
+        closure.step_groups[number]: _min_max_curve(
+            _as_input_function(sweep, number, method, closed), sampled[number]
+        )
         for number, method in told.items()
     }
 
 
-def _of_pose(
-    way: InputSweep, number: int, method: Callable[..., float], closed: float
+def _as_input_function(
+    sweep: InputSweep, number: int, method: Callable[..., float], closed: float
 ) -> Callable[[float], float]:
     """Return a method of a step as a function of the input; NaN where its loops do not close."""
-    pose_at = pose_alone(way.closure, number, *way.inputs(closed))
+    pose_at = pose_alone(sweep.closure, number, *sweep.inputs_at(closed))
 
-    def told(value: float) -> float:
-        pose = pose_at(*way.inputs(value))
+    def pose_value(value: float) -> float:
+        pose = pose_at(*sweep.inputs_at(value))
         return method(pose) if pose.status.has_pose else nan
 
-    return told
+    return pose_value
 
 
 def worst_residual(closure: LoopClosure) -> tuple[float, tuple[float, ...], int] | None:
@@ -519,11 +527,11 @@ def worst_residual(closure: LoopClosure) -> tuple[float, tuple[float, ...], int]
 
     """
     if len(closure.linkage.inputs) > 1:
-        tried = grid(closure)
+        tried = grid_positions(closure)
     else:
-        way = InputSweep(closure)
-        values = [value for interval in way.ranges for value in samples(interval)]
-        tried = (((value,), way.position(value)) for value in values)
+        sweep = InputSweep(closure)
+        values = [value for interval in sweep.ranges for value in sample_inputs(interval)]
+        tried = (((value,), sweep.position_at(value)) for value in values)
     found = [
         (closure.residual(position), inputs)
         for inputs, position in tried
@@ -544,14 +552,14 @@ def check_closes(closure: LoopClosure) -> None:
     if len(closure.linkage.inputs) != 1 or closure.closing_ranges:
         return
 
-    def distance(position: Position) -> tuple[int, float]:
+    def miss_distance(position: Position) -> tuple[int, float]:
         return -len(position.poses), position.gap
 
-    states = [(inputs[0], position) for inputs, position in grid(closure, _SAMPLES)]
-    value, nearest = min(states, key=lambda state: distance(state[1]))
+    states = [(inputs[0], position) for inputs, position in grid_positions(closure, _SAMPLES)]
+    value, nearest = min(states, key=lambda state: miss_distance(state[1]))
     step = abs(states[1][0] - states[0][0])
-    between = golden(lambda at: closure.position(at).gap, value - step, value + step)[1]
-    nearest = min(nearest, closure.position(between), key=distance)
+    between = golden_section(lambda at: closure.position(at).gap, value - step, value + step)[1]
+    nearest = min(nearest, closure.position(between), key=miss_distance)
     group = closure.structure.groups[closure.step_groups[len(nearest.poses) - 1]]
     sliders = {block: f'slider {name}' for name, block in closure.structure.blocks.items()}
     links = [sliders.get(link, link) for link in links_of(group)]
@@ -568,10 +576,10 @@ def check_closes(closure: LoopClosure) -> None:
 def check_turns(closure: LoopClosure) -> None:
     """Refuse a ratio of an angle that leaves the half turns in which its turns are known."""
     for step in closure.steps:
-        if not isinstance(step, Following) or step.middle is None:
+        if not isinstance(step, FollowerJoint) or step.middle is None:
             continue
         for interval in closure.closing_ranges:
-            found = [closure.posed(value) for value in samples(interval)]
+            found = [closure.close_unlimited(value) for value in sample_inputs(interval)]
             states = [one.state.coordinates for one in found if one.status.has_pose]
             followed = [x[step.one] - x[step.other] + step.constant - step.middle for x in states]
             turned = [remainder(value, tau) for value in followed]
@@ -602,8 +610,8 @@ def check_limits(closure: LoopClosure) -> None:
             raise DefinitionError(
                 'pose.inputs',
                 f'bring {quoted(bound.name)} to {bound.turned(joints[bound.number]):.6g} '
-                f'{_unit(linkage, bound)}, '
-                f'beyond its limits {_limits(closure, bound)}',
+                f'{_joint_unit(linkage, bound)}, '
+                f'beyond its limits {_limits_text(closure, bound)}',
                 'start within the limits, or widen them',
             )
     if len(linkage.inputs) == 1:
@@ -625,17 +633,17 @@ def _check_single(closure: LoopClosure) -> None:
         if not ranges:
             raise DefinitionError(
                 'input.limits',
-                f'{_limits(closure, bound)} of {quoted(bound.name)} never meet its range, '
-                f'{describe(closure.closing_ranges)}',
+                f'{_limits_text(closure, bound)} of {quoted(bound.name)} never meet its range, '
+                f'{describe_ranges(closure.closing_ranges)}',
                 'widen them',
             )
     for bound in bounds.joints:
         if not within_published(closure, ranges, [bound]):
-            low, high = _extent(closure, ranges, bound)
+            low, high = _joint_range(closure, ranges, bound)
             raise DefinitionError(
                 f'joints.{bound.name}.limits',
-                f'{_limits(closure, bound)} of {quoted(bound.name)} are never met: it goes from '
-                f'{low:.6g} to {high:.6g} {_unit(closure.linkage, bound)}',
+                f'{_limits_text(closure, bound)} of {quoted(bound.name)} are never met: it goes from '
+                f'{low:.6g} to {high:.6g} {_joint_unit(closure.linkage, bound)}',
                 'widen them',
             )
     if bounds.joints and not within_published(closure, ranges, bounds.joints):
@@ -647,28 +655,28 @@ def _check_single(closure: LoopClosure) -> None:
         )
 
 
-def _extent(
+def _joint_range(
     closure: LoopClosure, ranges: Iterable[InputRange], bound: Bound
 ) -> tuple[float, float]:
     """Return the range of a published joint, with the turns that bring it nearest its limits."""
-    values = [value for one in ranges for value in samples(one)]
+    values = [value for one in ranges for value in sample_inputs(one)]
     found = [closure.position(value).joints for value in values]
-    turned = [bound.turned(joints[bound.number]) for joints in found if joints]
+    turned = [bound.turn_to_middle(joints[bound.number]) for joints in found if joints]
     return min(turned), max(turned)
 
 
 def _met_on_grid(closure: LoopClosure) -> bool:
     return any(
         position.joints and closure.bounds.exceeded(inputs, position.joints) is None
-        for inputs, position in grid(closure)
+        for inputs, position in grid_positions(closure)
     )
 
 
-def _limits(closure: LoopClosure, bound: Bound) -> str:
+def _limits_text(closure: LoopClosure, bound: Bound) -> str:
     limits = closure.linkage.limits[bound.name]
-    return f'{limits} {_unit(closure.linkage, bound)}'
+    return f'{limits} {_joint_unit(closure.linkage, bound)}'
 
 
-def _unit(linkage: Linkage, bound: Bound) -> str:
+def _joint_unit(linkage: Linkage, bound: Bound) -> str:
     driven = {given.joint: given.unit for given in linkage.inputs}
     return driven.get(bound.name) or linkage.joints[bound.name].unit

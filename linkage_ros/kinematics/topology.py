@@ -23,10 +23,10 @@ from itertools import combinations
 
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.linkage import (
-    carriers,
     GROUND,
     Input,
     Linkage,
+    links_by_point,
     Point,
     RevoluteJoint,
 )
@@ -95,7 +95,7 @@ class Structure:
     ratios: int = 0  # Number of joints that follow others
 
     @property
-    def freedom(self) -> int:
+    def mobility(self) -> int:
         """Degrees of freedom by Grübler's count, with the inputs free."""
         return 3 * (len(self.links) - 1) - 2 * len(self.joints) - self.ratios
 
@@ -148,11 +148,11 @@ def assur_groups(linkage: Linkage) -> Structure:
 
     A DefinitionError is raised if a link is free, over-constrained, or not joined to the ground.
     """
-    links, blocks, joints = _parts(linkage)
+    links, blocks, joints = _links_and_joints(linkage)
     _check_connected(linkage, links, joints)
-    search = _Search(linkage, links, blocks, joints)
-    structure = Structure(links, blocks, tuple(search.groups()), joints, len(linkage.ratios))
-    freedom, inputs = structure.freedom, len(linkage.inputs)
+    search = _GroupSearch(linkage, links, blocks, joints)
+    structure = Structure(links, blocks, tuple(search.find_groups()), joints, len(linkage.ratios))
+    freedom, inputs = structure.mobility, len(linkage.inputs)
     if freedom != inputs:
         raise DefinitionError(
             'links',
@@ -164,13 +164,13 @@ def assur_groups(linkage: Linkage) -> Structure:
     return structure
 
 
-def count_freedom(linkage: Linkage) -> int:
+def count_mobility(linkage: Linkage) -> int:
     """Return the degrees of freedom by Grübler's count, with the inputs free."""
-    links, blocks, joints = _parts(linkage)
-    return Structure(links, blocks, (), joints, len(linkage.ratios)).freedom
+    links, blocks, joints = _links_and_joints(linkage)
+    return Structure(links, blocks, (), joints, len(linkage.ratios)).mobility
 
 
-def _parts(
+def _links_and_joints(
     linkage: Linkage,
 ) -> tuple[dict[str, Mapping[str, Point]], dict[str, str], tuple[Joint, ...]]:
     """Return the links with the blocks of slots, the links that slide, and the joints."""
@@ -180,13 +180,13 @@ def _parts(
         blocks[name] = slider.block or f'{_BLOCK}{name}'
         if not slider.block:
             links[blocks[name]] = {slider.point: (0.0, 0.0)}
-    return links, blocks, tuple(_joints(linkage, links, blocks))
+    return links, blocks, tuple(_find_joints(linkage, links, blocks))
 
 
-def _joints(
+def _find_joints(
     linkage: Linkage, links: Mapping[str, Mapping[str, Point]], blocks: Mapping[str, str]
 ) -> Iterator[Joint]:
-    for point, (first, *others) in carriers(links).items():
+    for point, (first, *others) in links_by_point(links).items():
         for link in others:
             yield Joint('R', point, link, first)
     for name, slider in linkage.sliders.items():
@@ -212,7 +212,7 @@ def _check_connected(
             )
 
 
-class _Search:
+class _GroupSearch:
     """The search for the next group, given the known links."""
 
     def __init__(
@@ -228,7 +228,7 @@ class _Search:
         self._sliders = {j.name: j for j in joints if j.kind == 'P'}
         self._rank = {GROUND: 0}
         self._order = {link: i for i, link in enumerate(links)}
-        self._drives = tuple(self._driven_joint(given, blocks) for given in linkage.driven)
+        self._drives = tuple(self._driven_joint(given, blocks) for given in linkage.driven_joints)
         # Of the ratios those whose other joint is not known yet; and that joint.
         self._waiting = {
             index: (ratio.of, find_followed_links(linkage, blocks, ratio.of))
@@ -237,16 +237,16 @@ class _Search:
         self._bodies: list[tuple[str, ...]] = []
         self._start_following()
 
-    def groups(self) -> Iterator[Group]:
+    def find_groups(self) -> Iterator[Group]:
         """Yield group after group until all links are known."""
-        yield from self._learn(GROUND)
+        yield from self._mark_body_solved(GROUND)
         while True:
             for index in self._start_following():
-                known = [end for end in self._ends(index) if end in self._rank]
+                known = [end for end in self._drive_links(index) if end in self._rank]
                 if len(known) == 2:
-                    raise self._held(index, 'are joined without it')
+                    raise self._held_error(index, 'are joined without it')
                 if known:
-                    yield from self._learn(known[0])
+                    yield from self._mark_body_solved(known[0])
             unknown = [body for body in self._bodies if body[0] not in self._rank]
             if not unknown:
                 break
@@ -254,13 +254,13 @@ class _Search:
             if dyad is not None:
                 yield dyad
                 for outer in dyad.outer:
-                    yield from self._learn(outer.link)
+                    yield from self._mark_body_solved(outer.link)
                 continue
             chosen = self._smallest_group(unknown)
             ratios = self._solved_with(chosen)
             for index in ratios:
                 del self._waiting[index]
-            names = tuple(self._linkage.driven[index].joint for index in ratios)
+            names = tuple(self._linkage.driven_joints[index].joint for index in ratios)
             yield Iterated(tuple(link for body in chosen for link in body), names)
             for body in chosen:
                 for link in body:
@@ -272,15 +272,15 @@ class _Search:
         (pin,) = set(self._links[given.parent]) & set(self._links[given.child])
         return Joint('R', pin, given.child, given.parent)
 
-    def _ends(self, index: int) -> tuple[str, str]:
+    def _drive_links(self, index: int) -> tuple[str, str]:
         drive = self._drives[index]
         return drive.link, drive.to
 
-    def _held(self, index: int, how: str) -> DefinitionError:
+    def _held_error(self, index: int, how: str) -> DefinitionError:
         """Return the error for a driven joint whose two links are held already."""
-        one, other = self._ends(index)
+        one, other = self._drive_links(index)
         kind = 'input' if index < len(self._linkage.inputs) else 'ratio'
-        key = f'{"ratios" if kind == "ratio" else kind}.{self._linkage.driven[index].joint}'
+        key = f'{"ratios" if kind == "ratio" else kind}.{self._linkage.driven_joints[index].joint}'
         return DefinitionError(
             key, f'{one!r} and {other!r} {how}', f'leave one of the {kind}s out'
         )
@@ -289,7 +289,7 @@ class _Search:
         """Merge the bodies anew if ratios have become known; return these."""
         found: list[int] = []
         while True:
-            names = {self._linkage.driven[index].joint for index in self._waiting}
+            names = {self._linkage.driven_joints[index].joint for index in self._waiting}
             new = [
                 index
                 for index, (of, links) in self._waiting.items()
@@ -301,7 +301,7 @@ class _Search:
                 del self._waiting[index]
             found += new
         if found or not self._bodies:
-            self._bodies = self._merged()
+            self._bodies = self._merge_bodies()
         return found
 
     def _solved_with(self, bodies: Collection[tuple[str, ...]]) -> list[int]:
@@ -310,10 +310,10 @@ class _Search:
         return [
             index
             for index, (_, links) in self._waiting.items()
-            if links <= known and known.issuperset(self._ends(index))
+            if links <= known and known.issuperset(self._drive_links(index))
         ]
 
-    def _merged(self) -> list[tuple[str, ...]]:
+    def _merge_bodies(self) -> list[tuple[str, ...]]:
         """Return the bodies; links that driven joints hold together are one."""
         body_of: dict[str, tuple[str, ...]] = {link: (link,) for link in self._links}
         for index, drive in enumerate(self._drives):
@@ -321,13 +321,13 @@ class _Search:
                 continue
             one, other = body_of[drive.link], body_of[drive.to]
             if one == other:
-                raise self._held(index, 'are held by other driven joints already')
+                raise self._held_error(index, 'are held by other driven joints already')
             both = tuple(sorted(one + other, key=self._order.__getitem__))
             for link in both:
                 body_of[link] = both
         return sorted(set(body_of.values()), key=lambda body: self._order[body[0]])
 
-    def _learn(self, first: str) -> Iterator[Driven]:
+    def _mark_body_solved(self, first: str) -> Iterator[Driven]:
         """Mark the links of a body as known, by its driven joints from the first known one."""
         self._rank.setdefault(first, len(self._rank))
         body = next(known for known in self._bodies if first in known)
@@ -343,7 +343,7 @@ class _Search:
                     self._rank[new] = len(self._rank)
                     learnt = True
 
-    def _outer(self, body: tuple[str, ...]) -> list[Joint]:
+    def _outer_joints(self, body: tuple[str, ...]) -> list[Joint]:
         """Return the joints of a body to the known part."""
         pins: dict[str, Joint] = {}
         for link in body:
@@ -358,7 +358,7 @@ class _Search:
                     joints.append(Joint('P', joint.name, one, other))
         return joints
 
-    def _inner(self, one: tuple[str, ...], other: tuple[str, ...]) -> list[Joint]:
+    def _inner_joints(self, one: tuple[str, ...], other: tuple[str, ...]) -> list[Joint]:
         """Return the joints between two bodies, without pins that are known already."""
         known = {point for link in self._rank for point in self._links[link]}
         pins: dict[str, Joint] = {}
@@ -376,31 +376,31 @@ class _Search:
         return joints
 
     def _next_dyad(self, unknown: list[tuple[str, ...]]) -> Dyad | None:
-        outer = {body: self._outer(body) for body in unknown}
+        outer = {body: self._outer_joints(body) for body in unknown}
         for body, joints in outer.items():
             if len(joints) > 1:
                 raise DefinitionError(
-                    _key(body, self._linkage),
-                    f'is over-constrained by {" and ".join(_spoken(j) for j in joints)}',
+                    _file_key(body, self._linkage),
+                    f'is over-constrained by {" and ".join(_joint_text(j) for j in joints)}',
                     'take one of them away: with both it cannot move',
                 )
         for one, other in combinations(unknown, 2):
             if not (outer[one] and outer[other]):
                 continue
-            inner = self._inner(one, other)
+            inner = self._inner_joints(one, other)
             if len(inner) > 1:
                 raise DefinitionError(
-                    _key(other, self._linkage),
-                    f'is joined to {one[0]!r} twice: by {" and ".join(_spoken(j) for j in inner)}',
+                    _file_key(other, self._linkage),
+                    f'is joined to {one[0]!r} twice: by {" and ".join(_joint_text(j) for j in inner)}',
                     'take one of them away, or make one link of the two',
                 )
             if inner:
-                dyad = self._dyad((one, other), (outer[one][0], outer[other][0]), inner[0])
+                dyad = self._make_dyad((one, other), (outer[one][0], outer[other][0]), inner[0])
                 if dyad is not None:
                     return dyad
         return None
 
-    def _dyad(
+    def _make_dyad(
         self,
         bodies: tuple[tuple[str, ...], tuple[str, ...]],
         outer: tuple[Joint, Joint],
@@ -436,17 +436,17 @@ class _Search:
 
     def _smallest_group(self, unknown: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
         """Return the smallest set of bodies that has as many unknowns as constraints."""
-        constrained = {body: len(self._outer(body)) for body in unknown}
+        constrained = {body: len(self._outer_joints(body)) for body in unknown}
         between = {
-            frozenset((one, other)): self._inner(one, other)
+            frozenset((one, other)): self._inner_joints(one, other)
             for one, other in combinations(unknown, 2)
         }
         largest = len(unknown) if len(unknown) <= 14 else 0
         for size in range(1, min(largest, _LARGEST_GROUP) + 1):
             for chosen in combinations(unknown, size):
-                if self._freedom_of(list(chosen), constrained, between) == 0:
+                if self._count_mobility(list(chosen), constrained, between) == 0:
                     return list(chosen)
-        everything = self._freedom_of(unknown, constrained, between)
+        everything = self._count_mobility(unknown, constrained, between)
         if everything == 0:
             return unknown
         if everything > 0:
@@ -458,18 +458,18 @@ class _Search:
                 ),
             )
             raise DefinitionError(
-                _key(loose, self._linkage),
+                _file_key(loose, self._linkage),
                 'is free: its pins and sliders do not hold it, '
                 f'{everything} degree(s) of freedom too many',
                 _same_pin(self._linkage) or 'join it to one more link, or name one more input',
             )
         raise DefinitionError(
-            _key(unknown[-1], self._linkage),
+            _file_key(unknown[-1], self._linkage),
             f'belongs to over-constrained links, {-everything} degree(s) of freedom too few',
             'take away a link or a pin',
         )
 
-    def _freedom_of(
+    def _count_mobility(
         self,
         bodies: list[tuple[str, ...]],
         constrained: Mapping[tuple[str, ...], int],
@@ -505,7 +505,7 @@ def _same_pin(linkage: Linkage) -> str:
         used |= {slider.point, slider.through}
     single = {
         point: links[0]
-        for point, links in carriers(linkage.links).items()
+        for point, links in links_by_point(linkage.links).items()
         if len(links) == 1 and point not in used
     }
     if len({*single.values()}) < 2:
@@ -514,7 +514,7 @@ def _same_pin(linkage: Linkage) -> str:
     return f'{points} each stand on one link only; the same pin? then give it one name'
 
 
-def _key(body: tuple[str, ...], linkage: Linkage) -> str:
+def _file_key(body: tuple[str, ...], linkage: Linkage) -> str:
     """Return the key of a body in the linkage file: a link, or the slider of a slot."""
     for link in body:
         if link in linkage.links:
@@ -522,5 +522,5 @@ def _key(body: tuple[str, ...], linkage: Linkage) -> str:
     return f'sliders.{body[0].removeprefix(_BLOCK)}'
 
 
-def _spoken(joint: Joint) -> str:
+def _joint_text(joint: Joint) -> str:
     return f'{"pin" if joint.kind == "R" else "slider"} {joint.name!r}'

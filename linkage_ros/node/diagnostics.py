@@ -26,7 +26,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from linkage_ros.drives.drive import describe_chatter
 from linkage_ros.errors import listed
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.ranges import describe
+from linkage_ros.kinematics.ranges import describe_ranges
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import head_of, Rejection
@@ -240,7 +240,7 @@ class DiagnosticsSummary:
         level, message = OK, 'Closed'
         lines = self.loop.pipeline.lines
         number, last = counts.last_unclosed.get(Status.OPEN, (0, None))
-        reachable = describe(lines[number].closure.input_ranges)
+        reachable = describe_ranges(lines[number].closure.input_ranges)
         if self.now.unclosed > self.before.unclosed:
             level = ERROR
             message = (
@@ -250,7 +250,7 @@ class DiagnosticsSummary:
             )
         elif self.now.limited > self.before.limited:
             number, beyond = counts.last_unclosed[Status.LIMITED]
-            level, message = WARN, f'Beyond limits: {lines[number].closure.beyond(beyond)}'
+            level, message = WARN, f'Beyond limits: {lines[number].closure.limit_exceeded(beyond)}'
         elif self.now.toggles > self.before.toggles:
             level, message = WARN, 'At a toggle: position valid, velocity not'
         values: dict[str, object] = {
@@ -669,9 +669,9 @@ class Warnings:
                 line = text.format(
                     ticks=ticks,
                     gap=position.gap,
-                    reachable=describe(closure.input_ranges),
+                    reachable=describe_ranges(closure.input_ranges),
                     published='published all the same' if position.joints else 'nothing published',
-                    beyond=closure.beyond(position),
+                    beyond=closure.limit_exceeded(position),
                 )
                 if self.warn(status.value, line, period):
                     self._unclosed[status] = counts.unclosed[status]

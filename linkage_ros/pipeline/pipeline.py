@@ -54,7 +54,7 @@ from linkage_ros.solvers.registry import SOLVERS
 if TYPE_CHECKING:
     from linkage_ros.dynamics.wrenches import HeldWrench
     from linkage_ros.faults import Injection
-    from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
+    from linkage_ros.kinematics.compiling.trace import TracedMotion as CompiledMotion
     from linkage_ros.pipeline.wrench_topics import WrenchTopic
     from linkage_ros.solvers.solver import Choice
 
@@ -293,7 +293,7 @@ class LinkagePipeline:
             of = [wanted.parameters[name] for name in self.stages if name in moved]
             of += [self._read_off, self.context.loads, self.context.friction]
             outputs = _Wanted(of, self._ideal)
-        compiled = self.closure.compiled(len(moved.intersection(_KINEMATIC)), outputs)
+        compiled = self.closure.compile_linkage(len(moved.intersection(_KINEMATIC)), outputs)
         # Where the forces have no solution, a compiled path has fewer values.
         if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
             return None
@@ -471,7 +471,7 @@ def _silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable
 
     def within(*inputs: float) -> Position:
         position = close(*inputs)
-        if position.joints and closure.bounds.exceeded(inputs, position.joints) is not None:
+        if position.joints and closure.bounds.first_exceeded(inputs, position.joints) is not None:
             return replace(position, status=Status.LIMITED, joints=())
         return position
 

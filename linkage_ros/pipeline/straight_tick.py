@@ -143,7 +143,7 @@ def _mechanism_lines(compiled: Compiled, leave: str) -> tuple[Lines, list[list[s
         lines += _leave_unless('values is not None', leave)
         lines.append(f'{", ".join(numbers)}, = chain(*values)')
         return Lines(lines, bound), groups
-    body = compiled.body(leave)
+    body = compiled.first_path_body(leave)
     outputs = chain(*body.outputs)
     lines += body.lines
     lines += [f'{name} = {output}' for name, output in zip(numbers, outputs, strict=True)]

@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 from linkage_ros.drawing.drawing_data import drawn_in_frames
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.link_frames import blocks
+from linkage_ros.kinematics.link_frames import separate_blocks
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.shapes import COLOURS, FACES, INK, link_frames
@@ -95,7 +95,7 @@ def poses(
         found, reason = _by_joints(grow(linkage, names), prefix, known), ''
     except DefinitionError as error:
         found, reason = _by_closing(closure, [known[name] for name in inputs]), error.reason
-    for block in blocks(linkage, closure.structure):
+    for block in separate_blocks(linkage, closure.structure):
         place = _at(found, block.link, linkage.links[block.link][block.point])
         found.setdefault(block.name, (place, found[block.along][1]))
     links = tuple(link for link in found if link != GROUND)
@@ -140,7 +140,7 @@ def _by_joints(tree: Tree, prefix: str, values: Mapping[str, Numbers]) -> _Found
 def _by_closing(closure: Closure, inputs: Sequence[Numbers]) -> _Found:
     links = (
         *closure.linkage.links,
-        *(block.name for block in blocks(closure.linkage, closure.structure)),
+        *(block.name for block in separate_blocks(closure.linkage, closure.structure)),
     )
     count = len(inputs[0])
     found = {link: (np.full(count, np.nan + 0j), np.full(count, np.nan + 0j)) for link in links}

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, SlideJoint
-from linkage_ros.kinematics.ranges import link_lengths, reach
+from linkage_ros.kinematics.ranges import link_lengths, slide_bound
 from linkage_ros.kinematics.shapes import hull
 from linkage_ros.robot_models.orientation import named_joints, Span
 
@@ -81,7 +81,7 @@ def bodies(closure: Closure, ranges: Mapping[str, Span], first_layer: int = 0) -
 def bar_width(closure: Closure) -> float:
     """Return the width of bars, in [m]: a fraction of the typical length of links."""
     lengths = [length for length in link_lengths(closure.linkage.links) if length > 0.0]
-    longest = max(lengths, default=0.0) or reach(closure) or 1.0
+    longest = max(lengths, default=0.0) or slide_bound(closure) or 1.0
     common = median(lengths or [longest])
     return min(0.12 * common, 0.05 * longest)
 
@@ -151,5 +151,5 @@ def travel(closure: Closure, slider: str, ranges: Mapping[str, Span]) -> tuple[f
     for name, joint in named_joints(closure.linkage).items():
         if isinstance(joint, SlideJoint) and joint.slider == slider:
             return ranges[name].lowest, ranges[name].highest
-    far = 0.5 * reach(closure)
+    far = 0.5 * slide_bound(closure)
     return -far, far

@@ -20,19 +20,19 @@ from typing import NamedTuple
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
     GROUND,
     Input,
     Limits,
     Linkage,
     NO_LIMITS,
     Point,
-    Pose,
     Ratio,
     RevoluteJoint,
     Side,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.kinematics.topology import assur_groups, count_freedom, Dyad, Iterated
+from linkage_ros.kinematics.topology import assur_groups, count_mobility, Dyad, Iterated
 from linkage_ros.robot_models.planar import (
     add_places,
     find_closings,
@@ -94,9 +94,9 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
     """
     groups = assur_groups(linkage).groups
     # Where a side changes at change points, it is that at the pose.
-    linkage = replace(linkage, pose=Pose(inputs, {}))
+    linkage = replace(linkage, pose=AssemblyPose(inputs, {}))
     if any(isinstance(group, Iterated) for group in groups):
-        linkage = replace(linkage, pose=Pose(inputs, _points(linkage, poses)))
+        linkage = replace(linkage, pose=AssemblyPose(inputs, _points(linkage, poses)))
     keys = [_key(each) for each in groups if isinstance(each, Dyad) and each.kind in _SIDED]
     if len(keys) > _MANY:
         reason = f'{len(keys)} dyads are too many to try all their sides'
@@ -115,7 +115,7 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
         raise DefinitionError('assembly', f'no way to close it leads to the pose {where}', _REMEDY)
     if len(candidates) > 1 and candidates[1][0] < least + _SAME:
         raise DefinitionError('assembly', f'two ways to close it meet {where}', _REMEDY)
-    if closure.linkage.pose == Pose(inputs, {}):
+    if closure.linkage.pose == AssemblyPose(inputs, {}):
         bare = Closure(replace(closure.linkage, pose=None))
         if _near(usual_inputs(bare), inputs) and _off(bare, inputs, poses) <= _FOUND:
             return bare.linkage
@@ -300,7 +300,7 @@ class _Import:
             if joint.mimics in joints and joint.name in linkage.joints
         }
         names = sorted(ratios, key=lambda name: not ends(name) & ends(ratios[name].of))
-        wanted = count_freedom(linkage) - len(linkage.inputs)
+        wanted = count_mobility(linkage) - len(linkage.inputs)
         for chosen in islice(combinations(names, max(0, min(wanted, len(names)))), _MOST_TRIED):
             with_ratios = replace(linkage, ratios={name: ratios[name] for name in chosen})
             try:

@@ -25,9 +25,9 @@ from xml.etree import ElementTree as ET
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
-    carriers,
     GROUND,
     Limits,
+    links_by_point,
     Mass,
     NO_LIMITS,
     RevoluteJoint,
@@ -104,7 +104,7 @@ def physical_tree(closure: Closure) -> PhysicalTree:
 def _edges(closure: Closure) -> Iterator[_Edge]:
     """Yield pins between any two links, and sliders; those to keep in the tree rank first."""
     linkage, links = closure.linkage, closure.structure.links
-    driven = {frozenset((given.parent, given.child)) for given in linkage.driven}
+    driven = {frozenset((given.parent, given.child)) for given in linkage.driven_joints}
     for name, slider in linkage.sliders.items():
         is_input = any(given.slider == name for given in linkage.inputs)
         ends = (slider.along, closure.structure.blocks[name])
@@ -123,7 +123,7 @@ def _edges(closure: Closure) -> Iterator[_Edge]:
 
 
 def _cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]:
-    for point, carried in carriers(closure.structure.links).items():
+    for point, carried in links_by_point(closure.structure.links).items():
         part_of = {link: link for link in carried}
         for edge in kept:
             if edge.kind == 'R' and edge.name == point:
@@ -290,7 +290,7 @@ class Bodies:
         value = remainder(branch.sign * (angles[branch.child] - angles[branch.parent]), tau)
         for bound in self._closure.bounds.joints:
             if bound.name == branch.joint:
-                return bound.turned(value)
+                return bound.turn_to_middle(value)
         return value
 
 
@@ -336,7 +336,7 @@ def _weight(body: Body) -> float:
 
 def _limit(joint: ET.Element, limits: Limits) -> None:
     """Write the limits of a joint that MJCF can express: it has none for rates."""
-    if limits.bounded:
+    if limits.is_bounded:
         joint.set('range', numbers(max(limits.low, -_FARTHEST), min(limits.high, _FARTHEST)))
     if limits.effort < inf:
         joint.set('actuatorfrcrange', numbers(-limits.effort, limits.effort))
@@ -459,7 +459,7 @@ def _gravity(parts: Sequence[Part]) -> tuple[float, float]:
 def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> None:
     """Write the connections that are not joints: cut pins and springs."""
     linkage = part.closure.linkage
-    links = carriers(linkage.links)
+    links = links_by_point(linkage.links)
     for point in linkage.traced:
         bodies.site(links[point][0], point)
     for point, one, other in bodies.cuts:
@@ -510,5 +510,5 @@ def _drive(actuators: ET.Element, part: Part, bodies: Bodies) -> None:
             kp=rough(inertia * _PACE * _PACE),
             kv=rough(2.0 * inertia * _PACE),
         )
-        if given.limits.bounded:
+        if given.limits.is_bounded:
             servo.set('ctrlrange', joint.get('range', ''))

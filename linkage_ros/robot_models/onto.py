@@ -23,7 +23,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from linkage_ros.errors import FileError, listed, quoted
-from linkage_ros.kinematics.linkage import carriers, GROUND, NO_LIMITS, SlideJoint
+from linkage_ros.kinematics.linkage import GROUND, links_by_point, NO_LIMITS, SlideJoint
 from linkage_ros.robot_models.orientation import named_joints, spans
 from linkage_ros.robot_models.part import free_name, Names, Part, prefixed, PrefixedNames
 from linkage_ros.robot_models.planar import lay_flat, Loops, PlanarJoint
@@ -207,7 +207,7 @@ class _Onto:
         name = self._slider(slide)
         tree.slides.append(name)
         slider = self._linkage.sliders[name]
-        on = carriers(self._linkage.links)[slider.point][0]
+        on = links_by_point(self._linkage.links)[slider.point][0]
         place = complex(*self._linkage.links[on][slider.point])
         frames = []
         for link, there in ((slide.child, 0j), (self._names.own(on), place)):

@@ -25,9 +25,9 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.ranges import reach
+from linkage_ros.kinematics.ranges import slide_bound
 from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
+from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array
@@ -133,7 +133,7 @@ def spans(closure: Closure) -> dict[str, Span]:
     """Return the range of each joint that has a name in messages."""
     joints = named_joints(closure.linkage)
     if len(closure.linkage.inputs) > 1:
-        far = reach(closure)
+        far = slide_bound(closure)
         return {
             name: Span(-far, far) if isinstance(joint, SlideJoint) else _ROUND
             for name, joint in joints.items()
@@ -143,9 +143,9 @@ def spans(closure: Closure) -> dict[str, Span]:
     assert interval is not None, 'what is usual lies in a range'
     ranges = dict(zip(closure.linkage.joints, _published(closure, start, interval), strict=True))
     (given,) = closure.linkage.inputs
-    margin = _MARGIN * (1.0 if interval.turning else reach(closure))
+    margin = _MARGIN * (1.0 if interval.turning else slide_bound(closure))
     own = Span(interval.lowest - margin, interval.highest + margin)
-    if interval.whole or (interval.turning and own.passes_pi):
+    if interval.is_whole or (interval.turning and own.passes_pi):
         own = _ROUND
     ranges.setdefault(given.joint, own)
     return {name: ranges[name] for name in joints}
@@ -154,7 +154,7 @@ def spans(closure: Closure) -> dict[str, Span]:
 def _published(closure: Closure, start: float, interval: InputRange) -> list[Span]:
     import numpy as np  # local import: only the batch needs it
 
-    values = np.array(samples(interval, _SAMPLES))
+    values = np.array(sample_inputs(interval, _SAMPLES))
     rows = closure.solve(values, derivatives=0).positions
     for i in np.flatnonzero(np.isnan(rows).any(axis=0)):
         # The batch leaves out toggles, and so the ends of most ranges; the node publishes them.
@@ -171,14 +171,14 @@ def _published(closure: Closure, start: float, interval: InputRange) -> list[Spa
 
 def _span(row: Array, first: int, turning: bool, closure: Closure, interval: InputRange) -> Span:
     low, high = int(row.argmin()), int(row.argmax())
-    if turning and interval.whole and abs(row[-1] - row[0]) > pi:
+    if turning and interval.is_whole and abs(row[-1] - row[0]) > pi:
         return _ROUND
-    margin = _MARGIN * (1.0 if turning else reach(closure))
+    margin = _MARGIN * (1.0 if turning else slide_bound(closure))
 
     def beyond(i: int) -> float:
         sides = [abs(row[j] - row[i]) for j in (i - 1, i + 1) if 0 <= j < len(row)]
         # At an end of a limited range the last sample is the limit itself.
-        inner = 0 < i < len(row) - 1 or interval.whole
+        inner = 0 < i < len(row) - 1 or interval.is_whole
         return margin + (max(sides, default=0.0) if inner else 0.0)
 
     begun = remainder(row[first], tau) - row[first] if turning else 0.0

@@ -25,10 +25,10 @@ from xml.etree import ElementTree as ET
 from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
-    carriers,
     GROUND,
     Limits,
     Linkage,
+    links_by_point,
     Mass,
     NO_LIMITS,
     Ratio,
@@ -76,7 +76,7 @@ class _Adding:
 
     def pins(self) -> list[LoopJoint]:
         cuts = []
-        for point, links in carriers(self._tree.linkage.links).items():
+        for point, links in links_by_point(self._tree.linkage.links).items():
             apart = {link: link for link in links}
             for pin, on, link in self._tree.pins:
                 if pin == point:
@@ -91,7 +91,7 @@ class _Adding:
 
     def sliders(self) -> list[LoopJoint]:
         linkage, cuts = self._tree.linkage, []
-        links = carriers(linkage.links)
+        links = links_by_point(linkage.links)
         for name, slider in linkage.sliders.items():
             if name in self._tree.slides:
                 continue
@@ -122,7 +122,7 @@ class _Adding:
                 self._slide(name, frame)
 
     def traced(self) -> None:
-        links = carriers(self._tree.linkage.links)
+        links = links_by_point(self._tree.linkage.links)
         there = {joint.child for joint in self._tree.joints}
         for point in self._tree.linkage.traced:
             if not any(self._names.text_on(point, link) in there for link in links[point]):
@@ -352,7 +352,7 @@ def add_joint(
     if kind == 'revolute' and span is not None:
         # A wrapped angle that passes π is on both sides.
         passing = wrapped and Span(limits.low, limits.high).passes_pi
-        if passing if limits.bounded else not span.limited:
+        if passing if limits.is_bounded else not span.limited:
             kind = 'continuous'
     element = ET.SubElement(robot, 'joint', name=joint.name, type=kind)
     _origin(element, joint.place, joint.turn)

@@ -446,7 +446,7 @@ def _silent(content: Section, linkage: Linkage) -> bool:
     if (
         'beyond_limits' in content
         and 'linkages' not in content
-        and not any(limits.bounded for limits in linkage.limits.values())
+        and not any(limits.is_bounded for limits in linkage.limits.values())
     ):
         raise content.error(
             'beyond_limits',

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.files.units import Units
-from linkage_ros.kinematics.linkage import carriers, Linkage, RevoluteJoint
+from linkage_ros.kinematics.linkage import Linkage, links_by_point, RevoluteJoint
 
 if TYPE_CHECKING:
     from linkage_ros.scene.scene import Scene, SceneLinkage
@@ -80,7 +80,7 @@ def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator
 
 def _lengths(linkage: Linkage) -> dict[str, float]:
     """Return for each link the greatest distance between its pins, in [m]."""
-    pins = {name for name, links in carriers(linkage.links).items() if len(links) > 1}
+    pins = {name for name, links in links_by_point(linkage.links).items() if len(links) > 1}
     lengths = {}
     for link, points in linkage.links.items():
         joined = [place for name, place in points.items() if name in pins]

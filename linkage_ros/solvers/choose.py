@@ -121,7 +121,7 @@ def _times(closed: Closure, able: dict[str, Solver]) -> dict[str, float]:
     spent: dict[str, list[float]] = {name: [] for name in able}
     # Call each solver as a tick does.
     ways = {
-        name: solver.compiled(0).fast if solver.by_steps else solver.position
+        name: solver.compile_linkage(0).fast if solver.by_steps else solver.position
         for name, solver in able.items()
     }
     for way in ways.values():

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.kinematics.known_links import Angle, KnownLinks
+from linkage_ros.kinematics.known_links import Angle, SolvedLinks
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Joint, Structure
 
@@ -60,7 +60,7 @@ class Loops(NamedTuple):
 class LoopFinder:
     """Finds the loops of a closure, from all its known links."""
 
-    def __init__(self, linkage: Linkage, structure: Structure, known: KnownLinks) -> None:
+    def __init__(self, linkage: Linkage, structure: Structure, known: SolvedLinks) -> None:
         self._known = known
         self._inputs = linkage.inputs
         self._sliders = linkage.sliders
@@ -129,7 +129,7 @@ class LoopFinder:
                 balances.append(Balance((*turned.terms, (index, -1.0)), turned.constant))
         coordinates = [known.angles[link].coordinate for link in group.links]
         coordinates += [known.slides[name].coordinate for name in slides]
-        pins = tuple(known.held[link].pin for link in group.links)
+        pins = tuple(known.attachments[link].pin for link in group.links)
         return Loops(tuple(coordinates), pins, tuple(equations), tuple(balances))
 
     def _between(self, link: str, to: str, angle: float) -> Balance:
@@ -158,7 +158,7 @@ class LoopFinder:
     def _walk(self, link: str, point: complex) -> list[Vector]:
         if link == GROUND:
             return [Vector(point)]
-        held = self._known.held[link]
+        held = self._known.attachments[link]
         way = []
         if held.point != point:
             way.append(self._arm(self._known.angles[link], point - held.point))
@@ -167,7 +167,7 @@ class LoopFinder:
         if held.slide is not None:
             unit = held.slide.sign * held.direction
             way.append(self._arm(self._known.angles[held.link], unit, held.slide.coordinate))
-        return [*way, *self._walk(held.link, held.at)]
+        return [*way, *self._walk(held.link, held.link_point)]
 
     def _arm(self, angle: Angle, vector: complex, slide: int = -1) -> Vector:
         return Vector(angle.unit * vector, self.turns(angle.coordinate), slide)

@@ -38,7 +38,7 @@ from math import copysign, inf, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.files.parameters import number
-from linkage_ros.kinematics.arithmetic import cross, UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import cross_product, UNIT_ROUNDOFF
 from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.doubles import HUGE
@@ -47,11 +47,11 @@ from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import (
     FixedPoint,
+    LinkState,
     PLACED,
     PointOnLink,
     PointOnRail,
     RelativeAngle,
-    State,
     Step,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
@@ -264,10 +264,10 @@ class NewtonDyad:
             for vector in self._new:
                 off += _value(vector, x, pins)
             by_p, by_q = self._slopes(x)
-            across = cross(by_p, by_q)
+            across = cross_product(by_p, by_q)
             if not across:
                 break
-            dp, dq = cross(by_q, off) / across, cross(off, by_p) / across
+            dp, dq = cross_product(by_q, off) / across, cross_product(off, by_p) / across
             x[first] += dp
             x[first + 1] += dq
             if -p_least <= dp <= p_least and -q_least <= dq <= q_least:
@@ -278,7 +278,7 @@ class NewtonDyad:
     def orientation(self, x: list[float]) -> float:
         """Return the sine of the angle from F_p to F_q."""
         by_p, by_q = self._slopes(x)
-        return cross(by_p, by_q) / (abs(by_p) * abs(by_q))
+        return cross_product(by_p, by_q) / (abs(by_p) * abs(by_q))
 
     def rates(
         self, x: list[float], pins: list[complex], v: list[float], speeds: list[complex]
@@ -310,9 +310,9 @@ class NewtonDyad:
 
     def _solve(self, x: list[float], drift: complex, into: list[float]) -> None:
         by_p, by_q = self._slopes(x)
-        across = cross(by_p, by_q)
-        into[self._first] = cross(by_q, drift) / across
-        into[self._first + 1] = cross(drift, by_p) / across
+        across = cross_product(by_p, by_q)
+        into[self._first] = cross_product(by_q, drift) / across
+        into[self._first + 1] = cross_product(drift, by_p) / across
 
     def _slopes(self, x: list[float]) -> tuple[complex, complex]:
         """Return F_p and F_q."""
@@ -437,7 +437,7 @@ class NewtonClosure(Solver):
         return self.linkage, self.tolerance, self._given_warm
 
     def position(self, *inputs: float) -> Position:
-        x = self._coordinates('inputs', inputs, 0.0, inf)
+        x = self._input_coordinates('inputs', inputs, 0.0, inf)
         if x is None:
             return self._exact(inputs)
         knot, offsets = self._knots.near(x[1:])
@@ -452,7 +452,7 @@ class NewtonClosure(Solver):
                 ]
         signs = iter(knot.signs)
         pins: list[complex] = []
-        state = State(x, pins)
+        state = LinkState(x, pins)
         poses = _Found() if self._iterates else _NO_POSES
         for part in self._plan:
             if isinstance(part, NewtonDyad):
@@ -476,11 +476,11 @@ class NewtonClosure(Solver):
         state, poses = position.state, position.poses
         if not isinstance(poses, _Found):
             return self.closed.velocity(position, *rates)
-        v = self._coordinates('rates', rates)
+        v = self._input_coordinates('rates', rates)
         if v is None:
             return super().velocity(position, *rates)
         x, pins = state
-        speeds = State(v, [])
+        speeds = LinkState(v, [])
         others = iter(poses)
         part_rates = []
         for part in self._plan:
@@ -488,7 +488,7 @@ class NewtonClosure(Solver):
                 part.rates(x, pins, v, speeds.pins)
             else:
                 part_rates.append(part.rates(next(others, PLACED), state, speeds))
-        return Velocity(self._joints(v), speeds, part_rates, self)
+        return Velocity(self._joint_rates(v), speeds, part_rates, self)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -496,11 +496,11 @@ class NewtonClosure(Solver):
         state, poses = position.state, position.poses
         if not isinstance(poses, _Found):
             return self.closed.acceleration(position, velocity, *accelerations)
-        a = self._coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
+        a = self._input_coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
         if a is None or velocity.rates is None:
             return super().acceleration(position, velocity, *accelerations)
         speeds, rates = velocity.state, velocity.rates
-        changes = State(a, [])
+        changes = LinkState(a, [])
         others, moving = iter(poses), iter(rates)
         for part in self._plan:
             if isinstance(part, NewtonDyad):
@@ -508,14 +508,14 @@ class NewtonClosure(Solver):
             else:
                 pose, rate = next(others, PLACED), next(moving)
                 part.accelerations(pose, rate, state, speeds, changes)
-        return Acceleration(self._joints(a), changes, self)
+        return Acceleration(self._joint_rates(a), changes, self)
 
     def placed(self, position: Position) -> Position:
         if not isinstance(position.poses, _Found):
             return position
         if self._iterates:
             return position
-        state = State(position.state.coordinates, [])
+        state = LinkState(position.state.coordinates, [])
         for step in self.steps:
             if isinstance(step, PLACING):
                 step.close(state)

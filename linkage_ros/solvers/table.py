@@ -41,7 +41,7 @@ from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.ranges import link_lengths
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.solvers.solver import refuse_ratios, Solver
 import numpy as np
@@ -223,7 +223,7 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (c[i] + t * c[i + 1],)
         given = x if self._factors is None else x * self._factors[0]
-        state = State([0.0, given], self._no_pins)
+        state = LinkState([0.0, given], self._no_pins)
         return Position(_CLOSED, 0.0, joints, state, cast('Any', _Place(c, t, density)), self)
 
     def residual(self, position: Position) -> float:
@@ -256,7 +256,7 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (factor * c[i + 1],)
         given = rate if self._factors is None else rate * self._factors[0]
-        return Velocity(joints, State([0.0, given], self._no_pins), [factor], self)
+        return Velocity(joints, LinkState([0.0, given], self._no_pins), [factor], self)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -277,7 +277,7 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (pull * c[i + 1],)
         given = change if self._factors is None else change * self._factors[0]
-        return Acceleration(joints, State([0.0, given], self._no_pins), self)
+        return Acceleration(joints, LinkState([0.0, given], self._no_pins), self)
 
     def _elsewhere(self, x: float) -> tuple[_Part | None, float]:
         """Return the part of the table that holds an input, or None, and the input within it."""
@@ -306,7 +306,7 @@ class TableClosure(Solver):
                 )
             return 0.0, [(low, high)]
         ranges = InputSweep(self.closed).ranges
-        whole = [one for one in ranges if one.whole]
+        whole = [one for one in ranges if one.is_whole]
         period = whole[0].highest - whole[0].lowest if whole else 0.0
         return period, [(one.lowest, one.highest) for one in ranges]
 

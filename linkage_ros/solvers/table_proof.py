@@ -27,9 +27,9 @@ from typing import Any, NamedTuple, NoReturn
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.solve import Solver
-from linkage_ros.kinematics.compiling.trace import Motion
-from linkage_ros.kinematics.singularity_margin import away
+from linkage_ros.kinematics.compiling.solve import SolverOutline
+from linkage_ros.kinematics.compiling.trace import TracedMotion
+from linkage_ros.kinematics.singularity_margin import signed_distance
 from linkage_ros.solvers.loops import Loops, Turns
 from linkage_ros.solvers.validated_enclosure import (
     Array,
@@ -67,7 +67,7 @@ def refuse_trouble(request: TableRequest, ranges: Sequence[tuple[float, float]])
     for low, high in ranges:
         for singular in request.closed.singular_inputs:
             middle = 0.5 * (low + high)
-            if low <= middle - away(request.closed, middle, singular.value) <= high:
+            if low <= middle - signed_distance(request.closed, middle, singular.value) <= high:
                 raise refusal(request, f'cannot be proven near {place(request, singular.value)}')
 
 
@@ -77,7 +77,7 @@ def place(request: TableRequest, value: float) -> str:
         return f'{value:.6g} m'
     where = f'{degrees(remainder(value, tau)):.4g}°'
     near = any(
-        abs(away(request.closed, value, singular.value)) < _NEAR
+        abs(signed_distance(request.closed, value, singular.value)) < _NEAR
         for singular in request.closed.singular_inputs
     )
     return f'the toggle or change point at {where}' if near else where
@@ -324,7 +324,7 @@ class _ClosedForm:
         self._numbers = [k for group in request.groups for k in group.coordinates]
         self._pins = [k for group in request.groups for k in group.pins]
         width = len(self._numbers) + 2 * len(self._pins)
-        self._solver = Solver(request.closed, width, self._wanted)
+        self._solver = SolverOutline(request.closed, width, self._wanted)
 
     def at(self, x: Array) -> tuple[Array, NDArray[np.complex128]]:
         """Return coordinates and pins, a row for each, at values in [rad] or [m]."""
@@ -336,7 +336,7 @@ class _ClosedForm:
         pins[self._pins] = parts[0::2] + 1j * parts[1::2]
         return coordinates, pins
 
-    def _wanted(self, motion: Motion) -> list[list[float]]:
+    def _wanted(self, motion: TracedMotion) -> list[list[float]]:
         if not motion.position.joints:
             return [[]]
         x, pins = motion.position.state

@@ -20,17 +20,17 @@ from typing import Any
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.equations import (
-    along,
+    BodyDirection,
+    CoincidentPoints,
     Constraint,
     End,
-    equations,
-    Facing,
-    Meeting,
+    evaluate_constraints,
     OnLine,
     Parallel,
+    point_in_line_frame,
 )
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 import numpy as np
 
 
@@ -65,8 +65,8 @@ class ConstraintEquations:
 
     def corrected(self, unknowns: Any, inputs: Sequence[float]) -> Any:
         """Return the unknowns after one step of Newton's method."""
-        known = State([0.0, *inputs], self._pins)
-        errors, jacobian = equations(self._constraints, unknowns.tolist(), known)
+        known = LinkState([0.0, *inputs], self._pins)
+        errors, jacobian = evaluate_constraints(self._constraints, unknowns.tolist(), known)
         return unknowns - np.linalg.solve(jacobian, errors)
 
     def joints(self, unknowns: Any) -> tuple[float, ...]:
@@ -75,11 +75,11 @@ class ConstraintEquations:
         def angle(link: str) -> float:
             return float(unknowns[3 * self._bodies[link]]) if link != GROUND else 0.0
 
-        known, values = State([0.0], self._pins), unknowns.tolist()
+        known, values = LinkState([0.0], self._pins), unknowns.tolist()
         return tuple(
             angle(joint.child) - angle(joint.parent)
             if isinstance(joint, RevoluteJoint)
-            else along(self._slides[joint.slider], known, values).real
+            else point_in_line_frame(self._slides[joint.slider], known, values).real
             for joint in self._linkage.joints.values()
         )
 
@@ -90,7 +90,7 @@ class ConstraintEquations:
             for point in points:
                 if point in carriers:
                     found.append(
-                        Meeting(self._end(link, point), self._end(carriers[point], point))
+                        CoincidentPoints(self._end(link, point), self._end(carriers[point], point))
                     )
                 carriers.setdefault(point, link)
         for name, slider in self._linkage.sliders.items():
@@ -121,8 +121,8 @@ class ConstraintEquations:
             self._bodies[link], complex(*points[point]) - complex(*next(iter(points.values())))
         )
 
-    def _facing(self, link: str, direction: float = 0.0) -> Facing:
-        return Facing(self._bodies.get(link, -1), 0, direction)
+    def _facing(self, link: str, direction: float = 0.0) -> BodyDirection:
+        return BodyDirection(self._bodies.get(link, -1), 0, direction)
 
 
 _MOST = 50

@@ -116,7 +116,7 @@ def _paths(line: LinkagePipeline) -> list[Path]:
         sizes = [0.01 * closure.scale if i.slider else 0.01 for i in closure.linkage.inputs]
         return [_swing(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
     widest = InputSweep(closure).widest_range
-    if widest is None or widest.whole:
+    if widest is None or widest.is_whole:
         return [lambda seconds: (speed * seconds, speed)]
     middle, width = 0.5 * (widest.lowest + widest.highest), widest.highest - widest.lowest
     return [_swing(middle, 0.4 * width, speed)]

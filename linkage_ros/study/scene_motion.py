@@ -147,7 +147,7 @@ def _sines(closure: Closure) -> Path:
         widest = InputSweep(closure).widest_range
         assert widest is not None, 'reading the file has proved that it closes somewhere'
         sizes = [_AMPLITUDE]
-        if not widest.whole:
+        if not widest.is_whole:
             centers = (0.5 * (widest.lowest + widest.highest),)
             sizes = [min(_AMPLITUDE, _PART * (widest.highest - widest.lowest))]
 

@@ -27,7 +27,7 @@ from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint
-from linkage_ros.kinematics.ranges import reach
+from linkage_ros.kinematics.ranges import slide_bound
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.measuring import Contender, in_turn, Progress
@@ -215,8 +215,8 @@ def _own(closure: Closure) -> Solver:
     if type(closure) is not Closure:
         kind = type(closure).__name__.removesuffix('Closure').lower()
         return Solver(kind, lambda *inputs: closure.position(*inputs).joints)
-    compiled = closure.compiled(0)
-    fast, plain = compiled.fast, compiled.plain
+    compiled = closure.compile_linkage(0)
+    fast, plain = compiled.fast, compiled.run_interpreted
 
     def position(*inputs: float) -> Sequence[Any]:
         (joints,) = fast(*inputs) or plain(*inputs).values or ((),)
@@ -272,7 +272,7 @@ def _solve_by_spline(closure: Closure, knots: int) -> Solve | None:
         if isinstance(joint, RevoluteJoint):
             row[:] = np.unwrap(row)
     spline = CubicSpline(places, joints.T)
-    whole = interval.whole
+    whole = interval.is_whole
 
     def position(value: float) -> Sequence[Any]:
         if whole:
@@ -331,7 +331,7 @@ Near = Callable[[Closure], 'tuple[list[tuple[float, ...]], list[float]]']
 def _near_toggle(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]]:
     interval = InputSweep(closure).widest_range
     assert interval is not None, 'it has one'
-    unit = 1.0 if interval.turning else reach(closure)
+    unit = 1.0 if interval.turning else slide_bound(closure)
     return _closed(closure, interval.highest, [-unit * distance for distance in DISTANCES])
 
 

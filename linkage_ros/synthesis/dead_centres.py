@@ -27,7 +27,7 @@ from math import acos, inf, pi, tan
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.ranges import golden
+from linkage_ros.kinematics.ranges import golden_section
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
 
 _SAMPLES = 1000
@@ -75,7 +75,7 @@ def crank_rockers(task: DeadCentreTask, count: int) -> list[Design]:
         if loss(best) < 0.0:
             step = 1.0 / _SAMPLES
             ends = max(best - step, step * step), min(best + step, 1.0 - step * step)
-            found.append((*golden(loss, *ends), side))
+            found.append((*golden_section(loss, *ends), side))
             usable = [ratio for ratio in ratios if loss(ratio) < 0.0]
             chosen = usable[:: max(1, len(usable) // max(1, count))]
             found += [(loss(ratio), ratio, side) for ratio in chosen]

@@ -21,11 +21,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
     GROUND,
     Input,
     Linkage,
     Point,
-    Pose,
     RevoluteJoint,
 )
 
@@ -115,7 +115,7 @@ class FourBar:
             },
             sliders={},
             traced=('P',) if self.traced is not None else (),
-            pose=None if start is None else Pose((start,), {}),
+            pose=None if start is None else AssemblyPose((start,), {}),
         )
 
 

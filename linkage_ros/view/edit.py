@@ -36,8 +36,8 @@ from linkage_ros.files.linkage_file import FARTHEST, written_linkage
 from linkage_ros.files.linkage_rewriting import rewritten
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage, RevoluteJoint
-from linkage_ros.kinematics.sides import assembly_sides, undrawn, written_sides
+from linkage_ros.kinematics.linkage import GROUND, Linkage, links_by_point, RevoluteJoint
+from linkage_ros.kinematics.sides import assembly_sides, without_drawn_pose, written_sides
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import assur_groups
 
@@ -118,7 +118,7 @@ def pin_of(error: LinkageError, text: str) -> str | None:
         written, _ = written_linkage(parse_yaml(text.encode('utf-8', 'replace'), _NAME))
     except LinkageError:
         return None
-    names = {*carriers(written.links), *written.sliders, *written.links}
+    names = {*links_by_point(written.links), *written.sliders, *written.links}
     where = error.key if isinstance(error, FileError) else error.where
     return next((part for part in reversed(str(where).split('.')) if part in names), None)
 
@@ -134,7 +134,7 @@ def _shown(closure: Closure, given: Any) -> _Shown:
             raise _open()
     frames: dict[str, tuple[complex, float]] = {GROUND: (0j, 0.0)}
     found = closure.link_frames
-    frames |= dict(zip(found.links, found.at(position), strict=True))
+    frames |= dict(zip(found.links, found.frames_at(position), strict=True))
     points = closure.points(position)
     return _Shown(closure, inputs, frames, {point: place for (_, point), place in points.items()})
 
@@ -238,7 +238,7 @@ def _rounded(shown: _Shown, value: float) -> float:
 def _stands(linkage: Linkage, name: str) -> bool:
     """Return whether the line of a slider stands where it is, whatever its point does."""
     along = linkage.sliders[name].along
-    pins = carriers(linkage.links)
+    pins = links_by_point(linkage.links)
     return along == GROUND or sum(len(pins[point]) > 1 for point in linkage.links[along]) > 1
 
 
@@ -295,7 +295,7 @@ def _trace(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
     linkage = shown.closure.linkage
     link, points = _link(linkage, given)
     x, y = _numbers('at', given.get('at'), 2)
-    taken = {*carriers(linkage.links), *linkage.sliders, *linkage.links}
+    taken = {*links_by_point(linkage.links), *linkage.sliders, *linkage.links}
     free = (f'P{number or ""}' for number in range(len(taken) + 1))
     name = given.get('name', next(name for name in free if name not in taken))
     if not isinstance(name, str) or name in taken:
@@ -309,7 +309,7 @@ def _untrace(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
     """Trace a point no more; one that nothing else needs goes."""
     linkage = shown.closure.linkage
     name = _named('untrace', edit['untrace'], linkage.traced)
-    carried = carriers(linkage.links)[name]
+    carried = links_by_point(linkage.links)[name]
     links = dict(linkage.links)
     needed = {end for s in linkage.sliders.values() for end in (s.point, s.through)}
     if len(carried) == 1 and name not in needed and len(links[carried[0]]) > 2:
@@ -361,7 +361,7 @@ def _side(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
             remedy = f'choose {" or ".join(possible[key])}'
             raise LinkageError(f'assembly.{key}', f'{quoted(side)} is no side of it', remedy)
     sides: Any = {**written_sides(shown.closure), **given}
-    return _Change(replace(undrawn(linkage, shown.closure.structure), assembly=sides))
+    return _Change(replace(without_drawn_pose(linkage, shown.closure.structure), assembly=sides))
 
 
 _KINDS: dict[str, Callable[[_Shown, Mapping[str, Any]], _Change]] = {
@@ -384,7 +384,7 @@ def _in_pose(
     except DefinitionError:  # the check of the text tells it with its place
         return linkage
     sides = assembly_sides(structure)
-    linkage = undrawn(linkage, structure)
+    linkage = without_drawn_pose(linkage, structure)
     written = {name: side for name, side in linkage.assembly.items() if name in sides}
     # First the assembly that is written.
     own = [

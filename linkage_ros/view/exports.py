@@ -20,7 +20,7 @@ from linkage_ros.drawing.figure import picture
 from linkage_ros.errors import did_you_mean, LinkageError, listed, quoted
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.languages import c_name, LANGUAGES
-from linkage_ros.kinematics.compiling.source import source, Subject
+from linkage_ros.kinematics.compiling.source import Subject, write_source
 from linkage_ros.kinematics.pose_view import View, view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
@@ -107,7 +107,7 @@ def _compiled(suffix: str) -> Callable[[_Linkage], bytes]:
         in_c = (c_name(name) or 'linkage') if suffix in ('.c', '.h') else name
         joints = tuple(closure.linkage.joints)
         subject = Subject(closure, in_c, f'{name}.yaml', _DERIVATIVES, joints)
-        return source(subject, LANGUAGES[suffix](subject)).encode()
+        return write_source(subject, LANGUAGES[suffix](subject)).encode()
 
     return write
 

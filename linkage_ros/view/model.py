@@ -27,10 +27,10 @@ from linkage_ros.files.units import Units
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.javascript import JavaScript
-from linkage_ros.kinematics.compiling.source import source, STATUSES, Subject
-from linkage_ros.kinematics.linkage import carriers, GROUND, Linkage
+from linkage_ros.kinematics.compiling.source import STATUSES, Subject, write_source
+from linkage_ros.kinematics.linkage import GROUND, Linkage, links_by_point
 from linkage_ros.kinematics.pose_view import view
-from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.shapes import driven_links
 from linkage_ros.kinematics.sides import assembly_sides, written_sides
 from linkage_ros.kinematics.status import Status
@@ -122,7 +122,7 @@ def _quick(
     if written.sliders or closure.bounds or len(shown.inputs) != len(written.inputs):
         return None
     position = closure.position(*shown.inputs)
-    if not position.joints or iterated(closure):
+    if not position.joints or is_iterated(closure):
         return None
     drawn = pose_in_frames(closure, position, shown.size)
     return _model(closure, name, text, content.units, shown.inputs, drawn)
@@ -134,7 +134,7 @@ def _model(
 ) -> dict[str, Any]:  # fmt: skip
     linkage = closure.linkage
     program = program_of(closure)
-    carried = carriers(linkage.links)
+    carried = links_by_point(linkage.links)
     sides, now = assembly_sides(closure.structure), written_sides(closure)
     return {
         'name': name,
@@ -193,7 +193,7 @@ def program_of(closure: Closure) -> str | None:
     """Return the program of a linkage; None if it is solved by iteration."""
     subject = Subject(closure, closure.name, closure.name, 2, closure.joint_names, frames=True)
     try:
-        return source(subject, JavaScript(for_page=True))
+        return write_source(subject, JavaScript(for_page=True))
     except DefinitionError:
         return None
 
@@ -259,7 +259,7 @@ def _analysis(closure: Closure, units: Units) -> dict[str, Any]:
 
 def _margin(closure: Closure, way: InputSweep, value: float) -> tuple[float, float]:
     """Return transmission angle and conditioning at an input; infinite if they are unknown."""
-    position = way.position(value)
+    position = way.position_at(value)
     if not position.joints:
         return inf, inf
     margin = closure.singularity_margin(position)
@@ -298,7 +298,7 @@ def pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
     if not position.joints:
         return found
     frames = closure.link_frames
-    found['frames'] = _flat(frames.at(position))
+    found['frames'] = _flat(frames.frames_at(position))
     if position.status.has_rates:
         rest = [0.0] * (len(inputs) - 1)
         velocity = closure.velocity(position, 1.0, *rest)
@@ -306,7 +306,7 @@ def pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
         motion = {
             'rates': list(velocity.joints),
             'accelerations': list(acceleration.joints),
-            'frameRates': _flat(frames.rates(position, velocity)),
+            'frameRates': _flat(frames.frame_rates(position, velocity)),
         }
         # Beside a toggle they may be larger than a number can be.
         if all(map(isfinite, chain(*motion.values()))):

@@ -131,7 +131,7 @@ class Wrong:
 def has_limits(topology: Topology) -> bool:
     closure = closure_of(topology, Findings())
     turning = not topology.linkage.inputs[0].slider
-    return closure is not None and turning and not closure.input_ranges[0].whole
+    return closure is not None and turning and not closure.input_ranges[0].is_whole
 
 
 def test_wrong_ranges_and_singular_inputs_are_found() -> None:

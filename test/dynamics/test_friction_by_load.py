@@ -30,7 +30,7 @@ from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.dynamics.motion import OneFreedom
 from linkage_ros.dynamics.reactions import Reactions
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.arithmetic import cross
+from linkage_ros.kinematics.arithmetic import cross_product
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Mass
 from linkage_ros.messages.joint_state import EffortCommand
@@ -92,11 +92,11 @@ def test_a_coupler_pushes_along_a_tangent_of_both_friction_circles(angle, load, 
     for pushes in (1.0, -1.0):
         sine = -(at_a + at_b) * RADIUS / abs(b - a) * pushes
         along = (b - a) / abs(b - a) * complex(sqrt(1.0 - sine * sine), sine)
-        lever = cross(b - o4, along) + pushes * RADIUS * (at_b - at_o4)
+        lever = cross_product(b - o4, along) + pushes * RADIUS * (at_b - at_o4)
         force = -load / lever
         if force * pushes > 0.0:
             rubbed = RADIUS * abs(force) * (at_o2 - at_a)
-            found.append((abs(force), force * cross(a, along) + rubbed))
+            found.append((abs(force), force * cross_product(a, along) + rubbed))
     ((force, effort),) = found
     assert reactions.efforts(position, velocity, acceleration) == pytest.approx((effort,))
     for reaction in reactions.solve(position, velocity, acceleration):
@@ -138,7 +138,7 @@ def test_each_joint_rubs_by_the_force_that_it_then_has(name):
                 slider = closure.linkage.sliders[joint.name]
                 line = complex(*slider.direction)
                 line *= rect(1.0 / abs(line), closure.link_angles(position)[slider.along])
-                pressed = cross(line, pressed)
+                pressed = cross_product(line, pressed)
             rubbing = joints[joint.name]
             by_force = 0.1 * (rubbing.radius or 1.0) * abs(pressed)
             constant[joint.name] = JointFriction(0.01, 0.02 + by_force)

@@ -91,7 +91,7 @@ def some_inputs(closure):
     way = InputSweep(closure, start)
     span = way.range_about(start[0])
     steps = (0.03, 0.2, 0.45, 0.7, 0.97)
-    found = [way.inputs(span.lowest + (span.highest - span.lowest) * part) for part in steps]
+    found = [way.inputs_at(span.lowest + (span.highest - span.lowest) * part) for part in steps]
     return [inputs for inputs in found if closure.position(*inputs).joints]
 
 

@@ -14,16 +14,16 @@ from typing import Any
 from linkage_ros.kinematics.dyads.rpr import RPRDyad, RPRPose, swivel_diagonal
 from linkage_ros.kinematics.dyads.rrr import crank_diagonal, RRRDyad, RRRPose
 from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
     Input,
     Linkage,
     Point,
-    Pose,
     RevoluteJoint,
     Side,
     SlideJoint,
     Slider,
 )
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 # Linkage objects for the tests: textbook shapes, in plain or arbitrary frames.
 
@@ -134,7 +134,7 @@ def class_3_linkage() -> Linkage:
             name: RevoluteJoint('ground', name) for name in ('platform', 'arm_1', 'arm_2', 'arm_3')
         },
         sliders={},
-        pose=Pose((1.0,), {'P1': (0.4, 0.7), 'P2': (1.2, 0.8), 'P3': (0.8, 1.2)}),
+        pose=AssemblyPose((1.0,), {'P1': (0.4, 0.7), 'P2': (1.2, 0.8), 'P3': (0.8, 1.2)}),
     )
 
 
@@ -150,8 +150,8 @@ class _OnCrank:
 
     def rates(self, pose: Any, crank_rate: float) -> tuple[float, float]:
         """Return the rates of both coordinates."""
-        speeds = State([0.0, crank_rate], [])
-        self._dyad.rates(pose, State([], []), speeds)
+        speeds = LinkState([0.0, crank_rate], [])
+        self._dyad.rates(pose, LinkState([], []), speeds)
         first, second = speeds.coordinates[2:]
         return first, second
 
@@ -159,9 +159,9 @@ class _OnCrank:
         self, pose: Any, crank_rate: float, crank_acceleration: float
     ) -> tuple[float, float]:
         """Return the accelerations of both coordinates."""
-        known, speeds = State([], []), State([0.0, crank_rate], [])
+        known, speeds = LinkState([], []), LinkState([0.0, crank_rate], [])
         rates = self._dyad.rates(pose, known, speeds)
-        changes = State([0.0, crank_acceleration], [])
+        changes = LinkState([0.0, crank_acceleration], [])
         self._dyad.accelerations(pose, rates, known, speeds, changes)
         first, second = changes.coordinates[2:]
         return first, second
@@ -175,7 +175,7 @@ class FourBar(_OnCrank):
 
     def close(self, phi: float) -> RRRPose:
         """Return the pose at a crank direction."""
-        return self._dyad.close(State([0.0, phi], []))  # type: ignore[no-any-return]
+        return self._dyad.close(LinkState([0.0, phi], []))  # type: ignore[no-any-return]
 
 
 class InvertedSliderCrank(_OnCrank):
@@ -186,4 +186,4 @@ class InvertedSliderCrank(_OnCrank):
 
     def close(self, phi: float) -> RPRPose:
         """Return the pose at a crank direction."""
-        return self._dyad.close(State([0.0, phi], []))  # type: ignore[no-any-return]
+        return self._dyad.close(LinkState([0.0, phi], []))  # type: ignore[no-any-return]

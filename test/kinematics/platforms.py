@@ -28,10 +28,10 @@ import random
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
     Input,
     Linkage,
     Point,
-    Pose,
     RevoluteJoint,
     Slider,
 )
@@ -154,7 +154,9 @@ def linkage_of(made: Platform, rng: random.Random) -> Linkage:
         assembly={},
         joints=joints,
         sliders=sliders,
-        pose=Pose((x,), {f'P{number}': (z.real, z.imag) for number, z in enumerate(spots)}),
+        pose=AssemblyPose(
+            (x,), {f'P{number}': (z.real, z.imag) for number, z in enumerate(spots)}
+        ),
     )
 
 

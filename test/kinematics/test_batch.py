@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling import numpy_blocks
-from linkage_ros.kinematics.linkage import Pose, RevoluteJoint
+from linkage_ros.kinematics.linkage import AssemblyPose, RevoluteJoint
 from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpc, mpf
 import numpy as np
@@ -73,7 +73,7 @@ def four_bars_of(a: float, b: float, c: float, d: float, sign: int, phi: float =
     """Return a four-bar that publishes the directions of coupler and rocker."""
     linkage = four_bar_linkage((a, b, c, d), 'left' if sign > 0 else 'right')
     joints = {name: RevoluteJoint('ground', name) for name in ('coupler', 'rocker')}
-    return Closure(replace(linkage, joints=joints, pose=Pose((phi,), {})))
+    return Closure(replace(linkage, joints=joints, pose=AssemblyPose((phi,), {})))
 
 
 def solved(closure: Closure, phi: Any, rate: Any = 1.0, acceleration: Any = 0.0) -> list[Any]:

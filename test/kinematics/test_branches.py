@@ -16,7 +16,7 @@ import random
 
 from linkage_ros.kinematics.assembly_modes import other_assemblies
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, Pose
+from linkage_ros.kinematics.linkage import AssemblyPose, Input, Linkage
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.solvers.table import TableClosure
@@ -105,7 +105,7 @@ def test_ranges_end_where_the_curve_turns_back(kind):
     for number, (made, linkage, down, up) in enumerate(family(kind)):
         closure = Closure(linkage)
         (interval,) = closure.input_ranges
-        if interval.whole:
+        if interval.is_whole:
             assert (down.end, up.end) == (None, None), number
             continue
         x = made.pose[2]
@@ -131,7 +131,7 @@ def test_ends_are_toggles_to_the_last_digits():
     for made, linkage, down, up in family('three arms'):
         (interval,) = Closure(linkage).input_ranges
         for end, walked in ((interval.lowest, down), (interval.highest, up)):
-            if interval.whole or walked.end is None:
+            if interval.is_whole or walked.end is None:
                 continue
             toggle, condition = exact_toggle(made, walked.states[-1].tolist())
             assert abs(end - toggle) < 64.0 * 2.0**-53 * condition, end
@@ -189,7 +189,7 @@ def test_after_its_turns_a_branch_begins_again_and_angles_have_grown_by_them():
     for made, linkage, down, up in family('three arms'):
         closure = Closure(linkage)
         (interval,) = closure.input_ranges
-        if not interval.whole:
+        if not interval.is_whole:
             continue
         for walked in (down, up):
             for _, _, angle, x in walked.states[:: len(walked.states) // 30].tolist():
@@ -209,7 +209,7 @@ def test_an_input_that_does_not_turn_round_is_taken_modulo_a_turn():
     for _, linkage, _, _ in family('three arms'):
         closure = Closure(linkage)
         (interval,) = closure.input_ranges
-        if interval.whole or interval.highest - interval.lowest >= tau:
+        if interval.is_whole or interval.highest - interval.lowest >= tau:
             continue
         for x in np.linspace(interval.lowest, interval.highest, 7)[1:-1].tolist():
             expected = closure.points(closure.position(x))
@@ -227,7 +227,7 @@ def test_what_once_leapt_stays_on_its_branch(name):
     # Of the linkage whose range is a five-hundredth, the walk's steps are too long for its turns.
     down, up = walks([made, made], [-1.0, 1.0])
     (interval,) = closure.input_ranges
-    assert not interval.whole
+    assert not interval.is_whole
     if name != 'ref_11':
         assert not off_branch(closure, down, 1)
         assert not off_branch(closure, up, 1)
@@ -301,7 +301,7 @@ def two_inputs(rng: random.Random) -> tuple[Linkage, Platform]:
             'second': {'E': (0.0, 0.0), 'A0': (end.real, end.imag)},
         },
         inputs=(Input('one', 'ground', 'driver'), Input('two', 'driver', 'second')),
-        pose=Pose(begin, linkage.pose.points),
+        pose=AssemblyPose(begin, linkage.pose.points),
     )
     line = Platform(legs, (made.pose[0], made.pose[1], 0.0), True)
     return replace(linkage, traced=()), line
@@ -360,7 +360,7 @@ def test_an_assembly_that_is_listed_can_be_named_as_the_pose():
     inputs = closure.linkage.pose.inputs if closure.linkage.pose else ()
     for one in others:
         rough = {name: (round(z.real, 3), round(z.imag, 3)) for name, z in one.points.items()}
-        named = Closure(replace(closure.linkage, pose=Pose(inputs, rough)))
+        named = Closure(replace(closure.linkage, pose=AssemblyPose(inputs, rough)))
         places = {name: z for (_, name), z in named.points(named.position(*inputs)).items()}
         assert all(abs(places[name] - place) < 1e-9 for name, place in one.points.items())
 
@@ -371,7 +371,7 @@ def test_a_branch_of_several_turns_comes_to_assemblies_that_are_listed():
     x = -1.1
     places = {name: z for (_, name), z in closure.points(closure.position(x)).items()}
     points = {name: (places[name].real, places[name].imag) for name in ('P3', 'P5', 'P7')}
-    moved = Closure(replace(closure.linkage, pose=Pose((x,), points)))
+    moved = Closure(replace(closure.linkage, pose=AssemblyPose((x,), points)))
     later = moved.position(x + tau)
     assert later.status is Status.CLOSED
     expected = {name: z for (_, name), z in moved.points(later).items()}

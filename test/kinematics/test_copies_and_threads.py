@@ -157,7 +157,7 @@ def test_the_first_solutions_of_several_threads(name):
 def test_what_is_compiled_is_compiled_once_and_is_what_was_asked_for(derivatives):
     for _ in range(20):
         closure = lr.load('four_bar')
-        calls = [lambda d=d, c=closure: (d, c.compiled(d)) for d in derivatives]
+        calls = [lambda d=d, c=closure: (d, c.compile_linkage(d)) for d in derivatives]
         found = many(calls, 3)
         assert all(one.derivatives == asked for asked, one in found)
         assert len({id(one) for _, one in found}) == len(derivatives)
@@ -174,7 +174,7 @@ def test_whatever_is_used_first_by_several_threads():
             lambda c=closure: c.input_ranges and motion(c),
             lambda c=closure: c.solve([1.0]) and motion(c),
             lambda c=closure: c.singular_inputs is not None and motion(c),
-            lambda c=closure: c.compiled(1) and motion(c),
+            lambda c=closure: c.compile_linkage(1) and motion(c),
         ]
         assert many(calls, 2) == [expected] * 10
 

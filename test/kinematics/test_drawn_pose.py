@@ -27,10 +27,10 @@ from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.drawn_pose import drawn_pose
 from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
     Input,
     Linkage,
     Point,
-    Pose,
     RevoluteJoint,
     Slider,
 )
@@ -146,7 +146,7 @@ def drawing(seed: int, dyads: int) -> Drawing:
 
 def posed(drawn: Drawing, points: Mapping[str, complex], angles: Mapping[str, float]) -> Closure:
     named = {name: (place.real, place.imag) for name, place in points.items()}
-    return Closure(replace(drawn.linkage, pose=Pose((drawn.at,), named, dict(angles))))
+    return Closure(replace(drawn.linkage, pose=AssemblyPose((drawn.at,), named, dict(angles))))
 
 
 def is_as_drawn(closure: Closure, drawn: Drawing) -> bool:
@@ -209,7 +209,7 @@ def test_the_pose_to_copy_leads_back_and_sides_are_those_of_the_drawing(seed, dy
     again = Closure(replace(drawn.linkage, pose=drawn_pose(closure, position)))
     assert again.position(drawn.at).joints == position.joints
     sides = sides_at(closure, position)
-    by_sides = Closure(replace(drawn.linkage, assembly=sides, pose=Pose((drawn.at,), {})))
+    by_sides = Closure(replace(drawn.linkage, assembly=sides, pose=AssemblyPose((drawn.at,), {})))
     assert is_as_drawn(by_sides, drawn)
     # Each side of a pose that draws the other one is refused, and both are named.
     name, side = random.Random(seed).choice(list(sides.items()))
@@ -224,7 +224,7 @@ def test_the_pose_to_copy_leads_back_and_sides_are_those_of_the_drawing(seed, dy
 
 def test_a_pose_that_does_not_tell_lists_the_assemblies_and_what_tells():
     linkage = replace(four_bar_linkage((0.04, 0.12, 0.08, 0.1), 'left'), assembly={})
-    meant = Pose((1.0,), {'B': (0.12, 0.0)})
+    meant = AssemblyPose((1.0,), {'B': (0.12, 0.0)})
     with pytest.raises(DefinitionError) as error:
         Closure(replace(linkage, pose=meant))
     assert error.value.where == 'pose'
@@ -408,7 +408,7 @@ def test_a_changed_length_stays_on_the_branch_through_change_points(name, side, 
             linkage = replace(linkage, nominal=four_bar_linkage(nominal, word))
         elif how != 'sides':
             at = _ANGLES[4 if how == 'pose' else 3]
-            drawn = Pose((at,), {}, {'coupler': branch[at][0], 'rocker': branch[at][1]})
+            drawn = AssemblyPose((at,), {}, {'coupler': branch[at][0], 'rocker': branch[at][1]})
             linkage = replace(linkage, assembly={}, pose=drawn)
         closure = Closure(linkage)
         for at, angles in branch.items():
@@ -517,7 +517,7 @@ def test_links_that_inputs_hold_to_one_another_are_drawn_too(side, drawn):
         {},
     )
     inputs = (-1.2, 1.2)
-    told = Closure(replace(linkage, pose=Pose(inputs, {})))
+    told = Closure(replace(linkage, pose=AssemblyPose(inputs, {})))
     position = told.position(*inputs)
     places = told.points(position)
     points, angles = {}, {}
@@ -527,5 +527,5 @@ def test_links_that_inputs_hold_to_one_another_are_drawn_too(side, drawn):
     else:
         at = places['left_rod', drawn] + 0.005
         points[drawn] = at.real, at.imag
-    found = Closure(replace(linkage, assembly={}, pose=Pose(inputs, points, angles)))
+    found = Closure(replace(linkage, assembly={}, pose=AssemblyPose(inputs, points, angles)))
     assert found.position(*inputs).joints == position.joints

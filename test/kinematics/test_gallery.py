@@ -120,7 +120,7 @@ def test_it_moves_through_its_whole_range_with_a_residual_at_rounding_level(name
 def test_its_range_is_the_one_that_the_independent_solver_met(name):
     closure = closure_of(name)
     low, high = EXPECTED[f'{name}.yaml']['range']
-    if closure.input_ranges[0].whole:
+    if closure.input_ranges[0].is_whole:
         assert high - low == pytest.approx(tau)
         return
     # The other ranges are mirror images, or the same on the far side.

@@ -22,7 +22,7 @@ from campaigns.inverse import errors_of, passes_of, random_four_bars
 from flint import arb
 from linkage_ros import Closure, DefinitionError, Limits, linkage_names, load
 from linkage_ros.kinematics.batch import CODES
-from linkage_ros.kinematics.crank_branches import _pieces, CrankBranch
+from linkage_ros.kinematics.crank_branches import _monotonic_pieces, CrankBranch
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.status import Status
 from linkage_ros.study.enclosure import prove, SingularError
@@ -79,7 +79,7 @@ def test_exact_crank_lies_within_the_bound(name):
         for branch in closure.branches(joint):
             for share in numbers(3):
                 y = branch.low + share * (branch.high - branch.low)
-                crank, slope = branch.find(y)
+                crank, slope = branch.find_crank(y)
                 size = tau if branch.turning else closure.scale
                 bound = 8.0 * U * (abs(crank) + (abs(y) + size) / abs(slope) + 1.0)
                 sides = []
@@ -392,16 +392,16 @@ class Cubic:
 
 def test_flat_place_within_a_branch_goes_on():
     output = Cubic()
-    ((piece, turns_on),) = _pieces(output, InputRange(-1.1, 0.9))
+    ((piece, turns_on),) = _monotonic_pieces(output, InputRange(-1.1, 0.9))
     assert not turns_on
     branch = CrankBranch(output, piece, 1)
     for y in (-1.0, -1e-3, -1e-9, 1e-6, 0.5):
-        assert branch.find(y)[0] == pytest.approx(np.cbrt(y), rel=1e-12)
-    assert abs(branch.find(0.0)[1]) < branch.flat
+        assert branch.find_crank(y)[0] == pytest.approx(np.cbrt(y), rel=1e-12)
+    assert abs(branch.find_crank(0.0)[1]) < branch.flat
 
 
 @pytest.mark.parametrize('bend', [1e-2, 1e-3, -1e-3])
 def test_joint_that_turns_back_only_a_little_has_three_branches(bend):
-    pieces = list(_pieces(Cubic(bend), InputRange(-1.1, 0.9)))
+    pieces = list(_monotonic_pieces(Cubic(bend), InputRange(-1.1, 0.9)))
     ends = [piece[0][0] for piece, _ in pieces[1:]]
     assert ends == pytest.approx(sorted((0.0, -2.0 * bend / 3.0)), abs=1e-12)

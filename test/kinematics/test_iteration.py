@@ -18,7 +18,7 @@ from typing import Any
 
 from linkage_ros.kinematics import closure as closure_module
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Pose, RevoluteJoint
+from linkage_ros.kinematics.linkage import AssemblyPose, GROUND, Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.sides import sides_at
 from linkage_ros.kinematics.status import Status
@@ -65,7 +65,7 @@ def test_it_finds_what_the_closed_form_finds(name, monkeypatch):
         point: (place.real + 0.003 * exact.scale, place.imag - 0.002 * exact.scale)
         for (_, point), place in exact.points(exact.position(start)).items()
     }
-    posed = replace(linkage, assembly={}, pose=Pose((start,), rough))
+    posed = replace(linkage, assembly={}, pose=AssemblyPose((start,), rough))
     monkeypatch.setattr(closure_module, 'assur_groups', iterated)
     found = Closure(posed)
     turns = not linkage.inputs[0].slider
@@ -136,7 +136,7 @@ def test_a_pose_that_leads_nowhere_is_an_open_loop():
     # The pose's input is beyond the limit: there is nothing to continue from.
     sound = class_3_linkage()
     assert sound.pose is not None
-    closure = Closure(replace(sound, pose=Pose((3.0,), sound.pose.points)))
+    closure = Closure(replace(sound, pose=AssemblyPose((3.0,), sound.pose.points)))
     assert closure.position(3.0).status is Status.OPEN
     assert closure.position(1.0).status is Status.OPEN
 
@@ -192,7 +192,11 @@ def chain(rng: random.Random, lengths: tuple[float, float, float, float], tail: 
         assembly['E'] = 'left' if left else 'right'
         joints['fin'] = RevoluteJoint('ground', 'fin')
     return replace(
-        driven, links=links, assembly=assembly, joints=joints, pose=Pose((x,), linkage.pose.points)
+        driven,
+        links=links,
+        assembly=assembly,
+        joints=joints,
+        pose=AssemblyPose((x,), linkage.pose.points),
     )
 
 
@@ -219,7 +223,9 @@ def test_a_chain_goes_its_ranges_without_a_leap_and_no_farther(name, tail):
         closure = Closure(chain(rng, FOUR_BARS[name], tail))
         assert closure.linkage.pose is not None
         (start,) = closure.linkage.pose.inputs
-        assert any(one.lowest <= start <= one.highest or one.whole for one in closure.input_ranges)
+        assert any(
+            one.lowest <= start <= one.highest or one.is_whole for one in closure.input_ranges
+        )
         for interval in closure.input_ranges:
             middle = 0.5 * (interval.lowest + interval.highest)
             half = 0.5 * (interval.highest - interval.lowest)
@@ -236,7 +242,7 @@ def test_a_chain_goes_its_ranges_without_a_leap_and_no_farther(name, tail):
             for end, sign in ((interval.lowest, -1.0), (interval.highest, 1.0)):
                 position = closure.position(end)
                 assert misfit(closure, position) < 1e-12
-                if not interval.whole:
+                if not interval.is_whole:
                     assert position.status is Status.TOGGLE
                     assert not closure.position(end + sign * 1e-9).status.has_pose
 
@@ -246,7 +252,7 @@ def test_a_platform_on_a_change_point_linkage_repeats_after_two_turns():
     for seed in (4, 8, 9, 11, 12):
         closure = Closure(chain(random.Random(seed), FOUR_BARS['change point'], tail=False))
         (interval,) = closure.input_ranges
-        assert interval.whole
+        assert interval.is_whole
         assert interval.turns == 2
         assert InputSweep(closure).ranges[0].highest == pytest.approx(2.0 * tau)
         # Apart: the four-bar itself is on its other side after a turn, and back after two.
@@ -266,7 +272,7 @@ def test_a_table_of_a_chain_is_proven(tail):
     closure = Closure(linkage)
     interval = InputSweep(closure).ranges[0]
     span = None
-    if not interval.whole:
+    if not interval.is_whole:
         width = interval.highest - interval.lowest
         span = interval.lowest + 0.2 * width, interval.highest - 0.2 * width
     table = TableClosure(linkage, 1e-4, span=span)

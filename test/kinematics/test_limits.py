@@ -101,7 +101,7 @@ def test_a_toggle_beyond_the_limits_stays_a_toggle():
     closure = closed(DOUBLE_ROCKER, ', input: {limits: [-0.5, 0.5]}')
     assert closure.position(toggle).status is TOGGLE
     assert closure.solve(np.array([toggle])).status.tolist() == [CODES[TOGGLE]]
-    assert closure.beyond(closure.position(toggle)).startswith('crank_joint at ')
+    assert closure.limit_exceeded(closure.position(toggle)).startswith('crank_joint at ')
 
 
 def test_beyond_the_limits_all_numbers_are_those_of_the_linkage():
@@ -183,7 +183,7 @@ def test_ranges_end_at_limits(name):
 
 def test_a_range_without_an_end():
     (one,) = closed(CRANK_ROCKER, ', input: {limits: [0.5, .inf]}').input_ranges
-    assert (one.lowest, one.limited, one.by, one.whole) == (
+    assert (one.lowest, one.limited, one.by, one.is_whole) == (
         0.5, (True, False), ('crank_joint', ''), False,
     )  # fmt: skip
     assert str(one) == '0.5 rad and more'
@@ -202,7 +202,7 @@ def test_a_narrow_gap_between_samples_is_found():
     assert closure.position(summit).status is LIMITED
     (one,) = closure.input_ranges
     assert tau - (one.highest - one.lowest) == pytest.approx(1e-3, rel=0.05)
-    assert not one.whole
+    assert not one.is_whole
 
 
 @settings(max_examples=30, deadline=None)
@@ -278,7 +278,7 @@ def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
             for one in ranges
             for turn in away
         ]
-        if not any(one.whole for one in ranges) and all(abs(end) > 1e-7 for end in inside):
+        if not any(one.is_whole for one in ranges) and all(abs(end) > 1e-7 for end in inside):
             assert any(end > 0.0 for end in inside) == (not beyond)
     about = [
         value
@@ -289,7 +289,7 @@ def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
     for value in about[:: max(1, len(about) // 5)]:
         interval = InputSweep(closure).range_about(value)
         assert interval is not None
-        assert interval.whole or interval.lowest <= value <= interval.highest
+        assert interval.is_whole or interval.lowest <= value <= interval.highest
 
 
 @pytest.mark.parametrize(
@@ -303,7 +303,7 @@ def test_links_that_are_iterated(lines, seed, turns):
     free = Closure(linkage)
     (whole,) = free.input_ranges
     assert whole.turns == turns
-    low, high = (whole.lowest, whole.highest) if not whole.whole else (-tau, tau)
+    low, high = (whole.lowest, whole.highest) if not whole.is_whole else (-tau, tau)
     values = np.linspace(low + 1e-6, high - 1e-6, 601)
     angles = free.solve(values, derivatives=0).positions[0]
     (driven,) = linkage.inputs
@@ -337,7 +337,7 @@ def test_links_that_are_iterated(lines, seed, turns):
             assert (now.status is LIMITED) == (left < 0.0)
             away = [0.0] if own.low > -inf or not turns else [n * tau for n in range(-3, 4)]
             inside = any(
-                one.whole or one.lowest - 1e-6 <= value + turn <= one.highest + 1e-6
+                one.is_whole or one.lowest - 1e-6 <= value + turn <= one.highest + 1e-6
                 for one in ranges
                 for turn in away
             )
@@ -367,5 +367,5 @@ def test_with_several_inputs_the_limits_of_each_joint_hold():
     assert one.highest <= 2.0
     for end, by, outward in zip(one[:2], one.by, (-1, 1), strict=True):
         assert by in ('left_joint', 'rod_joint')
-        assert InputSweep(closure, (1.5, 1.5)).position(end + outward * 1e-6).status is LIMITED
+        assert InputSweep(closure, (1.5, 1.5)).position_at(end + outward * 1e-6).status is LIMITED
     assert remainder(rod, tau) == rod

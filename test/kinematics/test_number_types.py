@@ -232,7 +232,7 @@ def test_both_zeros_give_the_same_bits(name):
     for values in (many.positions, many.velocities, many.accelerations):
         np.testing.assert_array_equal(values[:, 0], values[:, 1])
     if one.status is Status.CLOSED:
-        fast = closure.compiled(2)
+        fast = closure.compile_linkage(2)
         assert repr(fast(0.0, 1.0, 0.5)) == repr(fast(-0.0, 1.0, 0.5))
         assert fast(-0.0, 1.0, 0.5).values[0] == one.joints
         np.testing.assert_allclose(many.positions[:, 1], one.joints, atol=1e-12)
@@ -280,7 +280,7 @@ def test_rates_that_overflow_are_infinite_everywhere(name, rate, change):
     position = closure.position(x)
     velocity = closure.velocity(position, rate)
     acceleration = closure.acceleration(position, velocity, change)
-    compiled = closure.compiled(2)(x, rate, change).values
+    compiled = closure.compile_linkage(2)(x, rate, change).values
     for number in (rate, [rate]):
         many = closure.solve([x], rates=number, accelerations=change)
         for found in (

@@ -18,15 +18,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bar_type, four_bars
-from linkage_ros.kinematics.linkage import Input, Limits, Linkage, Pose, RevoluteJoint
-from linkage_ros.kinematics.ranges import describe
+from linkage_ros.kinematics.linkage import AssemblyPose, Input, Limits, Linkage, RevoluteJoint
+from linkage_ros.kinematics.ranges import describe_ranges
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
-    extremes,
-    grid,
+    find_extremes,
+    grid_positions,
     InputSweep,
-    samples,
+    sample_inputs,
     transmission_angles,
     usual_inputs,
     worst_residual,
@@ -198,7 +198,7 @@ def test_ranges_are_of_the_input_joint_and_turn_with_its_frame(angle):
 
 def test_ranges_are_told_in_words():
     words = {
-        name: describe(Closure(four_bar_linkage(lengths, 'left')).input_ranges)
+        name: describe_ranges(Closure(four_bar_linkage(lengths, 'left')).input_ranges)
         for name, (lengths, _, _) in FOUR_BARS.items()
     }
     assert words['crank-rocker'] == 'every crank angle'
@@ -359,16 +359,16 @@ def test_every_shipped_linkage_closes_to_rounding_all_over_its_range(file):
 # A pose, and the start of a linkage with it; for a crank-rocker, and one that folds.
 POSES = {
     'none': ((2.0, 7.0, 9.0, 6.0), None, radians(60.0)),
-    'a start': ((2.0, 7.0, 9.0, 6.0), Pose((0.436,), {}), 0.436),
-    'a start some turns away': ((2.0, 7.0, 9.0, 6.0), Pose((-20.0,), {}), -20.0),
-    'a start of one that folds': ((4.0, 8.0, 3.0, 6.0), Pose((2.5,), {}), 2.5),
+    'a start': ((2.0, 7.0, 9.0, 6.0), AssemblyPose((0.436,), {}), 0.436),
+    'a start some turns away': ((2.0, 7.0, 9.0, 6.0), AssemblyPose((-20.0,), {}), -20.0),
+    'a start of one that folds': ((4.0, 8.0, 3.0, 6.0), AssemblyPose((2.5,), {}), 2.5),
     # It closes beyond acos(27/48) only: from there to as far on the other side, two thirds.
     'a start where it is open': (
         (4.0, 8.0, 3.0, 6.0),
-        Pose((0.5,), {}),
+        AssemblyPose((0.5,), {}),
         acos(0.5625) + (tau - 2.0 * acos(0.5625)) * 2.0 / 3.0,
     ),
-    'as drawn': ((2.0, 7.0, 9.0, 6.0), Pose((0.436,), {'A': (1.8, 0.8)}), 0.436),
+    'as drawn': ((2.0, 7.0, 9.0, 6.0), AssemblyPose((0.436,), {'A': (1.8, 0.8)}), 0.436),
 }
 
 
@@ -385,7 +385,7 @@ def test_a_pose_says_where_a_linkage_starts(kind):
     ids=['closes', 'open: the elbows are 0.3 m apart, 0.22 at most'],
 )
 def test_several_inputs_start_from_their_pose(inputs, expected):
-    linkage = replace(shipped('five_bar').linkage, pose=Pose(inputs, {}))
+    linkage = replace(shipped('five_bar').linkage, pose=AssemblyPose(inputs, {}))
     assert usual_inputs(Closure(linkage)) == pytest.approx(expected)
 
 
@@ -398,8 +398,8 @@ def test_the_other_inputs_are_held_along_a_way():
     for end in (low, high):
         a = complex(0.09 * cos(end), 0.09 * sin(end))
         assert abs(b - a) == pytest.approx(0.22, abs=1e-14)
-    assert way.closes(radians(60.0))
-    assert not way.closes(high + 1e-9)
+    assert way.is_closed(radians(60.0))
+    assert not way.is_closed(high + 1e-9)
 
 
 def test_a_range_is_found_from_any_turn():
@@ -415,7 +415,7 @@ def test_a_range_is_found_from_any_turn():
 @pytest.mark.parametrize('whole', [True, False])
 def test_samples_go_from_end_to_end(whole):
     interval = InputRange(0.0, tau) if whole else InputRange(-0.7, 1.1)
-    values = samples(interval, 50)
+    values = sample_inputs(interval, 50)
     assert values[0] == interval.lowest
     assert values[-1] == interval.highest
     assert values == sorted(values)
@@ -429,7 +429,7 @@ def test_extremes_are_found_wherever_they_lie(place, size, other, times):
     def function(x: float) -> float:
         return -size * cos(x - place) - other * 0.1 * size * cos(times * (x - place))
 
-    found = extremes(function, [InputRange(0.0, tau)])
+    found = find_extremes(function, [InputRange(0.0, tau)])
     assert found.lowest.value == pytest.approx(function(place), rel=1e-12)
     # A value within 1e-13 of the best counts as the best: at a curvature of the size, so far off.
     off = sqrt(2e-13 / size)
@@ -437,12 +437,12 @@ def test_extremes_are_found_wherever_they_lie(place, size, other, times):
 
 
 def test_what_does_not_change_has_its_extreme_nowhere():
-    found = extremes(lambda _: 1.25, [InputRange(0.0, tau)])
+    found = find_extremes(lambda _: 1.25, [InputRange(0.0, tau)])
     assert found == ((1.25, ()), (1.25, ()))
 
 
 def test_the_ends_of_a_limited_range_count():
-    found = extremes(lambda x: x, [InputRange(-0.5, 2.0)])
+    found = find_extremes(lambda x: x, [InputRange(-0.5, 2.0)])
     assert found == ((-0.5, (-0.5,)), (2.0, (2.0,)))
 
 
@@ -491,7 +491,7 @@ def test_a_dyad_that_an_input_stretches_is_no_four_bar():
 
 
 def test_a_grid_goes_over_all_inputs():
-    found = list(grid(shipped('five_bar'), 6))
+    found = list(grid_positions(shipped('five_bar'), 6))
     assert len({inputs for inputs, _ in found}) == len(found) == 36
 
 
@@ -578,9 +578,9 @@ def test_the_input_turns_fully_where_its_letter_is_c(a, b, c, d):
     assume(kind.margin == 0.0 or abs(kind.margin) > 1e-9)
     ranges = Closure(four_bar_linkage((a, b, c, d), 'left')).input_ranges
     if kind.code.startswith('G'):
-        assert ranges[0].whole == (kind.code[1] == 'C')
+        assert ranges[0].is_whole == (kind.code[1] == 'C')
     elif kind.code.startswith('R'):
-        assert not any(interval.whole for interval in ranges)
+        assert not any(interval.is_whole for interval in ranges)
         assert max(high - low for low, high, *_ in ranges) < 2.0 * pi < inf
 
 

@@ -26,7 +26,7 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import diagonals, dyads, newton_group, rail, step
 from linkage_ros.kinematics.batch import Batch, CODES
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.linkage import Answer, Compiled
+from linkage_ros.kinematics.compiling.linkage import Compiled, CompiledAnswer
 from linkage_ros.kinematics.compiling.solve import BLOCK
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.results import Position
@@ -302,7 +302,7 @@ def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name):
     met = check(closure, samples(inputs, 500))
     assert Status.CLOSED in met
     (interval, *_) = closure.input_ranges or (None,)
-    if interval is not None and not interval.whole and name != 'class_3':
+    if interval is not None and not interval.is_whole and name != 'class_3':
         # A parallelogram closes everywhere, also beyond the limits of a gripper's motor.
         assert (Status.LIMITED if name == 'gripper' else Status.OPEN) in met
 
@@ -325,7 +325,7 @@ def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(name, mon
     asked = []
     answer_of = Compiled.__call__
 
-    def answer(linkage: Compiled, *numbers: float) -> Answer:
+    def answer(linkage: Compiled, *numbers: float) -> CompiledAnswer:
         asked.append(numbers)
         return answer_of(linkage, *numbers)
 

@@ -16,7 +16,14 @@ from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, Pose, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
+    Input,
+    Linkage,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+)
 from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
@@ -323,11 +330,11 @@ MALFORMED = {
         FOUR_BAR, put('traced', ('P',)), 'traced', 'name one of A, B'
     ),
     'a pose with a value too many': Fault(
-        FOUR_BAR, put('pose', Pose((1.0, 2.0), {})), 'pose.inputs', 'give one for each input'
+        FOUR_BAR, put('pose', AssemblyPose((1.0, 2.0), {})), 'pose.inputs', 'give one for each input'
     ),
     'a class III group without a pose': Fault(CLASS_3, put('pose', None), 'pose', 'pose: {inputs'),
     'a pose that leaves a link out': Fault(
-        CLASS_3, put('pose', Pose((1.0,), {})), 'pose.points',
+        CLASS_3, put('pose', AssemblyPose((1.0,), {})), 'pose.points',
         'give two of its points: P1, P2, P3'
     ),
     'rails that run alike': Fault(

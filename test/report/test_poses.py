@@ -20,7 +20,7 @@ from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.shapes import carried_shapes, Circle, link_frames, shapes
-from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
+from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.report.data import page_data, poses
@@ -56,7 +56,7 @@ def some(closure):
     """Return inputs at which a linkage closes, and its positions there."""
     usual = usual_inputs(closure)
     interval = InputSweep(closure, usual).range_about(usual[0])
-    values = samples(interval, 24) if interval else [usual[0]]
+    values = sample_inputs(interval, 24) if interval else [usual[0]]
     inputs = [(value, *usual[1:]) for value in values]
     found = [(each, closure.position(*each)) for each in inputs]
     return zip(*((each, position) for each, position in found if position.joints), strict=True)
@@ -160,7 +160,7 @@ def moments(scene):
     (member,) = scene.members
     usual = usual_inputs(line.closure)
     interval = InputSweep(line.closure, usual).range_about(usual[0])
-    values = samples(interval, TICKS) if interval else [usual[0]] * TICKS
+    values = sample_inputs(interval, TICKS) if interval else [usual[0]] * TICKS
     write = JointStateWriter(member.inputs).write
     for tick, value in enumerate(values):
         time = BEGIN + tick * MS

@@ -181,4 +181,4 @@ def test_several_linkages_have_their_prefixes():
     written = limits_in(urdf('it', parts))
     assert written['left_crank_joint'][1]['upper'] == '1.5'
     assert written['right_crank_joint'][0] == 'continuous'
-    assert replace(Limits(), low=0.0).bounded
+    assert replace(Limits(), low=0.0).is_bounded

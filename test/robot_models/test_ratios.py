@@ -14,7 +14,7 @@ from random import Random
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Ratio
-from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
+from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs
 from linkage_ros.robot_models.from_urdf import from_urdf, ImportedLinkage
 from linkage_ros.robot_models.mjcf import mjcf
 from linkage_ros.robot_models.part import Part
@@ -139,7 +139,7 @@ def test_urdf_there_and_back(name: str) -> None:
     again = Closure(from_urdf(read_urdf(data, 'r.urdf')).linkage)
     assert again.linkage.ratios == closure.linkage.ratios
     for interval in InputSweep(closure).ranges:
-        for value in samples(interval, 24)[1:-1]:
+        for value in sample_inputs(interval, 24)[1:-1]:
             here, there = closure.position(value), again.position(value)
             for joint_name, turns in zip(closure.joint_names, closure.turning, strict=True):
                 off = there[joint_name] - here[joint_name]

@@ -17,7 +17,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import load
 from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
+from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.robot_models.from_urdf import from_urdf
@@ -150,7 +150,7 @@ def test_no_state_of_the_whole_range_lies_beyond_the_limits(name, angles):
     limits = limits_of(scene_model(scene, closures, urdf))
     (given,) = closures[0].linkage.inputs
     interval = InputSweep(closures[0]).range_about(*usual_inputs(closures[0]))
-    values = samples(interval, 300)
+    values = sample_inputs(interval, 300)
     seen = 0
     for first in range(0, len(values), len(values) // 4):
         for way in (values[first:], values[first::-1]):
@@ -286,7 +286,7 @@ def inputs_of(closure):
     if len(closure.linkage.inputs) > 1:
         return [(1.3 + 0.05 * i, 1.8 - 0.03 * i) for i in range(15)]
     interval = InputSweep(closure).widest_range
-    return [(value,) for value in samples(interval, 200)[1:-1]]
+    return [(value,) for value in sample_inputs(interval, 200)[1:-1]]
 
 
 def differences(one, other):

@@ -19,7 +19,14 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.linkage_text import linkage_text, number_text, write_linkage
 from linkage_ros.files.yaml_file import parse_yaml
-from linkage_ros.kinematics.linkage import Limits, Linkage, Mass, Pose, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
+    Limits,
+    Linkage,
+    Mass,
+    RevoluteJoint,
+    SlideJoint,
+)
 import pytest
 import yaml
 
@@ -133,7 +140,7 @@ def linkages(draw: st.DrawFn) -> Linkage:
         draw(
             st.none()
             | st.builds(
-                Pose,
+                AssemblyPose,
                 st.tuples(*[NUMBERS] * len(linkage.inputs)),
                 # Points of the ground tell nothing: any place of them is read.
                 st.dictionaries(st.sampled_from(sorted(links['ground'])), POINTS),

@@ -66,21 +66,21 @@ class C(Language):
         self._header = header
         self.status = f'{name.upper()}_{{}}'
 
-    def function(self, derivatives: int) -> str:
-        return f'{self._name}_{super().function(derivatives)}'
+    def function_name(self, derivatives: int) -> str:
+        return f'{self._name}_{super().function_name(derivatives)}'
 
-    def call(self, operation: Operation, parts: list[str]) -> str:
+    def write_call(self, operation: Operation, parts: list[str]) -> str:
         if operation.name == '**' and parts[1] == '2.0':
             return f'pow({parts[0]}, {_TWO})'
-        return super().call(operation, parts)
+        return super().write_call(operation, parts)
 
-    def assigned(self, name: str, text: str, truth: bool = False) -> str:
+    def assign(self, name: str, text: str, truth: bool = False) -> str:
         return f'const {"int" if truth else "double"} {name} = {text};'
 
-    def left(self, status: str) -> str:
+    def return_status(self, status: str) -> str:
         return f'return {status};'
 
-    def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
+    def return_solution(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
         lines = [
             f'{array}[{number}] = {text};'
             for array, group in zip(RETURNED, groups, strict=False)
@@ -88,7 +88,7 @@ class C(Language):
         ]
         return [*lines, f'return {status};']
 
-    def scaled(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+    def scale_rates(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
         end = 1 + len(given)
         names = [f'scaled_{name}' for name in GIVEN[1:end]]
         returned = RETURNED[:end]
@@ -98,15 +98,15 @@ class C(Language):
         return [
             *(f'const double {name}[] = {{{", ".join(group)}}};' for name, group in arrays),
             f'const enum {self._name}_status status =',
-            f'    {self.function(len(given))}({arguments});',
+            f'    {self.function_name(len(given))}({arguments});',
             f'for (int i = 0; {valid} && i < {len(subject.joints)}; ++i) {{',
             *(f'    {name}[i] *= up;' for order in (1, 2) for name in returned[order:]),
             '}',
             'return status;',
         ]
 
-    def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
-        name, function = self._name, self.function(subject.derivatives)
+    def whole_source(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+        name, function = self._name, self.function_name(subject.derivatives)
         driven, joints = len(subject.closure.linkage.inputs), len(subject.joints)
         kind = f'enum {name}_status'
         parameters = [

@@ -64,40 +64,40 @@ class JavaScript(Language):
     nearest = 'Math.round'
     status = 'Status.{}'
 
-    def assigned(self, name: str, text: str, truth: bool = False) -> str:
+    def assign(self, name: str, text: str, truth: bool = False) -> str:
         return f'const {name} = {text};'
 
-    def left(self, status: str) -> str:
+    def return_status(self, status: str) -> str:
         return f'return nothing({status});'
 
-    def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
+    def return_solution(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
         arrays = (
             f', {name}: [{", ".join(group)}]'
             for name, group in zip(self._names, groups, strict=False)
         )
         return [f'return {{status: {status}{"".join(arrays)}}};']
 
-    def scaled(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+    def scale_rates(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
         arguments = ''.join(f', [{", ".join(group)}]' for group in given)
         return [
-            f'const found = {self.function(len(given))}(inputs{arguments});',
+            f'const found = {self.function_name(len(given))}(inputs{arguments});',
             *(
                 f'found.{name} = found.{name}.map((each) => each{" * up" * _ORDERS[name]});'
-                for name in self._returned(subject)
+                for name in self._returned_values(subject)
                 if name in _ORDERS
             ),
             'return found;',
         ]
 
-    def _returned(self, subject: Subject) -> Sequence[str]:
+    def _returned_values(self, subject: Subject) -> Sequence[str]:
         return self._names if subject.frames else self._names[: 1 + subject.derivatives]
 
-    def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+    def whole_source(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
         given = GIVEN[: 1 + subject.derivatives]
-        empty = ', '.join(f'{name}: []' for name in self._returned(subject))
+        empty = ', '.join(f'{name}: []' for name in self._returned_values(subject))
         comment = (f' * {line}'.rstrip() for line in (*head, *_NOTES))
         statuses = (f'    {status}: {number},' for number, status in enumerate(STATUSES))
-        name = self.function(subject.derivatives)
+        name = self.function_name(subject.derivatives)
         lines = [
             '/*', *comment, ' */', '',
             f'{self._export}const Status = Object.freeze({{', *statuses, '});',

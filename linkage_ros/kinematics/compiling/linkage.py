@@ -15,9 +15,20 @@ from itertools import islice, product
 from math import inf, pi, tau
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.compiling.python import Body, python_body, python_function, Values
-from linkage_ros.kinematics.compiling.trace import joints, moved, Path, traced, Wanted
-from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.compiling.python import (
+    python_body,
+    python_function,
+    PythonBody,
+    Values,
+)
+from linkage_ros.kinematics.compiling.trace import (
+    motion_at,
+    OutputSelection,
+    Path,
+    published_joints,
+    trace_path,
+)
+from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
@@ -34,7 +45,7 @@ _TRIED_ITERATED = 2
 """The same for an iterated linkage, where one state may take a tenth of a second."""
 
 
-class Answer(NamedTuple):
+class CompiledAnswer(NamedTuple):
     """
     The result of a compiled linkage at a state; status and gap are those of `Position`.
 
@@ -71,7 +82,7 @@ class Compiled:
         self,
         closure: LoopClosure,
         derivatives: int = 0,
-        wanted: Wanted = joints,
+        wanted: OutputSelection = published_joints,
         within_limits: bool = True,
     ) -> None:
         self._closure = closure
@@ -83,33 +94,33 @@ class Compiled:
         # forms in different regions.
         self.paths: list[Path] = []
         self._functions: list[Callable[..., Values | None]] = []
-        self._bodies: dict[str, Body] = {}
-        for inputs in _states(closure):
-            self._follow(inputs)
+        self._bodies: dict[str, PythonBody] = {}
+        for inputs in _trial_states(closure):
+            self._add_path(inputs)
         if not self.paths and (self.driven > 1 or closure.input_ranges):
             # This starts an additional search, which takes longer.
-            self._follow(usual_inputs(closure))
+            self._add_path(usual_inputs(closure))
         # Takes the inputs, their rates and their accelerations, in this order; returns the values,
         # or None if the plain steps must answer.
         self.fast: Callable[..., Values | None] = _first_of(self._functions)
 
-    def _follow(self, inputs: tuple[float, ...]) -> None:
+    def _add_path(self, inputs: tuple[float, ...]) -> None:
         """Add the path that the steps take at a state, if it is closed and the path is new."""
         more = (1.25,) * self.driven * self.derivatives
         if len(self.paths) == _MOST_PATHS or any(
             function(*inputs, *more) is not None for function in self._functions
         ):
             return
-        close = self._closure.position if self._within_limits else self._closure.posed
+        close = self._closure.position if self._within_limits else self._closure.close_unlimited
         if close(*inputs).status is Status.CLOSED:
-            path = traced(
+            path = trace_path(
                 self._closure, inputs, self.derivatives, self.wanted, self._within_limits
             )
             if path.outputs:
                 self.paths.append(path)
                 self._functions.append(python_function(path))
 
-    def body(self, leave: str) -> Body:
+    def first_path_body(self, bail_out: str) -> PythonBody:
         """
         Return the first path as lines of Python, which are written once.
 
@@ -119,11 +130,11 @@ class Compiled:
             The statement that leaves the lines if the path is not valid.
 
         """
-        if leave not in self._bodies:
-            self._bodies[leave] = python_body(self.paths[0], leave)
-        return self._bodies[leave]
+        if bail_out not in self._bodies:
+            self._bodies[bail_out] = python_body(self.paths[0], bail_out)
+        return self._bodies[bail_out]
 
-    def __call__(self, *numbers: float) -> Answer:
+    def __call__(self, *numbers: float) -> CompiledAnswer:
         """
         Return the answer at a state.
 
@@ -140,17 +151,17 @@ class Compiled:
         """
         values = self.fast(*numbers)
         if values is not None:
-            return Answer(Status.CLOSED, 0.0, values)
-        return self.plain(*numbers)
+            return CompiledAnswer(Status.CLOSED, 0.0, values)
+        return self.run_interpreted(*numbers)
 
-    def plain(self, *numbers: float) -> Answer:
+    def run_interpreted(self, *numbers: float) -> CompiledAnswer:
         """Return the result of the plain steps."""
         given = list(zip(*[iter(numbers)] * self.driven, strict=True))
-        motion = moved(self._closure, given, self._within_limits)
+        motion = motion_at(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
         values = tuple(tuple(group) for group in self.wanted(motion))
         groups = len(self.paths[0].outputs) if self.paths else 1 + self.derivatives
-        return Answer(status, gap, (*values, *((),) * (groups - len(values))))
+        return CompiledAnswer(status, gap, (*values, *((),) * (groups - len(values))))
 
 
 def _first_of(
@@ -160,22 +171,22 @@ def _first_of(
     if len(functions) == 1:
         return functions[0]
 
-    def first(*numbers: float) -> Values | None:
+    def first_result(*numbers: float) -> Values | None:
         for function in functions:
             values = function(*numbers)
             if values is not None:
                 return values
         return None
 
-    return first
+    return first_result
 
 
-def _states(closure: LoopClosure) -> Iterator[tuple[float, ...]]:
+def _trial_states(closure: LoopClosure) -> Iterator[tuple[float, ...]]:
     """Yield inputs at which a linkage may be closed: those of its pose, and some in its ranges."""
     linkage = closure.linkage
     if linkage.pose is not None:
         yield linkage.pose.inputs
-    count = _TRIED_ITERATED if iterated(closure) else _TRIED
+    count = _TRIED_ITERATED if is_iterated(closure) else _TRIED
     each = max(2, round(count ** (1.0 / len(linkage.inputs))))
     ways = []
     for given in linkage.inputs:

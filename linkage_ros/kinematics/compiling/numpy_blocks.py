@@ -24,22 +24,22 @@ from typing import Any, Final, NamedTuple
 from linkage_ros.generated_code import written
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.batch import Array, Mask
-from linkage_ros.kinematics.compiling.tape import Kind, Operation, rewritten
-from linkage_ros.kinematics.compiling.writer import needed, uses
+from linkage_ros.kinematics.compiling.tape import Kind, Operation, rewrite_operations
+from linkage_ros.kinematics.compiling.writer import count_uses, needed_operations
 import numpy as np
 
 Number = Any
 """An operation, or a constant: a number or a truth value."""
 
 
-class Bounds(NamedTuple):
+class BlockBounds(NamedTuple):
     """The range of a number, up to its rounding."""
 
     low: float = -inf
     high: float = inf
 
 
-_ANY = Bounds()
+_ANY = BlockBounds()
 
 _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
     '<': operator.lt,
@@ -86,54 +86,60 @@ class ArrayForm:
     def __init__(self, given: Mapping[str, int]) -> None:
         self._given = given
         self._known: dict[tuple[Any, ...], Operation] = {}
-        self._bounds: dict[Operation, Bounds] = {}
+        self._bounds: dict[Operation, BlockBounds] = {}
         self._written: dict[Operation, Number] = {}
 
-    def number(self, root: Number) -> Number:
+    def rewrite_number(self, root: Number) -> Number:
         """Return an operation of a path in its new form, or the constant that it reduces to."""
-        return root if _constant(root) else rewritten(root, self._written, self._write)
+        return (
+            root
+            if _is_constant(root)
+            else rewrite_operations(root, self._written, self._rewrite_operation)
+        )
 
-    def opposite(self, condition: Number) -> Number:
+    def logical_not(self, condition: Number) -> Number:
         """Return the negation of a condition."""
-        return (not condition) if _constant(condition) else self._new('not', condition)
+        return (
+            (not condition) if _is_constant(condition) else self._new_operation('not', condition)
+        )
 
-    def both(self, one: Number, other: Number) -> Number:
+    def logical_and(self, one: Number, other: Number) -> Number:
         """Return the conjunction of two conditions."""
         for first, second in ((one, other), (other, one)):
-            if _constant(first):
+            if _is_constant(first):
                 return second if first else False
-        return self._new('and', one, other)
+        return self._new_operation('and', one, other)
 
-    def either(self, one: Number, other: Number) -> Number:
+    def logical_or(self, one: Number, other: Number) -> Number:
         """Return the disjunction of two conditions."""
         for first, second in ((one, other), (other, one)):
-            if _constant(first):
+            if _is_constant(first):
                 return True if first else second
-        return self._new('or', one, other)
+        return self._new_operation('or', one, other)
 
     def where(self, condition: Number, one: Number, other: Number) -> Number:
         """Return ``one`` if a condition holds, otherwise ``other``."""
-        if _constant(condition):
+        if _is_constant(condition):
             return one if condition else other
         if one is other:
             return one
         greater = condition.name in ('>', '>=')
         if greater or condition.name in ('<', '<='):
             if condition.arguments == (one, other):
-                return self._new('maximum' if greater else 'minimum', one, other)
+                return self._new_operation('maximum' if greater else 'minimum', one, other)
             if condition.arguments == (other, one):
-                return self._new('minimum' if greater else 'maximum', one, other)
-        (low, high), (other_low, other_high) = self._between(one), self._between(other)
-        return self._new(
+                return self._new_operation('minimum' if greater else 'maximum', one, other)
+        (low, high), (other_low, other_high) = self._bounds_of(one), self._bounds_of(other)
+        return self._new_operation(
             'where', condition, one, other,
-            bounds=Bounds(min(low, other_low), max(high, other_high)),
+            bounds=BlockBounds(min(low, other_low), max(high, other_high)),
         )  # fmt: skip
 
-    def _write(self, operation: Operation) -> Number:
+    def _rewrite_operation(self, operation: Operation) -> Number:
         name = operation.name
         if operation.is_input:
             known = self._given.get(name)
-            return self._new(name) if known is None else known
+            return self._new_operation(name) if known is None else known
         given = [self._written[a] if isinstance(a, Operation) else a for a in operation.arguments]
         match name:
             case '+':
@@ -147,96 +153,98 @@ class ArrayForm:
             case '**':
                 return self._power(*given)
             case 'negative':
-                return self._negative(*given)
+                return self._negate(*given)
             case 'sin' | 'cos':
                 return self._sine_cosine(*given)[name == 'cos']
             case 'where':
                 return self.where(*given)
             case 'abs':
-                return self._absolute(*given)
+                return self._absolute_value(*given)
             case 'sqrt':
-                return self._root(*given)
+                return self._square_root(*given)
         if name in _COMPARED:
             return self._compare(name, *given)
-        return self._new(name, *given)
+        return self._new_operation(name, *given)
 
     def _add(self, one: Number, other: Number) -> Number:
-        if _constant(one) and _constant(other):
+        if _is_constant(one) and _is_constant(other):
             return one + other
         for first, second in ((one, other), (other, one)):
-            if _constant(first) and first == 0.0:
+            if _is_constant(first) and first == 0.0:
                 return second
-            if (positive := _negated(second)) is not None:
+            if (positive := _negated_operand(second)) is not None:
                 return self._subtract(first, positive)
-        (low, high), (other_low, other_high) = self._between(one), self._between(other)
-        return self._new(
-            '+', *_ordered(one, other), bounds=Bounds(low + other_low, high + other_high)
+        (low, high), (other_low, other_high) = self._bounds_of(one), self._bounds_of(other)
+        return self._new_operation(
+            '+', *_order_pair(one, other), bounds=BlockBounds(low + other_low, high + other_high)
         )
 
     def _subtract(self, one: Number, other: Number) -> Number:
-        if _constant(one) and _constant(other):
+        if _is_constant(one) and _is_constant(other):
             return one - other
-        if _constant(other) and other == 0.0:
+        if _is_constant(other) and other == 0.0:
             return one
-        if _constant(one) and one == 0.0:
-            return self._negative(other)
-        if (positive := _negated(other)) is not None:
+        if _is_constant(one) and one == 0.0:
+            return self._negate(other)
+        if (positive := _negated_operand(other)) is not None:
             return self._add(one, positive)
-        if (positive := _negated(one)) is not None:
-            return self._negative(self._add(positive, other))
-        (low, high), (other_low, other_high) = self._between(one), self._between(other)
-        return self._new('-', one, other, bounds=Bounds(low - other_high, high - other_low))
+        if (positive := _negated_operand(one)) is not None:
+            return self._negate(self._add(positive, other))
+        (low, high), (other_low, other_high) = self._bounds_of(one), self._bounds_of(other)
+        return self._new_operation(
+            '-', one, other, bounds=BlockBounds(low - other_high, high - other_low)
+        )
 
-    def _negative(self, one: Number) -> Number:
-        if _constant(one):
+    def _negate(self, one: Number) -> Number:
+        if _is_constant(one):
             return -one
         if one.name == '-':
             return self._subtract(*reversed(one.arguments))
         return self._multiply(-1.0, one)
 
     def _multiply(self, one: Number, other: Number) -> Number:
-        (factor, one), (more, other) = _split(one), _split(other)
-        if _nothing(factor) or _nothing(more):
+        (factor, one), (more, other) = _split_factor(one), _split_factor(other)
+        if _is_given_zero(factor) or _is_given_zero(more):
             return 0
-        return self._scaled(factor * more, self._product(one, other))
+        return self._scale(factor * more, self._multiply_terms(one, other))
 
-    def _product(self, one: Number, other: Number) -> Number:
+    def _multiply_terms(self, one: Number, other: Number) -> Number:
         if one is None or other is None:
             return one if other is None else other
         bounds = _ANY
-        ends = [p * q for p in self._between(one) for q in self._between(other)]
+        ends = [p * q for p in self._bounds_of(one) for q in self._bounds_of(other)]
         if all(abs(end) < inf for end in ends):
-            bounds = Bounds(min(ends), max(ends))
+            bounds = BlockBounds(min(ends), max(ends))
         if one is other:
             bounds = bounds._replace(low=0.0)
-            if bounds.high < inf and self._between(one).low > 0.0:
-                bounds = bounds._replace(low=self._between(one).low ** 2)
-        return self._new('*', *_ordered(one, other), bounds=bounds)
+            if bounds.high < inf and self._bounds_of(one).low > 0.0:
+                bounds = bounds._replace(low=self._bounds_of(one).low ** 2)
+        return self._new_operation('*', *_order_pair(one, other), bounds=bounds)
 
     def _divide(self, one: Number, other: Number) -> Number:
-        (factor, one), (divisor, other) = _split(one), _split(other)
-        if _nothing(factor):
+        (factor, one), (divisor, other) = _split_factor(one), _split_factor(other)
+        if _is_given_zero(factor):
             return 0
         if divisor == 0.0:
             # Only in branches that the steps do not take.
             return nan
         factor /= divisor
         if other is None:
-            return self._scaled(factor, one)
+            return self._scale(factor, one)
         if one is None:
-            return self._new('/', factor, other)
-        return self._scaled(factor, self._new('/', one, other))
+            return self._new_operation('/', factor, other)
+        return self._scale(factor, self._new_operation('/', one, other))
 
-    def _scaled(self, factor: float, one: Number) -> Number:
+    def _scale(self, factor: float, one: Number) -> Number:
         """Return a number without a constant factor, times a factor."""
         if one is None or factor == 1.0:
             return factor if one is None else one
         if factor == -1.0 and one.name == '-':
             return self._subtract(*reversed(one.arguments))
-        if one.name == '/' and _constant(one.arguments[0]):
-            return self._new('/', factor * one.arguments[0], one.arguments[1])
-        ends = [factor * end for end in self._between(one)]
-        return self._new('*', factor, one, bounds=Bounds(min(ends), max(ends)))
+        if one.name == '/' and _is_constant(one.arguments[0]):
+            return self._new_operation('/', factor * one.arguments[0], one.arguments[1])
+        ends = [factor * end for end in self._bounds_of(one)]
+        return self._new_operation('*', factor, one, bounds=BlockBounds(min(ends), max(ends)))
 
     def _power(self, one: Number, power: int) -> Number:
         """Return an integer power, as products."""
@@ -254,48 +262,56 @@ class ArrayForm:
         its sine and cosine are not: the tangent takes a tenth of the time of both.
         """
         if not _BY_TANGENT:
-            unit = Bounds(-1.0, 1.0)
-            return self._new('sin', angle, bounds=unit), self._new('cos', angle, bounds=unit)
+            unit = BlockBounds(-1.0, 1.0)
+            return self._new_operation('sin', angle, bounds=unit), self._new_operation(
+                'cos', angle, bounds=unit
+            )
         # With t = tan(angle/2): 2t/(1 + t²) and (1 − t²)/(1 + t²).
-        tangent = self._new('tan', self._multiply(0.5, angle))
+        tangent = self._new_operation('tan', self._multiply(0.5, angle))
         square = self._multiply(tangent, tangent)
         more = self._add(1.0, square)
-        half_sine = self._new('/', tangent, more, bounds=Bounds(-0.5, 0.5))
-        cosine = self._new('/', self._subtract(1.0, square), more, bounds=Bounds(-1.0, 1.0))
+        half_sine = self._new_operation('/', tangent, more, bounds=BlockBounds(-0.5, 0.5))
+        cosine = self._new_operation(
+            '/', self._subtract(1.0, square), more, bounds=BlockBounds(-1.0, 1.0)
+        )
         return self._multiply(2.0, half_sine), cosine
 
-    def _absolute(self, one: Number) -> Number:
-        if _constant(one):
+    def _absolute_value(self, one: Number) -> Number:
+        if _is_constant(one):
             return abs(one)
-        low, high = self._between(one)
+        low, high = self._bounds_of(one)
         if low >= 0.0:
             return one
         if high <= 0.0:
-            return self._negative(one)
-        return self._new('abs', one, bounds=Bounds(0.0, max(-low, high)))
+            return self._negate(one)
+        return self._new_operation('abs', one, bounds=BlockBounds(0.0, max(-low, high)))
 
-    def _root(self, one: Number) -> Number:
-        if not _constant(one) and one.name == '*' and one.arguments[0] is one.arguments[1]:
-            return self._absolute(one.arguments[0])
-        low, high = self._between(one)
-        return self._new('sqrt', one, bounds=Bounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5))
+    def _square_root(self, one: Number) -> Number:
+        if not _is_constant(one) and one.name == '*' and one.arguments[0] is one.arguments[1]:
+            return self._absolute_value(one.arguments[0])
+        low, high = self._bounds_of(one)
+        return self._new_operation(
+            'sqrt', one, bounds=BlockBounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5)
+        )
 
     def _compare(self, name: str, one: Number, other: Number) -> Number:
-        if _constant(one) and _constant(other):
+        if _is_constant(one) and _is_constant(other):
             return _COMPARED[name](one, other)
-        (low, high), (other_low, other_high) = self._between(one), self._between(other)
-        if _clear(high, other_low):
+        (low, high), (other_low, other_high) = self._bounds_of(one), self._bounds_of(other)
+        if _is_clearly_less(high, other_low):
             return _COMPARED[name](0.0, 1.0)
-        if _clear(other_high, low):
+        if _is_clearly_less(other_high, low):
             return _COMPARED[name](1.0, 0.0)
-        return self._new(name, one, other)
+        return self._new_operation(name, one, other)
 
-    def _between(self, number: Number) -> Bounds:
-        if _constant(number):
-            return Bounds(number, number)
+    def _bounds_of(self, number: Number) -> BlockBounds:
+        if _is_constant(number):
+            return BlockBounds(number, number)
         return self._bounds[number]
 
-    def _new(self, name: str, *arguments: Number, bounds: Bounds = _ANY) -> Operation:
+    def _new_operation(
+        self, name: str, *arguments: Number, bounds: BlockBounds = _ANY
+    ) -> Operation:
         key = (name, *(a.number if isinstance(a, Operation) else repr(a) for a in arguments))
         operation = self._known.get(key)
         if operation is None:
@@ -306,41 +322,41 @@ class ArrayForm:
         return operation
 
 
-def _constant(number: Number) -> bool:
+def _is_constant(number: Number) -> bool:
     return not isinstance(number, Operation)
 
 
-def _nothing(number: Number) -> bool:
+def _is_given_zero(number: Number) -> bool:
     """Return whether a number is a given 0, whose sign does not matter."""
     return isinstance(number, int) and number == 0
 
 
-def _split(number: Number) -> tuple[float, Number]:
+def _split_factor(number: Number) -> tuple[float, Number]:
     """Return the constant factor of a number, and the rest, or None if there is none."""
-    if _constant(number):
+    if _is_constant(number):
         return number, None
     # A 0 stays where it is: a product of the other factors alone may overflow.
-    if number.name == '*' and _constant(number.arguments[0]) and number.arguments[0] != 0.0:
+    if number.name == '*' and _is_constant(number.arguments[0]) and number.arguments[0] != 0.0:
         factor, rest = number.arguments
         return factor, rest
     return 1.0, number
 
 
-def _negated(number: Number) -> Number:
+def _negated_operand(number: Number) -> Number:
     """Return the operand of a negation, or None."""
-    if not _constant(number) and number.name == '*' and number.arguments[0] == -1.0:
+    if not _is_constant(number) and number.name == '*' and number.arguments[0] == -1.0:
         return number.arguments[1]
     return None
 
 
-def _ordered(one: Operation, other: Operation) -> tuple[Number, Number]:
+def _order_pair(one: Operation, other: Operation) -> tuple[Number, Number]:
     """Return two terms or factors in their canonical order."""
-    if _constant(one) or _constant(other):
-        return (one, other) if _constant(one) else (other, one)
+    if _is_constant(one) or _is_constant(other):
+        return (one, other) if _is_constant(one) else (other, one)
     return (one, other) if one.number <= other.number else (other, one)
 
 
-def _clear(less: float, more: float) -> bool:
+def _is_clearly_less(less: float, more: float) -> bool:
     """Return whether one number is less than another, however both are rounded."""
     return more - less > _CLEAR * max(abs(less), abs(more)) and less < inf and more > -inf
 
@@ -396,7 +412,7 @@ class BlockFunction:
         roots: Sequence[Number],
         condition: Number = True,
     ) -> None:
-        writer = _Writer(arrays, roots, condition)
+        writer = _BlockWriter(arrays, roots, condition)
         # Number of scratch rows of floats, and of truth values.
         self.rows, self.masks = writer.rows.count, writer.masks.count
         names = [
@@ -439,7 +455,7 @@ class BlockFunction:
         return holds
 
 
-class _Room:
+class _NamePool:
     """A pool of buffer names."""
 
     def __init__(self, letter: str) -> None:
@@ -447,63 +463,65 @@ class _Room:
         self._free: list[str] = []
         self.count = 0
 
-    def take(self) -> str:
+    def take_name(self) -> str:
         """Return a free name."""
         if self._free:
             return self._free.pop()
         self.count += 1
         return f'{self._letter}{self.count - 1}'
 
-    def give_back(self, name: str) -> None:
+    def return_name(self, name: str) -> None:
         """Return a name to the pool."""
         if name.startswith(self._letter):
             self._free.append(name)
 
 
-class _Writer:
+class _BlockWriter:
     """Writes operations as passes over arrays, each after its operands."""
 
     def __init__(self, arrays: Sequence[str], roots: Sequence[Number], condition: Number) -> None:
-        self.rows, self.masks = _Room('r'), _Room('m')
+        self.rows, self.masks = _NamePool('r'), _NamePool('m')
         self.lines: list[str] = []
         self._arrays = arrays
         self._names: dict[Operation, str] = {}
         self._of_states: set[Operation] = set()
-        self._left = uses([condition, *roots])
+        self._left = count_uses([condition, *roots])
         self._wanted: dict[Operation, str] = {}
         for k, root in enumerate(roots):
             if isinstance(root, Operation) and not root.is_input:
                 self._wanted.setdefault(root, f'o{k}')
-        self._write(condition)
-        held = self._text(condition) if isinstance(condition, Operation) else None
+        self._write_number(condition)
+        held = self._number_text(condition) if isinstance(condition, Operation) else None
         if held:
             self.lines.append(f'if 2 * count_nonzero({held}) < {held}.size: return {held}')
         for k, root in enumerate(roots):
-            self._write(root)
+            self._write_number(root)
             place = f'o{k}'
-            if self._text(root) != place:
-                self.lines.append(f'copyto({place}, {self._text(root)})')
+            if self._number_text(root) != place:
+                self.lines.append(f'copyto({place}, {self._number_text(root)})')
         self.lines.append(f'return {held}')
 
-    def _text(self, number: Number) -> str:
+    def _number_text(self, number: Number) -> str:
         if isinstance(number, Operation):
             return self._names[number]
         # A linkage may hold numpy numbers, whose repr() includes the type.
         return repr(number if isinstance(number, bool) else float(number))
 
-    def _write(self, root: Number) -> None:
+    def _write_number(self, root: Number) -> None:
         """Write a number, after the operations that it needs."""
-        for operation in needed(root, self._names) if isinstance(root, Operation) else ():
-            self._place(operation)
+        for operation in (
+            needed_operations(root, self._names) if isinstance(root, Operation) else ()
+        ):
+            self._write_operation(operation)
 
-    def _place(self, operation: Operation) -> None:
+    def _write_operation(self, operation: Operation) -> None:
         operands = operation.operands()
         if operation.is_input:
             self._names[operation] = operation.name
             if operation.name in self._arrays:
                 self._of_states.add(operation)
             return
-        texts = [self._text(argument) for argument in operation.arguments]
+        texts = [self._number_text(argument) for argument in operation.arguments]
         if not any(operand in self._of_states for operand in operands):
             # The same number for all states.
             self._names[operation] = f't{operation.number}'
@@ -513,19 +531,19 @@ class _Writer:
             return
         self._of_states.add(operation)
         if operation.name == 'where':
-            self._choose(operation, texts)
+            self._write_choice(operation, texts)
         else:
             self._done_with(operands)
-            into = self._into(operation)
+            into = self._result_buffer(operation)
             self.lines.append(
                 f'{_FUNCTIONS[operation.name].__name__}({", ".join(texts)}, out={into})'
             )
 
-    def _into(self, operation: Operation) -> str:
+    def _result_buffer(self, operation: Operation) -> str:
         """Return the buffer for the result of an operation."""
         wanted = self._wanted.get(operation)
         if wanted is None:
-            wanted = (self.masks if operation.kind == 'truth' else self.rows).take()
+            wanted = (self.masks if operation.kind == 'truth' else self.rows).take_name()
         self._names[operation] = wanted
         return wanted
 
@@ -535,9 +553,9 @@ class _Writer:
             self._left[operand] -= 1
             if not self._left[operand]:
                 for room in (self.rows, self.masks):
-                    room.give_back(self._names[operand])
+                    room.return_name(self._names[operand])
 
-    def _choose(self, operation: Operation, texts: Sequence[str]) -> None:
+    def _write_choice(self, operation: Operation, texts: Sequence[str]) -> None:
         """Write a choice: one number over the other where a condition holds."""
         condition, one, other = texts
         last = operation.arguments[2]
@@ -546,7 +564,7 @@ class _Writer:
             into = self._names[operation] = other
             self._left[last] += 1
         else:
-            into = self._into(operation)
+            into = self._result_buffer(operation)
             self.lines.append(f'copyto({into}, {other})')
         self.lines.append(f'copyto({into}, {one}, where={condition})')
         self._done_with(operation.operands())

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from linkage_ros.generated_code import written
 from linkage_ros.kinematics.compiling.tape import Operation, Tape
 from linkage_ros.kinematics.compiling.trace import number_of, Path
-from linkage_ros.kinematics.compiling.writer import Writer
+from linkage_ros.kinematics.compiling.writer import TextWriter
 from linkage_ros.kinematics.doubles import HUGE
 
 Values = tuple[tuple[float, ...], ...]
@@ -40,7 +40,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 _ATTRIBUTES = frozenset(('real', 'imag'))
 
 
-class Body(NamedTuple):
+class PythonBody(NamedTuple):
     """A path as lines of Python."""
 
     lines: list[str]  # The lines; they use the inputs by their names in the path
@@ -63,24 +63,24 @@ def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]
     return '\n'.join([*text, f'    return {returned}', '']), bound
 
 
-def python_body(path: Path, leave: str) -> Body:
+def python_body(path: Path, bail_out: str) -> PythonBody:
     """Return a path as lines of Python; ``leave`` is the statement if it is not valid."""
     constants: dict[str, Any] = {}
     conditions = [decision.condition for decision in path.decisions]
     outputs = [number for group in path.outputs for number in group]
 
-    def constant(value: Any) -> str:
+    def write_constant(value: Any) -> str:
         if isinstance(value, int | float) and math.isfinite(value):
             return repr(value)
         known = f'k{len(constants)}'
         constants[known] = value
         return known
 
-    def call(operation: Operation, parts: list[str]) -> str:
+    def write_call(operation: Operation, parts: list[str]) -> str:
         if operation.name in _ATTRIBUTES:
-            return f'{_atom(parts[0])}.{operation.name}'
+            return f'{_bracket_text(parts[0])}.{operation.name}'
         if operation.name == 'conjugate':
-            return f'{_atom(parts[0])}.conjugate()'
+            return f'{_bracket_text(parts[0])}.conjugate()'
         if operation.name == 'facing':
             return f'rect(1.0, {parts[0]})'
         if operation.name == 'vector':
@@ -88,37 +88,41 @@ def python_body(path: Path, leave: str) -> Body:
         if operation.name == '**':
             return f'({parts[0]}) ** {parts[1]}'
         if operation.name == 'item':
-            return f'{_atom(parts[0])}[{parts[1]}]'
+            return f'{_bracket_text(parts[0])}[{parts[1]}]'
         if operation.name == 'finite':
-            return '(' + ' and '.join(f'{_atom(p)} - {_atom(p)} == 0.0' for p in parts) + ')'
+            return (
+                '('
+                + ' and '.join(f'{_bracket_text(p)} - {_bracket_text(p)} == 0.0' for p in parts)
+                + ')'
+            )
         if operation.name == 'found':
             return f'({parts[0]} is not None)'
         if operation.name == 'call':
             return f'{parts[0]}({", ".join(parts[1:])})'
         return f'{operation.name}({", ".join(parts)})'
 
-    writer = Writer(
+    writer = TextWriter(
         [*conditions, *outputs],
-        constant,
-        call,
+        write_constant,
+        write_call,
         lambda condition, one, other: f'{one} if {condition} else {other}',
         lambda known, text, _: f'{known} = {text}',
     )
     for given in path.inputs:
-        writer.name(given, given.name)
+        writer.name_operation(given, given.name)
     if any(map(_of_inputs, conditions)):
         # 0 for finite numbers, otherwise NaN; a sum that overflows leaves the path, too, and so
         # do huge rates, whose squares might.
         large = f'{2.0**512 / HUGE * 2.0**512!r} * '
         names = [given.name for given in path.inputs]
         total = ' + '.join(name if name[0] == 'q' else large + name for name in names)
-        writer.lines += [f'total = {total}', 'if total - total != 0.0:', f'    {leave}']
+        writer.lines += [f'total = {total}', 'if total - total != 0.0:', f'    {bail_out}']
     for condition, held in path.decisions:
         if not _of_inputs(condition):
             text = writer.write(condition)
-            writer.lines += [f'if not ({text}):' if held else f'if {text}:', f'    {leave}']
+            writer.lines += [f'if not ({text}):' if held else f'if {text}:', f'    {bail_out}']
     groups = [[writer.write(number) for number in group] for group in path.outputs]
-    return Body(writer.lines, groups, {**_FUNCTIONS, **constants})
+    return PythonBody(writer.lines, groups, {**_FUNCTIONS, **constants})
 
 
 def python_function(path: Path) -> Callable[..., Values | None]:
@@ -133,11 +137,11 @@ def _of_inputs(condition: Operation) -> bool:
     return condition.name == 'finite' and all(one.is_input for one in condition.operands())
 
 
-def _atom(text: str) -> str:
+def _bracket_text(text: str) -> str:
     return text if text.isidentifier() else f'({text})'
 
 
-class StraightFunction(NamedTuple):
+class CompiledFunction(NamedTuple):
     """A function of numbers as straight-line code, without loops, lists and calls."""
 
     # Takes the arguments and returns those results that depend on them.
@@ -146,9 +150,9 @@ class StraightFunction(NamedTuple):
     results: tuple[float, ...]  # All results, with 0 for those that vary
 
 
-def straight(
+def compile_function(
     function: Callable[..., Sequence[float]], values: Sequence[complex]
-) -> StraightFunction:
+) -> CompiledFunction:
     """
     Return a function as straight-line code, which gives the same bits.
 
@@ -161,7 +165,7 @@ def straight(
 
     """
     tape = Tape()
-    given = [tape.given(f'x{i}', value) for i, value in enumerate(values)]
+    given = [tape.add_input(f'x{i}', value) for i, value in enumerate(values)]
     results = [number_of(number) for number in function(*given)]
     if tape.decisions:
         raise ValueError('the function decides by its arguments, and has no straight line')
@@ -169,9 +173,9 @@ def straight(
     inputs = tuple(one.operation for one in given)
     line = python_function(Path(inputs, (), (tuple(results[i] for i in places),), tape))
 
-    def varying(*arguments: Any) -> tuple[float, ...]:
+    def varying_results(*arguments: Any) -> tuple[float, ...]:
         (group,) = line(*arguments) or ((),)
         return group
 
     constants = tuple(0.0 if isinstance(number, Operation) else number for number in results)
-    return StraightFunction(varying, places, constants)
+    return CompiledFunction(varying_results, places, constants)

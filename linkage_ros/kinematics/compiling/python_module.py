@@ -46,27 +46,27 @@ class PythonModule(Language):
     def __init__(self, derivatives: int) -> None:
         self._groups = 1 + derivatives
 
-    def call(self, operation: Operation, parts: list[str]) -> str:
+    def write_call(self, operation: Operation, parts: list[str]) -> str:
         if operation.name == '**':
             return f'(({parts[0]}) ** {parts[1]})'
         if operation.name == 'hypot':
             # The root that C's hypot() gives; the last digits of math.hypot() differ.
             return f'abs(complex({parts[0]}, {parts[1]}))'
-        return super().call(operation, parts)
+        return super().write_call(operation, parts)
 
-    def choice(self, condition: str, one: str, other: str) -> str:
+    def write_choice(self, condition: str, one: str, other: str) -> str:
         return f'{one} if {condition} else {other}'
 
-    def negated(self, condition: str) -> str:
+    def negate(self, condition: str) -> str:
         return f'not {condition}' if condition.isidentifier() else f'not ({condition})'
 
-    def below(self, number: str, most: str) -> str:
+    def write_below(self, number: str, most: str) -> str:
         return f'-{most} < {number} < {most}'  # takes half the time of a call
 
-    def block(self, condition: str, lines: Sequence[str]) -> list[str]:
+    def write_block(self, condition: str, lines: Sequence[str]) -> list[str]:
         return [f'if {condition}:', *(f'    {line}' for line in lines)]
 
-    def wrapped(self, line: str) -> list[str]:
+    def wrap_line(self, line: str) -> list[str]:
         if len(line) > WIDTH:
             name, equals, text = line.partition(' = ')
             if equals:
@@ -74,19 +74,19 @@ class PythonModule(Language):
             elif line.lstrip().startswith('if '):
                 indent, _, condition = line.partition('if ')
                 line = f'{indent}if ({condition[:-1]}):'
-        return super().wrapped(line)
+        return super().wrap_line(line)
 
-    def assigned(self, name: str, text: str, truth: bool = False) -> str:
+    def assign(self, name: str, text: str, truth: bool = False) -> str:
         return f'{name} = {text}'
 
-    def left(self, status: str) -> str:
+    def return_status(self, status: str) -> str:
         return f'return ({", ".join([status, *["()"] * self._groups])})'
 
-    def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
+    def return_solution(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
         tuples = (f'({", ".join(group)},)' for group in groups)
         return [f'return ({", ".join([status, *tuples])})']
 
-    def scaled(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+    def scale_rates(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
         names = RETURNED[: self._groups]
         arguments = ''.join(f', ({", ".join(group)},)' for group in given)
         tuples = (
@@ -94,12 +94,12 @@ class PythonModule(Language):
             for order, name in enumerate(names[1:], 1)
         )
         return [
-            f'status, {", ".join(names)} = {self.function(len(given))}(inputs{arguments})',
+            f'status, {", ".join(names)} = {self.function_name(len(given))}(inputs{arguments})',
             f'return (status, {names[0]}{"".join(tuples)})',
         ]
 
-    def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
-        name = self.function(subject.derivatives)
+    def whole_source(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+        name = self.function_name(subject.derivatives)
         lines = [
             _CODING, *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', _IMPORTS, '',
             *(f'{status} = {number}' for number, status in enumerate(STATUSES)), '', '',

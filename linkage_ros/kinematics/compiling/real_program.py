@@ -22,19 +22,25 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.arithmetic import atan2, cos, sin, sqrt, where
 from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.tape import Decision, Operation, rewritten, Symbol, Tape
+from linkage_ros.kinematics.compiling.tape import (
+    Decision,
+    Operation,
+    rewrite_operations,
+    Symbol,
+    Tape,
+)
 from linkage_ros.kinematics.compiling.trace import (
-    Branch,
-    moved,
+    DecisionBranch,
+    motion_at,
     Number,
     number_of,
+    OutputSelection,
     Path,
-    Solved,
+    SolvedLeaf,
     Tree,
     tree_below,
-    Wanted,
 )
-from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
@@ -52,10 +58,12 @@ class Lowered(NamedTuple):
     """A path in real numbers, and its fates."""
 
     path: Path
-    fates: tuple[Tree, ...]
+    fallback_statuses: tuple[Tree, ...]
 
 
-def lowered(path: Path, fates: tuple[Tree, ...] = (), by_squares: bool = False) -> Lowered:
+def lower_path(
+    path: Path, fallback_statuses: tuple[Tree, ...] = (), by_squares: bool = False
+) -> Lowered:
     """
     Return a path in real numbers only; paths with iterated links have no such form.
 
@@ -71,12 +79,15 @@ def lowered(path: Path, fates: tuple[Tree, ...] = (), by_squares: bool = False) 
 
     """
     lower = Lowering(by_squares)
-    inputs = tuple(lower.operation(given) for given in path.inputs)
+    inputs = tuple(lower.lower_operation(given) for given in path.inputs)
     decisions = tuple(
-        Decision(lower.operation(condition), held) for condition, held in path.decisions
+        Decision(lower.lower_operation(condition), held) for condition, held in path.decisions
     )
-    outputs = tuple(tuple(map(lower.operation, group)) for group in path.outputs)
-    return Lowered(Path(inputs, decisions, outputs, lower.tape), tuple(map(lower.tree, fates)))
+    outputs = tuple(tuple(map(lower.lower_operation, group)) for group in path.outputs)
+    return Lowered(
+        Path(inputs, decisions, outputs, lower.tape),
+        tuple(map(lower.lower_tree, fallback_statuses)),
+    )
 
 
 class Lowering:
@@ -88,37 +99,40 @@ class Lowering:
         self._formulas = _BY_SQUARES if by_squares else _FORMULAS
         self._known: dict[Operation, Any] = {}
 
-    def operation(self, root: Number) -> Any:
+    def lower_operation(self, root: Number) -> Any:
         """Return a real number on the new tape, or the constant that it reduces to."""
-        number = self._number(root)
+        number = self._lower_number(root)
         return number.operation if isinstance(number, Symbol) else number
 
-    def tree(self, tree: Tree) -> Tree:
+    def lower_tree(self, tree: Tree) -> Tree:
         """Return a tree with conditions and numbers on the new tape."""
-        if isinstance(tree, Branch):
-            condition = self.operation(tree.condition)
+        if isinstance(tree, DecisionBranch):
+            condition = self.lower_operation(tree.condition)
             if isinstance(condition, bool):
-                return self.tree(tree.held if condition else tree.failed)
-            return Branch(condition, self.tree(tree.held), self.tree(tree.failed), tree.usual)
-        if isinstance(tree, Solved):
-            return Solved(
-                tree.status, tuple(tuple(map(self.operation, group)) for group in tree.outputs)
+                return self.lower_tree(tree.held if condition else tree.failed)
+            return DecisionBranch(
+                condition, self.lower_tree(tree.held), self.lower_tree(tree.failed), tree.usual
+            )
+        if isinstance(tree, SolvedLeaf):
+            return SolvedLeaf(
+                tree.status,
+                tuple(tuple(map(self.lower_operation, group)) for group in tree.outputs),
             )
         return tree
 
-    def _number(self, root: Any) -> Any:
+    def _lower_number(self, root: Any) -> Any:
         """Return a symbol, its components, or a constant."""
         if isinstance(root, complex):
             return _Parts(root.real, root.imag)
         if not isinstance(root, Operation):
             return root
-        return rewritten(root, self._known, self._written)
+        return rewrite_operations(root, self._known, self._write_operation)
 
-    def _written(self, operation: Operation) -> Any:
+    def _write_operation(self, operation: Operation) -> Any:
         name = operation.name
         if operation.is_input:
-            return self.tape.given(name, operation.value)
-        given = [self._known.get(a) if isinstance(a, Operation) else self._number(a)
+            return self.tape.add_input(name, operation.value)
+        given = [self._known.get(a) if isinstance(a, Operation) else self._lower_number(a)
                  for a in operation.arguments]  # fmt: skip
         if not any(isinstance(one, _Parts) for one in given) and name not in _MAKES_PARTS:
             return self.tape.write(name, *given)
@@ -128,55 +142,55 @@ class Lowering:
 _MAKES_PARTS = frozenset(('facing', 'vector'))
 
 
-def _times(one: Any, other: Any) -> Any:
+def _short_product(one: Any, other: Any) -> Any:
     """Return a product; 0 if one factor is a constant 0."""
-    if not _constants(one, other) and (_zero(one) or _zero(other)):
+    if not _are_constants(one, other) and (_is_zero(one) or _is_zero(other)):
         return 0.0
     return one * other
 
 
-def _zero(number: Any) -> bool:
+def _is_zero(number: Any) -> bool:
     return isinstance(number, int | float) and number == 0.0
 
 
-def _constants(one: Any, other: Any) -> bool:
+def _are_constants(one: Any, other: Any) -> bool:
     """Return whether both are constants; then a zero has its correct sign too."""
     return isinstance(one, int | float) and isinstance(other, int | float)
 
 
-def _sum(one: Any, other: Any) -> Any:
-    if _constants(one, other):
+def _short_sum(one: Any, other: Any) -> Any:
+    if _are_constants(one, other):
         return one + other
-    return other if _zero(one) else one if _zero(other) else one + other
+    return other if _is_zero(one) else one if _is_zero(other) else one + other
 
 
-def _difference(one: Any, other: Any) -> Any:
-    if _constants(one, other):
+def _short_difference(one: Any, other: Any) -> Any:
+    if _are_constants(one, other):
         return one - other
-    return -other if _zero(one) else one if _zero(other) else one - other
+    return -other if _is_zero(one) else one if _is_zero(other) else one - other
 
 
 _EXACT = (operator.mul, operator.add, operator.sub)
-_SHORT = (_times, _sum, _difference)
+_SHORT = (_short_product, _short_sum, _short_difference)
 """Arithmetic of components, with every zero or without products with a constant 0."""
 
 
-def _both(number: Any) -> _Parts:
+def _to_parts(number: Any) -> _Parts:
     return number if isinstance(number, _Parts) else _Parts(number, 0.0)
 
 
-def _add(lower: Lowering, one: Any, other: Any) -> _Parts:
-    a, b = _both(one), _both(other)
+def _add_parts(lower: Lowering, one: Any, other: Any) -> _Parts:
+    a, b = _to_parts(one), _to_parts(other)
     return _Parts(lower.plus(a.x, b.x), lower.plus(a.y, b.y))
 
 
-def _subtract(lower: Lowering, one: Any, other: Any) -> _Parts:
-    a, b = _both(one), _both(other)
+def _subtract_parts(lower: Lowering, one: Any, other: Any) -> _Parts:
+    a, b = _to_parts(one), _to_parts(other)
     return _Parts(lower.minus(a.x, b.x), lower.minus(a.y, b.y))
 
 
-def _multiply(lower: Lowering, one: Any, other: Any) -> _Parts:
-    a, b = _both(one), _both(other)
+def _multiply_parts(lower: Lowering, one: Any, other: Any) -> _Parts:
+    a, b = _to_parts(one), _to_parts(other)
     times = lower.times
     return _Parts(
         lower.minus(times(a.x, b.x), times(a.y, b.y)),
@@ -184,9 +198,9 @@ def _multiply(lower: Lowering, one: Any, other: Any) -> _Parts:
     )
 
 
-def _divide(lower: Lowering, one: Any, other: Any) -> _Parts:
+def _divide_parts(lower: Lowering, one: Any, other: Any) -> _Parts:
     """Return a quotient by Smith's method: R. L. Smith, Algorithm 116, CACM 5 (1962)."""
-    a = _both(one)
+    a = _to_parts(one)
     if not isinstance(other, _Parts):
         ratio = 0.0 / other
         x = lower.plus(a.x, lower.times(a.y, ratio))
@@ -203,30 +217,30 @@ def _divide(lower: Lowering, one: Any, other: Any) -> _Parts:
 
 def _divide_by_squares(lower: Lowering, one: Any, other: Any) -> _Parts:
     if isinstance(other, _Parts):
-        one = _multiply(lower, one, _Parts(other.x, -other.y))
-        other = _square(other)
-    a = _both(one)
+        one = _multiply_parts(lower, one, _Parts(other.x, -other.y))
+        other = _squared_length(other)
+    a = _to_parts(one)
     return _Parts(a.x / other, a.y / other)
 
 
 def _length_by_squares(_: Lowering, one: _Parts) -> Any:
-    return sqrt(_square(one))
+    return sqrt(_squared_length(one))
 
 
-def _square(one: _Parts) -> Any:
-    return _sum(_times(one.x, one.x), _times(one.y, one.y))
+def _squared_length(one: _Parts) -> Any:
+    return _short_sum(_short_product(one.x, one.x), _short_product(one.y, one.y))
 
 
-def _negative(_: Lowering, one: _Parts) -> _Parts:
+def _negate_parts(_: Lowering, one: _Parts) -> _Parts:
     return _Parts(-one.x, -one.y)
 
 
 _FORMULAS: dict[str, Callable[..., Any]] = {
-    '+': _add,
-    '-': _subtract,
-    '*': _multiply,
-    '/': _divide,
-    'negative': _negative,
+    '+': _add_parts,
+    '-': _subtract_parts,
+    '*': _multiply_parts,
+    '/': _divide_parts,
+    'negative': _negate_parts,
     'conjugate': lambda _, one: _Parts(one.x, -one.y),
     'real': lambda _, one: one.x,
     'imag': lambda _, one: one.y,
@@ -261,7 +275,7 @@ class Program(NamedTuple):
     tree: Tree  # The decisions and results for finite inputs
 
 
-def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
+def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelection) -> Program:
     """
     Return the tree of a linkage, ignoring its limits.
 
@@ -269,7 +283,7 @@ def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
     velocities, 2 with accelerations. A DefinitionError says that links are solved by iteration, or
     that no closed state is found.
     """
-    if iterated(closure):
+    if is_iterated(closure):
         raise DefinitionError(
             'links',
             'some are only solved by iteration, which is no straight line',
@@ -284,19 +298,19 @@ def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
         )
     tape = Tape()
     count = len(closure.linkage.inputs)
-    given: list[Any] = [tape.given(one.name, one.value) for one in paths[0].inputs]
+    given: list[Any] = [tape.add_input(one.name, one.value) for one in paths[0].inputs]
     groups = [given[start:][:count] for start in range(0, len(given), count)]
     taken = [tuple(decision.held for decision in path.decisions) for path in paths]
     solved = 0
 
-    def leaf(decided: tuple[bool, ...]) -> Tree:
+    def run_leaf(decided: tuple[bool, ...]) -> Tree:
         """Run the steps; the last of the first decisions is the one that differs."""
         nonlocal solved
         first = len(decided)
         known = next((way for way in taken if way[:first] == decided), None)
         ahead = decided if known is None else known
-        tape.begin(ahead)
-        state = closure.known(*groups[0])
+        tape.reset_decisions(ahead)
+        state = closure.initial_state(*groups[0])
         for step in closure.steps:
             before = len(tape.decisions)
             status = step.close(state).status
@@ -308,12 +322,12 @@ def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
         if solved == _MOST_SOLVED:
             return None
         solved += 1
-        tape.begin(ahead)
-        motion = moved(closure, groups, within_limits=False)
+        tape.reset_decisions(ahead)
+        motion = motion_at(closure, groups, within_limits=False)
         numbers = tuple(tuple(map(number_of, group)) for group in wanted(motion))
-        return Solved(motion.position.status, numbers)
+        return SolvedLeaf(motion.position.status, numbers)
 
-    tree = tree_below(tape, (), leaf)
+    tree = tree_below(tape, (), run_leaf)
     lowering = Lowering()
-    inputs = tuple(lowering.operation(one.operation) for one in given)
-    return Program(inputs, lowering.tree(tree))
+    inputs = tuple(lowering.lower_operation(one.operation) for one in given)
+    return Program(inputs, lowering.lower_tree(tree))

@@ -26,10 +26,16 @@ from linkage_ros.kinematics.batch import Array, Batch, CODES, Codes, Mask
 from linkage_ros.kinematics.built_once import keep_results
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction, Number
-from linkage_ros.kinematics.compiling.real_program import Lowered, lowered
-from linkage_ros.kinematics.compiling.trace import Branch, fates, joints, Tree, Wanted
+from linkage_ros.kinematics.compiling.real_program import lower_path, Lowered
+from linkage_ros.kinematics.compiling.trace import (
+    DecisionBranch,
+    fallback_statuses,
+    OutputSelection,
+    published_joints,
+    Tree,
+)
 from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_doubles
-from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.status import Status
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,15 +62,15 @@ _LOST = (Status.OPEN, Status.INDETERMINATE)
 """The statuses that the fates of a path decide; the plain steps decide all others."""
 
 
-class _Program(NamedTuple):
+class _SolveProgram(NamedTuple):
     """A path over arrays."""
 
     values: BlockFunction  # The requested numbers, and where the path is valid
     # Where the path is not valid: which states are open, and which are indeterminate.
-    fates: BlockFunction
+    fallbacks: BlockFunction
 
 
-class Solver:
+class SolverOutline:
     """
     Solves a linkage for certain numbers at many states.
 
@@ -80,14 +86,16 @@ class Solver:
 
     """
 
-    def __init__(self, closure: LoopClosure, width: int, wanted: Wanted = joints) -> None:
+    def __init__(
+        self, closure: LoopClosure, width: int, wanted: OutputSelection = published_joints
+    ) -> None:
         self._closure = closure
-        self._limited = wanted is joints
+        self._limited = wanted is published_joints
         self._driven = len(closure.linkage.inputs)
         self._width = width
         self._wanted = wanted
         self._compiled = keep_results(self._compile)
-        self._programs = keep_results(self._program)
+        self._programs = keep_results(self._array_programs)
 
     def solve(
         self,
@@ -107,13 +115,13 @@ class Solver:
             rates = 1.0
         if accelerations is None:
             accelerations = [0.0] * driven
-        given = _numbers('inputs', list(inputs), driven, None)
+        given = _broadcast_values('inputs', list(inputs), driven, None)
         count = len(given[0])
         for name, values in (('rates', rates), ('accelerations', accelerations))[:derivatives]:
             # The values of a single driven joint need no list.
             each: Any = to_doubles(name, values) if driven == 1 else values
             alone = each.ndim < 2 if driven == 1 else not np.iterable(each)
-            given += _numbers(name, [each] if alone else list(each), driven, count)
+            given += _broadcast_values(name, [each] if alone else list(each), driven, count)
         numbers: list[Any] = [value if value.ndim else float(value) for value in given]
         with np.errstate(all='ignore'):
             if _has_huge(numbers[driven:], driven):
@@ -123,7 +131,7 @@ class Solver:
     def _solve_blocks(self, numbers: list[Any], derivatives: int, out: Batch | None) -> Batch:
         """Solve with usual rates, block by block."""
         driven, count = self._driven, len(numbers[0])
-        batch = _room(self._width, count, derivatives, out)
+        batch = _result_arrays(self._width, count, derivatives, out)
         # A constant 0 or 1 is folded into the program.
         kinds = [int(n) if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
         programs = self._programs(derivatives, tuple(kinds))
@@ -134,7 +142,7 @@ class Solver:
         masks = np.empty((max((f.masks for f in functions), default=0), longest), bool)
         for start in range(0, count, BLOCK):
             part = slice(start, start + BLOCK)
-            block = _Block(
+            block = _ProgramBlock(
                 # Adding 0.0 makes 0.0 of −0.0, which is the same input.
                 [
                     *(n[part] + 0.0 for n in numbers[:driven]),
@@ -145,7 +153,7 @@ class Solver:
                 rows,
                 masks,
             )
-            self._solve(block, programs, self._compiled(derivatives))
+            self._solve_block(block, programs, self._compiled(derivatives))
         return batch
 
     def _solve_huge(self, given: list[Array], derivatives: int, out: Batch | None) -> Batch:
@@ -167,9 +175,11 @@ class Solver:
                 np.divide(values, scale, out=values)
         return batch
 
-    def _solve(self, block: _Block, programs: Sequence[_Program], one: Compiled) -> None:
+    def _solve_block(
+        self, block: _ProgramBlock, programs: Sequence[_SolveProgram], one: Compiled
+    ) -> None:
         """Solve a block; states that no program covers are solved one by one."""
-        left = block.begin(self._driven)
+        left = block.mark_nonfinite(self._driven)
         for program in programs:
             if left is not None and not left.size:
                 break
@@ -177,26 +187,28 @@ class Solver:
         if left is None:
             left = np.arange(len(block.status))
         for k in left.tolist():
-            block.put(k, self._driven, one)
+            block.solve_state(k, self._driven, one)
         if self._limited and (bounds := self._closure.bounds):
             beyond = bounds.beyond(block.given, block.values[0])
             block.status[beyond & (block.status < _LIMITED)] = _LIMITED
-        block.clear()
+        block.clear_invalid()
 
     def _compile(self, derivatives: int) -> Compiled:
         return Compiled(self._closure, derivatives, self._wanted, within_limits=False)
 
-    def _program(self, derivatives: int, kinds: tuple[Any, ...]) -> list[_Program]:
+    def _array_programs(self, derivatives: int, kinds: tuple[Any, ...]) -> list[_SolveProgram]:
         """Return the paths over arrays; none if links are iterated, which is no straight line."""
-        if iterated(self._closure):
+        if is_iterated(self._closure):
             return []
         return [
-            _program(lowered(path, fates(self._closure, path), by_squares=True), kinds)
+            _array_program(
+                lower_path(path, fallback_statuses(self._closure, path), by_squares=True), kinds
+            )
             for path in self._compiled(derivatives).paths
         ]
 
 
-class _Block(NamedTuple):
+class _ProgramBlock(NamedTuple):
     """A block of states."""
 
     given: list[Any]  # The inputs, their rates and their accelerations, each an array or a number
@@ -206,7 +218,7 @@ class _Block(NamedTuple):
     rows: Array
     masks: Mask
 
-    def begin(self, driven: int) -> Any:
+    def mark_nonfinite(self, driven: int) -> Any:
         """Mark the states that are not finite; return the others, or None if all are finite."""
         self.status.fill(_CLOSED)
         for values in self.given[:driven]:
@@ -215,9 +227,9 @@ class _Block(NamedTuple):
                 self.status[~np.isfinite(values)] = _INDETERMINATE
         return np.flatnonzero(self.status == _CLOSED) if self.status.any() else None
 
-    def pass_through(self, program: _Program, states: Any) -> Any:
+    def pass_through(self, program: _SolveProgram, states: Any) -> Any:
         """Pass states (None: all) through a path; return those that it does not cover."""
-        holds = self._write(program, states)
+        holds = self._write_results(program, states)
         if holds is None or holds.all():
             return np.empty(0, np.intp)
         on, off = np.flatnonzero(holds), np.flatnonzero(~holds)
@@ -225,25 +237,25 @@ class _Block(NamedTuple):
             on, off = states[on], states[off]
         if len(on) < len(off):
             # Nothing was written, since most of it would be invalid.
-            self._write(program, on)
+            self._write_results(program, on)
         lost = np.empty((len(_LOST), len(off)), bool)
-        self._run(program.fates, self._of(off), list(lost))
+        self._run_function(program.fallbacks, self._select_states(off), list(lost))
         for status, those in zip(_LOST, lost, strict=True):
             self.status[off[those]] = CODES[status]
         return off[~lost.any(axis=0)]
 
-    def _write(self, program: _Program, states: Any) -> Mask | None:
+    def _write_results(self, program: _SolveProgram, states: Any) -> Mask | None:
         """Write the requested numbers of states (None: all); return where the path is valid."""
         rows = [row for values in self.values for row in values]
         if states is None:
-            return self._run(program.values, self.given, rows)
+            return self._run_function(program.values, self.given, rows)
         into = np.empty((len(rows), len(states)))
-        holds = self._run(program.values, self._of(states), list(into))
+        holds = self._run_function(program.values, self._select_states(states), list(into))
         for row, numbers in zip(rows, into, strict=True):
             row[states] = numbers
         return holds
 
-    def put(self, k: int, driven: int, one: Compiled) -> None:
+    def solve_state(self, k: int, driven: int, one: Compiled) -> None:
         """Solve a single state."""
         numbers = [float(n[k]) if isinstance(n, np.ndarray) else n for n in self.given]
         # A rate that is not finite has no result, but the pose is valid.
@@ -254,23 +266,25 @@ class _Block(NamedTuple):
                 end = (1 + order) * driven
                 values[:, k] = solved if all_finite(numbers[:end]) else np.nan
 
-    def _of(self, states: Any) -> list[Any]:
+    def _select_states(self, states: Any) -> list[Any]:
         return [n[states] if isinstance(n, np.ndarray) else n for n in self.given]
 
-    def _run(self, function: BlockFunction, given: list[Any], into: list[Any]) -> Mask | None:
+    def _run_function(
+        self, function: BlockFunction, given: list[Any], into: list[Any]
+    ) -> Mask | None:
         count = len(into[0]) if into else len(self.status)
         return function(
             given, into, self.rows[: function.rows, :count], self.masks[: function.masks, :count]
         )
 
-    def clear(self) -> None:
+    def clear_invalid(self) -> None:
         """Write NaN for states without a pose, or without rates."""
         if self.status.any():
             for order, values in enumerate(self.values):
                 np.copyto(values, np.nan, where=self.status >= (_TOGGLE if order else _OPEN))
 
 
-def _program(path: Lowered, kinds: Sequence[Any]) -> _Program:
+def _array_program(path: Lowered, kinds: Sequence[Any]) -> _SolveProgram:
     """Return a path over arrays; kinds are the types of its inputs, or their constants."""
     (inputs, decisions, outputs, _), ends = path
     names = [given.name for given in inputs]
@@ -281,24 +295,30 @@ def _program(path: Lowered, kinds: Sequence[Any]) -> _Program:
     lost: list[Number] = [False] * len(_LOST)
     for (condition, held), fate in zip(decisions, ends, strict=True):
         if condition.name != 'finite':
-            truth = form.number(condition)
-            falls = truth if held else form.opposite(truth)
-            leaves = form.both(holds, form.opposite(falls))
-            holds = form.both(holds, falls)
+            truth = form.rewrite_number(condition)
+            falls = truth if held else form.logical_not(truth)
+            leaves = form.logical_and(holds, form.logical_not(falls))
+            holds = form.logical_and(holds, falls)
             for k, status in enumerate(_LOST):
-                lost[k] = form.either(lost[k], form.both(leaves, _comes_to(form, fate, status)))
-    roots = [form.number(number) for group in outputs for number in group]
-    return _Program(BlockFunction(names, arrays, roots, holds), BlockFunction(names, arrays, lost))
+                lost[k] = form.logical_or(
+                    lost[k], form.logical_and(leaves, _leads_to_status(form, fate, status))
+                )
+    roots = [form.rewrite_number(number) for group in outputs for number in group]
+    return _SolveProgram(
+        BlockFunction(names, arrays, roots, holds), BlockFunction(names, arrays, lost)
+    )
 
 
-def _comes_to(form: ArrayForm, fate: Tree, status: Status) -> Number:
+def _leads_to_status(form: ArrayForm, fallback: Tree, status: Status) -> Number:
     """Return the condition that a fate leads to a status."""
-    if not isinstance(fate, Branch):
-        return fate is status
-    condition = form.number(fate.condition)
-    return form.either(
-        form.both(condition, _comes_to(form, fate.held, status)),
-        form.both(form.opposite(condition), _comes_to(form, fate.failed, status)),
+    if not isinstance(fallback, DecisionBranch):
+        return fallback is status
+    condition = form.rewrite_number(fallback.condition)
+    return form.logical_or(
+        form.logical_and(condition, _leads_to_status(form, fallback.held, status)),
+        form.logical_and(
+            form.logical_not(condition), _leads_to_status(form, fallback.failed, status)
+        ),
     )
 
 
@@ -322,7 +342,7 @@ def _are_huge(values: Any, rates: bool) -> Any:
     return np.abs(values) >= (HUGE if rates else HUGE * HUGE)
 
 
-def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> list[Array]:
+def _broadcast_values(name: str, values: list[Any], driven: int, count: int | None) -> list[Array]:
     """Return an array for each driven joint; a scalar stays one if the count is known."""
     if len(values) != driven:
         raise ValueError(f'{name}: {len(values)} given; give {driven}, one for each driven joint')
@@ -342,7 +362,7 @@ def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> li
     ]
 
 
-def _room(width: int, count: int, derivatives: int, out: Batch | None) -> Batch:
+def _result_arrays(width: int, count: int, derivatives: int, out: Batch | None) -> Batch:
     """Return the arrays for the results: those of ``out``, and new ones for the others."""
     arrays: list[Any] = []
     given = out or (None,) * 4

@@ -26,10 +26,10 @@ from typing import Any, ClassVar, NamedTuple
 from linkage_ros import __version__
 from linkage_ros.kinematics.arithmetic import ROUNDING, SMALLEST
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.real_program import Program, program
+from linkage_ros.kinematics.compiling.real_program import compile_program, Program
 from linkage_ros.kinematics.compiling.tape import Operation
-from linkage_ros.kinematics.compiling.trace import Branch, Motion, Solved, Tree
-from linkage_ros.kinematics.compiling.writer import uses, Writer
+from linkage_ros.kinematics.compiling.trace import DecisionBranch, SolvedLeaf, TracedMotion, Tree
+from linkage_ros.kinematics.compiling.writer import count_uses, TextWriter
 from linkage_ros.kinematics.doubles import SHRINK
 from linkage_ros.kinematics.limits import Bound
 from linkage_ros.kinematics.linkage import RevoluteJoint
@@ -117,33 +117,33 @@ class Language(ABC):
     status: str = '{}'
     """Forms of a comment and of the name of a status."""
 
-    def constant(self, value: Any) -> str:
+    def write_constant(self, value: Any) -> str:
         """Write a number."""
         if not isfinite(value):
             return self.infinity if value > 0.0 else f'-{self.infinity}'
         return repr(float(value))
 
-    def call(self, operation: Operation, parts: list[str]) -> str:
+    def write_call(self, operation: Operation, parts: list[str]) -> str:
         """Write the call of a function."""
         return f'{self.functions.get(operation.name, operation.name)}({", ".join(parts)})'
 
-    def choice(self, condition: str, one: str, other: str) -> str:
+    def write_choice(self, condition: str, one: str, other: str) -> str:
         """Write a choice between two expressions."""
         return f'{condition} ? {one} : {other}'
 
-    def negated(self, condition: str) -> str:
+    def negate(self, condition: str) -> str:
         """Write that a condition does not hold; this is true for NaN too."""
         return f'!{condition}' if condition.isidentifier() else f'!({condition})'
 
-    def below(self, number: str, most: str) -> str:
+    def write_below(self, number: str, most: str) -> str:
         """Write that the size of a number is below a bound."""
         return f'{self.functions["abs"]}({number}) < {most}'
 
-    def block(self, condition: str, lines: Sequence[str]) -> list[str]:
+    def write_block(self, condition: str, lines: Sequence[str]) -> list[str]:
         """Write lines that run if a condition holds."""
         return [f'if ({condition}) {{', *(f'    {line}' for line in lines), '}']
 
-    def wrapped(self, line: str) -> list[str]:
+    def wrap_line(self, line: str) -> list[str]:
         """Break a line of code that is too long."""
         code = line.lstrip()
         indent = ' ' * (len(line) - len(code))
@@ -152,32 +152,32 @@ class Language(ABC):
             break_long_words=False, break_on_hyphens=False,
         )  # fmt: skip
 
-    def function(self, derivatives: int) -> str:
+    def function_name(self, derivatives: int) -> str:
         """Return the name of the function with so many derivatives."""
         return FUNCTIONS[derivatives]
 
     @abstractmethod
-    def assigned(self, name: str, text: str, truth: bool = False) -> str:
+    def assign(self, name: str, text: str, truth: bool = False) -> str:
         """Write a line that assigns a number, or a truth value, to a name."""
 
     @abstractmethod
-    def left(self, status: str) -> str:
+    def return_status(self, status: str) -> str:
         """Write a line that returns a status without values."""
 
     @abstractmethod
-    def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
+    def return_solution(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
         """Write lines that return a status and values."""
 
     @abstractmethod
-    def scaled(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+    def scale_rates(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
         """Write lines that call the function with scaled rates, and scale its results back."""
 
     @abstractmethod
-    def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+    def whole_source(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
         """Write the source from the lines of its head, a comment, and of the function's body."""
 
 
-def source(subject: Subject, language: Language) -> str:
+def write_source(subject: Subject, language: Language) -> str:
     """
     Return a linkage as the source of a program.
 
@@ -199,47 +199,47 @@ def source(subject: Subject, language: Language) -> str:
     asked = [names.index(name) for name in subject.joints]
     bounded = [bound.number for bound in closure.bounds.joints]
 
-    def wanted(motion: Motion) -> list[list[float]]:
+    def wanted_numbers(motion: TracedMotion) -> list[list[float]]:
         groups = [[part.joints[i] for i in asked] for part in motion if part is not None]
         if subject.frames:
-            groups += frames(closure, motion)
+            groups += frame_values(closure, motion)
         return [*groups, [motion.position.joints[i] for i in bounded]]
 
-    compiled = program(closure, subject.derivatives, wanted)
-    body = _Body(subject, language, compiled)
-    head = _head(subject, language.function(subject.derivatives))
-    return language.whole(subject, list(head), body.lines())
+    compiled = compile_program(closure, subject.derivatives, wanted_numbers)
+    body = _SourceBody(subject, language, compiled)
+    head = _head_lines(subject, language.function_name(subject.derivatives))
+    return language.whole_source(subject, list(head), body.write_lines())
 
 
-def frames(closure: Closure, motion: Motion) -> list[list[Any]]:
+def frame_values(closure: Closure, motion: TracedMotion) -> list[list[Any]]:
     """Return x, y and angle of the frame of each link that moves, and their rates if known."""
     of = closure.link_frames
-    groups = [of.at(motion.position)]
+    groups = [of.frames_at(motion.position)]
     if motion.velocity is not None:
-        groups.append(of.rates(motion.position, motion.velocity))
+        groups.append(of.frame_rates(motion.position, motion.velocity))
     return [[n for place, turn in each for n in (place.real, place.imag, turn)] for each in groups]
 
 
-class _Body:
+class _SourceBody:
     """Writes the lines of the function."""
 
     def __init__(self, subject: Subject, language: Language, found: Program) -> None:
         self._language = language
         self._subject = subject
         self._program = found
-        roots = list(_roots(found.tree))
-        self._lengths = _lengths(subject.closure)
-        self._often = Counter(_constants(roots))
+        roots = list(_tree_roots(found.tree))
+        self._lengths = _length_names(subject.closure)
+        self._often = Counter(_used_constants(roots))
         self._named: dict[float, str] = {}
-        self._writer = Writer(
+        self._writer = TextWriter(
             roots,
-            self._constant,
-            language.call,
-            language.choice,
-            lambda name, text, operation: language.assigned(name, text, operation.kind == 'truth'),
+            self._constant_text,
+            language.write_call,
+            language.write_choice,
+            lambda name, text, operation: language.assign(name, text, operation.kind == 'truth'),
         )
 
-    def lines(self) -> list[str]:
+    def write_lines(self) -> list[str]:
         """Return all lines, indented."""
         language = self._language
         inputs = self._program.inputs
@@ -247,104 +247,104 @@ class _Body:
         given = []
         for number, operation in enumerate(inputs):
             array, index = divmod(number, count)
-            given.append(language.assigned(operation.name, f'{GIVEN[array]}[{index}]'))
-            self._writer.name(operation, operation.name)
-        lines = [language.left(language.status.format(Status.INDETERMINATE.name))]
+            given.append(language.assign(operation.name, f'{GIVEN[array]}[{index}]'))
+            self._writer.name_operation(operation, operation.name)
+        lines = [language.return_status(language.status.format(Status.INDETERMINATE.name))]
         finite = [f'{language.finite}({each.name})' for each in inputs]
         usual = finite[:count]
         groups = list(zip(*[iter(each.name for each in inputs)] * count, strict=True))
         for most, names in zip(_USUAL[1:], groups[1:], strict=False):
-            usual += (language.below(name, language.constant(most)) for name in names)
+            usual += (language.write_below(name, language.write_constant(most)) for name in names)
         if usual != finite:
             scaled = [
                 [f'{name}{" * down" * order}' for name in names]
                 for order, names in enumerate(groups[1:], 1)
             ]
             lines = [
-                *self._unless(finite, lines),
+                *self._write_unless(finite, lines),
                 language.comment.format('What overflows is infinite, nothing is NaN.'),
-                language.assigned('down', language.constant(SHRINK)),
-                language.assigned('up', language.constant(1.0 / SHRINK)),
-                *language.scaled(self._subject, scaled),
+                language.assign('down', language.write_constant(SHRINK)),
+                language.assign('up', language.write_constant(1.0 / SHRINK)),
+                *language.scale_rates(self._subject, scaled),
             ]
-        given += self._unless(usual, lines)
-        self._follow(self._program.tree)
+        given += self._write_unless(usual, lines)
+        self._write_tree(self._program.tree)
         constants = []
         for value, name in self._named.items():
-            line = language.assigned(name, language.constant(value))
+            line = language.assign(name, language.write_constant(value))
             if value in self._lengths:
                 length = value * self._subject.closure.scale
                 note = language.comment.format(f'{length:.9g} m')
                 line = f'{line}  {note}'
             constants.append(line)
         code = (f'    {line}' for line in (*given, *self._writer.lines))
-        wrapped = (part for line in code for part in language.wrapped(line))
+        wrapped = (part for line in code for part in language.wrap_line(line))
         return [*(f'    {line}' for line in constants), *wrapped]
 
-    def _unless(self, conditions: Sequence[str], lines: Sequence[str]) -> list[str]:
+    def _write_unless(self, conditions: Sequence[str], lines: Sequence[str]) -> list[str]:
         """Write lines that run unless all conditions hold."""
         language = self._language
         all_hold = f' {language.conjunction} '.join(conditions)
-        return language.block(language.negated(all_hold), lines)
+        return language.write_block(language.negate(all_hold), lines)
 
-    def _follow(self, tree: Tree) -> None:
+    def _write_tree(self, tree: Tree) -> None:
         """Write a tree: the usual path continues, every other one is a block that returns."""
         language, writer = self._language, self._writer
-        while isinstance(tree, Branch):
+        while isinstance(tree, DecisionBranch):
             condition = writer.write(tree.condition)
             usual, other = tree.held, tree.failed
             if tree.usual:
-                condition = language.negated(condition)
+                condition = language.negate(condition)
             else:
                 usual, other = other, usual
-            with writer.block() as lines:
-                self._follow(other)
-            writer.lines += language.block(condition, lines)
+            with writer.open_block() as lines:
+                self._write_tree(other)
+            writer.lines += language.write_block(condition, lines)
             tree = usual
-        if isinstance(tree, Solved):
-            self._solved(tree)
+        if isinstance(tree, SolvedLeaf):
+            self._write_solution(tree)
         else:
             status = UNDECIDED if tree is None else tree.name
-            writer.lines.append(language.left(language.status.format(status)))
+            writer.lines.append(language.return_status(language.status.format(status)))
 
-    def _solved(self, leaf: Solved) -> None:
+    def _write_solution(self, leaf: SolvedLeaf) -> None:
         language, writer = self._language, self._writer
         *groups, bounded = leaf.outputs
         bounds = self._subject.closure.bounds
-        beyond = [self._beyond(bound, f'q{bound.number}') for bound in bounds.inputs]
+        beyond = [self._write_beyond(bound, f'q{bound.number}') for bound in bounds.inputs]
         for number, (bound, value) in enumerate(zip(bounds.joints, bounded, strict=True)):
             name = f'limited{number}'
-            writer.lines.append(language.assigned(name, writer.write(value)))
+            writer.lines.append(language.assign(name, writer.write(value)))
             if isinstance(value, Operation):
-                writer.name(value, name)
-            beyond.append(self._beyond(bound, name))
+                writer.name_operation(value, name)
+            beyond.append(self._write_beyond(bound, name))
         texts = [[writer.write(number) for number in group] for group in groups]
         status = language.status.format(leaf.status.name)
         if beyond:
             condition = f' {language.disjunction} '.join(beyond)
-            status = language.choice(
+            status = language.write_choice(
                 condition, language.status.format(Status.LIMITED.name), status
             )
-        writer.lines += language.solved(status, texts)
+        writer.lines += language.return_solution(status, texts)
 
-    def _beyond(self, bound: Bound, name: str) -> str:
+    def _write_beyond(self, bound: Bound, name: str) -> str:
         """Write that a value is beyond its limits, as `Bound.beyond` does."""
         language = self._language
 
         def compared(value: str) -> str:
-            low, high = language.constant(bound.low), language.constant(bound.high)
+            low, high = language.write_constant(bound.low), language.write_constant(bound.high)
             return f'({value} < {low} {language.disjunction} {value} > {high})'
 
         if bound.middle is None:
             return compared(name)
-        middle, turn = language.constant(bound.middle), language.constant(tau)
+        middle, turn = language.write_constant(bound.middle), language.write_constant(tau)
         turns = f'{language.nearest}(({name} - {middle}) / {turn})'
         turned = f'{name}_turned'
-        self._writer.lines.append(language.assigned(turned, f'{name} - {turn} * {turns}'))
+        self._writer.lines.append(language.assign(turned, f'{name} - {turn} * {turns}'))
         return f'({compared(name)} {language.conjunction} {compared(turned)})'
 
-    def _constant(self, value: float) -> str:
-        text = self._language.constant(value)
+    def _constant_text(self, value: float) -> str:
+        text = self._language.write_constant(value)
         name = self._lengths.get(value) or _THRESHOLDS.get(value)
         if abs(value) in _PLAIN or (self._often[value] < 2 and not name):
             return text
@@ -353,26 +353,26 @@ class _Body:
         return self._named[value]
 
 
-def _roots(tree: Tree) -> Iterator[Any]:
+def _tree_roots(tree: Tree) -> Iterator[Any]:
     """Yield all conditions and outputs of a tree."""
-    if isinstance(tree, Branch):
+    if isinstance(tree, DecisionBranch):
         yield tree.condition
-        yield from _roots(tree.held)
-        yield from _roots(tree.failed)
-    elif isinstance(tree, Solved):
+        yield from _tree_roots(tree.held)
+        yield from _tree_roots(tree.failed)
+    elif isinstance(tree, SolvedLeaf):
         for group in tree.outputs:
             yield from group
 
 
-def _constants(roots: Sequence[Any]) -> Iterator[float]:
+def _used_constants(roots: Sequence[Any]) -> Iterator[float]:
     """Yield the constants that the roots need, once for each use."""
-    for operation in uses(roots):
+    for operation in count_uses(roots):
         for argument in operation.arguments:
             if not isinstance(argument, Operation):
                 yield argument
 
 
-def _lengths(closure: Closure) -> dict[float, str]:
+def _length_names(closure: Closure) -> dict[float, str]:
     """Return names of the lengths of links, by their values in the unit of the steps."""
     named: dict[float, set[str]] = defaultdict(set)
     for link, points in closure.linkage.links.items():
@@ -391,7 +391,7 @@ def _lengths(closure: Closure) -> dict[float, str]:
     }
 
 
-def _head(subject: Subject, function: str) -> Iterator[str]:
+def _head_lines(subject: Subject, function: str) -> Iterator[str]:
     """Yield the lines of the head."""
     closure = subject.closure
     linkage = closure.linkage
@@ -402,12 +402,12 @@ def _head(subject: Subject, function: str) -> Iterator[str]:
     for number, given in enumerate(linkage.inputs):
         unit = given.unit
         yield f'  {GIVEN[0]}[{number}]  {comment_text(given.joint)} [{unit}]'
-    yield from _derived(subject, GIVEN)
+    yield from _derived_names(subject, GIVEN)
     yield 'and gives:'
     for number, name in enumerate(subject.joints):
         unit = 'rad' if isinstance(linkage.joints[name], RevoluteJoint) else 'm'
         yield f'  {RETURNED[0]}[{number}]  {comment_text(name)} [{unit}]'
-    yield from _derived(subject, RETURNED)
+    yield from _derived_names(subject, RETURNED)
     yield ''
     yield 'Angles are not wrapped to one turn. The function returns a status:'
     for number, (name, text) in enumerate(STATUSES.items()):
@@ -418,7 +418,7 @@ def _head(subject: Subject, function: str) -> Iterator[str]:
     if closure.bounds:
         yield 'Limits that are checked, in [rad] or [m]:'
         for name, limits in linkage.limits.items():
-            if limits.bounded:
+            if limits.is_bounded:
                 yield f'  {comment_text(name)} {limits}'
     else:
         yield 'The linkage file names no limits of joints.'
@@ -434,7 +434,7 @@ def _head(subject: Subject, function: str) -> Iterator[str]:
     yield 'on are what the solution makes of them.'
 
 
-def _derived(subject: Subject, names: Sequence[str]) -> Iterator[str]:
+def _derived_names(subject: Subject, names: Sequence[str]) -> Iterator[str]:
     per = ('', 'per second', 'per second squared')
     for order in range(1, 1 + subject.derivatives):
         yield f'  {names[order]}[]  of the same, {per[order]}'

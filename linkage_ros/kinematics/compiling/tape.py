@@ -47,7 +47,9 @@ class Operation:
         return [argument for argument in self.arguments if isinstance(argument, Operation)]
 
 
-def rewritten(root: Any, known: dict[Operation, Any], write: Callable[[Operation], Any]) -> Any:
+def rewrite_operations(
+    root: Any, known: dict[Operation, Any], write: Callable[[Operation], Any]
+) -> Any:
     """Return what an operation is rewritten as, after its operands; others are kept as known."""
     waiting = [root]
     while waiting:
@@ -120,12 +122,12 @@ class Tape:
         self._settled: Mapping[int, bool] = {}
         self._ahead: Sequence[bool | None] = ()
 
-    def given(self, name: str, value: complex) -> Symbol:
+    def add_input(self, name: str, value: complex) -> Symbol:
         """Return the symbol of an input, real or complex like its value."""
         kind: Kind = 'complex' if isinstance(value, complex) else 'real'
-        return Symbol(self, self._new(name, (), kind, value))
+        return Symbol(self, self._new_operation(name, (), kind, value))
 
-    def begin(
+    def reset_decisions(
         self, ahead: Sequence[bool | None] = (), settled: Mapping[int, bool] | None = None
     ) -> None:
         """
@@ -150,26 +152,28 @@ class Tape:
     def write(self, name: str, *arguments: Any) -> Any:
         """Return the symbol of an operation on symbols and constants."""
         given = tuple(a.operation if isinstance(a, Symbol) else a for a in arguments)
-        simple = _simplified(name, given)
+        simple = _simplify(name, given)
         if simple is not None:
             return Symbol(self, simple) if isinstance(simple, Operation) else simple
-        if name == '+' and (back := _negated(given[1])) is not None:
+        if name == '+' and (back := _negated_operand(given[1])) is not None:
             name, given = '-', (given[0], back)
-        elif name == '+' and (back := _negated(given[0])) is not None:
+        elif name == '+' and (back := _negated_operand(given[0])) is not None:
             name, given = '-', (given[1], back)
-        return Symbol(self, self._new(name, given, _kind(name, given), None))
+        return Symbol(self, self._new_operation(name, given, _result_kind(name, given), None))
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Symbol:
         """Return the symbol of a function's result; the function cannot take symbols."""
         given = tuple(a.operation if isinstance(a, Symbol) else a for a in arguments)
-        return Symbol(self, self._new('call', (function, *given), 'other', None))
+        return Symbol(self, self._new_operation('call', (function, *given), 'other', None))
 
-    def _new(self, name: str, arguments: tuple[Any, ...], kind: Kind, value: Any) -> Operation:
-        key = (name, *(_key(argument) for argument in arguments))
+    def _new_operation(
+        self, name: str, arguments: tuple[Any, ...], kind: Kind, value: Any
+    ) -> Operation:
+        key = (name, *(_argument_key(argument) for argument in arguments))
         operation = self._known.get(key)
         if operation is None:
             if value is None:
-                value = _value(name, arguments)
+                value = _operation_value(name, arguments)
             operation = Operation(name, arguments, kind, len(self._known), value)
             self._known[key] = operation
         return operation
@@ -281,27 +285,27 @@ def never_minus_zero(number: Any) -> bool:
     return number.name == 'abs'
 
 
-def _simplified(name: str, given: tuple[Any, ...]) -> Any:
+def _simplify(name: str, given: tuple[Any, ...]) -> Any:
     """Return an operation in a simpler form with the same bits, or None if there is none."""
     if name in ('+', '-', '*', '/') and not any(
         isinstance(a, complex) or (isinstance(a, Operation) and a.kind == 'complex') for a in given
     ):
         one, other = given
-        if name == '-' and _is(other, 0.0):
+        if name == '-' and _is_exactly(other, 0.0):
             return one
-        if name in ('*', '/') and _is(other, 1.0):
+        if name in ('*', '/') and _is_exactly(other, 1.0):
             return one
-        if name == '*' and _is(one, 1.0):
+        if name == '*' and _is_exactly(one, 1.0):
             return other
-        if name == '+' and _is(other, -0.0):
+        if name == '+' and _is_exactly(other, -0.0):
             return one
-        if name == '+' and _is(one, 0.0) and never_minus_zero(other):
+        if name == '+' and _is_exactly(one, 0.0) and never_minus_zero(other):
             return other
-        if name == '+' and _is(other, 0.0) and never_minus_zero(one):
+        if name == '+' and _is_exactly(other, 0.0) and never_minus_zero(one):
             return one
     if name == 'negative':
         (one,) = given
-        return _negated(one)
+        return _negated_operand(one)
     if name == 'abs':
         (one,) = given
         if isinstance(one, Operation) and one.name == 'abs':
@@ -309,7 +313,7 @@ def _simplified(name: str, given: tuple[Any, ...]) -> Any:
     return None
 
 
-def _is(given: Any, value: float) -> bool:
+def _is_exactly(given: Any, value: float) -> bool:
     return (
         isinstance(given, (int, float))
         and given == value
@@ -317,14 +321,14 @@ def _is(given: Any, value: float) -> bool:
     )
 
 
-def _negated(given: Any) -> Any:
+def _negated_operand(given: Any) -> Any:
     """Return the operand of a negation, or None."""
     if isinstance(given, Operation) and given.name == 'negative' and given.kind == 'real':
         return given.arguments[0]
     return None
 
 
-def _kind(name: str, given: tuple[Any, ...]) -> Kind:
+def _result_kind(name: str, given: tuple[Any, ...]) -> Kind:
     if name in _TRUTHS:
         return 'truth'
     if name in _REALS:
@@ -339,13 +343,13 @@ def _kind(name: str, given: tuple[Any, ...]) -> Kind:
     return 'real'
 
 
-def _key(argument: Any) -> Any:
+def _argument_key(argument: Any) -> Any:
     if isinstance(argument, Operation):
         return argument.number
     return id(argument) if callable(argument) else repr(argument)
 
 
-def _value(name: str, arguments: tuple[Any, ...]) -> Any:
+def _operation_value(name: str, arguments: tuple[Any, ...]) -> Any:
     """Return the value; NaN if it has none, in branches that the steps do not take."""
     values = [a.value if isinstance(a, Operation) else a for a in arguments]
     try:

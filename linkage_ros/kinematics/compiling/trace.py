@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.kinematics.compiling.tape import Decision, Operation, Symbol, Tape
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State, Step
+from linkage_ros.kinematics.step import LinkState, Step
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import Acceleration, LoopClosure, Position, Velocity
@@ -26,7 +26,7 @@ Number = Operation | float
 """A result of a program: an operation, or a constant."""
 
 
-class Motion(NamedTuple):
+class TracedMotion(NamedTuple):
     """The motion of a linkage on symbols, as far as requested."""
 
     position: Position
@@ -34,7 +34,7 @@ class Motion(NamedTuple):
     acceleration: Acceleration | None
 
 
-Wanted = Callable[[Motion], Sequence[Sequence[float]]]
+OutputSelection = Callable[[TracedMotion], Sequence[Sequence[float]]]
 """Selects the numbers of a motion that a program returns, in groups."""
 
 
@@ -49,16 +49,16 @@ class Path(NamedTuple):
     tape: Tape  # The tape of the operations
 
 
-def joints(motion: Motion) -> Sequence[Sequence[float]]:
+def published_joints(motion: TracedMotion) -> Sequence[Sequence[float]]:
     """Return the published joints of a motion, with their rates and accelerations."""
     return [part.joints for part in motion if part is not None]
 
 
-def traced(
+def trace_path(
     closure: LoopClosure,
     at: Sequence[float],
     derivatives: int,
-    wanted: Wanted = joints,
+    wanted: OutputSelection = published_joints,
     within_limits: bool = True,
 ) -> Path:
     """
@@ -85,11 +85,11 @@ def traced(
     """
     tape = Tape()
     given = [
-        [tape.given(f'{letter}{i}', value) for i, value in enumerate(values)]
+        [tape.add_input(f'{letter}{i}', value) for i, value in enumerate(values)]
         for letter, values in zip('qwa', (at, [1.25] * len(at), [0.75] * len(at)), strict=True)
     ][: 1 + derivatives]
-    tape.begin()
-    motion = moved(closure, given, within_limits)
+    tape.reset_decisions()
+    motion = motion_at(closure, given, within_limits)
     if motion.position.status is not Status.CLOSED:
         raise ValueError(f'{list(at)}: the linkage is {motion.position.status.value} there')
     # The selection may make decisions, too.
@@ -98,18 +98,18 @@ def traced(
     return Path(inputs, tuple(tape.decisions), outputs, tape)
 
 
-def moved(
+def motion_at(
     closure: LoopClosure, given: Sequence[Sequence[Any]], within_limits: bool = True
-) -> Motion:
+) -> TracedMotion:
     """Return the motion of a closure at inputs, rates and accelerations, as far as given."""
     inputs, *more = given
-    position = closure.position(*inputs) if within_limits else closure.posed(*inputs)
+    position = closure.position(*inputs) if within_limits else closure.close_unlimited(*inputs)
     velocity = acceleration = None
     if more and position.status.has_rates:
         velocity = closure.velocity(position, *more[0])
         if len(more) > 1:
             acceleration = closure.acceleration(position, velocity, *more[1])
-    return Motion(position, velocity, acceleration)
+    return TracedMotion(position, velocity, acceleration)
 
 
 def number_of(number: Any) -> Number:
@@ -117,14 +117,14 @@ def number_of(number: Any) -> Number:
     return number.operation if isinstance(number, Symbol) else number
 
 
-class Solved(NamedTuple):
+class SolvedLeaf(NamedTuple):
     """A leaf with numbers, in the requested groups."""
 
     status: Status
     outputs: tuple[tuple[Number, ...], ...]
 
 
-class Branch(NamedTuple):
+class DecisionBranch(NamedTuple):
     """A condition, the trees where it holds and where it fails, and the usual outcome."""
 
     condition: Operation
@@ -133,7 +133,7 @@ class Branch(NamedTuple):
     usual: bool
 
 
-Tree: TypeAlias = Branch | Solved | Status | None
+Tree: TypeAlias = DecisionBranch | SolvedLeaf | Status | None
 """What the steps come to, by their decisions; None where that is not followed."""
 
 
@@ -161,11 +161,11 @@ def tree_below(
             continue
         other = tree_below(tape, (*(each.held for each in made[:number]), not held), leaf)
         if tree != other:
-            tree = Branch(condition, *((tree, other) if held else (other, tree)), held)
+            tree = DecisionBranch(condition, *((tree, other) if held else (other, tree)), held)
     return tree
 
 
-def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
+def fallback_statuses(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
     """
     Return, for each decision of a path, the status of the linkage if the decision differs.
 
@@ -177,8 +177,8 @@ def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
     inputs: list[Any] = [
         Symbol(tape, given) for given in path.inputs[: len(closure.linkage.inputs)]
     ]
-    tape.begin()
-    known = closure.known(*inputs)
+    tape.reset_decisions()
+    known = closure.initial_state(*inputs)
     settled: dict[int, bool] = {}
     of_steps: list[Tree] = []
     for step in closure.steps:
@@ -195,16 +195,16 @@ def fates(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
         leaf(())
         settled |= {condition.number: holds for condition, holds in made}
     # The rates begin where the links are closed.
-    fate = chain(of_steps, repeat(None))
+    fallback = chain(of_steps, repeat(None))
     return tuple(
-        Status.INDETERMINATE if condition.name == 'finite' else next(fate)
+        Status.INDETERMINATE if condition.name == 'finite' else next(fallback)
         for condition, _ in path.decisions
     )
 
 
 def _status_of(
     step: Step,
-    known: State,
+    solved: LinkState,
     count: tuple[int, int],
     tape: Tape,
     settled: dict[int, bool],
@@ -213,8 +213,8 @@ def _status_of(
     """Return the status of a step with given first decisions; None if it is closed."""
     # What the step appended before.
     coordinates, pins = count
-    del known.coordinates[coordinates:]
-    del known.pins[pins:]
-    tape.begin(decided, settled)
-    status = step.close(known).status
+    del solved.coordinates[coordinates:]
+    del solved.pins[pins:]
+    tape.reset_decisions(decided, settled)
+    status = step.close(solved).status
     return None if status is Status.CLOSED else status

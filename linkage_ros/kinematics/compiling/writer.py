@@ -23,7 +23,7 @@ _PRECEDENCE = {'+': 4, '-': 4, '*': 5, '/': 5, 'negative': 6, '**': 7}
 _COMPARISONS = frozenset(('<', '<=', '>', '>=', '==', '!='))
 
 
-def uses(roots: Iterable[Any]) -> dict[Operation, int]:
+def count_uses(roots: Iterable[Any]) -> dict[Operation, int]:
     """Return how often each operation is used, by others that the roots need or as a root."""
     counts: dict[Operation, int] = {}
     waiting = [root for root in roots if isinstance(root, Operation)]
@@ -40,7 +40,7 @@ def uses(roots: Iterable[Any]) -> dict[Operation, int]:
     return counts
 
 
-def needed(root: Operation, known: Container[Operation]) -> Iterator[Operation]:
+def needed_operations(root: Operation, known: Container[Operation]) -> Iterator[Operation]:
     """Yield an operation and those that it needs, unless known, each after its operands."""
     waiting: list[tuple[Operation, bool]] = [(root, False)]
     while waiting:
@@ -54,14 +54,14 @@ def needed(root: Operation, known: Container[Operation]) -> Iterator[Operation]:
         waiting += [(operand, False) for operand in reversed(operation.operands())]
 
 
-class Text(NamedTuple):
+class WrittenText(NamedTuple):
     """An expression: its text, how tightly it binds, and how deep it is nested."""
 
     text: str
     precedence: int
     depth: int
 
-    def within(self, precedence: int) -> str:
+    def in_parentheses(self, precedence: int) -> str:
         """Return it as a part of an expression of a precedence."""
         return self.text if self.precedence >= precedence else f'({self.text})'
 
@@ -69,7 +69,7 @@ class Text(NamedTuple):
 _ATOM = 9
 
 
-class Writer:
+class TextWriter:
     """
     Writes operations as lines of a language with the operators of C.
 
@@ -98,20 +98,20 @@ class Writer:
         choice: Callable[[str, str, str], str],
         assign: Callable[[str, str, Operation], str],
     ) -> None:
-        self._uses = uses(roots)
+        self._uses = count_uses(roots)
         self._constant = constant
         self._call = call
         self._choice = choice
         self._assign = assign
-        self._texts: dict[Operation, Text] = {}
+        self._texts: dict[Operation, WrittenText] = {}
         self.lines: list[str] = []
 
-    def name(self, operation: Operation, text: str) -> None:
+    def name_operation(self, operation: Operation, text: str) -> None:
         """Give a name to an operation, such as an input."""
-        self._texts[operation] = Text(text, _ATOM, 0)
+        self._texts[operation] = WrittenText(text, _ATOM, 0)
 
     @contextmanager
-    def block(self) -> Iterator[list[str]]:
+    def open_block(self) -> Iterator[list[str]]:
         """Collect the lines of a block; names assigned in it are unknown after it."""
         texts, lines = self._texts, self.lines
         self._texts, self.lines = dict(texts), []
@@ -120,46 +120,54 @@ class Writer:
 
     def write(self, root: Any) -> str:
         """Return the text of a number, after the lines that it needs."""
-        return self.text(root).text
+        return self.expression_text(root).text
 
-    def text(self, root: Any) -> Text:
+    def expression_text(self, root: Any) -> WrittenText:
         """Return a number as an expression, after the lines that it needs."""
         if not isinstance(root, Operation):
-            return Text(self._constant(root), _ATOM if not str(root).startswith('-') else 6, 0)
-        for operation in needed(root, self._texts):
-            self._texts[operation] = self._placed(operation)
+            return WrittenText(
+                self._constant(root), _ATOM if not str(root).startswith('-') else 6, 0
+            )
+        for operation in needed_operations(root, self._texts):
+            self._texts[operation] = self._place_operation(operation)
         return self._texts[root]
 
-    def _placed(self, operation: Operation) -> Text:
-        text = self._expression(operation)
+    def _place_operation(self, operation: Operation) -> WrittenText:
+        text = self._format_expression(operation)
         if self._uses[operation] < 2 and text.depth < _DEEPEST and operation.name != 'call':
             return text
         name = f't{operation.number}'
         self.lines.append(self._assign(name, text.text, operation))
-        return Text(name, _ATOM, 0)
+        return WrittenText(name, _ATOM, 0)
 
-    def _expression(self, operation: Operation) -> Text:
-        parts = [self.text(argument) for argument in operation.arguments]
+    def _format_expression(self, operation: Operation) -> WrittenText:
+        parts = [self.expression_text(argument) for argument in operation.arguments]
         depth = 1 + max((part.depth for part in parts), default=0)
         name = operation.name
         if name in _PRECEDENCE and name not in ('negative', '**'):
             precedence = _PRECEDENCE[name]
             one, other = parts
             # Sums and products associate to the left: the right operand needs brackets.
-            return Text(
-                f'{one.within(precedence)} {name} {other.within(precedence + 1)}',
+            return WrittenText(
+                f'{one.in_parentheses(precedence)} {name} {other.in_parentheses(precedence + 1)}',
                 precedence,
                 depth,
             )
         if name == 'negative':
             precedence = _PRECEDENCE[name]
-            return Text(f'-{parts[0].within(precedence + 1)}', precedence, depth)
+            return WrittenText(f'-{parts[0].in_parentheses(precedence + 1)}', precedence, depth)
         if name in _COMPARISONS:
             one, other = parts
-            return Text(f'{one.within(4)} {name} {other.within(4)}', 2, depth)
+            return WrittenText(
+                f'{one.in_parentheses(4)} {name} {other.in_parentheses(4)}', 2, depth
+            )
         if name == 'where':
             condition, one, other = parts
-            return Text(
-                self._choice(condition.within(2), one.within(2), other.within(2)), 0, depth
+            return WrittenText(
+                self._choice(
+                    condition.in_parentheses(2), one.in_parentheses(2), other.in_parentheses(2)
+                ),
+                0,
+                depth,
             )
-        return Text(self._call(operation, [part.text for part in parts]), _ATOM, depth)
+        return WrittenText(self._call(operation, [part.text for part in parts]), _ATOM, depth)

@@ -32,9 +32,9 @@ from __future__ import annotations
 from math import pi
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import atan2, cross, facing, phase, ROUNDING
+from linkage_ros.kinematics.arithmetic import atan2, cross_product, phase, ROUNDING, unit_vector
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 
 class PRPPose(NamedTuple):
@@ -97,65 +97,67 @@ class PRPDyad(_CrossingLines):
         self._starts = starts
         self._units = units
 
-    def close(self, known: State) -> PRPPose:
+    def close(self, solved: LinkState) -> PRPPose:
         """Append both slides."""
-        angle, other_angle = (known.coordinates[k] for k in self.arms)
-        start, end = (known.pins[k] for k in self._starts)
-        units = facing(angle) * self._units[0], facing(other_angle) * self._units[1]
+        angle, other_angle = (solved.coordinates[k] for k in self.arms)
+        start, end = (solved.pins[k] for k in self._starts)
+        units = unit_vector(angle) * self._units[0], unit_vector(other_angle) * self._units[1]
         # The angle first: the product of two directions would cancel for parallel lines.
-        across = facing(other_angle - angle) * self._across
+        across = unit_vector(other_angle - angle) * self._across
         between = end - start
         if abs(across.imag) <= ROUNDING:
-            gap = abs(cross(units[0], between))
+            gap = abs(cross_product(units[0], between))
             far = gap > ROUNDING * (abs(start) + abs(end))
             status = Status.OPEN if far else Status.INDETERMINATE
             return PRPPose(status, gap if far else 0.0, 0.0, 0.0, across, units)
-        first, second = resolved(between, units, across.imag, known)
+        first, second = resolve_along_lines(between, units, across.imag, solved)
         return PRPPose(Status.CLOSED, 0.0, first, second, across, units)
 
-    def rates(self, pose: PRPPose, known: State, speeds: State) -> tuple[float, float]:
+    def rates(
+        self, pose: PRPPose, solved: LinkState, velocities: LinkState
+    ) -> tuple[float, float]:
         """Append the rates of both slides."""
         one, other = pose.units
-        turn, other_turn = (speeds.coordinates[k] for k in self.arms)
-        start, end = (speeds.pins[k] for k in self._starts)
-        begin, finish = (known.pins[k] for k in self._starts)
+        turn, other_turn = (velocities.coordinates[k] for k in self.arms)
+        start, end = (velocities.pins[k] for k in self._starts)
+        begin, finish = (solved.pins[k] for k in self._starts)
         away, drift = finish - begin, end - start
         swing, sine = other_turn - turn, pose.across.imag
-        first = (cross(drift - 1j * turn * away, other) - swing * pose.second) / sine
-        second = (cross(drift - 1j * other_turn * away, one) - swing * pose.first) / sine
-        speeds.coordinates.append(first)
-        speeds.coordinates.append(second)
+        first = (cross_product(drift - 1j * turn * away, other) - swing * pose.second) / sine
+        second = (cross_product(drift - 1j * other_turn * away, one) - swing * pose.first) / sine
+        velocities.coordinates.append(first)
+        velocities.coordinates.append(second)
         return first, second
 
     def accelerations(
         self,
         pose: PRPPose,
         rates: tuple[float, float],
-        _known: State,
-        speeds: State,
-        changes: State,
+        _solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append the accelerations of both slides."""
-        v, a = speeds.coordinates, changes.coordinates
+        v, a = velocities.coordinates, accelerations.coordinates
         (i, j), (one, other) = self.arms, pose.units
         slide_rate, other_slide_rate = rates
-        start, end = (changes.pins[k] for k in self._starts)
-        carried = end + _carried(pose.second, other_slide_rate, v[j], a[j]) * other
-        carried -= start + _carried(pose.first, slide_rate, v[i], a[i]) * one
-        resolved(carried, pose.units, pose.across.imag, changes)
+        start, end = (accelerations.pins[k] for k in self._starts)
+        carried = end + _carried_acceleration(pose.second, other_slide_rate, v[j], a[j]) * other
+        carried -= start + _carried_acceleration(pose.first, slide_rate, v[i], a[i]) * one
+        resolve_along_lines(carried, pose.units, pose.across.imag, accelerations)
 
 
-def _carried(slide: float, rate: float, turn: float, change: float) -> complex:
+def _carried_acceleration(slide: float, rate: float, turn: float, change: float) -> complex:
     """Return the centrifugal, Euler and Coriolis terms of a point on a turning line."""
     return 1j * (change * slide + 2.0 * turn * rate) - turn * turn * slide
 
 
-def resolved(
-    between: complex, units: tuple[complex, complex], sine: float, state: State
+def resolve_along_lines(
+    between: complex, units: tuple[complex, complex], sine: float, state: LinkState
 ) -> tuple[float, float]:
     """Resolve a vector along both lines, and append its components."""
     one, other = units
-    first, second = cross(between, other) / sine, cross(between, one) / sine
+    first, second = cross_product(between, other) / sine, cross_product(between, one) / sine
     state.coordinates.append(first)
     state.coordinates.append(second)
     return first, second
@@ -203,11 +205,11 @@ class CrankPRPDyad(_CrossingLines):
         self._offsets = offsets
         self._size = size
 
-    def close(self, known: State) -> PRPPose:
+    def close(self, solved: LinkState) -> PRPPose:
         """Append r1 and r2."""
-        x = known.coordinates
+        x = solved.coordinates
         (i, j), (one, other) = self.arms, self._offsets
-        across = facing(x[j] - x[i]) * self._across
+        across = unit_vector(x[j] - x[i]) * self._across
         sine, cosine = across.imag, across.real
         if abs(sine) <= ROUNDING:
             gap = abs(one * cosine - other)
@@ -219,27 +221,27 @@ class CrankPRPDyad(_CrossingLines):
         x.append(second)
         return PRPPose(Status.CLOSED, 0.0, first, second, across)
 
-    def rates(self, pose: PRPPose, _known: State, speeds: State) -> float:
+    def rates(self, pose: PRPPose, _solved: LinkState, velocities: LinkState) -> float:
         """Append their rates; return δ̇/sin δ."""
-        v = speeds.coordinates
+        v = velocities.coordinates
         i, j = self.arms
-        swing = (v[j] - v[i]) / pose.across.imag
-        v.append(-swing * pose.second)
-        v.append(-swing * pose.first)
-        return swing
+        rate_ratio = (v[j] - v[i]) / pose.across.imag
+        v.append(-rate_ratio * pose.second)
+        v.append(-rate_ratio * pose.first)
+        return rate_ratio
 
     def accelerations(
         self,
         pose: PRPPose,
-        swing: float,
-        _known: State,
-        _speeds: State,
-        changes: State,
+        rate_ratio: float,
+        _solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append their accelerations."""
-        a = changes.coordinates
+        a = accelerations.coordinates
         i, j = self.arms
         first, second, cosine = pose.first, pose.second, pose.across.real
-        pull, whirl = (a[j] - a[i]) / pose.across.imag, swing * swing
+        pull, whirl = (a[j] - a[i]) / pose.across.imag, rate_ratio * rate_ratio
         a.append(whirl * (first + second * cosine) - pull * second)
         a.append(whirl * (second + first * cosine) - pull * first)

@@ -25,10 +25,10 @@ from __future__ import annotations
 from math import asin
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import cross
+from linkage_ros.kinematics.arithmetic import cross_product
 from linkage_ros.kinematics.rail import PinOnRail, Rail
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 _STILL = (0.0, 0.0)
 
@@ -42,7 +42,7 @@ class RPPPose(NamedTuple):
     # s1 and s2, in the unit of the lengths.
     first: float
     second: float
-    sight: PinOnRail  # A in the frame of the link that carries the known line
+    pin_on_rail: PinOnRail  # A in the frame of the link that carries the known line
 
 
 class RPPDyad:
@@ -70,44 +70,48 @@ class RPPDyad:
         self._inner = inner
         self._outer = outer
         self._offsets = offsets
-        self._across = cross(inner, outer)
+        self._across = cross_product(inner, outer)
 
-    def close(self, known: State) -> RPPPose:
+    def close(self, solved: LinkState) -> RPPPose:
         """Append both slides."""
-        sight = self.rail.at(known)
-        first, second = self._slides(sight.place, self._offsets, known)
-        return RPPPose(Status.CLOSED, 0.0, first, second, sight)
+        pin_on_rail = self.rail.pin_at(solved)
+        first, second = self._append_slides(pin_on_rail.place, self._offsets, solved)
+        return RPPPose(Status.CLOSED, 0.0, first, second, pin_on_rail)
 
-    def rates(self, pose: RPPPose, known: State, speeds: State) -> tuple[complex, float]:
+    def rates(
+        self, pose: RPPPose, solved: LinkState, velocities: LinkState
+    ) -> tuple[complex, float]:
         """Append the rates of both slides."""
-        rates = self.rail.rates(pose.sight, known, speeds)
+        rates = self.rail.rates(pose.pin_on_rail, solved, velocities)
         velocity, _ = rates
-        self._slides(velocity, _STILL, speeds)
+        self._append_slides(velocity, _STILL, velocities)
         return rates
 
     def accelerations(
         self,
         pose: RPPPose,
         rates: tuple[complex, float],
-        known: State,
-        speeds: State,
-        changes: State,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append the accelerations of both slides."""
-        pull, _ = self.rail.accelerations(pose.sight, rates, known, speeds, changes)
-        self._slides(pull, _STILL, changes)
+        pull, _ = self.rail.accelerations(
+            pose.pin_on_rail, rates, solved, velocities, accelerations
+        )
+        self._append_slides(pull, _STILL, accelerations)
 
     def transmission_angle(self, _pose: RPPPose) -> float:
         """Return the angle between the two lines, in [0, π/2], in [rad]."""
         return asin(min(abs(self._across), 1.0))
 
-    def _slides(
-        self, place: complex, offsets: tuple[float, float], state: State
+    def _append_slides(
+        self, place: complex, offsets: tuple[float, float], state: LinkState
     ) -> tuple[float, float]:
         """Resolve a vector along both lines, and append its components."""
         along_outer, along_inner = offsets
-        first = (cross(place, self._outer) - along_outer) / self._across
-        second = (along_inner - cross(place, self._inner)) / self._across
+        first = (cross_product(place, self._outer) - along_outer) / self._across
+        second = (along_inner - cross_product(place, self._inner)) / self._across
         state.coordinates.append(first)
         state.coordinates.append(second)
         return first, second

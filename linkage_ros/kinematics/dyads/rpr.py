@@ -33,7 +33,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import atan2, margin
+from linkage_ros.kinematics.arithmetic import atan2, exact_sum
 from linkage_ros.kinematics.diagonals import (
     AnyDiagonal,
     crank_diagonal_of,
@@ -43,7 +43,7 @@ from linkage_ros.kinematics.diagonals import (
 )
 from linkage_ros.kinematics.dyads.two_sided import TwoSided
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 
 class RPRPose(NamedTuple):
@@ -79,43 +79,58 @@ class RPRDyad(TwoSided):
         self.offset = offset
         super().__init__(sign)
 
-    def close(self, known: State) -> RPRPose:
+    def close(self, solved: LinkState) -> RPRPose:
         """Append the direction of the rail, and the slide."""
-        diagonal = self.diagonal.at(known)
+        diagonal = self.diagonal.diagonal_at(solved)
         status = diagonal.status
         if not status.has_pose:
             return RPRPose(status, diagonal.gap, 0.0, 0.0, diagonal)
         slide = self._sign * diagonal.fold
         rail = diagonal.direction - atan2(self.offset, slide)
-        known.coordinates.append(rail)
-        known.coordinates.append(slide)
+        solved.coordinates.append(rail)
+        solved.coordinates.append(slide)
         return RPRPose(status, 0.0, rail, slide, diagonal)
 
-    def rates(self, pose: RPRPose, known: State, speeds: State) -> DiagonalRate:
+    def rates(self, pose: RPRPose, solved: LinkState, velocities: LinkState) -> DiagonalRate:
         """Append the rates of rail and slide."""
-        growth = self.diagonal.rates(pose.diagonal, known, speeds)
-        lean = self._sign * growth.lean
-        turn = growth.turn + self.offset * lean
-        speeds.coordinates.append(growth.base + growth.swing * turn)
-        speeds.coordinates.append(growth.swing * (pose.diagonal.square * lean))
-        return growth
+        rate = self.diagonal.rates(pose.diagonal, solved, velocities)
+        lean = self._sign * rate.growth_over_height
+        turn = rate.direction_rate + self.offset * lean
+        velocities.coordinates.append(rate.base_rate + rate.relative_rate * turn)
+        velocities.coordinates.append(rate.relative_rate * (pose.diagonal.square * lean))
+        return rate
 
     def accelerations(
-        self, pose: RPRPose, growth: DiagonalRate, known: State, speeds: State, changes: State
+        self,
+        pose: RPRPose,
+        rate: DiagonalRate,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append the accelerations of rail and slide."""
-        change = self.diagonal.accelerations(pose.diagonal, growth, known, speeds, changes)
-        lean = self._sign * growth.lean
-        if change.bend is None:
-            slope = growth.growth * (self.offset / pose.slide)
-            bend = (change.pull - slope * slope) / pose.slide
+        acceleration = self.diagonal.accelerations(
+            pose.diagonal, rate, solved, velocities, accelerations
+        )
+        lean = self._sign * rate.growth_over_height
+        if acceleration.curvature_over_height is None:
+            slope = rate.log_length_rate * (self.offset / pose.slide)
+            bend = (acceleration.length_curvature - slope * slope) / pose.slide
         else:
-            bend = self._sign * change.bend
-        swirl = change.swirl + self.offset * (bend - 2.0 * growth.growth * lean)
-        turn = growth.turn + self.offset * lean
-        whirl = growth.swing * growth.swing
-        changes.coordinates.append(change.base + change.change * turn + whirl * swirl)
-        changes.coordinates.append(pose.diagonal.square * (change.change * lean + whirl * bend))
+            bend = self._sign * acceleration.curvature_over_height
+        swirl = acceleration.direction_curvature + self.offset * (
+            bend - 2.0 * rate.log_length_rate * lean
+        )
+        turn = rate.direction_rate + self.offset * lean
+        whirl = rate.relative_rate * rate.relative_rate
+        accelerations.coordinates.append(
+            acceleration.base_acceleration
+            + acceleration.relative_acceleration * turn
+            + whirl * swirl
+        )
+        accelerations.coordinates.append(
+            pose.diagonal.square * (acceleration.relative_acceleration * lean + whirl * bend)
+        )
 
     def side_of(self, pose: RPRPose) -> float:
         """Return a number with the sign of the assembly; 0 where it is singular."""
@@ -136,6 +151,6 @@ def swivel_diagonal(
     crosses: tuple[bool, bool] | None = None,
 ) -> CrankDiagonal:
     """Return the diagonal of the inverted slider-crank with crank a on ground d."""
-    fold = margin(max(a, d), -min(a, d), -abs(offset))
+    fold = exact_sum(max(a, d), -min(a, d), -abs(offset))
     limits = (abs(offset), inf, inf)
     return crank_diagonal_of(a, d, (fold, inf), limits, (arms, angle), not turns_known, crosses)

@@ -30,7 +30,7 @@ from linkage_ros.kinematics.arithmetic import atan2, SMALLEST
 from linkage_ros.kinematics.dyads.two_sided import TwoSided
 from linkage_ros.kinematics.rail import PinOnRail, Rail
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 
 class RRPPose(NamedTuple):
@@ -41,7 +41,7 @@ class RRPPose(NamedTuple):
     link: float  # Direction of A→B, in [rad]
     slide: float  # r, in the unit of the lengths
     along: float  # w, from A to B along the line
-    sight: PinOnRail  # A in the frame of the rail
+    pin_on_rail: PinOnRail  # A in the frame of the rail
 
 
 class RRPRates(NamedTuple):
@@ -71,40 +71,51 @@ class RRPDyad(TwoSided):
         self.rail = rail
         super().__init__(sign)
 
-    def close(self, known: State) -> RRPPose:
+    def close(self, solved: LinkState) -> RRPPose:
         """Append the direction of the link, in the rail's coordinates, and the slide."""
-        sight = self.rail.at(known)
-        status, place = sight.status, sight.place
+        pin_on_rail = self.rail.pin_at(solved)
+        status, place = pin_on_rail.status, pin_on_rail.place
         if status is Status.OPEN:
-            return RRPPose(status, sight.gap, 0.0, 0.0, 0.0, sight)
-        along = self._sign * sight.below * sight.above
+            return RRPPose(status, pin_on_rail.gap, 0.0, 0.0, 0.0, pin_on_rail)
+        along = self._sign * pin_on_rail.below * pin_on_rail.above
         if status is Status.CLOSED and abs(along) < SMALLEST:
             along, status = 0.0, Status.TOGGLE
-        link = sight.base + atan2(-place.imag, along)
+        link = pin_on_rail.base + atan2(-place.imag, along)
         slide = place.real + along
-        known.coordinates.append(link)
-        known.coordinates.append(slide)
-        return RRPPose(status, 0.0, link, slide, along, sight)
+        solved.coordinates.append(link)
+        solved.coordinates.append(slide)
+        return RRPPose(status, 0.0, link, slide, along, pin_on_rail)
 
-    def rates(self, pose: RRPPose, known: State, speeds: State) -> RRPRates:
+    def rates(self, pose: RRPPose, solved: LinkState, velocities: LinkState) -> RRPRates:
         """Append the rates of link and slide."""
-        rail = self.rail.rates(pose.sight, known, speeds)
+        rail = self.rail.rates(pose.pin_on_rail, solved, velocities)
         velocity, turn = rail
-        link = -self._sign * self.rail.climb(pose.sight, velocity.imag, speeds)
-        speeds.coordinates.append(turn + link)
-        speeds.coordinates.append(velocity.real + pose.sight.place.imag * link)
+        link = -self._sign * self.rail.unsigned_link_rate(
+            pose.pin_on_rail, velocity.imag, velocities
+        )
+        velocities.coordinates.append(turn + link)
+        velocities.coordinates.append(velocity.real + pose.pin_on_rail.place.imag * link)
         return RRPRates(rail, link)
 
     def accelerations(
-        self, pose: RRPPose, rates: RRPRates, known: State, speeds: State, changes: State
+        self,
+        pose: RRPPose,
+        rates: RRPRates,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append the accelerations of link and slide."""
         (velocity, _), link = rates
-        pull, turn = self.rail.accelerations(pose.sight, rates.rail, known, speeds, changes)
-        y = pose.sight.place.imag
-        change = -self._sign * self.rail.across(pose.sight, pull, link, speeds, changes)
-        changes.coordinates.append(turn + change)
-        changes.coordinates.append(pull.real + velocity.imag * link + y * change)
+        pull, turn = self.rail.accelerations(
+            pose.pin_on_rail, rates.rail, solved, velocities, accelerations
+        )
+        y = pose.pin_on_rail.place.imag
+        change = -self._sign * self.rail.unsigned_link_acceleration(
+            pose.pin_on_rail, pull, link, velocities, accelerations
+        )
+        accelerations.coordinates.append(turn + change)
+        accelerations.coordinates.append(pull.real + velocity.imag * link + y * change)
 
     def side_of(self, pose: RRPPose) -> float:
         """Return a number with the sign of the assembly; 0 where it is singular."""
@@ -112,4 +123,4 @@ class RRPDyad(TwoSided):
 
     def transmission_angle(self, pose: RRPPose) -> float:
         """Return the angle between the link and the normal of the line, in [0, π/2], in [rad]."""
-        return atan2(abs(pose.along), abs(pose.sight.place.imag))
+        return atan2(abs(pose.along), abs(pose.pin_on_rail.place.imag))

@@ -45,13 +45,13 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import (
+    acute_angle,
     atan2,
     copysign,
-    facing,
-    folded,
-    margin,
+    exact_sum,
     phase,
     SMALLEST,
+    unit_vector,
 )
 from linkage_ros.kinematics.diagonals import (
     AnyDiagonal,
@@ -67,7 +67,7 @@ from linkage_ros.kinematics.diagonals import (
 )
 from linkage_ros.kinematics.dyads.two_sided import TwoSided
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import LinkState
 
 
 class RRRPose(NamedTuple):
@@ -105,29 +105,38 @@ class RRRDyad(TwoSided):
 
     def __init__(self, diagonal: AnyDiagonal, b: float, c: float, sign: int) -> None:
         self.diagonal = diagonal
-        self._sums = sums(b, c, diagonal.least)
+        self._sums = square_sums(b, c, diagonal.least)
         super().__init__(sign)
         self._difference = (b - c) * (b + c)
 
-    def close(self, known: State) -> RRRPose:
+    def close(self, solved: LinkState) -> RRRPose:
         """Append the directions of both links."""
-        pose = close_triangle(self.diagonal.at(known), *self._sums, self._sign)
-        known.coordinates.append(pose.first)
-        known.coordinates.append(pose.second)
+        pose = close_triangle(self.diagonal.diagonal_at(solved), *self._sums, self._sign)
+        solved.coordinates.append(pose.first)
+        solved.coordinates.append(pose.second)
         return pose
 
-    def rates(self, pose: RRRPose, known: State, speeds: State) -> DiagonalRate:
+    def rates(self, pose: RRRPose, solved: LinkState, velocities: LinkState) -> DiagonalRate:
         """Append the rates of both links."""
-        growth = self.diagonal.rates(pose.diagonal, known, speeds)
-        triangle_rates(pose, self._sign, growth, speeds)
-        return growth
+        rate = self.diagonal.rates(pose.diagonal, solved, velocities)
+        triangle_rates(pose, self._sign, rate, velocities)
+        return rate
 
     def accelerations(
-        self, pose: RRRPose, growth: DiagonalRate, known: State, speeds: State, changes: State
+        self,
+        pose: RRRPose,
+        rate: DiagonalRate,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append the accelerations of both links."""
-        change = self.diagonal.accelerations(pose.diagonal, growth, known, speeds, changes)
-        triangle_accelerations(pose, self._sign, self._difference, growth, change, changes)
+        acceleration = self.diagonal.accelerations(
+            pose.diagonal, rate, solved, velocities, accelerations
+        )
+        triangle_accelerations(
+            pose, self._sign, self._difference, rate, acceleration, accelerations
+        )
 
     def side_of(self, pose: RRRPose) -> float:
         """Return a number with the sign of the assembly; 0 where it is singular."""
@@ -135,7 +144,7 @@ class RRRDyad(TwoSided):
 
     def transmission_angle(self, pose: RRRPose) -> float:
         """Return the angle between the two links at B, folded into [0, π/2], in [rad]."""
-        return folded(pose.second - pose.first)
+        return acute_angle(pose.second - pose.first)
 
 
 def crank_diagonal(
@@ -153,15 +162,15 @@ def crank_diagonal(
 
     The whole turns of a parallelogram need not be known: both roots change sign with a turn.
     """
-    fold = margin(max(a, d), -min(a, d), -max(b, c), min(b, c))
-    stretch = margin(b, c, -a, -d)
+    fold = exact_sum(max(a, d), -min(a, d), -max(b, c), min(b, c))
+    stretch = exact_sum(b, c, -a, -d)
     both = fold == stretch == 0.0 if crosses is None else all(crosses)
     limits = (abs(b - c), b + c, 4.0 * b * c)
     turns_matter = not (turns_known or both)
     return crank_diagonal_of(a, d, (fold, stretch), limits, (arms, offset), turns_matter, crosses)
 
 
-def sums(b: float, c: float, least: Fraction) -> tuple[float, float]:
+def square_sums(b: float, c: float, least: Fraction) -> tuple[float, float]:
     """Return (b² − c²) ± the constant part of s², correctly rounded."""
     difference = Fraction(b) ** 2 - Fraction(c) ** 2
     return float(difference + least), float(difference - least)
@@ -181,40 +190,44 @@ def close_triangle(diagonal: Diagonal, more: float, less: float, sign: float) ->
     return RRRPose(status, 0.0, first, second, cross, diagonal, more, less)
 
 
-def triangle_rates(pose: RRRPose, sign: float, growth: DiagonalRate, speeds: State) -> None:
+def triangle_rates(pose: RRRPose, sign: float, rate: DiagonalRate, velocities: LinkState) -> None:
     """Append ω3 and ω4 of a closed pose."""
-    lean = sign * growth.lean
+    lean = sign * rate.growth_over_height
     for part in (pose.less, pose.more):
-        speeds.coordinates.append(growth.base + growth.swing * (part * lean + growth.turn))
+        velocities.coordinates.append(
+            rate.base_rate + rate.relative_rate * (part * lean + rate.direction_rate)
+        )
 
 
 def triangle_accelerations(
     pose: RRRPose,
     sign: float,
     difference: float,
-    growth: DiagonalRate,
-    change: DiagonalAcceleration,
-    changes: State,
+    rate: DiagonalRate,
+    acceleration: DiagonalAcceleration,
+    accelerations: LinkState,
 ) -> None:
     """Append α3 and α4."""
-    lean = sign * growth.lean
-    if change.bend is None:
-        bend = (change.pull - pose.more * lean * (pose.less * lean)) / pose.cross
+    lean = sign * rate.growth_over_height
+    if acceleration.curvature_over_height is None:
+        bend = (acceleration.length_curvature - pose.more * lean * (pose.less * lean)) / pose.cross
     else:
-        bend = sign * change.bend
-    swirl = change.swirl - 2.0 * growth.growth * (lean * difference)
-    whirl = growth.swing * growth.swing
+        bend = sign * acceleration.curvature_over_height
+    swirl = acceleration.direction_curvature - 2.0 * rate.log_length_rate * (lean * difference)
+    whirl = rate.relative_rate * rate.relative_rate
     for part in (pose.less, pose.more):
-        first = part * lean + growth.turn
-        changes.coordinates.append(
-            change.base + change.change * first + whirl * (swirl + part * bend)
+        first = part * lean + rate.direction_rate
+        accelerations.coordinates.append(
+            acceleration.base_acceleration
+            + acceleration.relative_acceleration * first
+            + whirl * (swirl + part * bend)
         )
 
 
 class FoldingRRRRates(NamedTuple):
     """The rates, and the terms that the accelerations start from."""
 
-    swing: float  # φ̇
+    relative_rate: float  # φ̇
     # ω3 and ω4 for φ̇ = 1, relative to OD.
     first: float
     second: float
@@ -268,14 +281,14 @@ class FoldingRRRDyad(RRRDyad):
         apart = Fraction(d) - Fraction(a)
         left, right = (
             float(whole * (apart - Fraction(one) + Fraction(other)))
-            if margin(d, -a, -one, other)
+            if exact_sum(d, -a, -one, other)
             else 0.0
             for one, other in ((b, c), (c, b))
         )
         self._constants = (float(whole), b + c, b - c, diagonal.brackets[1], left, right)
 
     @staticmethod
-    def fits(diagonal: AnyDiagonal) -> bool:
+    def passes_fold(diagonal: AnyDiagonal) -> bool:
         """Return whether a diagonal passes a change point where the links fold."""
         return (
             isinstance(diagonal, CrankDiagonal)
@@ -284,12 +297,12 @@ class FoldingRRRDyad(RRRDyad):
         )
 
     def rates(  # type: ignore[override]  # other ones
-        self, pose: RRRPose, _known: State, speeds: State
+        self, pose: RRRPose, _solved: LinkState, velocities: LinkState
     ) -> FoldingRRRRates:
         """Append the rates of both links."""
         outer, inner, apart, bracket, left, right = self._constants
-        stretch, far = pose.diagonal.stretch, pose.diagonal.far
-        fold_ratio, stretch_ratio = self.diagonal.ratios(pose.diagonal)
+        stretch, far = pose.diagonal.stretch, pose.diagonal.far_root
+        fold_ratio, stretch_ratio = self.diagonal.root_ratios(pose.diagonal)
         ratio = self._sign * fold_ratio * stretch_ratio
         side = copysign(1.0, ratio)
         # 1 on one side and 0 on the other.
@@ -300,7 +313,7 @@ class FoldingRRRDyad(RRRDyad):
             less = bracket / stretch / stretch / more
             bent = side * apart * (bracket / (stretch * (inner * abs(far) + outer * stretch)))
         rest = 0.5 * bent + 0.5 * constant / pose.diagonal.square
-        v = speeds.coordinates
+        v = velocities.coordinates
         i, j = self.diagonal.arms
         base = v[j]
         swing = v[i] - base
@@ -314,14 +327,14 @@ class FoldingRRRDyad(RRRDyad):
         self,
         pose: RRRPose,
         rates: FoldingRRRRates,
-        _known: State,
-        _speeds: State,
-        changes: State,
+        _solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append the accelerations of both links."""
         outer, inner, apart, bracket, _, _ = self._constants
         square, stretch = pose.diagonal.square, pose.diagonal.stretch
-        near, far = pose.diagonal.near, pose.diagonal.far
+        near, far = pose.diagonal.near_root, pose.diagonal.far_root
         whirl = 0.5 * rates.constant * (near / square) * (far / square)
         turn = 0.0
         if bracket:
@@ -331,10 +344,10 @@ class FoldingRRRDyad(RRRDyad):
             turn = 0.5 * push / stretch / stretch / stretch
             slope = 0.5 * inner * (stretch + size * (size / stretch)) + outer * size
             whirl -= push * apart * (slope / stretch / part) / stretch / part
-        a = changes.coordinates
+        a = accelerations.coordinates
         i, j = self.diagonal.arms
         base = a[j]
-        pull, square_rate = a[i] - base, rates.swing * rates.swing
+        pull, square_rate = a[i] - base, rates.relative_rate * rates.relative_rate
         a.append(base + pull * rates.first + square_rate * (whirl + turn))
         a.append(base + pull * rates.second + square_rate * (whirl - turn))
 
@@ -357,7 +370,7 @@ class DrivenOffset(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
+class DyadSide:
     """
     A vector from one point of a group of links to another, in the frame of the link of the first.
 
@@ -372,26 +385,26 @@ class Side:
 
     start: complex
     end: complex
-    carries: tuple[DrivenOffset, ...]
+    transforms: tuple[DrivenOffset, ...]
 
-    def at(self, x: list[float]) -> complex:
+    def vector_at(self, x: list[float]) -> complex:
         """Return the vector."""
         z = self.end
-        for origin, inner, angle, turn, slide, sign, unit in self.carries:
+        for origin, inner, angle, turn, slide, sign, unit in self.transforms:
             if turn >= 0:
-                z = origin + facing(angle + sign * x[turn]) * (z - inner)
+                z = origin + unit_vector(angle + sign * x[turn]) * (z - inner)
             else:
-                z = origin + facing(angle) * (z - inner) + sign * x[slide] * unit
+                z = origin + unit_vector(angle) * (z - inner) + sign * x[slide] * unit
         return z - self.start
 
-    def changes(
+    def vector_derivatives(
         self, x: list[float], v: list[float], a: list[float] | None = None
     ) -> tuple[complex, complex]:
         """Return the first derivative, and the second if accelerations are given."""
         z, rate, change = self.end, 0j, 0j
-        for origin, inner, angle, turn, slide, sign, unit in self.carries:
+        for origin, inner, angle, turn, slide, sign, unit in self.transforms:
             if turn >= 0:
-                turned = facing(angle + sign * x[turn])
+                turned = unit_vector(angle + sign * x[turn])
                 w = sign * v[turn]
                 arm = z - inner
                 if a is not None:
@@ -400,7 +413,7 @@ class Side:
                 rate = turned * (rate + 1j * w * arm)
                 z = origin + turned * arm
             else:
-                held = facing(angle)
+                held = unit_vector(angle)
                 if a is not None:
                     change = held * change + sign * a[slide] * unit
                 rate = held * rate + sign * v[slide] * unit
@@ -420,7 +433,7 @@ class DrivenRRRPose(NamedTuple):
 class DrivenRRRRates(NamedTuple):
     """The rates of the diagonal, and those of both sides."""
 
-    growth: DiagonalRate
+    diagonal_rate: DiagonalRate
     sides: tuple[complex, complex]
 
 
@@ -447,16 +460,16 @@ class DrivenRRRDyad(TwoSided):
 
     __slots__ = ('_ends', '_sides')
 
-    def __init__(self, ends: tuple[int, int], sides: tuple[Side, Side], sign: int) -> None:
+    def __init__(self, ends: tuple[int, int], sides: tuple[DyadSide, DyadSide], sign: int) -> None:
         self._ends = ends
         self._sides = sides
         super().__init__(sign)
 
-    def close(self, known: State) -> DrivenRRRPose:
+    def close(self, solved: LinkState) -> DrivenRRRPose:
         """Append the angles of the first link of each group."""
-        x = known.coordinates
-        start, end = (known.pins[i] for i in self._ends)
-        one, other = (side.at(x) for side in self._sides)
+        x = solved.coordinates
+        start, end = (solved.pins[i] for i in self._ends)
+        one, other = (side.vector_at(x) for side in self._sides)
         b, c = abs(one), abs(other)
         diagonal = free_diagonal(
             end - start, abs(start) + abs(end), abs(b - c), b + c, 4.0 * b * c
@@ -467,48 +480,56 @@ class DrivenRRRDyad(TwoSided):
         x.append(pose.second - phase(other))
         return DrivenRRRPose(pose.status, pose.gap, pose, (one, other))
 
-    def rates(self, pose: DrivenRRRPose, known: State, speeds: State) -> DrivenRRRRates:
+    def rates(
+        self, pose: DrivenRRRPose, solved: LinkState, velocities: LinkState
+    ) -> DrivenRRRRates:
         """Append the rates of the first link of each group."""
         start, end = self._ends
         (one, _), (other, _) = (
-            side.changes(known.coordinates, speeds.coordinates) for side in self._sides
+            side.vector_derivatives(solved.coordinates, velocities.coordinates)
+            for side in self._sides
         )
-        unit, other_unit = self._units(pose)
-        between = speeds.pins[end] + other * other_unit - speeds.pins[start] - one * unit
-        vector = known.pins[end] - known.pins[start]
-        growth = free_diagonal_rate(pose.triangle.diagonal, vector, between)
-        triangle_rates(pose.triangle, self._sign, growth, speeds)
-        return DrivenRRRRates(growth, (one, other))
+        unit, other_unit = self._unit_vectors(pose)
+        between = velocities.pins[end] + other * other_unit - velocities.pins[start] - one * unit
+        vector = solved.pins[end] - solved.pins[start]
+        rate = free_diagonal_rate(pose.triangle.diagonal, vector, between)
+        triangle_rates(pose.triangle, self._sign, rate, velocities)
+        return DrivenRRRRates(rate, (one, other))
 
     def accelerations(
         self,
         pose: DrivenRRRPose,
         rates: DrivenRRRRates,
-        known: State,
-        speeds: State,
-        changes: State,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
     ) -> None:
         """Append the accelerations of the first link of each group."""
-        x, v, a = known.coordinates, speeds.coordinates, changes.coordinates
+        x, v, a = solved.coordinates, velocities.coordinates, accelerations.coordinates
         start, end = self._ends
-        growth, triangle = rates.growth, pose.triangle
-        lean = self._sign * growth.lean
+        growth, triangle = rates.diagonal_rate, pose.triangle
+        lean = self._sign * growth.growth_over_height
         # The rates of the links of this dyad, as `rates` has appended them.
-        turns = growth.turn + triangle.less * lean, growth.turn + triangle.more * lean
+        turns = (
+            growth.direction_rate + triangle.less * lean,
+            growth.direction_rate + triangle.more * lean,
+        )
         pulls = []
         for side, turn, rate, unit in zip(
-            self._sides, turns, rates.sides, self._units(pose), strict=True
+            self._sides, turns, rates.sides, self._unit_vectors(pose), strict=True
         ):
-            _, change = side.changes(x, v, a)
+            _, change = side.vector_derivatives(x, v, a)
             pulls.append((change + 2j * turn * rate) * unit)
         one, other = pulls
-        between = changes.pins[end] + other - changes.pins[start] - one
+        between = accelerations.pins[end] + other - accelerations.pins[start] - one
         growth_change = free_diagonal_acceleration(
-            growth, known.pins[end] - known.pins[start], between
+            growth, solved.pins[end] - solved.pins[start], between
         )
         b, c = map(abs, pose.sides)
         difference = (b - c) * (b + c)
-        triangle_accelerations(triangle, self._sign, difference, growth, growth_change, changes)
+        triangle_accelerations(
+            triangle, self._sign, difference, growth, growth_change, accelerations
+        )
 
     def side_of(self, pose: DrivenRRRPose) -> float:
         """Return a number with the sign of the assembly; 0 where it is singular."""
@@ -516,12 +537,12 @@ class DrivenRRRDyad(TwoSided):
 
     def transmission_angle(self, pose: DrivenRRRPose) -> float:
         """Return the angle between the two sides at B, folded into [0, π/2], in [rad]."""
-        return folded(pose.triangle.second - pose.triangle.first)
+        return acute_angle(pose.triangle.second - pose.triangle.first)
 
-    def _units(self, pose: DrivenRRRPose) -> tuple[complex, complex]:
+    def _unit_vectors(self, pose: DrivenRRRPose) -> tuple[complex, complex]:
         """Return e^{iθ} of the first link of each group."""
         triangle, (one, other) = pose.triangle, pose.sides
         return (
-            facing(triangle.first - phase(one)),
-            facing(triangle.second - phase(other)),
+            unit_vector(triangle.first - phase(one)),
+            unit_vector(triangle.second - phase(other)),
         )

@@ -497,6 +497,6 @@ def _opens_at(closure: Closure, low: float, high: float) -> float | None:
     interval = InputSweep(closure).range_about(low)
     if interval is None:
         return low
-    if interval.whole or interval.lowest - _SAME <= high <= interval.highest + _SAME:
+    if interval.is_whole or interval.lowest - _SAME <= high <= interval.highest + _SAME:
         return None
     return interval.highest if high > low else interval.lowest

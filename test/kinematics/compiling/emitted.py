@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.c import C
-from linkage_ros.kinematics.compiling.source import FUNCTIONS, source, STATUSES, Subject
-from linkage_ros.kinematics.compiling.trace import moved
+from linkage_ros.kinematics.compiling.source import FUNCTIONS, STATUSES, Subject, write_source
+from linkage_ros.kinematics.compiling.trace import motion_at
 import pytest
 
 COMPILERS = {'C99': ('cc', '-x', 'c', '-std=c99'), 'C++': ('c++', '-x', 'c++', '-std=c++11')}
@@ -101,7 +101,7 @@ def parts(numbers: Sequence[float], size: int) -> list[tuple[float, ...]]:
 
 def plain(closure: Closure, state: State) -> Told:
     """Return what the plain steps say."""
-    motion = moved(closure, parts(state, len(closure.linkage.inputs)))
+    motion = motion_at(closure, parts(state, len(closure.linkage.inputs)))
     status = motion.position.status
     if not status.has_rates:
         return Told(status.name, ())
@@ -111,7 +111,7 @@ def plain(closure: Closure, state: State) -> Told:
 
 def run_c(what: Subject, given: Sequence[State], folder: Path, kind: str = 'C99') -> list[Told]:
     """Return what a linkage in C says of states, compiled as strictly as can be."""
-    text = source(what, C(what.name, header=False))
+    text = write_source(what, C(what.name, header=False))
     n, joints = len(what.closure.linkage.inputs), len(what.joints)
     groups = 1 + what.derivatives
     arguments = [f'given + {n * i}' for i in range(groups)]

@@ -26,9 +26,9 @@ from linkage_ros.kinematics.arithmetic import sin, sqrt
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction
-from linkage_ros.kinematics.compiling.python import python_source, straight
+from linkage_ros.kinematics.compiling.python import compile_function, python_source
 from linkage_ros.kinematics.compiling.tape import Tape
-from linkage_ros.kinematics.compiling.trace import Motion
+from linkage_ros.kinematics.compiling.trace import TracedMotion
 from linkage_ros.kinematics.linkage import Limits
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -39,8 +39,8 @@ import pytest
 
 def written(root: object, condition: object = True, **given: int) -> BlockFunction:
     form = ArrayForm(given)
-    held = form.number(condition)
-    return BlockFunction(['q0', 'w0'], ['q0'], [form.number(root)], held)
+    held = form.rewrite_number(condition)
+    return BlockFunction(['q0', 'w0'], ['q0'], [form.rewrite_number(root)], held)
 
 
 def values_of(function: BlockFunction, x: np.ndarray, rate: float = 1.0) -> np.ndarray:
@@ -56,14 +56,14 @@ def passes(function: BlockFunction) -> int:
 
 def test_a_condition_that_bounds_settle_is_not_asked():
     tape = Tape()
-    sine = sin(tape.given('q0', 0.3))
+    sine = sin(tape.add_input('q0', 0.3))
     assert written(sine.operation, (sine * sine + 0.5 > 0.4).operation).masks == 0
     assert written(sine.operation, (sine * sine + 0.5 > 0.6).operation).masks > 0
 
 
 def test_constants_are_drawn_together_and_nothing_is_worked_out_of_0():
     tape = Tape()
-    x, rate = tape.given('q0', 0.3), tape.given('w0', 1.25)
+    x, rate = tape.add_input('q0', 0.3), tape.add_input('w0', 1.25)
     function = written((2.0 * (3.0 * x) / 4.0).operation)
     assert passes(function) == 1
     assert values_of(function, np.array([2.0])).tolist() == [3.0]
@@ -80,7 +80,7 @@ def test_every_constant_is_written_as_it_is(constant):
 
 def test_a_row_is_used_again_when_nobody_needs_what_is_in_it():
     tape = Tape()
-    total = x = tape.given('q0', 0.3)
+    total = x = tape.add_input('q0', 0.3)
     for k in range(30):
         total = sqrt(total + float(k)) * x
     assert written(total.operation).rows <= 2
@@ -127,7 +127,7 @@ def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name):
     compiled = Compiled(closure, 2)
     closed = left = 0
     for numbers in states(closure, STATES // 100 if name in ITERATED else STATES):
-        plain = compiled.plain(*numbers)
+        plain = compiled.run_interpreted(*numbers)
         assert repr(compiled(*numbers)) == repr(plain)
         if plain.status is Status.CLOSED:
             closed += 1
@@ -151,7 +151,7 @@ def test_random_linkages_of_every_topology_have_them(family):
         for _ in range(3 if iterated else 40):
             inputs = [start + rng.uniform(-1.0, 1.0) for start in topology.start]
             motion = [rng.uniform(-2.0, 2.0) for _ in range(2 * len(inputs))]
-            plain = compiled.plain(*inputs, *motion)
+            plain = compiled.run_interpreted(*inputs, *motion)
             assert repr(compiled(*inputs, *motion)) == repr(plain)
             seen.add(plain.status)
     assert seen
@@ -170,7 +170,7 @@ def test_toggles_change_points_and_huge_angles_have_them(name):
     for value in (*SPECIAL, *singular, *beside):
         for rate in (0.0, -0.0, 1.5):
             numbers = [value] * driven + [rate] * driven + [0.25] * driven
-            assert answered(compiled, *numbers) == answered(compiled.plain, *numbers)
+            assert answered(compiled, *numbers) == answered(compiled.run_interpreted, *numbers)
 
 
 @pytest.mark.parametrize('wrong', [nan, inf, -inf])
@@ -180,7 +180,7 @@ def test_what_is_not_finite_is_answered_by_the_plain_steps(wrong, place):
     numbers = [1.0, 2.0, 3.0]
     numbers[place] = wrong
     assert compiled.fast(*numbers) is None
-    assert answered(compiled, *numbers) == answered(compiled.plain, *numbers)
+    assert answered(compiled, *numbers) == answered(compiled.run_interpreted, *numbers)
 
 
 def test_beyond_a_limit_the_plain_steps_say_so():
@@ -193,7 +193,7 @@ def test_beyond_a_limit_the_plain_steps_say_so():
     found = {compiled(0.1 * i, 1.0).status for i in range(63)}
     assert found == {Status.CLOSED, Status.LIMITED}
     for i in range(63):
-        assert repr(compiled(0.1 * i, 1.0)) == repr(compiled.plain(0.1 * i, 1.0))
+        assert repr(compiled(0.1 * i, 1.0)) == repr(compiled.run_interpreted(0.1 * i, 1.0))
 
 
 def source(closure: Closure, derivatives: int, wanted: Any = None) -> str:
@@ -209,7 +209,7 @@ def operations(text: str) -> int:
 def test_what_is_not_asked_for_is_not_in_the_line(name):
     closure = closure_of(name)
 
-    def last(motion: Motion) -> list[list[float]]:
+    def last(motion: TracedMotion) -> list[list[float]]:
         return [[motion.position.joints[-1]]]
 
     sizes = [operations(source(closure, 0, last))]
@@ -238,7 +238,7 @@ def test_simplified_operations_keep_their_bits():
             (x + y) + 0.0, 0.0 + (x - y), 0.0 + (0.5 + x), abs(abs(x)), x - y, x * y,
         ]  # fmt: skip
 
-    line = straight(done, (1.0, 2.0))
+    line = compile_function(done, (1.0, 2.0))
     assert line.places == tuple(range(len(line.results)))
     values = (0.0, -0.0, 1.0, -1.5, 5e-324, -1e300, 3.0)
     for x in values:
@@ -257,4 +257,4 @@ def test_the_equation_of_motion_is_that_of_the_plain_steps(name):
 
 def test_a_function_that_decides_has_no_straight_line():
     with pytest.raises(ValueError, match='decides'):
-        straight(lambda x: [x if x > 0.0 else -x], (1.0,))
+        compile_function(lambda x: [x if x > 0.0 else -x], (1.0,))

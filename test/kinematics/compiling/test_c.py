@@ -17,7 +17,7 @@ from campaigns.topologies.families import FAMILIES
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.c import C
-from linkage_ros.kinematics.compiling.source import source
+from linkage_ros.kinematics.compiling.source import write_source
 from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
 import pytest
 
@@ -136,7 +136,7 @@ def test_what_is_not_asked_for_is_not_in_the_code(derivatives, tmp_path):
     ):
         count = len(closure.linkage.joints)
         assert one.values == all_of_it.values[1::count][: 1 + derivatives]
-    short, long = (source(what, C('leg', header=False)) for what in (asked, whole))
+    short, long = (write_source(what, C('leg', header=False)) for what in (asked, whole))
     assert short.count(' const ') < long.count(' const ')
 
 
@@ -154,7 +154,7 @@ def test_what_is_not_finite_is_indeterminate(odd, place, tmp_path):
 @pytest.mark.parametrize('header', [False, True])
 @pytest.mark.parametrize('name', GALLERY)
 def test_it_compiles_without_a_warning(name, header, kind, tmp_path):
-    text = source(subject(closure_of(name)), C('linkage', header=header))
+    text = write_source(subject(closure_of(name)), C('linkage', header=header))
     file = tmp_path / 'linkage.c'
     # A header may be included twice.
     (tmp_path / 'linkage.h').write_text(text)
@@ -165,7 +165,7 @@ def test_it_compiles_without_a_warning(name, header, kind, tmp_path):
 @pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
 def test_headers_of_one_linkage_go_together(kind, tmp_path):
     closure = closure_of('four_bar')
-    texts = [source(subject(closure, i), C('four_bar', header=True)) for i in range(3)]
+    texts = [write_source(subject(closure, i), C('four_bar', header=True)) for i in range(3)]
     (tmp_path / 'all.c').write_text('\n'.join(texts))
     build([*COMPILERS[kind], '-Wno-unused-function', '-c'], tmp_path / 'all.c', tmp_path / 'all.o')
 
@@ -173,4 +173,4 @@ def test_headers_of_one_linkage_go_together(kind, tmp_path):
 def test_links_that_are_iterated_are_refused():
     closure = closure_of('class_3')
     with pytest.raises(DefinitionError, match='links: some are only solved by iteration'):
-        source(subject(closure), C('linkage', header=False))
+        write_source(subject(closure), C('linkage', header=False))

@@ -19,7 +19,7 @@ from typing import Any
 
 from linkage_ros.kinematics.compiling.javascript import JavaScript
 from linkage_ros.kinematics.compiling.python_module import PythonModule
-from linkage_ros.kinematics.compiling.source import FUNCTIONS, source, Subject
+from linkage_ros.kinematics.compiling.source import FUNCTIONS, Subject, write_source
 import pytest
 
 from .emitted import COUNT, needs, NUMBERS, parts, plain, State, states, subject, Told
@@ -40,7 +40,7 @@ Solve = Callable[..., tuple[Any, ...]]
 def python_of(what: Subject) -> dict[str, Any]:
     """Return the names of the module that a linkage makes."""
     namespace: dict[str, Any] = {}
-    exec(source(what, PythonModule(what.derivatives)), namespace)
+    exec(write_source(what, PythonModule(what.derivatives)), namespace)
     return namespace
 
 
@@ -60,7 +60,7 @@ def test_python_has_the_bits_of_the_steps(name):
 
 
 def test_python_needs_nothing_but_math():
-    text = source(subject(closure_of('jansen_leg')), PythonModule(2))
+    text = write_source(subject(closure_of('jansen_leg')), PythonModule(2))
     imports = [line for line in text.splitlines() if 'import ' in line]
     assert imports == ['from math import atan2, copysign, cos, inf, isfinite, sin, sqrt']
 
@@ -104,7 +104,7 @@ writeFileSync('told', JSON.stringify(told));
 def run_javascript(what: Subject, given: Sequence[State], folder: Path) -> list[Told]:
     """Return what a linkage in JavaScript says of states."""
     (folder / 'package.json').write_text('{"type": "module"}')
-    (folder / 'linkage.js').write_text(source(what, JavaScript()))
+    (folder / 'linkage.js').write_text(write_source(what, JavaScript()))
     (folder / 'run.js').write_text(RUN)
     (folder / 'given').write_bytes(array('d', (v for state in given for v in state)).tobytes())
     typed = ['node', 'run.js', str(len(what.closure.linkage.inputs))]
