@@ -93,7 +93,7 @@ class Run(NamedTuple):
 
     def energy(self) -> Values:
         """Return the energy of the linkage, in [J]."""
-        energy = self.pipeline.lines[0].context.mechanics.energy
+        energy = self.pipeline.lines[0].context.mechanics.total_energy
         return np.array(
             [
                 energy(position, *crank.rates)

@@ -27,7 +27,7 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankAtRest, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
+from linkage_ros.dynamics.motion import LARGEST, Motion, SingleDofMechanism
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.parameters import choice, number, option, whole
 from linkage_ros.kinematics.closure import Closure
@@ -215,7 +215,7 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     motor = None
     if parameters.motor is not None:
         motor = _motor(parameters.motor, most)
-        motion = motor.mounted(motion)
+        motion = motor.mount_on(motion)
         if parameters.motor.command != 'effort':
             most = LARGEST
     start = motion.at(parameters.start, parameters.rate)
@@ -262,20 +262,20 @@ def _refuse_useless(parameters: TorqueParameters, context: Context) -> None:
 def _build_motion(parameters: TorqueParameters, context: Context) -> Any:
     """Build the motion of the mechanism between its stops, and of a motor beyond a play."""
     mechanics = context.mechanics
-    motion = OneFreedom(
-        mechanics.equation,
+    motion = SingleDofMechanism(
+        mechanics.motion_equation,
         METHODS[parameters.method].step,
         _stops(context.hard_limited, parameters.start, parameters.stop_margin),
         parameters.restitution,
         mechanics.laws,
-        context.reactions.resisting if mechanics.friction.loaded else None,
+        context.reactions.friction_effort if mechanics.friction.load_dependent_joint else None,
     )
     if parameters.play is None:
         return motion
     from linkage_ros.dynamics.two_masses import TwoMasses  # local import: only with play
 
     play = parameters.play
-    return TwoMasses.of(motion, play.inertia, play.width, play.restitution)
+    return TwoMasses.from_motor(motion, play.inertia, play.width, play.restitution)
 
 
 def _check_step(
@@ -287,9 +287,9 @@ def _check_step(
     """Refuse a step too long for the curves, the motor or the loads between two inputs."""
     low, high = ends
     moved = []
-    if motor or mechanics.curved:
+    if motor or mechanics.stribeck_joints:
         places = (low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
-        moved = [terms for terms in map(mechanics.equation, places) if terms]
+        moved = [terms for terms in map(mechanics.motion_equation, places) if terms]
         moved = [terms for terms in moved if terms.inertia > 0.0]
         mechanics.check_curves(moved, parameters.method, parameters.step)
     if motor:
@@ -299,7 +299,7 @@ def _check_step(
         motor.check_step(least, parameters.method, parameters.step)
     if mechanics.applied:
         mechanics.applied.check_step(
-            lambda value: terms.inertia if (terms := mechanics.equation(value)) else 0.0,
+            lambda value: terms.inertia if (terms := mechanics.motion_equation(value)) else 0.0,
             ends,
             parameters.method,
             parameters.step,
@@ -529,7 +529,7 @@ class TorqueDrive(Drive):
             return self._mechanism, effort, 0.0
         if self._quantum:
             effort = round(effort / self._quantum) * self._quantum
-        return self._motor.driven(self._mechanism, effort)
+        return self._motor.drive_by(self._mechanism, effort)
 
     @property
     def motion(self) -> Any:
@@ -542,7 +542,7 @@ class TorqueDrive(Drive):
             self._advance(now)
             if wrench != held.wrench and now > self._time:
                 self._go_to(now)
-        held.take(wrench, now)
+        held.set_wrench(wrench, now)
         self._loaded_until = min(each.until for each in self._wrenches)
 
     def state(self, now: int) -> CrankState:

@@ -24,7 +24,7 @@ from math import hypot, sqrt, tau
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics import longest_step
-from linkage_ros.dynamics.laws import Contact, Law, LawTerm, Table
+from linkage_ros.dynamics.laws import Contact, Law, LawTerm, TorqueTable
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, JointSpring, PointLoad, SoftStop
 from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
 from linkage_ros.kinematics.arithmetic import call, remainder, unit_vector
@@ -45,7 +45,7 @@ class JointCoordinate(NamedTuple):
     # Its number among the driven joints, or among the published ones.
     number: int
     driven: bool
-    turns: bool  # Whether it is an angle
+    is_revolute: bool  # Whether it is an angle
     slider: str  # The slider whose slide it is; '' for an angle
     # The links whose angle it is; '' for a slide.
     child: str
@@ -64,9 +64,9 @@ class JointCoordinate(NamedTuple):
         v = velocity.state.coordinates
         return self.factor * (v[self.one] - v[self.other])
 
-    def middle(self, low: float, high: float) -> float | None:
+    def reference_angle(self, low: float, high: float) -> float | None:
         """Return the angle nearest to which it is compared, if whole turns do not count."""
-        return 0.5 * (low + high) if self.turns and high - low <= tau + 1e-9 else None
+        return 0.5 * (low + high) if self.is_revolute and high - low <= tau + 1e-9 else None
 
 
 def joint_coordinate(closure: Closure, name: str) -> JointCoordinate:
@@ -93,7 +93,7 @@ class LoadedPoint(NamedTuple):
     # Its link, and its number among the loaded points.
     link: str
     number: int
-    place: int  # Its index among the tracked points
+    tracked_index: int  # Its index among the tracked points
     unit: complex  # Direction of the force, a unit vector
     coordinate: int  # Index of the closure's coordinate that turns the direction; 0 for none
 
@@ -105,13 +105,13 @@ class LoadedPoint(NamedTuple):
 
     def lever(self, _velocity: Velocity, position: Position, moved: Sequence[complex]) -> float:
         """Return the velocity of the point along the direction, in [m/s]."""
-        way, along = moved[self.place], self.direction(position)
+        way, along = moved[self.tracked_index], self.direction(position)
         return way.real * along.real + way.imag * along.imag
 
 
 class _Lawful(NamedTuple):
-    at: JointCoordinate | LoadedPoint
-    of: JointCoordinate
+    applied_to: JointCoordinate | LoadedPoint
+    depends_on: JointCoordinate
     force: Callable[..., tuple[float]]
 
 
@@ -146,7 +146,7 @@ class AppliedForces:
         linkage = closure.linkage
         self._closure, self._given = closure, applied
         self.seconds = 0.0  # The time since the first tick, for `acting` without one
-        _check(closure, applied)
+        _check_loads(closure, applied)
         places = [name.rpartition('.') for name in applied.forces]
         self.points = [(link, complex(*linkage.links[link][name])) for link, _, name in places]
         for link, wrench in applied.wrenches.items():
@@ -161,18 +161,18 @@ class AppliedForces:
         self._lawful: list[_Lawful] = []
         laws: list[Law] = []
 
-        def add(at: JointCoordinate | LoadedPoint, of: JointCoordinate, law: Law) -> None:
+        def add_law(at: JointCoordinate | LoadedPoint, of: JointCoordinate, law: Law) -> None:
             laws.append(law)
-            self._lawful.append(_Lawful(at, of, self._whole(law)))
+            self._lawful.append(_Lawful(at, of, self._joined_law(law)))
 
         self._stops: dict[str, tuple[JointCoordinate, Contact]] = {}
         for name, stop in applied.stops.items():
             joint = joint_coordinate(closure, name)
             limits = linkage.limits[name]
-            middle = None if joint.driven else joint.middle(limits.low, limits.high)
+            middle = None if joint.driven else joint.reference_angle(limits.low, limits.high)
             contact = Contact(limits.low, limits.high, stop.stiffness, stop.damping, middle)
             self._stops[name] = joint, contact
-            add(joint, joint, contact)
+            add_law(joint, joint, contact)
         loaded: list[tuple[JointCoordinate | LoadedPoint, JointCoordinate, JointLoad | PointLoad]]
         loaded = []
         for name, effort in applied.efforts.items():
@@ -195,8 +195,12 @@ class AppliedForces:
             for over in ('time', 'position', 'rate'):
                 table = getattr(load, f'over_{over}')
                 if table:
-                    middle = of.middle(table[0][0], table[-1][0]) if over == 'position' else None
-                    add(part, of, Table(over, table, middle))
+                    middle = (
+                        of.reference_angle(table[0][0], table[-1][0])
+                        if over == 'position'
+                        else None
+                    )
+                    add_law(part, of, TorqueTable(over, table, middle))
         self.wrenches: dict[str, HeldWrench] = {}
         self._components: list[tuple[JointCoordinate | LoadedPoint, Component]] = []
         if applied.wrenches:
@@ -254,10 +258,10 @@ class AppliedForces:
             **{f'stops.{name}': stop for name, stop in self._given.stops.items()},
         }
         worst, blamed = 0.0, ''
-        for inert, touched in self._sampled(inertia, between):
+        for inert, touched in self._sample_range(inertia, between):
             stiffness = sum(yielding[key].stiffness * lever**2 for key, lever in touched.items())
             damping = sum(yielding[key].damping * lever**2 for key, lever in touched.items())
-            fastest = _fastest(stiffness / inert, damping / inert)
+            fastest = _fastest_eigenvalue(stiffness / inert, damping / inert)
             if fastest > worst:
                 worst = fastest
                 blamed = max(touched, key=lambda key: yielding[key].stiffness * touched[key] ** 2)
@@ -271,7 +275,7 @@ class AppliedForces:
             longest_step.EXACT,
         )
 
-    def _sampled(
+    def _sample_range(
         self, inertia: Callable[[float], float], between: tuple[float, float]
     ) -> Iterator[tuple[float, dict[str, float]]]:
         """Yield inertia, and the lever of each spring and of each touched stop, over the range."""
@@ -315,11 +319,11 @@ class AppliedForces:
             For each law.
 
         """
-        moved = self._moved(position, velocity)
+        moved = self._point_velocities(position, velocity)
         slope = viscous = 0.0
         for joint, spring in self._springs:
             lever = joint.lever(velocity, position, moved)
-            slope += spring.stiffness * _stretch(joint, spring, position) * lever
+            slope += spring.stiffness * _spring_stretch(joint, spring, position) * lever
             viscous += spring.damping * lever * lever
         for at, force in self._constant:
             slope -= force * at.lever(velocity, position, moved)
@@ -331,14 +335,14 @@ class AppliedForces:
             terms += (LawTerm(at.lever(velocity, position, moved), 0.0, 0.0),)
         return slope, viscous, terms
 
-    def potential(self, position: Position) -> float:
+    def potential_energy(self, position: Position) -> float:
         """Return the energy of the springs at joints, in [J]."""
         energy = 0.0
         for joint, spring in self._springs:
-            energy += 0.5 * spring.stiffness * _stretch(joint, spring, position) ** 2
+            energy += 0.5 * spring.stiffness * _spring_stretch(joint, spring, position) ** 2
         return energy
 
-    def _whole(self, law: Law) -> Callable[..., tuple[float]]:
+    def _joined_law(self, law: Law) -> Callable[..., tuple[float]]:
         """Return a law as one function of value, rate and perhaps time, which may be `called`."""
 
         def force(value: float, rate: float, time: float | None = None) -> tuple[float]:
@@ -347,7 +351,7 @@ class AppliedForces:
 
         return force
 
-    def acting(
+    def acting_loads(
         self, position: Position, velocity: Velocity, time: float | None
     ) -> Iterator[tuple[JointCoordinate | LoadedPoint, float]]:
         """
@@ -364,7 +368,7 @@ class AppliedForces:
         now = () if time is None else (time,)
         for joint, spring in self._springs:
             rate = joint.lever(velocity, position, ())
-            stretch = _stretch(joint, spring, position)
+            stretch = _spring_stretch(joint, spring, position)
             yield joint, -spring.stiffness * stretch - spring.damping * rate
         yield from self._constant
         for at, of, force in self._lawful:
@@ -372,9 +376,9 @@ class AppliedForces:
             yield at, call(force, of.value(position), rate, *now)[0]
         for at, component in self._components:
             # A compiled program asks for the wrench each time that it runs.
-            yield at, call(component.acting, position.state.coordinates[1])[0]
+            yield at, call(component.current_load, position.state.coordinates[1])[0]
 
-    def work(
+    def virtual_work(
         self,
         position: Position,
         velocity: Velocity,
@@ -382,19 +386,19 @@ class AppliedForces:
         time: float,
     ) -> float:
         """Return the work of the loads over a virtual velocity; arguments as of `acting`."""
-        moved, work = self._moved(position, virtual), 0.0
-        for at, force in self.acting(position, velocity, time):
+        moved, work = self._point_velocities(position, virtual), 0.0
+        for at, force in self.acting_loads(position, velocity, time):
             work += force * at.lever(virtual, position, moved)
         return work
 
-    def _moved(self, position: Position, velocity: Velocity) -> list[complex]:
+    def _point_velocities(self, position: Position, velocity: Velocity) -> list[complex]:
         """Return the velocities of the loaded points."""
         if not self._tracker.indices:
             return []
         return self._tracker.velocities(position, velocity, self._tracker.places(position))
 
 
-def _fastest(stiffness: float, damping: float) -> float:
+def _fastest_eigenvalue(stiffness: float, damping: float) -> float:
     """Return the greatest |s| of s² + damping·s + stiffness = 0, in [1/s]."""
     half = 0.5 * damping
     if half * half > stiffness:
@@ -402,13 +406,13 @@ def _fastest(stiffness: float, damping: float) -> float:
     return sqrt(stiffness)
 
 
-def _stretch(joint: JointCoordinate, spring: JointSpring, position: Position) -> float:
+def _spring_stretch(joint: JointCoordinate, spring: JointSpring, position: Position) -> float:
     """Return how far a spring is from where it has no force, in [rad] or [m]."""
     stretch = joint.value(position) - spring.free
-    return remainder(stretch, tau) if joint.turns and not joint.driven else stretch
+    return remainder(stretch, tau) if joint.is_revolute and not joint.driven else stretch
 
 
-def _check(closure: Closure, applied: AppliedLoads) -> None:
+def _check_loads(closure: Closure, applied: AppliedLoads) -> None:
     """Refuse loads that make no sense."""
     linkage = closure.linkage
     for name in applied.stops:

@@ -42,7 +42,7 @@ class Law(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class TorqueTable:
     """A force that is linear between the rows of a table, and constant before and after them."""
 
     over: str  # What the first column is: 'time', 'position' or 'rate'
@@ -53,11 +53,11 @@ class Table:
 
     def segment(self, value: float, rate: float, time: float) -> int:
         """Return how many rows a state has passed."""
-        return bisect_right(self.rows, (self._at(value, rate, time), inf))
+        return bisect_right(self.rows, (self._force_at(value, rate, time), inf))
 
     def margin(self, segment: int, value: float, rate: float, time: float) -> float:
         """Return the distance from the nearer of both rows, in the unit of the first column."""
-        at, rows = self._at(value, rate, time), self.rows
+        at, rows = self._force_at(value, rate, time), self.rows
         below = at - rows[segment - 1][0] if segment else inf
         above = rows[segment][0] - at if segment < len(rows) else inf
         return min(below, above)
@@ -71,14 +71,16 @@ class Table:
         if segment == len(rows):
             return force
         end, other = rows[segment]
-        return force + (self._at(value, rate, time) - begin) / (end - begin) * (other - force)
+        return force + (self._force_at(value, rate, time) - begin) / (end - begin) * (
+            other - force
+        )
 
-    def _at(self, value: float, rate: float, time: float) -> float:
+    def _force_at(self, value: float, rate: float, time: float) -> float:
         if self.over == 'time':
             return time
         if self.over == 'rate':
             return rate
-        return value if self.middle is None else turned(value, self.middle)
+        return value if self.middle is None else nearest_turn(value, self.middle)
 
 
 class LawTerm(NamedTuple):
@@ -113,15 +115,15 @@ class Contact:
     def segment(self, value: float, rate: float, _time: float) -> int:
         """Return -1 at the lower stop, 1 at the upper one, or 0."""
         for side in (_LOW, _HIGH):
-            if self._push(side, value, rate) > 0.0:
+            if self._push_margin(side, value, rate) > 0.0:
                 return side
         return _FREE
 
     def margin(self, segment: int, value: float, rate: float, _time: float) -> float:
         """Return the depth or the force of a contact, the smaller; without, the opposite."""
         if segment:
-            return self._push(segment, value, rate)
-        return -max(self._push(_LOW, value, rate), self._push(_HIGH, value, rate))
+            return self._push_margin(segment, value, rate)
+        return -max(self._push_margin(_LOW, value, rate), self._push_margin(_HIGH, value, rate))
 
     def force(self, segment: int, value: float, rate: float, _time: float) -> float:
         """Return the force of a contact, towards the range; 0 without."""
@@ -134,10 +136,10 @@ class Contact:
     def depth(self, side: int, value: float) -> float:
         """Return how far a value is beyond the limit on a side, -1 or 1; negative within."""
         if self.middle is not None:
-            value = turned(value, self.middle)
+            value = nearest_turn(value, self.middle)
         return value - self.high if side == _HIGH else self.low - value
 
-    def _push(self, side: int, value: float, rate: float) -> float:
+    def _push_margin(self, side: int, value: float, rate: float) -> float:
         """Return a number that is positive where the stop pushes, and 0 where that changes."""
         depth = self.depth(side, value)
         return min(depth, self.stiffness * depth + side * self.damping * rate)
@@ -167,15 +169,15 @@ class Stribeck:
         return -segment * self.excess * exp(-((rate / self.rate) ** 2))
 
     @property
-    def steepest(self) -> float:
+    def steepest_slope(self) -> float:
         """Return the greatest fall of the friction over the rate, at s/√2, in [N·m·s/rad]."""
         return self.excess / self.rate * sqrt(2.0 / e)
 
-    def at(self, rate: float) -> tuple[float]:
+    def force_at(self, rate: float) -> tuple[float]:
         """Return the force at a rate, for `linkage_ros.kinematics.arithmetic.called`."""
         return (self.force(self.segment(0.0, rate, 0.0), 0.0, rate, 0.0),)
 
 
-def turned(angle: float, middle: float) -> float:
+def nearest_turn(angle: float, middle: float) -> float:
     """Return an angle plus the whole turns that bring it nearest to another one, in [rad]."""
     return angle - tau * round((angle - middle) / tau)

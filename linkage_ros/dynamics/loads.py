@@ -176,7 +176,7 @@ class AppliedLoads:
         return bool(constant or self.wrenches)
 
     @property
-    def timed(self) -> bool:
+    def changes_with_time(self) -> bool:
         """Whether a load changes with the time."""
         efforts, forces = self.efforts.values(), self.forces.values()
         return any(load.over_time for load in efforts) or any(load.over_time for load in forces)
@@ -230,7 +230,7 @@ class JointFriction:
     )
 
     @property
-    def excess(self) -> float:
+    def breakaway_excess(self) -> float:
         """Return how much more it is at rest, in [N·m] or [N]."""
         return max(0.0, self.breakaway - self.coulomb)
 
@@ -249,7 +249,7 @@ class Friction:
     """Whether friction carries the load at rest as far as it can, and the effort is the rest."""
 
     @property
-    def loaded(self) -> str:
+    def load_dependent_joint(self) -> str:
         """Return the first joint whose friction grows with the force in it; '' without one."""
         return next((name for name, joint in self.joints.items() if joint.coefficient), '')
 
@@ -334,10 +334,10 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
                 f'the force in a pin rubs by both, and there is no {missing}',
                 f'write {missing} too',
             )
-    if friction and friction.holds and friction.loaded:
+    if friction and friction.holds and friction.load_dependent_joint:
         raise DefinitionError(
             'effects.friction.holds',
-            f'at rest the force in {quoted(friction.loaded)} has no certain value, and neither '
+            f'at rest the force in {quoted(friction.load_dependent_joint)} has no certain value, and neither '
             'has its friction',
             'leave it out, or write breakaway instead of coefficient',
         )

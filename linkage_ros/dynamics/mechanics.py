@@ -75,7 +75,7 @@ class Terms(NamedTuple):
     breakaway: float = 0.0  # What friction holds at q̇ = 0 in addition to F
 
 
-class Rubbing(NamedTuple):
+class FrictionJoint(NamedTuple):
     """
     A joint with friction.
 
@@ -91,7 +91,7 @@ class Rubbing(NamedTuple):
     factor: float
     law: Stribeck | None
 
-    def slip(self, v: Sequence[float]) -> float:
+    def slip_rate(self, v: Sequence[float]) -> float:
         """Return the rate for the rates of the closure's coordinates."""
         return self.factor * (v[self.one] - v[self.other])
 
@@ -148,23 +148,23 @@ class Mechanics:
             for spring in self.loads.springs
         )
         self._gravity = complex(*self.loads.gravity)
-        self.rubbing = tuple(self._rubbing_joints())
+        self.friction_joints = tuple(self._find_friction_joints())
         """The joints that have friction."""
-        self.applied = _applied(closure, self.loads)
+        self.applied = _make_applied(closure, self.loads)
         """Loads on joints and points; None if there are none."""
         self.laws: tuple[Law, ...] = (
             *(self.applied.laws if self.applied else ()),
-            *(rubbing.law for rubbing in self.rubbing if rubbing.law),
+            *(rubbing.law for rubbing in self.friction_joints if rubbing.law),
         )
         """Laws of the forces, in the order of ``Terms.laws``."""
-        self.curved = tuple(rubbing for rubbing in self.rubbing if rubbing.law)
+        self.stribeck_joints = tuple(rubbing for rubbing in self.friction_joints if rubbing.law)
         """The joints whose friction falls with the rate; their laws are the last ones."""
-        sticks = any(rubbing.friction.excess for rubbing in self.rubbing)
-        self._plain = not sticks and self.applied is None
+        sticks = any(rubbing.friction.breakaway_excess for rubbing in self.friction_joints)
+        self._has_no_laws = not sticks and self.applied is None
         """Whether the equation has neither laws nor an excess of friction at rest."""
         self._units = tuple(closure.scale if given.slider else 1.0 for given in linkage.inputs)
 
-    def terms(self, position: Position) -> Terms | None:
+    def motion_terms(self, position: Position) -> Terms | None:
         """
         Return the equation of motion of a linkage with one input.
 
@@ -192,18 +192,18 @@ class Mechanics:
         viscous = coulomb = 0.0
         slips: tuple[float, ...] = ()
         for stiffness, free_length, damping, start, end in self._springs:
-            length, growth = stretched(places, velocities, start, end)
+            length, growth = spring_length(places, velocities, start, end)
             slope += stiffness * (length - free_length) * growth
             viscous += damping * growth * growth
-        for rubbing in self.rubbing:
-            slip, limit = rubbing.slip(v), rubbing.friction.coulomb
+        for rubbing in self.friction_joints:
+            slip, limit = rubbing.slip_rate(v), rubbing.friction.coulomb
             viscous += rubbing.friction.viscous * slip * slip
             coulomb += limit * abs(slip)
             if limit:
-                slips += (where(_stands(v, rubbing.one, rubbing.other), 0.0, limit * slip),)
+                slips += (where(_is_at_rest(v, rubbing.one, rubbing.other), 0.0, limit * slip),)
         if not all_finite((inertia, half_slope)):
             return None
-        if self._plain:
+        if self._has_no_laws:
             return Terms(inertia, half_slope, slope, viscous, coulomb, slips)
         from linkage_ros.dynamics.laws import LawTerm  # local import: only with laws
 
@@ -212,23 +212,23 @@ class Mechanics:
             pull, drag, laws = self.applied.one_input(position, velocity)
             slope, viscous = slope + pull, viscous + drag
         breakaway = 0.0
-        for rubbing in self.rubbing:
-            slip = rubbing.slip(v)
-            breakaway += rubbing.friction.excess * abs(slip)
+        for rubbing in self.friction_joints:
+            slip = rubbing.slip_rate(v)
+            breakaway += rubbing.friction.breakaway_excess * abs(slip)
             if rubbing.law:
-                slip = where(_stands(v, rubbing.one, rubbing.other), 0.0, slip)
+                slip = where(_is_at_rest(v, rubbing.one, rubbing.other), 0.0, slip)
                 laws += (LawTerm(slip, 0.0, slip),)
         return Terms(inertia, half_slope, slope, viscous, coulomb, slips, laws, breakaway)
 
     @cached_property
-    def equation(self) -> Callable[[float], Terms | None]:
+    def motion_equation(self) -> Callable[[float], Terms | None]:
         """
         Return the equation of motion of a linkage with one input, as a function of the input.
 
         Its results equal `terms` at the position to the last bit; it is straight-line code.
         """
         compiled = Compiled(self.closure, 0, self._wanted_terms, within_limits=False)
-        fast, position, terms = compiled.fast, self.closure.position, self.terms
+        fast, position, terms = compiled.fast, self.closure.position, self.motion_terms
 
         def equation(value: float) -> Terms | None:
             values = fast(value)
@@ -237,7 +237,7 @@ class Mechanics:
             (inertia, half_slope, potential_slope, viscous, coulomb), slips = values
             return Terms(inertia, half_slope, potential_slope, viscous, coulomb, slips)
 
-        if self._plain:
+        if self._has_no_laws:
             return equation
         from linkage_ros.dynamics.laws import LawTerm  # local import: only with laws
 
@@ -260,7 +260,7 @@ class Mechanics:
         return equation_with_laws
 
     def _wanted_terms(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
-        terms = self.terms(motion.position)
+        terms = self.motion_terms(motion.position)
         if terms is None:
             return []
         linear = (
@@ -270,11 +270,11 @@ class Mechanics:
             terms.viscous,
             terms.coulomb,
         )
-        if self._plain:
+        if self._has_no_laws:
             return [linear, terms.slips]
         return [linear, terms.slips, [*chain.from_iterable(terms.laws)], [terms.breakaway]]
 
-    def potential(self, position: Position) -> float:
+    def potential_energy(self, position: Position) -> float:
         """Return V at a closed position, in [J]; weight has potential 0 at the origin's height."""
         places = self._follower.places(position)
         moment = 0j
@@ -284,9 +284,9 @@ class Mechanics:
         for stiffness, free_length, _, start, end in self._springs:
             stretch = abs(places[end] - places[start]) - free_length
             energy += 0.5 * stiffness * stretch * stretch
-        return energy if self.applied is None else energy + self.applied.potential(position)
+        return energy if self.applied is None else energy + self.applied.potential_energy(position)
 
-    def kinetic(self, position: Position, velocity: Velocity) -> float:
+    def kinetic_energy(self, position: Position, velocity: Velocity) -> float:
         """Return the kinetic energy, including that of the drive's inertia, in [J]."""
         places = self._follower.places(position)
         velocities = self._follower.velocities(position, velocity, places)
@@ -300,7 +300,7 @@ class Mechanics:
             twice += self.loads.drive_inertia * (unit * v[i]) ** 2
         return 0.5 * twice
 
-    def energy(self, position: Position, *rates: float) -> float:
+    def total_energy(self, position: Position, *rates: float) -> float:
         """
         Return the sum of kinetic and potential energy, in [J].
 
@@ -313,7 +313,7 @@ class Mechanics:
 
         """
         velocity = self.closure.velocity(position, *rates)
-        return self.kinetic(position, velocity) + self.potential(position)
+        return self.kinetic_energy(position, velocity) + self.potential_energy(position)
 
     def drive_efforts(
         self,
@@ -347,12 +347,12 @@ class Mechanics:
         accelerations = follower.accelerations(position, velocity, acceleration, places)
         v, a = velocity.state.coordinates, acceleration.state.coordinates
         pulls = [
-            spring.tension(*stretched(places, velocities, start, end))
+            spring.tension(*spring_length(places, velocities, start, end))
             for spring, (_, _, _, start, end) in zip(
                 self.loads.springs, self._springs, strict=True
             )
         ]
-        drags = [resistance(rubbing, v) for rubbing in self.rubbing]
+        drags = [joint_friction(rubbing, v) for rubbing in self.friction_joints]
         efforts: tuple[float, ...] = ()
         for i, unit in enumerate(self._units):
             alone = [0.0] * count
@@ -366,15 +366,16 @@ class Mechanics:
                 effort += force.real * way.real + force.imag * way.imag
                 effort += gyration * a[turn] * w[turn]
             for pull, (_, _, _, start, end) in zip(pulls, self._springs, strict=True):
-                effort += pull * stretched(places, moved, start, end)[1]
-            for drag, rubbing in zip(drags, self.rubbing, strict=True):
-                effort += drag * rubbing.slip(w)
+                effort += pull * spring_length(places, moved, start, end)[1]
+            for drag, rubbing in zip(drags, self.friction_joints, strict=True):
+                effort += drag * rubbing.slip_rate(w)
             if self.applied is not None:
-                effort -= self.applied.work(position, velocity, virtual, seconds)
+                effort -= self.applied.virtual_work(position, velocity, virtual, seconds)
             if self.friction.holds:
                 held = sum(
-                    (rubbing.friction.coulomb + rubbing.friction.excess) * abs(rubbing.slip(w))
-                    for rubbing in self.rubbing
+                    (rubbing.friction.coulomb + rubbing.friction.breakaway_excess)
+                    * abs(rubbing.slip_rate(w))
+                    for rubbing in self.friction_joints
                 )
                 rest = copysign(where(abs(effort) > held, abs(effort) - held, 0.0), effort)
                 effort = where(abs(v[1]) <= 0.0, rest, effort)
@@ -400,9 +401,11 @@ class Mechanics:
         """
         worst, blamed = 0.0, None
         for terms in places:
-            first = len(terms.laws) - len(self.curved)
-            pairs = zip(self.curved, terms.laws[first:], strict=True)
-            falls = {r: r.law.steepest * at.factor**2 / terms.inertia for r, at in pairs if r.law}
+            first = len(terms.laws) - len(self.stribeck_joints)
+            pairs = zip(self.stribeck_joints, terms.laws[first:], strict=True)
+            falls = {
+                r: r.law.steepest_slope * at.factor**2 / terms.inertia for r, at in pairs if r.law
+            }
             if sum(falls.values()) > worst:
                 worst, blamed = sum(falls.values()), max(falls, key=falls.__getitem__)
         if blamed is not None:
@@ -417,7 +420,7 @@ class Mechanics:
                 EXACT,
             )
 
-    def _rubbing_joints(self) -> Iterator[Rubbing]:
+    def _find_friction_joints(self) -> Iterator[FrictionJoint]:
         closure = self.closure
         for number, joint in enumerate(closure.structure.joints):
             friction = self.friction.joints.get(joint.name)
@@ -429,14 +432,14 @@ class Mechanics:
                 slide = closure.slides[joint.name]
                 one, other, factor = slide.coordinate, 0, slide.sign * closure.scale
             law = None
-            if friction.excess and friction.stribeck:
+            if friction.breakaway_excess and friction.stribeck:
                 from linkage_ros.dynamics.laws import Stribeck  # local import: only with it
 
-                law = Stribeck(friction.excess, friction.stribeck)
-            yield Rubbing(number, friction, one, other, factor, law)
+                law = Stribeck(friction.breakaway_excess, friction.stribeck)
+            yield FrictionJoint(number, friction, one, other, factor, law)
 
 
-def _applied(closure: Closure, loads: Loads) -> AppliedForces | None:
+def _make_applied(closure: Closure, loads: Loads) -> AppliedForces | None:
     """Return the loads on joints and points, or None without importing their model."""
     if not loads.applied:
         return None
@@ -445,32 +448,32 @@ def _applied(closure: Closure, loads: Loads) -> AppliedForces | None:
     return AppliedForces(closure, loads.applied)
 
 
-def resistance(rubbing: Rubbing, v: list[float]) -> float:
+def joint_friction(joint: FrictionJoint, v: list[float]) -> float:
     """
     Return the friction of a joint against its motion, in [N·m] or [N], with the rate's sign.
 
     Coulomb friction is 0 in a joint at rest, within rounding.
     """
-    slip, coulomb = rubbing.slip(v), rubbing.friction.coulomb
-    stands = _stands(v, rubbing.one, rubbing.other)
+    slip, coulomb = joint.slip_rate(v), joint.friction.coulomb
+    stands = _is_at_rest(v, joint.one, joint.other)
     dry = where(stands, 0.0, copysign(coulomb, slip)) if coulomb else 0.0
-    if rubbing.law:
-        dry -= where(stands, 0.0, call(rubbing.law.at, slip)[0])
-    return rubbing.friction.viscous * slip + dry
+    if joint.law:
+        dry -= where(stands, 0.0, call(joint.law.force_at, slip)[0])
+    return joint.friction.viscous * slip + dry
 
 
-def sense(rubbing: Rubbing, v: list[float]) -> float:
+def slip_direction(joint: FrictionJoint, v: list[float]) -> float:
     """Return the direction of a joint's rate: 1, -1, or 0 at rest, within rounding."""
-    return where(_stands(v, rubbing.one, rubbing.other), 0.0, copysign(1.0, rubbing.slip(v)))
+    return where(_is_at_rest(v, joint.one, joint.other), 0.0, copysign(1.0, joint.slip_rate(v)))
 
 
-def _stands(v: list[float], one: int, other: int) -> bool:
+def _is_at_rest(v: list[float], one: int, other: int) -> bool:
     """Return whether the difference of two rates is 0 within rounding."""
     rates = abs(v[one]) + abs(v[other]) + abs(v[1])
     return abs(v[one] - v[other]) <= _ROUNDING * rates
 
 
-def stretched(
+def spring_length(
     places: list[complex], velocities: list[complex], start: int, end: int
 ) -> tuple[float, float]:
     """Return the length of a spring and its rate; both 0 if its ends coincide."""

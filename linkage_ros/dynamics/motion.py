@@ -164,7 +164,7 @@ class _Event(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class OneFreedom:
+class SingleDofMechanism:
     """A mechanism with one input that is moved by a force."""
 
     # The equation of motion at a value of the input; None if there is none.
@@ -175,30 +175,32 @@ class OneFreedom:
     laws: tuple[Law, ...] = ()  # The laws of the applied forces, as in ``Terms.laws``
     # What friction by the forces in the joints resists at a value, rate and time, with the q̈
     # without it and by how much a unit of it lowers q̈; None where it jams. None without any.
-    resisting: Callable[[float, float, float, float, float], float | None] | None = None
+    friction_effort: Callable[[float, float, float, float, float], float | None] | None = None
 
-    def driven_by(self, change: Callable[[OneFreedom], OneFreedom]) -> OneFreedom:
+    def driven_by(
+        self, change: Callable[[SingleDofMechanism], SingleDofMechanism]
+    ) -> SingleDofMechanism:
         """Return it with a change of what its motor moves: all of it."""
         return change(self)
 
-    def at(self, value: float, rate: float) -> Motion | None:
+    def state_at(self, value: float, rate: float) -> Motion | None:
         """Return a state, or None if it cannot exist."""
         low, high = self.stops
-        return self._reached(value, rate) if low <= value <= high else None
+        return self._reach_value(value, rate) if low <= value <= high else None
 
     def acceleration(
         self, motion: Motion, force: float, brake: float = 0.0, time: float = 0.0
     ) -> float:
         """Return q̈, in [rad/s²] or [m/s²]; the parameters are those of `advance`."""
         if self.laws:
-            force += self._applied(motion.terms, motion.rate, time)
-        sense = self._sense(motion, force, brake, time)
+            force += self._applied_force(motion.terms, motion.rate, time)
+        sense = self._motion_direction(motion, force, brake, time)
         if self.laws and not motion.rate:
-            force += self._applied(motion.terms, sense * _BEGINNING, time)
-            force -= self._applied(motion.terms, 0.0, time)
+            force += self._applied_force(motion.terms, sense * _BEGINNING, time)
+            force -= self._applied_force(motion.terms, 0.0, time)
         value, rate, terms, _ = motion
-        free = _acceleration(terms, rate, force, sense * brake, sense)
-        return self._rubbed(free, terms, value, rate, sense, time) or 0.0
+        free = _solve_acceleration(terms, rate, force, sense * brake, sense)
+        return self._rub_by_forces(free, terms, value, rate, sense, time) or 0.0
 
     def advance(
         self,
@@ -235,39 +237,41 @@ class OneFreedom:
         while pieces < _PIECES:
             if laws:
                 now = time + (seconds - left)
-                push = force + self._applied(motion.terms, motion.rate, now)
-            sense = self._sense(motion, push, brake, now)
+                push = force + self._applied_force(motion.terms, motion.rate, now)
+            sense = self._motion_direction(motion, push, brake, now)
             if sense == 0.0:
-                held = self._held(motion, left, force, brake, now) if laws else left
+                held = self._resting_time(motion, left, force, brake, now) if laws else left
                 left -= held
                 if left <= seconds * NARROW:
                     return motion
                 pieces += 1
                 continue
             terms = motion.terms
-            sticks = self.resisting is not None or terms.coulomb + terms.breakaway + brake > 0.0
+            sticks = (
+                self.friction_effort is not None or terms.coulomb + terms.breakaway + brake > 0.0
+            )
             cuts = kinks < _KINKS
             slips = terms.slips if cuts else ()
-            segments = self._segments(motion, now, sense) if laws and cuts else ()
-            reach = self._reach(motion, now, force, sense * brake, sense, slips, segments)
+            segments = self._law_segments(motion, now, sense) if laws and cuts else ()
+            reach = self._step_function(motion, now, force, sense * brake, sense, slips, segments)
             length = left
             reached = reach(length)
             while reached is None:
                 length *= 0.5
                 if length < seconds * _SHORTEST:
-                    return self._bounced(motion)
+                    return self._bounce(motion)
                 reached = reach(length)
             event = None
             # At the last state before one event, another event may have happened already.
-            while happened := self._event(reached, now, sense, sticks, slips, segments):
-                margin = self._margin(happened, now, sense, slips, segments)
+            while happened := self._find_event(reached, now, sense, sticks, slips, segments):
+                margin = self._event_margin(happened, now, sense, slips, segments)
                 length, last, known = last_before(reach, margin, motion, length, reached)
                 reached, event = last, happened if known else None
             if event is _Event.SEGMENT:
                 # The next segment begins just beyond, at a time that differs when it is rounded.
                 length = min(length + 2.0 * ulp(now + length), left)
                 beyond = reach(length)
-                if beyond and not self._event(beyond, now, sense, sticks, slips, ()):
+                if beyond and not self._find_event(beyond, now, sense, sticks, slips, ()):
                     reached = beyond
             motion = reached
             if event in (_Event.KINK, _Event.SEGMENT):
@@ -277,25 +281,25 @@ class OneFreedom:
             if event is _Event.TURN:
                 motion = _at_rest(motion)
             elif event in (_Event.LOW, _Event.HIGH):
-                motion = self._stopped(motion, event)
+                motion = self._stop_at(motion, event)
             left -= length
             if left <= seconds * NARROW:
                 return motion
         return _at_rest(motion)
 
-    def _sense(self, motion: Motion, force: float, brake: float, time: float) -> float:
+    def _motion_direction(self, motion: Motion, force: float, brake: float, time: float) -> float:
         """Return the direction of motion, 1 or -1, or 0 if it stays at rest."""
         value, rate, terms, _ = motion
         if rate:
             return copysign(1.0, rate)
         push = force - terms.potential_slope
         low, high = self.stops
-        held = abs(push) <= self._sticking(motion, push, brake, time)
+        held = abs(push) <= self._holding_effort(motion, push, brake, time)
         if held or (value >= high and push > 0.0) or (value <= low and push < 0.0):
             return 0.0
         return copysign(1.0, push)
 
-    def _reach(
+    def _step_function(
         self,
         motion: Motion,
         now: float,
@@ -307,52 +311,52 @@ class OneFreedom:
     ) -> Callable[[float], Motion | None]:
         """Return a function that gives the state after some seconds of one step."""
         value, rate, here, _ = motion
-        terms, step, reached, laws = self.terms, self.step, self._reached, self.laws
-        push = force + self._applied(here, rate, now, segments) if laws else force
-        free = _acceleration(here, rate, push, braking, sense)
-        start = self._rubbed(free, here, value, rate, sense, now)
+        terms, step, reached, laws = self.terms, self.step, self._reach_value, self.laws
+        push = force + self._applied_force(here, rate, now, segments) if laws else force
+        free = _solve_acceleration(here, rate, push, braking, sense)
+        start = self._rub_by_forces(free, here, value, rate, sense, now)
 
-        def field(q: float, w: float, ahead: float) -> float | None:
+        def acceleration_at(q: float, w: float, ahead: float) -> float | None:
             if not (-LARGEST <= q <= LARGEST and -LARGEST <= w <= LARGEST):
                 return None
             there = terms(q)
             if there is None or there.inertia < _LEAST:
                 return None
-            push = force + self._applied(there, w, now + ahead, segments) if laws else force
-            turned = _turned(there, slips) if slips else 0.0
-            free = _acceleration(there, w, push, braking, sense, turned)
-            return self._rubbed(free, there, q, w, sense, now + ahead)
+            push = force + self._applied_force(there, w, now + ahead, segments) if laws else force
+            turned = _reversed_friction(there, slips) if slips else 0.0
+            free = _solve_acceleration(there, w, push, braking, sense, turned)
+            return self._rub_by_forces(free, there, q, w, sense, now + ahead)
 
-        def reach(seconds: float) -> Motion | None:
+        def state_after(seconds: float) -> Motion | None:
             if start is None:
                 return None
-            end = step(field, value, rate, start, seconds)
+            end = step(acceleration_at, value, rate, start, seconds)
             return None if end is None else reached(*end, seconds)
 
-        return reach
+        return state_after
 
-    def _rubbed(
+    def _rub_by_forces(
         self, free: float, terms: Terms, value: float, rate: float, sense: float, time: float
     ) -> float | None:
         """Return q̈ with the friction by forces, from that without it; None if it jams."""
-        if self.resisting is None or sense == 0.0:
+        if self.friction_effort is None or sense == 0.0:
             return free
         # A rate that falls through zero within a step has the direction of the step.
         moving = rate if rate * sense > 0.0 else sense * _BEGINNING
         mobility = sense / terms.inertia
-        resisted = self.resisting(value, moving, time, free, mobility)
+        resisted = self.friction_effort(value, moving, time, free, mobility)
         return None if resisted is None else free - mobility * resisted
 
-    def _sticking(self, motion: Motion, push: float, brake: float, time: float) -> float:
+    def _holding_effort(self, motion: Motion, push: float, brake: float, time: float) -> float:
         """Return what friction and brake hold at rest against a push."""
         value, _, terms, _ = motion
         most = terms.coulomb + terms.breakaway + brake
-        if self.resisting is None or not push:
+        if self.friction_effort is None or not push:
             return most
-        resisted = self.resisting(value, copysign(_BEGINNING, push), time, 0.0, 0.0)
+        resisted = self.friction_effort(value, copysign(_BEGINNING, push), time, 0.0, 0.0)
         return inf if resisted is None else most + resisted
 
-    def _reached(self, value: float, rate: float, ahead: float = 0.0) -> Motion | None:
+    def _reach_value(self, value: float, rate: float, ahead: float = 0.0) -> Motion | None:
         if not (-LARGEST <= value <= LARGEST and -LARGEST <= rate <= LARGEST):
             return None
         terms = self.terms(value)
@@ -360,7 +364,7 @@ class OneFreedom:
             return None
         return Motion(value, rate, terms, ahead)
 
-    def _event(
+    def _find_event(
         self,
         motion: Motion,
         now: float,
@@ -378,11 +382,15 @@ class OneFreedom:
             return _Event.HIGH
         if value < low:
             return _Event.LOW
-        if slips and _turned(terms, slips):
+        if slips and _reversed_friction(terms, slips):
             return _Event.KINK
-        return _Event.SEGMENT if segments and self._within(motion, now, segments) < 0.0 else None
+        return (
+            _Event.SEGMENT
+            if segments and self._segment_margin(motion, now, segments) < 0.0
+            else None
+        )
 
-    def _margin(
+    def _event_margin(
         self,
         event: _Event,
         now: float,
@@ -399,43 +407,43 @@ class OneFreedom:
         if event is _Event.LOW:
             return lambda motion: motion.value - low
         if event is _Event.SEGMENT:
-            return lambda motion: self._within(motion, now, segments)
+            return lambda motion: self._segment_margin(motion, now, segments)
         return lambda motion: min(
             copysign(1.0, before) * now
             for before, now in zip(slips, motion.terms.slips, strict=True)
             if before
         )
 
-    def _stopped(self, motion: Motion, event: _Event) -> Motion:
+    def _stop_at(self, motion: Motion, event: _Event) -> Motion:
         """Return the state after an impact."""
         low, high = self.stops
         stop, outward = (high, 1.0) if event is _Event.HIGH else (low, -1.0)
-        at_stop = self._reached(stop, motion.rate) or motion
-        return self._bounced(at_stop) if outward * motion.rate > 0.0 else _at_rest(at_stop)
+        at_stop = self._reach_value(stop, motion.rate) or motion
+        return self._bounce(at_stop) if outward * motion.rate > 0.0 else _at_rest(at_stop)
 
-    def _bounced(self, motion: Motion) -> Motion:
+    def _bounce(self, motion: Motion) -> Motion:
         return motion._replace(rate=0.0 - self.restitution * motion.rate)
 
-    def _held(
+    def _resting_time(
         self, motion: Motion, seconds: float, force: float, brake: float, now: float
     ) -> float:
         """Return how long a state stays at rest, while the applied forces change with the time."""
         low, high = self.stops
         value, _, terms, _ = motion
 
-        def margin(ahead: float) -> float:
-            push = force - terms.potential_slope + self._applied(terms, 0.0, now + ahead)
-            held = self._sticking(motion, push, brake, now + ahead) - abs(push)
+        def holding_margin(ahead: float) -> float:
+            push = force - terms.potential_slope + self._applied_force(terms, 0.0, now + ahead)
+            held = self._holding_effort(motion, push, brake, now + ahead) - abs(push)
             if value >= high:
                 return max(held, push)
             return max(held, -push) if value <= low else held
 
-        if margin(seconds) >= 0.0:
+        if holding_margin(seconds) >= 0.0:
             return seconds
-        held = last_before(lambda ahead: ahead, margin, 0.0, seconds, seconds)[0]
+        held = last_before(lambda ahead: ahead, holding_margin, 0.0, seconds, seconds)[0]
         return min(held + 2.0 * ulp(now + held), seconds)
 
-    def _segments(self, motion: Motion, now: float, sense: float) -> tuple[int, ...]:
+    def _law_segments(self, motion: Motion, now: float, sense: float) -> tuple[int, ...]:
         """Return the segment of each law, of a motion that begins with those of its direction."""
         rate = motion.rate or sense * _BEGINNING
         return tuple(
@@ -443,7 +451,7 @@ class OneFreedom:
             for law, at in zip(self.laws, motion.terms.laws, strict=True)
         )
 
-    def _within(self, motion: Motion, now: float, segments: tuple[int, ...]) -> float:
+    def _segment_margin(self, motion: Motion, now: float, segments: tuple[int, ...]) -> float:
         """Return the least margin of the laws to the ends of their segments."""
         rate, time = motion.rate, now + motion.ahead
         return min(
@@ -451,7 +459,7 @@ class OneFreedom:
             for law, segment, at in zip(self.laws, segments, motion.terms.laws, strict=True)
         )
 
-    def _applied(
+    def _applied_force(
         self, terms: Terms, rate: float, time: float, segments: tuple[int, ...] = ()
     ) -> float:
         """Return the force of the laws on the input, in given segments or in the present ones."""
@@ -467,7 +475,7 @@ def _at_rest(motion: Motion) -> Motion:
     return motion._replace(rate=0.0)
 
 
-def _turned(terms: Terms, before: tuple[float, ...]) -> float:
+def _reversed_friction(terms: Terms, before: tuple[float, ...]) -> float:
     """Return the Coulomb friction of the joints whose slip has reversed, in [N·m] or [N]."""
     turned = 0.0
     for slip, earlier in zip(terms.slips, before, strict=True):
@@ -476,7 +484,7 @@ def _turned(terms: Terms, before: tuple[float, ...]) -> float:
     return turned
 
 
-def _acceleration(
+def _solve_acceleration(
     terms: Terms, rate: float, force: float, braking: float, sense: float, turned: float = 0.0
 ) -> float:
     """

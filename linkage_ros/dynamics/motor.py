@@ -39,10 +39,10 @@ from typing import Any, TypeVar
 from linkage_ros.dynamics.laws import LawTerm
 from linkage_ros.dynamics.longest_step import check_step
 from linkage_ros.dynamics.mechanics import Terms
-from linkage_ros.dynamics.motion import LARGEST, OneFreedom
+from linkage_ros.dynamics.motion import LARGEST, SingleDofMechanism
 from linkage_ros.dynamics.two_masses import TwoMasses
 
-Driven = TypeVar('Driven', OneFreedom, TwoMasses)
+Driven = TypeVar('Driven', SingleDofMechanism, TwoMasses)
 
 _AT_INPUT = LawTerm(1.0, 0.0, 1.0)
 _RESTING = -1
@@ -79,12 +79,12 @@ class MotorLaw:
 
     def force(self, segment: int, _value: float, rate: float, _time: float) -> float:
         """Return the effort by the line of a segment."""
-        return self.resting if segment == _RESTING else _at(self.lines[segment], rate)
+        return self.resting if segment == _RESTING else _evaluate_line(self.lines[segment], rate)
 
     def torque(self, rate: float) -> float:
         """Return the torque of the motor before the gear, in [N·m], at a rate of the input."""
         segment = self.segment(0.0, rate, 0.0)
-        return self.stalled if segment == _RESTING else _at(self.torques[segment], rate)
+        return self.stalled if segment == _RESTING else _evaluate_line(self.torques[segment], rate)
 
 
 _OFF = MotorLaw()
@@ -100,18 +100,18 @@ class Motor:
     # η and ηᵦ.
     forward: float
     backward: float
-    most: float  # iₘ, in [A]
+    max_current: float  # iₘ, in [A]
     supply: float  # U, in [V]
     # What is commanded: 'effort' in [N·m] or [N], 'current' in [A], or 'voltage' in [V].
     command: str
 
-    def mounted(self, mechanism: Driven) -> Driven:
+    def mount_on(self, mechanism: Driven) -> Driven:
         """Return a mechanism with this motor at its input, switched off: without a current."""
         return mechanism.driven_by(
             lambda moved: replace(moved, terms=_with_motor(moved.terms), laws=(*moved.laws, _OFF))
         )
 
-    def driven(self, mechanism: Driven, command: float) -> tuple[Driven, float, float]:
+    def drive_by(self, mechanism: Driven, command: float) -> tuple[Driven, float, float]:
         """
         Return a mechanism with this motor under a command.
 
@@ -132,7 +132,7 @@ class Motor:
             Friction of the gear that acts at rest too, as a brake, in [N·m] or [N].
 
         """
-        law = self.law(command)
+        law = self.effort_law(command)
         under = mechanism.driven_by(lambda moved: replace(moved, laws=(*moved.laws[:-1], law)))
         return under, 0.0, law.holding
 
@@ -166,8 +166,8 @@ class Motor:
             The remedy is the longest step that carries it.
 
         """
-        if self.command == 'voltage' or self._supply():
-            damping = -self._falling() * self.constant * self.ratio / self.backward
+        if self.command == 'voltage' or self._supply_limits():
+            damping = -self._current_slope() * self.constant * self.ratio / self.backward
             check_step(
                 'drive.torque.motor',
                 damping / inertia,
@@ -177,24 +177,24 @@ class Motor:
                 'add the inertia of its rotor to loads.drive_inertia',
             )
 
-    def law(self, command: float) -> MotorLaw:
+    def effort_law(self, command: float) -> MotorLaw:
         """Return the effort over the rate of the input, under a command."""
-        wanted, supply = self._wanted(command), self._supply()
-        limits: list[Line] = [(-self.most, 0.0), (self.most, 0.0), *supply]
+        wanted, supply = self._wanted_current(command), self._supply_limits()
+        limits: list[Line] = [(-self.max_current, 0.0), (self.max_current, 0.0), *supply]
         lossy = self.forward < 1.0 or self.backward < 1.0
-        found = {_crossing(*pair) for pair in combinations([wanted, *limits], 2)}
+        found = {_crossing_rate(*pair) for pair in combinations([wanted, *limits], 2)}
         if lossy:
-            found |= {0.0, *(_crossing(line, (0.0, 0.0)) for line in (wanted, *limits))}
+            found |= {0.0, *(_crossing_rate(line, (0.0, 0.0)) for line in (wanted, *limits))}
         rates = sorted(rate for rate in found if abs(rate) <= LARGEST)
-        still = _at(self._current(wanted, supply, 0.0), 0.0)
+        still = _evaluate_line(self._current_line(wanted, supply, 0.0), 0.0)
         to_input = self.ratio * self.constant
         holding = 0.5 * to_input * abs(still) * (1.0 / self.backward - self.forward)
         ends: list[float] = []
         lines: list[Line] = []
         torques: list[Line] = []
         begins = [-inf, *rates]
-        for begin, at in zip(begins, _between(rates), strict=True):
-            start, slope = self._current(wanted, supply, at)
+        for begin, at in zip(begins, _rates_between(rates), strict=True):
+            start, slope = self._current_line(wanted, supply, at)
             drives = (start + slope * at) * at >= 0.0
             factor = to_input * (self.forward if drives else 1.0 / self.backward)
             line = factor * start + copysign(holding, at), factor * slope
@@ -206,11 +206,11 @@ class Motor:
         stalled = self.constant * still
         return MotorLaw(tuple(ends[1:]), tuple(lines), resting, holding, tuple(torques), stalled)
 
-    def _wanted(self, command: float) -> Line:
+    def _wanted_current(self, command: float) -> Line:
         """Return the current that a command asks for, in [A]."""
         if self.command == 'voltage':
             voltage = min(max(command, -self.supply), self.supply)
-            return voltage / self.resistance, self._falling()
+            return voltage / self.resistance, self._current_slope()
         if self.command == 'current':
             return command, 0.0
         return self.current_for(command), 0.0
@@ -219,23 +219,23 @@ class Motor:
         """Return the current, in [A], that gives an effort at the input while it drives."""
         return effort / (self.constant * self.ratio * self.forward)
 
-    def _supply(self) -> tuple[Line, ...]:
+    def _supply_limits(self) -> tuple[Line, ...]:
         """Return the least and the greatest current by the supply; none if it has no limit."""
         if self.supply >= LARGEST:
             return ()
         most = self.supply / self.resistance
-        return (-most, self._falling()), (most, self._falling())
+        return (-most, self._current_slope()), (most, self._current_slope())
 
-    def _falling(self) -> float:
+    def _current_slope(self) -> float:
         return -self.constant * self.ratio / self.resistance
 
-    def _current(self, wanted: Line, supply: tuple[Line, ...], rate: float) -> Line:
+    def _current_line(self, wanted: Line, supply: tuple[Line, ...], rate: float) -> Line:
         """Return the line that the current follows about a rate of the input."""
         current = wanted
-        if abs(_at(wanted, rate)) > self.most:
-            current = copysign(self.most, _at(wanted, rate)), 0.0
+        if abs(_evaluate_line(wanted, rate)) > self.max_current:
+            current = copysign(self.max_current, _evaluate_line(wanted, rate)), 0.0
         for side, limit in zip((-1.0, 1.0), supply, strict=False):
-            if side * (_at(current, rate) - _at(limit, rate)) > 0.0:
+            if side * (_evaluate_line(current, rate) - _evaluate_line(limit, rate)) > 0.0:
                 current = limit
         return current
 
@@ -243,25 +243,25 @@ class Motor:
 def _with_motor(terms: Callable[[float], Terms | None]) -> Callable[[float], Terms | None]:
     """Return an equation of motion with the motor's law after all others."""
 
-    def equation(value: float) -> Terms | None:
+    def equation_with_motor(value: float) -> Terms | None:
         there = terms(value)
         return None if there is None else there._replace(laws=(*there.laws, _AT_INPUT))
 
-    return equation
+    return equation_with_motor
 
 
-def _at(line: Line, rate: float) -> float:
+def _evaluate_line(line: Line, rate: float) -> float:
     start, slope = line
     return start + slope * rate
 
 
-def _crossing(one: Line, other: Line) -> float:
+def _crossing_rate(one: Line, other: Line) -> float:
     """Return the rate at which two lines cross; infinity if they are parallel."""
     slope = one[1] - other[1]
     return (other[0] - one[0]) / slope if slope else inf
 
 
-def _between(rates: list[float]) -> list[float]:
+def _rates_between(rates: list[float]) -> list[float]:
     """Return a rate before, between and after some rates in order."""
     if not rates:
         return [0.0]

@@ -37,7 +37,7 @@ _STAYS = 4e-15
 """Change at which a friction stays, as a fraction of what it is made of."""
 
 
-class PressedJoint(NamedTuple):
+class LoadDependentFriction(NamedTuple):
     """A joint with such friction, and the force in it; of a slider, the force is a real number."""
 
     factor: float  # µ·ρ, in [m], or µ
@@ -47,8 +47,8 @@ class PressedJoint(NamedTuple):
     by_frictions: tuple[complex, ...]  # P_k, in [N] for a unit of each T_k
 
 
-def frictions(
-    joints: Sequence[PressedJoint], pull: float, mobility: float = 0.0
+def solve_frictions(
+    joints: Sequence[LoadDependentFriction], pull: float, mobility: float = 0.0
 ) -> list[float] | None:
     """
     Return the friction in each joint, in [N·m] or [N]; None if the linkage jams.
@@ -99,7 +99,7 @@ Unknown = tuple[int, bool, float]
 """Of a joint: its first unknown in the linear system, whether it is a pin, and its factor."""
 
 
-def resisting(
+def friction_effort(
     unknowns: Sequence[Unknown],
     forces: Sequence[float],
     levers: Sequence[float],
@@ -125,14 +125,14 @@ def resisting(
     joints = []
     for (_, _, factor), lever in zip(unknowns, levers, strict=True):
         free, by_pull, *others = [complex(*islice(numbers, 2)) for _ in range(count + 2)]
-        joints.append(PressedJoint(factor, lever, free, by_pull, tuple(others)))
-    found = frictions(joints, pull, mobility)
+        joints.append(LoadDependentFriction(factor, lever, free, by_pull, tuple(others)))
+    found = solve_frictions(joints, pull, mobility)
     if found is None:
         return None
     return sum(joint.lever * friction for joint, friction in zip(joints, found, strict=True))
 
 
-def solved(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> list[float] | None:
+def solve_pressed(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> list[float] | None:
     """
     Return the solution of a linear system with such friction, and the friction in each joint.
 
@@ -146,15 +146,17 @@ def solved(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> list[fl
         The right sides: first without this friction, then of a unit of each.
 
     """
-    solutions = _solutions(matrix, sides)
+    solutions = _solve_sides(matrix, sides)
     if solutions is None:
         return None
     free, *units = solutions
     joints = []
     for first, pin, factor in unknowns:
-        by_frictions = tuple(_force(unit, first, pin) for unit in units)
-        joints.append(PressedJoint(factor, 0.0, _force(free, first, pin), 0j, by_frictions))
-    found = frictions(joints, 0.0)
+        by_frictions = tuple(_joint_force(unit, first, pin) for unit in units)
+        joints.append(
+            LoadDependentFriction(factor, 0.0, _joint_force(free, first, pin), 0j, by_frictions)
+        )
+    found = solve_frictions(joints, 0.0)
     if found is None:
         return None
     for friction, unit in zip(found, units, strict=True):
@@ -164,14 +166,14 @@ def solved(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> list[fl
 
 def forces_in(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> list[float] | None:
     """Return the force in each joint, x and y, for right sides one after the other."""
-    solutions = _solutions(matrix, sides)
+    solutions = _solve_sides(matrix, sides)
     if solutions is None:
         return None
-    forces = [_force(each, first, pin) for first, pin, _ in unknowns for each in solutions]
+    forces = [_joint_force(each, first, pin) for first, pin, _ in unknowns for each in solutions]
     return [part for force in forces for part in (force.real, force.imag)]
 
 
-def _solutions(matrix: Array, sides: Sequence[float]) -> list[list[float]] | None:
+def _solve_sides(matrix: Array, sides: Sequence[float]) -> list[list[float]] | None:
     """Return the solutions of a linear system for right sides one after the other, or None."""
     try:
         found = np.linalg.solve(matrix, np.reshape(sides, (-1, len(matrix))).T).T
@@ -180,5 +182,5 @@ def _solutions(matrix: Array, sides: Sequence[float]) -> list[list[float]] | Non
     return found.tolist() if np.isfinite(found).all() else None
 
 
-def _force(solution: Sequence[float], first: int, pin: bool) -> complex:
+def _joint_force(solution: Sequence[float], first: int, pin: bool) -> complex:
     return complex(solution[first], solution[first + 1] if pin else 0.0)

@@ -34,7 +34,13 @@ from functools import cached_property, partial
 from math import isfinite
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.dynamics.mechanics import Mechanics, resistance, Rubbing, sense, stretched
+from linkage_ros.dynamics.mechanics import (
+    FrictionJoint,
+    joint_friction,
+    Mechanics,
+    slip_direction,
+    spring_length,
+)
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.arithmetic import call, has_result, make_vector, unit_vector
 from linkage_ros.kinematics.closure import Closure
@@ -53,7 +59,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Side(NamedTuple):
+class PinSide(NamedTuple):
     """A link of a joint: its first row, the index of its centre among the places, its sign."""
 
     row: int
@@ -61,7 +67,7 @@ class Side(NamedTuple):
     sign: float
 
 
-class Line(NamedTuple):
+class ForceLine(NamedTuple):
     """
     The line of a slider.
 
@@ -120,8 +126,8 @@ class JointMatrix:
         self.size = 3 * len(centers)
         self._scale = closure.scale
         self._centers = centers
-        self.sides = tuple(self._sides(joint.link, joint.to) for joint in joints)
-        self.lines: dict[int, Line] = {}
+        self.sides = tuple(self._joint_sides(joint.link, joint.to) for joint in joints)
+        self.lines: dict[int, ForceLine] = {}
         self._matrix = np.zeros((self.size, self.size))
         where: list[int] = []
         self._pins = self._plan_pins(joints, places, where)
@@ -130,7 +136,7 @@ class JointMatrix:
                 along = closure.angles[joint.to]
                 direction = complex(*linkage.sliders[joint.name].direction)
                 unit = along.unit * direction / abs(direction)
-                self.lines[number] = Line(along.coordinate, unit)
+                self.lines[number] = ForceLine(along.coordinate, unit)
         sliders = {joint.name: n for n, joint in enumerate(joints) if joint.kind == 'P'}
         self._thrusts = [
             self._plan_thrust(number, 1j, 2 * number, places[number], where)
@@ -143,10 +149,10 @@ class JointMatrix:
                     self._plan_thrust(number, 1 + 0j, column, places[number], where)
                 )
             else:
-                self._fill_moment(self._sides(given.child, given.parent), column)
-        self._fill = partial(_filled, self._matrix, np.array(where, dtype=np.intp))
+                self._fill_moment(self._joint_sides(given.child, given.parent), column)
+        self._fill = partial(_fill_matrix, self._matrix, np.array(where, dtype=np.intp))
 
-    def at(self, coordinates: Sequence[float], places: Sequence[complex]) -> Array:
+    def matrix_at(self, coordinates: Sequence[float], places: Sequence[complex]) -> Array:
         """
         Return the matrix at a position.
 
@@ -183,35 +189,38 @@ class JointMatrix:
                 continue
             for row, center, sign in sides:
                 self._matrix[row, column] = self._matrix[row + 1, column + 1] = sign
-                where += (self._entry(row + 2, column), self._entry(row + 2, column + 1))
+                where += (
+                    self._entry_index(row + 2, column),
+                    self._entry_index(row + 2, column + 1),
+                )
                 pins.append((places[number], center, sign / self._scale))
         return pins
 
     def _plan_thrust(
         self, number: int, turn: complex, column: int, place: int, where: list[int]
-    ) -> tuple[Line, complex, int, tuple[Side, ...]]:
+    ) -> tuple[ForceLine, complex, int, tuple[PinSide, ...]]:
         """Plan a force on a slider: along its line, turned by a constant factor."""
         sides = self.sides[number]
         for row, _, _ in sides:
-            where += (self._entry(row + i, column) for i in range(3))
+            where += (self._entry_index(row + i, column) for i in range(3))
         return self.lines[number], turn, place, sides
 
-    def _fill_moment(self, sides: tuple[Side, ...], column: int) -> None:
+    def _fill_moment(self, sides: tuple[PinSide, ...], column: int) -> None:
         for row, _, sign in sides:
             self._matrix[row + 2, column] = sign
 
-    def _sides(self, link: str, to: str) -> tuple[Side, ...]:
+    def _joint_sides(self, link: str, to: str) -> tuple[PinSide, ...]:
         return tuple(
-            Side(self.rows[name], self._centers[name], sign)
+            PinSide(self.rows[name], self._centers[name], sign)
             for name, sign in ((link, 1.0), (to, -1.0))
             if name != GROUND
         )
 
-    def _entry(self, row: int, column: int) -> int:
+    def _entry_index(self, row: int, column: int) -> int:
         return row * self.size + column
 
 
-def _filled(constant: Array, where: NDArray[np.intp], *values: float) -> Array:
+def _fill_matrix(constant: Array, where: NDArray[np.intp], *values: float) -> Array:
     """Return the matrix with values at the given entries, counted along its rows."""
     matrix = constant.copy()  # ticks and diagnostics ask for forces from different threads
     matrix.reshape(-1)[where] = values
@@ -275,7 +284,7 @@ class Reactions:
         self._mechanics = mechanics
         self._scale = closure.scale
         self.joints = structure.joints
-        self.names = _names(self.joints)
+        self.names = _joint_names(self.joints)
 
         moving = [link for link in structure.links if link != GROUND]
         points, weights = [], []
@@ -309,17 +318,19 @@ class Reactions:
             for spring in mechanics.loads.springs
         )
         self._loaded = tuple(at)
-        self._pressed = tuple(joint for joint in mechanics.rubbing if joint.friction.coefficient)
-        self._solved: Callable[..., list[float] | None] = _solved
-        if self._pressed:
+        self._load_dependent = tuple(
+            joint for joint in mechanics.friction_joints if joint.friction.coefficient
+        )
+        self._solve_system: Callable[..., list[float] | None] = _solve_linear
+        if self._load_dependent:
             from linkage_ros.dynamics import (
                 pressed_joints,
             )  # local import: only with it
 
-            unknowns = [self._unknowns(rubbing) for rubbing in self._pressed]
-            self._solved = partial(pressed_joints.solved, unknowns)
+            unknowns = [self._friction_unknown(rubbing) for rubbing in self._load_dependent]
+            self._solve_system = partial(pressed_joints.solve_pressed, unknowns)
             self._forces_in = partial(pressed_joints.forces_in, unknowns)
-            self._resisting = partial(pressed_joints.resisting, unknowns)
+            self._solve_friction_effort = partial(pressed_joints.friction_effort, unknowns)
         self._published = tuple(
             (rows.get(joint.child, -1), rows.get(joint.parent, -1))
             if isinstance(joint, RevoluteJoint)
@@ -347,7 +358,7 @@ class Reactions:
             Time since the first tick, for loads that change with it.
 
         """
-        balance = self._balance(position, velocity, acceleration, seconds)
+        balance = self._solve_balance(position, velocity, acceleration, seconds)
         if balance is None:
             return None
         forces, resistances = balance
@@ -364,7 +375,7 @@ class Reactions:
             reactions += (reaction,)
         return reactions
 
-    def efforts(
+    def drive_efforts(
         self,
         position: Position,
         velocity: Velocity,
@@ -377,7 +388,7 @@ class Reactions:
         It is that of `Mechanics.drive_efforts`, which does not know the friction that grows with
         the forces in the joints. The parameters are those of `solve`.
         """
-        balance = self._balance(position, velocity, acceleration, seconds)
+        balance = self._solve_balance(position, velocity, acceleration, seconds)
         if balance is None:
             return ()
         forces, _ = balance
@@ -392,7 +403,7 @@ class Reactions:
                 efforts += (force * self._scale + inert,)
         return efforts
 
-    def resisting(
+    def friction_effort(
         self, value: float, rate: float, seconds: float, pull: float, mobility: float
     ) -> float | None:
         """
@@ -416,44 +427,48 @@ class Reactions:
         closure, applied = self._mechanics.closure, self._mechanics.applied
         if applied is not None:
             applied.seconds = seconds
-        found: Sequence[Sequence[float]] | None = self._compiled.fast(value, rate)
+        found: Sequence[Sequence[float]] | None = self._compiled_motion.fast(value, rate)
         if found is None:
             position = closure.position(value)
             if position.status not in _SOLVED:
                 return None
-            found = self._pressed_by(position, closure.velocity(position, rate))
+            found = self._force_coefficients(position, closure.velocity(position, rate))
         if not found:
             return None
         forces, levers = found
-        return self._resisting(forces, levers, pull, mobility)
+        return self._solve_friction_effort(forces, levers, pull, mobility)
 
     @cached_property
-    def _compiled(self) -> Compiled:
+    def _compiled_motion(self) -> Compiled:
         def wanted(motion: CompiledMotion) -> Sequence[Sequence[float]]:
             assert motion.velocity is not None
-            return self._pressed_by(motion.position, motion.velocity)
+            return self._force_coefficients(motion.position, motion.velocity)
 
         return Compiled(self._mechanics.closure, 1, wanted, within_limits=False)
 
-    def _pressed_by(self, position: Position, velocity: Velocity) -> Sequence[Sequence[float]]:
+    def _force_coefficients(
+        self, position: Position, velocity: Velocity
+    ) -> Sequence[Sequence[float]]:
         """Return the coefficients of the forces in pressed joints, and the levers of these."""
         closure, size = self._mechanics.closure, self._matrix.size
         x, places = position.state.coordinates, self._follower.places(position)
         still, pulled = (closure.acceleration(position, velocity, pull) for pull in (0.0, 1.0))
-        sides, _ = self._sides(position, velocity, still, places, None)
-        more, _ = self._sides(position, velocity, pulled, places, None)
+        sides, _ = self._right_sides(position, velocity, still, places, None)
+        more, _ = self._right_sides(position, velocity, pulled, places, None)
         by_pull = [one - other for one, other in zip(more[:size], sides[:size], strict=True)]
         columns = [*sides[:size], *by_pull, *sides[size:]]
-        forces = call(self._forces_in, self._matrix.at(x, places), *columns)
+        forces = call(self._forces_in, self._matrix.matrix_at(x, places), *columns)
         if not has_result(forces):
             return []
         v = velocity.state.coordinates
         unit = self._scale if closure.linkage.inputs[0].slider else 1.0
-        levers = [abs(rubbing.slip(v) / (unit * v[1])) for rubbing in self._pressed]
-        count = 2 * len(self._pressed) * (len(self._pressed) + 2)
+        levers = [abs(rubbing.slip_rate(v) / (unit * v[1])) for rubbing in self._load_dependent]
+        count = 2 * len(self._load_dependent) * (len(self._load_dependent) + 2)
         return [[forces[i] for i in range(count)], levers]
 
-    def shift(self, position: Position, offsets: Sequence[complex]) -> tuple[float, ...] | None:
+    def joint_deflections(
+        self, position: Position, offsets: Sequence[complex]
+    ) -> tuple[float, ...] | None:
         """
         Return how far offsets in the joints move the published joints.
 
@@ -484,7 +499,7 @@ class Reactions:
         if position.status not in _SOLVED:
             return None
         places, x = self._follower.places(position), position.state.coordinates
-        matrix, lines = self._matrix.at(x, places), self._matrix.lines
+        matrix, lines = self._matrix.matrix_at(x, places), self._matrix.lines
         gaps = [0.0] * self._matrix.size
         for number, offset in enumerate(offsets):
             if number in lines:
@@ -492,19 +507,19 @@ class Reactions:
                 gaps[2 * number] = offset.real * across.real + offset.imag * across.imag
             else:
                 gaps[2 * number], gaps[2 * number + 1] = offset.real, offset.imag
-        moved = call(_turned_solved, matrix, *gaps)
+        moved = call(_solve_transposed, matrix, *gaps)
         if not has_result(moved):
             return None
         shifts: tuple[float, ...] = ()
         for published in self._published:
             if isinstance(published, int):
-                shifts += (self._slid(published, moved, x, places),)
+                shifts += (self._slide_displacement(published, moved, x, places),)
             else:
                 child, parent = (moved[row + 2] if row >= 0 else 0.0 for row in published)
                 shifts += ((child - parent) / self._scale,)
         return shifts
 
-    def _slid(
+    def _slide_displacement(
         self, number: int, moved: list[float], x: Sequence[float], places: list[complex]
     ) -> float:
         """Return how far displacements of the links move a point along its slider."""
@@ -516,7 +531,7 @@ class Reactions:
             slid += sign * (way.real * along.real + way.imag * along.imag)
         return slid
 
-    def _balance(
+    def _solve_balance(
         self,
         position: Position,
         velocity: Velocity,
@@ -527,16 +542,18 @@ class Reactions:
         if position.status not in _SOLVED:
             return None
         x, places = position.state.coordinates, self._follower.places(position)
-        sides, resistances = self._sides(position, velocity, acceleration, places, seconds)
-        forces = call(self._solved, self._matrix.at(x, places), *sides)
+        sides, resistances = self._right_sides(position, velocity, acceleration, places, seconds)
+        forces = call(self._solve_system, self._matrix.matrix_at(x, places), *sides)
         if not has_result(forces):
             return None
         v = velocity.state.coordinates
-        for i, rubbing in enumerate(self._pressed):
-            resistances[rubbing.joint] += sense(rubbing, v) * forces[self._matrix.size + i]
+        for i, rubbing in enumerate(self._load_dependent):
+            resistances[rubbing.joint] += (
+                slip_direction(rubbing, v) * forces[self._matrix.size + i]
+            )
         return forces, resistances
 
-    def _sides(
+    def _right_sides(
         self,
         position: Position,
         velocity: Velocity,
@@ -560,34 +577,34 @@ class Reactions:
         if self._springs:
             velocities = self._follower.velocities(position, velocity, places)
             for spring, (start, end), rows in self._springs:
-                length, growth = stretched(places, velocities, start, end)
+                length, growth = spring_length(places, velocities, start, end)
                 if not length:
                     continue
                 force = spring.tension(length, growth) / length * (places[end] - places[start])
                 for row, point, pulled in zip(rows, (start, end), (force, -force), strict=True):
                     if row >= 0:
                         lever = places[point] - places[self._bodies[row // 3][2]]
-                        self._push(sides, row, lever, pulled)
+                        self._apply_force(sides, row, lever, pulled)
         if self._mechanics.applied is not None:
-            for at, load in self._mechanics.applied.acting(position, velocity, seconds):
-                self._apply(sides, at, load, position, places)
+            for at, load in self._mechanics.applied.acting_loads(position, velocity, seconds):
+                self._apply_load(sides, at, load, position, places)
         resistances = [0.0] * len(self.joints)
-        for rubbing in self._mechanics.rubbing:
+        for rubbing in self._mechanics.friction_joints:
             number = rubbing.joint
-            resistances[number] = resistance(rubbing, v)
-            self._rub(sides, number, resistances[number], x, places)
-        for rubbing in self._pressed:
+            resistances[number] = joint_friction(rubbing, v)
+            self._add_friction(sides, number, resistances[number], x, places)
+        for rubbing in self._load_dependent:
             of_a_unit = [0.0] * self._matrix.size
-            self._rub(of_a_unit, rubbing.joint, sense(rubbing, v), x, places)
+            self._add_friction(of_a_unit, rubbing.joint, slip_direction(rubbing, v), x, places)
             sides += of_a_unit
         return sides, resistances
 
-    def _unknowns(self, rubbing: Rubbing) -> tuple[int, bool, float]:
+    def _friction_unknown(self, joint: FrictionJoint) -> tuple[int, bool, float]:
         """Return the first unknown of a joint, whether it is a pin, and its friction by force."""
-        friction, pin = rubbing.friction, rubbing.joint not in self._matrix.lines
-        return 2 * rubbing.joint, pin, friction.coefficient * (friction.radius if pin else 1.0)
+        friction, pin = joint.friction, joint.joint not in self._matrix.lines
+        return 2 * joint.joint, pin, friction.coefficient * (friction.radius if pin else 1.0)
 
-    def _apply(
+    def _apply_load(
         self,
         sides: list[float],
         at: JointCoordinate | LoadedPoint,
@@ -602,20 +619,20 @@ class Reactions:
         if isinstance(at, LoadedPoint):
             row = rows[at.link]
             lever = places[self._loaded[at.number]] - places[self._bodies[row // 3][2]]
-            self._push(sides, row, lever, load * at.direction(position))
+            self._apply_force(sides, row, lever, load * at.direction(position))
         elif at.slider:
             number = self._sliders[at.slider]
-            self._rub(sides, number, -load, position.state.coordinates, places)
+            self._add_friction(sides, number, -load, position.state.coordinates, places)
         else:
             for link, moment in ((at.child, load), (at.parent, -load)):
                 if link != GROUND:
                     sides[rows[link] + 2] -= moment / self._scale
 
-    def _rub(
+    def _add_friction(
         self,
         sides: list[float],
         number: int,
-        resisting: float,
+        friction: float,
         x: Sequence[float],
         places: list[complex],
     ) -> None:
@@ -623,19 +640,19 @@ class Reactions:
         line = self._matrix.lines.get(number)
         for row, center, sign in self._matrix.sides[number]:
             if line is None:
-                sides[row + 2] += sign * resisting / self._scale
+                sides[row + 2] += sign * friction / self._scale
             else:
                 lever = places[self._places[number]] - places[center]
-                self._push(sides, row, lever, -sign * resisting * line.direction(x))
+                self._apply_force(sides, row, lever, -sign * friction * line.direction(x))
 
-    def _push(self, sides: list[float], row: int, lever: complex, force: complex) -> None:
+    def _apply_force(self, sides: list[float], row: int, lever: complex, force: complex) -> None:
         """Add a known force on a link to its right sides."""
         sides[row] -= force.real
         sides[row + 1] -= force.imag
         sides[row + 2] -= (lever.real * force.imag - lever.imag * force.real) / self._scale
 
 
-def _solved(matrix: Array, *sides: float) -> list[float] | None:
+def _solve_linear(matrix: Array, *sides: float) -> list[float] | None:
     """Return the solution of a linear system, or None if it is singular."""
     try:
         solution: list[float] = np.linalg.solve(matrix, sides).tolist()
@@ -644,12 +661,12 @@ def _solved(matrix: Array, *sides: float) -> list[float] | None:
     return solution if all(map(isfinite, solution)) else None
 
 
-def _turned_solved(matrix: Array, *sides: float) -> list[float] | None:
+def _solve_transposed(matrix: Array, *sides: float) -> list[float] | None:
     """Return the solution of the system with the transposed matrix."""
-    return _solved(matrix.T, *sides)
+    return _solve_linear(matrix.T, *sides)
 
 
-def _names(joints: Sequence[Joint]) -> tuple[str, ...]:
+def _joint_names(joints: Sequence[Joint]) -> tuple[str, ...]:
     pins = [joint.name for joint in joints if joint.kind == 'R']
     names = []
     for joint in joints:

@@ -43,7 +43,7 @@ from math import copysign, ulp
 from typing import NamedTuple
 
 from linkage_ros.dynamics.mechanics import Terms
-from linkage_ros.dynamics.motion import last_before, Motion, NARROW, OneFreedom
+from linkage_ros.dynamics.motion import last_before, Motion, NARROW, SingleDofMechanism
 
 TRIALS = 3
 """Trials that each step may take to find the instants of meetings and partings."""
@@ -92,23 +92,25 @@ class PlayMotion(NamedTuple):
 class TwoMasses:
     """A motor that drives a mechanism of one input through play."""
 
-    crank: OneFreedom  # The mechanism without its motor
-    motor: OneFreedom  # The motor alone
-    joined: OneFreedom  # Both as one; it comes to rest at the crank's stops
+    crank: SingleDofMechanism  # The mechanism without its motor
+    motor: SingleDofMechanism  # The motor alone
+    joined: SingleDofMechanism  # Both as one; it comes to rest at the crank's stops
     half: float  # Half of the play, in [rad] or [m]
     restitution: float  # Ratio of the relative rates after and before a meeting, 0 to 1
 
     @classmethod
-    def of(cls, crank: OneFreedom, inertia: float, play: float, restitution: float) -> TwoMasses:
+    def from_motor(
+        cls, crank: SingleDofMechanism, inertia: float, play: float, restitution: float
+    ) -> TwoMasses:
         """Return a mechanism behind the play of a motor of this inertia, in [kg·m²] or [kg]."""
         alone = Terms(inertia, 0.0, 0.0, 0.0, 0.0)
 
-        def together(value: float) -> Terms | None:
+        def joined_terms(value: float) -> Terms | None:
             terms = crank.terms(value)
             return None if terms is None else terms._replace(inertia=terms.inertia + inertia)
 
-        motor = OneFreedom(lambda _value: alone, crank.step)
-        joined = replace(crank, terms=together, restitution=0.0)
+        motor = SingleDofMechanism(lambda _value: alone, crank.step)
+        joined = replace(crank, terms=joined_terms, restitution=0.0)
         return cls(crank, motor, joined, 0.5 * play, restitution)
 
     @property
@@ -116,13 +118,13 @@ class TwoMasses:
         """Lower and upper stop of the crank, in [rad] or [m]."""
         return self.crank.stops
 
-    def driven_by(self, change: Callable[[OneFreedom], OneFreedom]) -> TwoMasses:
+    def driven_by(self, change: Callable[[SingleDofMechanism], SingleDofMechanism]) -> TwoMasses:
         """Return it with a change of what its motor moves: itself, and both as one."""
         return replace(self, motor=change(self.motor), joined=change(self.joined))
 
-    def at(self, value: float, rate: float) -> PlayMotion | None:
+    def state_at(self, value: float, rate: float) -> PlayMotion | None:
         """Return a state with the motor in the middle of the play, or None if there is none."""
-        crank, motor = self.crank.at(value, rate), self.motor.at(value, rate)
+        crank, motor = self.crank.state_at(value, rate), self.motor.state_at(value, rate)
         return None if crank is None or motor is None else PlayMotion(crank, motor)
 
     def acceleration(
@@ -147,74 +149,76 @@ class TwoMasses:
         while True:
             now = time + (seconds - left)
             motion = motion._replace(ahead=0.0)
-            if motion.side and self._pressed(motion, force, brake, now) < 0.0:
+            if motion.side and self._pressing_rate(motion, force, brake, now) < 0.0:
                 motion = motion._replace(side=0)
             begin, side, trials = motion, motion.side, motion.trials
 
-            def reach(ahead: float, begin: PlayMotion = begin, now: float = now) -> PlayMotion:
+            def state_after(
+                ahead: float, begin: PlayMotion = begin, now: float = now
+            ) -> PlayMotion:
                 nonlocal trials
                 trials -= 1
-                return self._moved(begin, ahead, force, brake, now)
+                return self._move_freely(begin, ahead, force, brake, now)
 
-            opening = 0.0 if side else self._opening(begin)
-            margin = self._margin(begin, opening, force, brake, now)
-            length, end = left, reach(left)
+            opening = 0.0 if side else self._opening_rate(begin)
+            margin = self._event_margin(begin, opening, force, brake, now)
+            length, end = left, state_after(left)
             stopped = side and self._at_stop(end.crank) and not self._at_stop(begin.crank)
             ends = margin(end) < 0.0
             if not (ends or stopped):
                 return end._replace(trials=begin.trials)
             if trials < 0:
                 if stopped:
-                    end = self._stopped(end, False)
+                    end = self._stop_crank(end, False)
                 elif not side:
-                    end = self._met(end, False)
+                    end = self._meet(end, False)
                 return end._replace(trials=begin.trials, coarse=begin.coarse + 1)
             if stopped:
-                length, end, _ = last_before(reach, self._before_stop, begin, left, end)
+                length, end, _ = last_before(state_after, self._before_stop, begin, left, end)
                 ends = margin(end) < 0.0
             if ends:
-                length, _, _ = last_before(reach, margin, begin, length, end)
-                end = reach(length)
+                length, _, _ = last_before(state_after, margin, begin, length, end)
+                end = state_after(length)
             left -= length
             if not ends:
-                motion = self._stopped(end, bounces < _BOUNCES)
+                motion = self._stop_crank(end, bounces < _BOUNCES)
                 bounces += not motion.side
             elif side:
                 motion = end._replace(side=0)
             else:
                 last = opening > 0.0 and length < _BRIEF * seconds
-                motion = self._met(end, bounces < _BOUNCES and not last)
+                motion = self._meet(end, bounces < _BOUNCES and not last)
                 bounces += not motion.side
             motion = motion._replace(trials=trials)
             if left <= seconds * NARROW:
                 return motion
 
-    def _margin(
+    def _event_margin(
         self, begin: PlayMotion, opening: float, force: float, brake: float, now: float
     ) -> Callable[[PlayMotion], float]:
         """Return a function that is negative after they met or parted, since some state."""
         if begin.side:
-            return lambda state: self._pressed(state, force, brake, now + state.ahead)
+            return lambda state: self._pressing_rate(state, force, brake, now + state.ahead)
         if not opening:
-            return self._gap
+            return self._play_gap
         # A flight from one meeting to the next has the gap 0 at both ends. Divided by the time it
         # is nearly a straight line, on which the search ends soon.
-        return lambda state: self._gap(state) / state.ahead if state.ahead else opening
+        return lambda state: self._play_gap(state) / state.ahead if state.ahead else opening
 
-    def _gap(self, state: PlayMotion) -> float:
+    def _play_gap(self, state: PlayMotion) -> float:
         """Return how far they are from meeting, in [rad] or [m]; 0 within rounding."""
         motor, crank = state.motor.value, state.crank.value
         gap = self.half - abs(motor - crank)
         return gap if abs(gap) > 4.0 * ulp(abs(motor) + abs(crank)) else 0.0
 
-    def _opening(self, state: PlayMotion) -> float:
+    def _opening_rate(self, state: PlayMotion) -> float:
         """Return the rate at which they leave each other; 0 if they do not, or are apart."""
         motor, crank = state.motor, state.crank
-        if self._gap(state):
+        if self._play_gap(state):
             return 0.0
         return max(0.0, copysign(1.0, crank.value - motor.value) * (motor.rate - crank.rate))
 
-    def _moved(
+    def _move_freely(
         self, motion: PlayMotion, seconds: float, force: float, brake: float, now: float
     ) -> PlayMotion:
         """Return the state after some seconds in which they neither meet nor part."""
@@ -239,23 +243,23 @@ class TwoMasses:
     def _before_stop(self, motion: PlayMotion) -> float:
         return -1.0 if self._at_stop(motion.crank) else 1.0
 
-    def _stopped(self, motion: PlayMotion, bounces: bool) -> PlayMotion:
+    def _stop_crank(self, motion: PlayMotion, bounces: bool) -> PlayMotion:
         """Return the state after a crank that touches its motor has come to its stop."""
         low, high = self.stops
         crank, motor, side = motion[:3]
         stop = high if crank.rate > 0.0 else low
         rate = 0.0 - self.crank.restitution * crank.rate
-        crank = self.crank.at(stop, rate) or crank._replace(value=stop, rate=rate)
+        crank = self.crank.state_at(stop, rate) or crank._replace(value=stop, rate=rate)
         motor = motor._replace(value=stop + side * self.half)
         parted = motion._replace(crank=crank, motor=motor, side=0)
-        return self._met(parted, bounces) if side * (motor.rate - rate) > 0.0 else parted
+        return self._meet(parted, bounces) if side * (motor.rate - rate) > 0.0 else parted
 
-    def _pressed(self, motion: PlayMotion, force: float, brake: float, time: float) -> float:
+    def _pressing_rate(self, motion: PlayMotion, force: float, brake: float, time: float) -> float:
         """Return how fast they would press on each other if they were apart."""
         motor = self.motor.acceleration(motion.motor, force, brake, time)
         return motion.side * (motor - self.crank.acceleration(motion.crank, 0.0, 0.0, time))
 
-    def _met(self, motion: PlayMotion, bounces: bool) -> PlayMotion:
+    def _meet(self, motion: PlayMotion, bounces: bool) -> PlayMotion:
         """Return the state after a meeting."""
         crank, motor = motion.crank, motion.motor
         side = int(copysign(1.0, motor.value - crank.value))

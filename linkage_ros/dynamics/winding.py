@@ -49,11 +49,11 @@ class Winding:
         """Return the turns of the motor for one of the input, in [rad/rad] or [rad/m]."""
         return self.motor.ratio
 
-    def mounted(self, mechanism: Any) -> WoundMechanism:
+    def mount_on(self, mechanism: Any) -> WoundMechanism:
         """Return a mechanism with this motor at its input, without a command."""
-        return WoundMechanism(self.motor.mounted(mechanism), self)
+        return WoundMechanism(self.motor.mount_on(mechanism), self)
 
-    def driven(
+    def drive_by(
         self, mechanism: WoundMechanism, command: float
     ) -> tuple[WoundMechanism, float, float]:
         """Return a mechanism under a command, and no further force or friction on its input."""
@@ -67,7 +67,7 @@ class Winding:
 
     def at_rest(self, _mechanism: WoundMechanism, motion: WoundMotion) -> tuple[float, float]:
         """Return the effort at rest, and what the gear holds."""
-        law = self.motor.law(motion.current)
+        law = self.motor.effort_law(motion.current)
         return law.resting, law.holding
 
     def check_step(self, inertia: float, method: str, step: float) -> None:
@@ -96,7 +96,9 @@ class Winding:
             'add the inertia of its rotor to loads.drive_inertia',
         )
 
-    def current(self, begin: float, rate: float, command: float | None, seconds: float) -> float:
+    def current_after(
+        self, begin: float, rate: float, command: float | None, seconds: float
+    ) -> float:
         """
         Return the current after some time at a constant rate.
 
@@ -117,11 +119,11 @@ class Winding:
         low, high = -self.supply, self.supply
         if self.command == 'voltage':
             low = high = min(max(command, low), high)
-        least, most = (self._after(begin, rate, volt, seconds) for volt in (low, high))
+        least, most = (self._current_after(begin, rate, volt, seconds) for volt in (low, high))
         current = min(max(command, least), most)
-        return min(max(current, -self.motor.most), self.motor.most)
+        return min(max(current, -self.motor.max_current), self.motor.max_current)
 
-    def _after(self, begin: float, rate: float, voltage: float, seconds: float) -> float:
+    def _current_after(self, begin: float, rate: float, voltage: float, seconds: float) -> float:
         """Return the current after some time at a constant voltage."""
         push = voltage - self.motor.constant * self.motor.ratio * rate
         resistance, times = self.motor.resistance, seconds / self.inductance
@@ -166,7 +168,7 @@ class WoundMechanism:
         low, high = self.mechanism.stops
         return low, high
 
-    def at(self, value: float, rate: float) -> WoundMotion | None:
+    def state_at(self, value: float, rate: float) -> WoundMotion | None:
         """Return a state without a current, or None if there is none."""
         moved = self.mechanism.at(value, rate)
         return None if moved is None else WoundMotion(moved, 0.0)
@@ -175,7 +177,7 @@ class WoundMechanism:
         self, motion: WoundMotion, force: float, brake: float = 0.0, time: float = 0.0
     ) -> float:
         """Return q̈; the parameters are those of `OneFreedom.advance`."""
-        under, _, holding = self.winding.motor.driven(self.mechanism, motion.current)
+        under, _, holding = self.winding.motor.drive_by(self.mechanism, motion.current)
         return float(under.acceleration(motion.moved, force, brake + holding, time))
 
     def advance(
@@ -187,9 +189,9 @@ class WoundMechanism:
         time: float = 0.0,
     ) -> WoundMotion:
         """Advance a state by one step; the parameters are those of `OneFreedom.advance`."""
-        current_after, half = self.winding.current, 0.5 * seconds
+        current_after, half = self.winding.current_after, 0.5 * seconds
         current = current_after(motion.current, motion.motor.rate, self.command, half)
-        under, _, holding = self.winding.motor.driven(self.mechanism, current)
+        under, _, holding = self.winding.motor.drive_by(self.mechanism, current)
         moved = WoundMotion(
             under.advance(motion.moved, seconds, force, brake + holding, time), current
         )

@@ -56,7 +56,7 @@ class HeldWrench:
         self.max_age = round(max_age * NANOSECONDS)
         self.wrench, self.until, self.stamp = _NONE, NEVER, 0
 
-    def take(self, wrench: PlanarWrench, now: int) -> None:
+    def set_wrench(self, wrench: PlanarWrench, now: int) -> None:
         """Let a wrench act from a time on, in [ns]."""
         self.wrench, self.until, self.stamp = wrench, now + self.max_age, now
 
@@ -70,7 +70,7 @@ class HeldWrench:
 class Component:
     """One number of a held wrench, as a law (`linkage_ros.dynamics.laws`)."""
 
-    of: HeldWrench  # The wrench
+    held_wrench: HeldWrench  # The wrench
     number: int  # Index of the number in a `PlanarWrench`
 
     def segment(self, _value: float, _rate: float, _time: float) -> int:
@@ -83,8 +83,8 @@ class Component:
 
     def force(self, _segment: int, _value: float, _rate: float, _time: float) -> float:
         """Return the force or the torque that acts now, in [N] or [N·m]."""
-        return self.of.wrench[self.number]
+        return self.held_wrench.wrench[self.number]
 
-    def acting(self, _value: float) -> tuple[float]:
+    def current_load(self, _value: float) -> tuple[float]:
         """Return that alone, which may be `called` at a value of the input."""
-        return (self.of.wrench[self.number],)
+        return (self.held_wrench.wrench[self.number],)

@@ -84,7 +84,7 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
         if joint.kind == 'R' and joint.name in parameters.pins
     )
     centred = (0j,) * len(joints)
-    shift_of = context.reactions.shift
+    shift_of = context.reactions.joint_deflections
 
     def clearance(motion: MechanismState) -> MechanismState:
         reactions = motion.reactions

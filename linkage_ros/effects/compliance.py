@@ -78,7 +78,7 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
     """
     bars = tuple(_bar(context, link, k) for link, k in parameters.links.items())
     rigid = (0j,) * len(context.closure.structure.joints)
-    shift_of = context.reactions.shift
+    shift_of = context.reactions.joint_deflections
 
     def compliance(motion: MechanismState) -> MechanismState:
         position, reactions = motion.position, motion.reactions

@@ -47,8 +47,8 @@ PARAMETERS = EffortParameters
 def stage(_parameters: EffortParameters, context: Context) -> Stage:
     """Build the stage."""
     efforts_of = context.mechanics.drive_efforts
-    if context.friction and context.friction.loaded:
-        efforts_of = context.reactions.efforts
+    if context.friction and context.friction.load_dependent_joint:
+        efforts_of = context.reactions.drive_efforts
 
     def effort(motion: MechanismState) -> MechanismState:
         velocity, acceleration = motion.velocity, motion.acceleration

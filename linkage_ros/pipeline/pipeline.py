@@ -215,7 +215,7 @@ class LinkagePipeline:
     def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
         loads = self.member.loads if wanted.computes_forces else None
-        self._timed = loads is not None and loads.applied.timed
+        self._timed = loads is not None and loads.applied.changes_with_time
         self._first = -1
         self.wrenches: dict[str, HeldWrench] = {}
         """The wrenches that messages give, by the name of the link."""

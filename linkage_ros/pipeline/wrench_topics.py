@@ -86,7 +86,7 @@ class WrenchTopic:
                     return Rejection.WRENCH_TOO_LARGE
                 return Rejection.WRENCH_NOT_FINITE
         if self._load is None:
-            self.held.take(wrench, now)
+            self.held.set_wrench(wrench, now)
         else:
             # The drive moves the linkage up to this time under the load before.
             self._load(self.held, wrench, now)

@@ -148,7 +148,7 @@ def _lost(scene: Scene) -> tuple[str, ...]:
         if drive != 'topic' or parameters.cutoff:
             named.append(drive)
     for member in scene.members:
-        if member.loads is not None and member.loads.applied.timed:
+        if member.loads is not None and member.loads.applied.changes_with_time:
             named.append('loads')
         named += [effect for effect in member.effects if effect in _NEVER_FOUND_AGAIN]
         encoder = member.effects.get('encoder')

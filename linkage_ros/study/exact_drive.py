@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator, Sequence
 from math import copysign, inf, ulp
 from typing import Any, NamedTuple
 
-from linkage_ros.dynamics.motion import Motion, OneFreedom
+from linkage_ros.dynamics.motion import Motion, SingleDofMechanism
 import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
@@ -75,7 +75,9 @@ class Acting(NamedTuple):
 class _Body:
     """A mass of one freedom, at one moment: the crank, the motor, or both as one."""
 
-    def __init__(self, of: OneFreedom, force: float, brake: float, value: float, rate: float):
+    def __init__(
+        self, of: SingleDofMechanism, force: float, brake: float, value: float, rate: float
+    ):
         self.of, self.force, self.brake = of, force, brake
         self.value, self.rate = value, rate
         self.sense = 0.0
@@ -85,7 +87,7 @@ class _Body:
         """Find out whether it rests, and else in which direction it sets out."""
         terms = self._terms(self.value, time)
         dry = terms.coulomb + terms.breakaway + self.brake > 0.0
-        jumps = dry or self.of.resisting is not None or bool(self.of.laws)
+        jumps = dry or self.of.friction_effort is not None or bool(self.of.laws)
         if self.rate:
             self.rests, self.sense = False, copysign(1.0, self.rate) if jumps else 0.0
             return
@@ -104,7 +106,7 @@ class _Body:
     def _holds(self, terms: Any) -> bool:
         """Return whether something holds it, so that it does not just stand for a moment."""
         dry = terms.coulomb + terms.breakaway + self.brake > 0.0
-        return dry or self.of.resisting is not None or self.value in self.of.stops
+        return dry or self.of.friction_effort is not None or self.value in self.of.stops
 
     def _terms(self, value: float, time: float) -> Any:
         terms = self.of.terms(value)

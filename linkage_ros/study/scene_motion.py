@@ -197,7 +197,7 @@ def moves(motion: MemberMotion, horizon: float) -> bool:
 
 def _usual_effort(motion: MemberMotion) -> float:
     """Return the amplitude of the commands: they pass friction and a fifth of the weight."""
-    equation = motion.context.mechanics.equation
+    equation = motion.context.mechanics.motion_equation
     drive = build_drive(motion)
     start = motion.member.drive[1].start
     low, high = (min(max(end, start - tau), start + tau) for end in drive.acting(None)[0].stops)

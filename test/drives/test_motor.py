@@ -403,7 +403,7 @@ def positive(least, most):
 def test_its_segments_follow_the_equation(command, value, parameters, rate):
     k, resistance, ratio, forward, backward, most, supply = parameters
     motor = Motor(k, resistance, ratio, forward, backward, most, supply, command)
-    law = motor.law(value)
+    law = motor.effort_law(value)
     emf = k * ratio * rate
     if command == 'voltage':
         current = (min(max(value, -supply), supply) - emf) / resistance

@@ -247,10 +247,10 @@ def test_a_cylinder_gives_the_bucket_its_work():
     mechanics = Context(EXCAVATOR, 0.0, True, 'seed', GRAVITY, None).mechanics
 
     def energy(state):
-        return mechanics.energy(EXCAVATOR.position(*state.angles), *state.rates)
+        return mechanics.total_energy(EXCAVATOR.position(*state.angles), *state.rates)
 
     first = built.state(BEGIN)
-    force = 1.2 * mechanics.terms(EXCAVATOR.position(0.9)).potential_slope
+    force = 1.2 * mechanics.motion_terms(EXCAVATOR.position(0.9)).potential_slope
     assert built.offer(command(force), BEGIN) is GOOD
     ways = set()
     for time in range(0, 400, 25):

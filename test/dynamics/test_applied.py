@@ -262,7 +262,7 @@ def test_compiled_terms_equal_plain_ones_to_the_bit(name):
     closure = closed(name)
     mechanics = Mechanics(closure, Loads(applied=everywhere(closure)))
     for (q,) in STATES[name]:
-        assert mechanics.equation(q) == mechanics.terms(closure.position(q))
+        assert mechanics.motion_equation(q) == mechanics.motion_terms(closure.position(q))
 
 
 def test_without_such_loads_nothing_of_them_is_built():

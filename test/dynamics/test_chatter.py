@@ -18,7 +18,7 @@ from itertools import pairwise
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics, Terms
-from linkage_ros.dynamics.motion import OneFreedom
+from linkage_ros.dynamics.motion import SingleDofMechanism
 from linkage_ros.dynamics.two_masses import TwoMasses
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
@@ -53,7 +53,7 @@ CASES = {
 @pytest.mark.parametrize('name', CASES)
 def test_a_step_costs_no_more_than_its_bound(name):
     force, rate, inertia, restitution, play, step, method = CASES[name]
-    equation = Mechanics(Closure(shipped('four_bar')), Loads(drive_inertia=1e-3)).equation
+    equation = Mechanics(Closure(shipped('four_bar')), Loads(drive_inertia=1e-3)).motion_equation
     asked = 0
 
     def counted(value):
@@ -61,9 +61,9 @@ def test_a_step_costs_no_more_than_its_bound(name):
         asked += 1
         return equation(value)
 
-    crank = OneFreedom(counted, METHODS[method].step)
-    mechanism = TwoMasses.of(crank, inertia, play, restitution)
-    motion = mechanism.at(1.0, rate)
+    crank = SingleDofMechanism(counted, METHODS[method].step)
+    mechanism = TwoMasses.from_motor(crank, inertia, play, restitution)
+    motion = mechanism.state_at(1.0, rate)
     most = EVALUATIONS[method]
     for number in range(1, STEPS + 1):
         motion = mechanism.advance(motion, step, force, 0.0, step * number)
@@ -76,9 +76,9 @@ def test_a_step_costs_no_more_than_its_bound(name):
 @pytest.mark.parametrize('force', [0.4, -0.4, 0.0])
 def test_steps_without_trials_keep_the_momentum_and_the_play(force):
     # Two wheels: whatever the meetings, the momentum is the impulse of the drive.
-    wheel = OneFreedom(lambda _: Terms(0.23, 0.0, 0.0, 0.0, 0.0), METHODS['rk4'].step)
-    mechanism = TwoMasses.of(wheel, 0.1, 0.02, 0.7)
-    motion = mechanism.at(0.0, 0.0)
+    wheel = SingleDofMechanism(lambda _: Terms(0.23, 0.0, 0.0, 0.0, 0.0), METHODS['rk4'].step)
+    mechanism = TwoMasses.from_motor(wheel, 0.1, 0.02, 0.7)
+    motion = mechanism.state_at(0.0, 0.0)
     motion = motion._replace(motor=motion.motor._replace(rate=20.0))
     for number in range(1, 300):
         motion = mechanism.advance(motion._replace(trials=-100), 1e-3, force)
@@ -91,11 +91,13 @@ def test_steps_without_trials_keep_the_momentum_and_the_play(force):
 
 
 def test_a_crank_comes_to_its_stop_without_trials_too():
-    wheel = OneFreedom(lambda _: Terms(0.23, 0.0, 0.0, 0.0, 0.0), METHODS['rk4'].step, (-1.0, 1.0))
+    wheel = SingleDofMechanism(
+        lambda _: Terms(0.23, 0.0, 0.0, 0.0, 0.0), METHODS['rk4'].step, (-1.0, 1.0)
+    )
     for end in (1.0, -1.0):
         for side in (1, -1, 0):
-            mechanism = TwoMasses.of(replace(wheel, restitution=0.5), 0.1, 0.02, 0.5)
-            motion = mechanism.at(0.99 * end, 20.0 * end)
+            mechanism = TwoMasses.from_motor(replace(wheel, restitution=0.5), 0.1, 0.02, 0.5)
+            motion = mechanism.state_at(0.99 * end, 20.0 * end)
             at = motion.crank.value + 0.01 * side
             motion = motion._replace(side=side, motor=motion.motor._replace(value=at))
             for _ in range(20):

@@ -27,7 +27,7 @@ from linkage_ros.dynamics.loads import (
     WrenchLoad,
 )
 from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.motion import OneFreedom
+from linkage_ros.dynamics.motion import SingleDofMechanism
 from linkage_ros.dynamics.reactions import Reactions
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.arithmetic import cross_product
@@ -63,7 +63,7 @@ def test_a_crank_alone_rubs_with_the_force_that_its_mass_needs(angle, rate, pull
     against = (rate > 0.0) - (rate < 0.0)
     rubbed = against * (0.1 + RADIUS * 2.0 * hypot(inward, across))
     expected = (0.05 + 2.0 * 0.3**2) * pull + 2.0 * 9.81 * 0.3 * cos(angle) + rubbed
-    assert reactions.efforts(*motion) == pytest.approx((expected,), rel=1e-12, abs=1e-12)
+    assert reactions.drive_efforts(*motion) == pytest.approx((expected,), rel=1e-12, abs=1e-12)
     assert reactions.solve(*motion)[0].moment == pytest.approx(-rubbed, rel=1e-12)
 
 
@@ -98,7 +98,7 @@ def test_a_coupler_pushes_along_a_tangent_of_both_friction_circles(angle, load, 
             rubbed = RADIUS * abs(force) * (at_o2 - at_a)
             found.append((abs(force), force * cross_product(a, along) + rubbed))
     ((force, effort),) = found
-    assert reactions.efforts(position, velocity, acceleration) == pytest.approx((effort,))
+    assert reactions.drive_efforts(position, velocity, acceleration) == pytest.approx((effort,))
     for reaction in reactions.solve(position, velocity, acceleration):
         assert hypot(reaction.fx, reaction.fy) == pytest.approx(force)
 
@@ -145,7 +145,7 @@ def test_each_joint_rubs_by_the_force_that_it_then_has(name):
         mechanics = Mechanics(closure, loads, Friction(constant))
         for one, other in zip(Reactions(mechanics).solve(*motion), forces, strict=True):
             assert tuple(one) == pytest.approx(tuple(other), rel=1e-9, abs=1e-9)
-        assert reactions.efforts(*motion) == pytest.approx(
+        assert reactions.drive_efforts(*motion) == pytest.approx(
             mechanics.drive_efforts(*motion), rel=1e-9
         )
 
@@ -160,7 +160,7 @@ def test_a_linkage_that_jams_has_no_forces():
         reactions = Reactions(Mechanics(closure, loads, friction))
         motion = moved(closure, 0.9, rate)
         assert (reactions.solve(*motion) is not None) == moves
-        assert bool(reactions.efforts(*motion)) == moves
+        assert bool(reactions.drive_efforts(*motion)) == moves
 
 
 SCENE = """
@@ -229,13 +229,15 @@ def test_the_acceleration_is_that_whose_effort_is_the_command(name):
     closure, joints = rubbing_everywhere(name)
     mechanics = Mechanics(closure, loads_of(closure.linkage), Friction(joints))
     reactions = Reactions(mechanics)
-    mechanism = OneFreedom(mechanics.equation, METHODS['rk4'].step, resisting=reactions.resisting)
+    mechanism = SingleDofMechanism(
+        mechanics.motion_equation, METHODS['rk4'].step, friction_effort=reactions.friction_effort
+    )
     for (value,) in STATES[name]:
         for rate, force in ((1.5, 3.0), (-0.7, 0.0)):
-            motion = mechanism.at(value, rate)
+            motion = mechanism.state_at(value, rate)
             pull = mechanism.acceleration(motion, force)
-            efforts = reactions.efforts(*moved(closure, value, rate, pull))
-            size = abs(mechanics.terms(closure.position(value)).inertia * pull) + abs(force)
+            efforts = reactions.drive_efforts(*moved(closure, value, rate, pull))
+            size = abs(mechanics.motion_terms(closure.position(value)).inertia * pull) + abs(force)
             assert efforts == pytest.approx((force,), abs=1e-10 * size)
 
 
@@ -264,7 +266,7 @@ def test_loads_over_time_press_too():
     for seconds in (0.0, 0.5, 1.5, 3.0):
         load = 2.0 * 9.81 + min(40.0 * seconds, 80.0)
         for rate in (1e-200, -1e-200):
-            resisted = reactions.resisting(0.4, rate, seconds, 0.0, 0.0)
+            resisted = reactions.friction_effort(0.4, rate, seconds, 0.0, 0.0)
             assert resisted == pytest.approx(RADIUS * load, rel=1e-12)
 
 
@@ -273,6 +275,6 @@ def test_wrenches_press_too():
     mechanics = Mechanics(closure_of(PENDULUM), loads, Friction({'O': RUBBING}))
     held, reactions = mechanics.applied.wrenches['crank'], Reactions(mechanics)
     for count, force in enumerate((0.0, 30.0, -50.0)):
-        held.take(PlanarWrench(0.0, -force, 1.0), count)
-        resisted = reactions.resisting(0.4, 1e-200, 0.0, 0.0, 0.0)
+        held.set_wrench(PlanarWrench(0.0, -force, 1.0), count)
+        resisted = reactions.friction_effort(0.4, 1e-200, 0.0, 0.0, 0.0)
         assert resisted == pytest.approx(RADIUS * abs(2.0 * 9.81 + force), rel=1e-12)

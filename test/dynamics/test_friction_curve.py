@@ -117,4 +117,4 @@ def test_compiled_terms_equal_plain_ones_to_the_bit(name):
     joints = {joint.name: CURVE for joint in closure.structure.joints}
     mechanics = Mechanics(closure, friction=Friction(joints))
     for (q,) in STATES[name]:
-        assert mechanics.equation(q) == mechanics.terms(closure.position(q))
+        assert mechanics.motion_equation(q) == mechanics.motion_terms(closure.position(q))

@@ -21,7 +21,7 @@ from linkage_ros.dynamics.integrators import (
 )
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.motion import last_before, OneFreedom
+from linkage_ros.dynamics.motion import last_before, SingleDofMechanism
 from linkage_ros.kinematics.closure import Closure
 import mpmath
 import numpy as np
@@ -114,8 +114,8 @@ SPEED = 40.0
 
 def turned(loaded, method, seconds, steps):
     """Return the states of a crank that turns freely, at the end of each step."""
-    crank = OneFreedom(loaded.equation, STEP[method])
-    motion = crank.at(BEGIN, SPEED)
+    crank = SingleDofMechanism(loaded.equation, STEP[method])
+    motion = crank.state_at(BEGIN, SPEED)
     motions = [motion]
     for _ in range(steps):
         motion = crank.advance(motion, seconds / steps, 0.0)

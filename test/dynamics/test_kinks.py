@@ -24,7 +24,7 @@ from math import acos, log2, pi, sin, sqrt
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.loads import Friction, JointFriction, Loads
 from linkage_ros.dynamics.mechanics import Mechanics, Terms
-from linkage_ros.dynamics.motion import OneFreedom
+from linkage_ros.dynamics.motion import SingleDofMechanism
 from linkage_ros.kinematics.linkage import Mass
 import numpy as np
 import pytest
@@ -141,8 +141,8 @@ def loaded(coulomb):
 
 def turned(mechanics, method, steps):
     """Return where a crank comes to in `SECONDS`, in a number of steps."""
-    crank = OneFreedom(mechanics.equation, STEP[method])
-    motion = crank.at(BEGIN, SPEED)
+    crank = SingleDofMechanism(mechanics.equation, STEP[method])
+    motion = crank.state_at(BEGIN, SPEED)
     for _ in range(steps):
         motion = crank.advance(motion, SECONDS / steps, 0.0)
     return motion
@@ -180,8 +180,8 @@ def test_the_gallery_keeps_the_highest_order_with_friction_in_every_joint(name):
     ends, start = [], STATES[name][0][0]
     for steps in (50, 100, 400):
         motions = []
-        crank = OneFreedom(mechanics.equation, STEP['gauss_legendre'])
-        motion = crank.at(start, 15.0)
+        crank = SingleDofMechanism(mechanics.motion_equation, STEP['gauss_legendre'])
+        motion = crank.state_at(start, 15.0)
         for _ in range(steps):
             motions.append(motion)
             motion = crank.advance(motion, 0.6 / steps, 0.0)
@@ -198,10 +198,10 @@ def test_the_gallery_keeps_the_highest_order_with_friction_in_every_joint(name):
 def test_a_step_without_a_kink_is_one_step_to_the_last_bit():
     # The friction of this motion has the sign that it has at the start, as it had without kinks.
     mechanics = loaded(COULOMB)
-    position, terms = mechanics.closure.position, mechanics.terms
+    position, terms = mechanics.closure.position, mechanics.motion_terms
     for method in METHODS:
-        crank = OneFreedom(lambda angle: terms(position(angle)), STEP[method])
-        motion = crank.at(2.0, 5.0)
+        crank = SingleDofMechanism(lambda angle: terms(position(angle)), STEP[method])
+        motion = crank.state_at(2.0, 5.0)
         assert motion.terms.coulomb == pytest.approx(sum(map(abs, motion.terms.slips)))
 
         def plain(value, rate, _time=0.0):
@@ -216,15 +216,15 @@ def test_a_step_without_a_kink_is_one_step_to_the_last_bit():
 @pytest.mark.parametrize('method', METHODS)
 def test_without_coulomb_friction_no_slip_is_looked_at(method):
     mechanics = loaded(dict.fromkeys(COULOMB, 0.0))
-    position, terms = mechanics.closure.position, mechanics.terms
+    position, terms = mechanics.closure.position, mechanics.motion_terms
     asked = []
 
     def counted(angle):
         asked.append(angle)
         return terms(position(angle))
 
-    crank = OneFreedom(counted, STEP[method])
-    motion = crank.at(3.1, 50.0)
+    crank = SingleDofMechanism(counted, STEP[method])
+    motion = crank.state_at(3.1, 50.0)
     assert motion.terms.slips == ()
     moved = crank.advance(motion, 1e-3, 0.0)
     assert moved.value > 3.15, 'beyond the place at which a slip turns'
@@ -236,8 +236,8 @@ def test_without_coulomb_friction_no_slip_is_looked_at(method):
 
 
 def spun(mechanics, method, rate, seconds, steps):
-    crank = OneFreedom(mechanics.equation, STEP[method])
-    motion = crank.at(0.1, rate)
+    crank = SingleDofMechanism(mechanics.equation, STEP[method])
+    motion = crank.state_at(0.1, rate)
     for _ in range(steps):
         motion = crank.advance(motion, seconds / steps, 0.0)
     return motion
@@ -277,12 +277,12 @@ def test_a_kink_and_a_stop_and_a_turn_in_one_step():
     def terms(x):
         return Terms(1.0, 0.0, 0.0, 0.0, abs(x - 1.0), (x - 1.0,))
 
-    mass = OneFreedom(terms, STEP['gauss_legendre'], (-5.0, 2.0), 0.5)
+    mass = SingleDofMechanism(terms, STEP['gauss_legendre'], (-5.0, 2.0), 0.5)
     # To 1: ẍ = x − 1, energy ½v² − ½(x − 1)²; from 1 to 2: ẍ = −(x − 1), and back so too.
     at_one = sqrt(3.0**2 - 1.0)
     at_two = sqrt(at_one**2 - 1.0)
     back = 0.5 * at_two
-    motion = mass.at(0.0, 3.0)
+    motion = mass.state_at(0.0, 3.0)
     fine = [motion]
     for _ in range(4000):
         fine.append(mass.advance(fine[-1], 1e-3, 0.0))
@@ -297,7 +297,7 @@ def test_a_kink_and_a_stop_and_a_turn_in_one_step():
     # Below 1 friction is 1 − x, against the motion: a cosine, to rest at 1 − at_one_again.
     assert fine[-1].rate == 0.0
     assert fine[-1].value == pytest.approx(1.0 - at_one_again, abs=1e-9)
-    coarse = mass.at(0.0, 3.0)
+    coarse = mass.state_at(0.0, 3.0)
     for _ in range(8):
         coarse = mass.advance(coarse, 0.5, 0.0)
     assert coarse.value == pytest.approx(fine[-1].value, abs=1e-4)

@@ -20,7 +20,7 @@ from linkage_ros.dynamics.laws import Contact, LawTerm
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.longest_step import EXACT
 from linkage_ros.dynamics.mechanics import Mechanics, Terms
-from linkage_ros.dynamics.motion import OneFreedom
+from linkage_ros.dynamics.motion import SingleDofMechanism
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import EffortCommand
@@ -61,14 +61,14 @@ def test_a_blow_on_a_stop_gives_back_its_rate(method, damping):
     fastest = damping + sqrt(damping**2 - 1.0) if damping > 1.0 else 1.0
     step, drawn = EXACT[method] / fastest, random.Random(f'{method} {damping}')
     stop = Contact(-inf, 0.0, 1.0, 2.0 * damping)
-    mechanism = OneFreedom(
+    mechanism = SingleDofMechanism(
         lambda value: Terms(1.0, 0.0, 0.0, 0.0, 0.0, (), (LawTerm(1.0, value, 1.0),)),
         METHODS[method].step,
         laws=(stop,),
     )
     expected = after_a_blow(damping)
     for _ in range(6):
-        motion = mechanism.at(-drawn.random() * step, 1.0)
+        motion = mechanism.state_at(-drawn.random() * step, 1.0)
         for _ in range(100_000):
             motion = mechanism.advance(motion, step, 0.0)
             if motion.rate < 0.0 and stop.segment(motion.value, motion.rate, 0.0) == 0:
@@ -114,7 +114,10 @@ def test_a_rocker_leaves_its_stop_as_scipy_says(method, stiffness):
     def slopes(contact):
         def slope(_, y):
             position = closure.position(y[0])
-            terms, lever = mechanics.terms(position), closure.velocity(position, 1.0).joints[1]
+            terms, lever = (
+                mechanics.motion_terms(position),
+                closure.velocity(position, 1.0).joints[1],
+            )
             push = float(stiffness) * depth(0, y) * lever if contact else 0.0
             return [
                 y[1],
@@ -157,13 +160,13 @@ def rubbed_by_scipy(rate, count):
         t, end, push = 0.01 * number, 0.01 * (number + 1), pushed(number)
         while t < end:
             if not sense:
-                left = push - mechanics.terms(closure.position(state[0])).potential_slope
+                left = push - mechanics.motion_terms(closure.position(state[0])).potential_slope
                 if abs(left) <= 0.05:
                     break
                 sense = 1.0 if left > 0.0 else -1.0
 
             def slope(_, y, push=push, sense=sense):
-                terms = mechanics.terms(closure.position(y[0]))
+                terms = mechanics.motion_terms(closure.position(y[0]))
                 rubs = sense * (0.02 + 0.03 * exp(-((y[1] / rate) ** 2)))
                 left = push - rubs - terms.potential_slope - terms.half_slope * y[1] ** 2
                 return [y[1], left / terms.inertia]

@@ -58,7 +58,7 @@ def test_pendulum(angle):
     # The centre is 0.5 m from O, at atan2(0.4, 0.3) from the arm's axis.
     height = 0.3 * sin(angle) + 0.4 * cos(angle)
     assert_terms(
-        mechanics.terms(mechanics.closure.position(angle)),
+        mechanics.motion_terms(mechanics.closure.position(angle)),
         Terms(
             inertia=0.07 + 0.1 + 2.0 * 0.25,
             half_slope=0.0,
@@ -69,9 +69,9 @@ def test_pendulum(angle):
         tolerance=1e-14,
     )
     position = mechanics.closure.position(angle)
-    assert mechanics.potential(position) == pytest.approx(2.0 * GRAVITY * height)
+    assert mechanics.potential_energy(position) == pytest.approx(2.0 * GRAVITY * height)
     energy = 0.5 * (0.07 + 0.1 + 0.5) * 9.0 + 2.0 * GRAVITY * height
-    assert mechanics.energy(position, 3.0) == pytest.approx(energy)
+    assert mechanics.total_energy(position, 3.0) == pytest.approx(energy)
 
 
 @pytest.mark.parametrize('angle', [0.3, 1.2, 2.8, -0.7])
@@ -87,7 +87,9 @@ def test_scotch_yoke_with_spring_damper_and_friction(angle):
         }
     )
     closure = scotch_yoke(Mass(0.4, (0.01, 0.0), 2e-4), Mass(m, (0.3, 0.2), 5.0))
-    terms = Mechanics(closure, Loads(springs=(spring,)), friction).terms(closure.position(angle))
+    terms = Mechanics(closure, Loads(springs=(spring,)), friction).motion_terms(
+        closure.position(angle)
+    )
     sine, cosine = a * sin(angle), a * cos(angle)
     assert_terms(
         terms,
@@ -111,7 +113,7 @@ def test_a_parallelogram_has_one_inertia():
     }
     mechanics = Mechanics(four_bar(masses, 0.1, 0.3, 0.1, 0.3))
     for angle in (0.5, 2.0, -1.0):
-        terms = mechanics.terms(mechanics.closure.position(angle))
+        terms = mechanics.motion_terms(mechanics.closure.position(angle))
         assert terms.inertia == pytest.approx(2 * (1e-3 + 0.2 * 0.0025) + 0.7 * 0.01, rel=1e-14)
         assert terms.half_slope == pytest.approx(0.0, abs=1e-16)
 
@@ -121,9 +123,9 @@ def test_slopes_are_those_of_inertia_and_potential(name):
     closure = closed(name)
     mechanics = Mechanics(closure, loads_of(closure.linkage))
     for (q,) in STATES[name]:
-        terms = mechanics.terms(closure.position(q))
-        by_half = slope(lambda x: 0.5 * mechanics.terms(closure.position(x)).inertia, q)
-        by_height = slope(lambda x: mechanics.potential(closure.position(x)), q)
+        terms = mechanics.motion_terms(closure.position(q))
+        by_half = slope(lambda x: 0.5 * mechanics.motion_terms(closure.position(x)).inertia, q)
+        by_height = slope(lambda x: mechanics.potential_energy(closure.position(x)), q)
         assert terms.half_slope == pytest.approx(by_half, rel=1e-8, abs=1e-9)
         assert terms.potential_slope == pytest.approx(by_height, rel=1e-8, abs=1e-9)
 
@@ -193,7 +195,9 @@ def test_what_drives_put_in_is_stored_or_rubbed_away(name):
             return closure.position(*moved)
 
         def energy(t, at=at, rates=rates, pulls=pulls):
-            return mechanics.energy(at(t), *(v + a * t for v, a in zip(rates, pulls, strict=True)))
+            return mechanics.total_energy(
+                at(t), *(v + a * t for v, a in zip(rates, pulls, strict=True))
+            )
 
         lost = 0.0
         for joint in closure.structure.joints:
@@ -229,7 +233,7 @@ def test_terms_and_effort_are_one_equation(name, q, rate, pull):
     velocity = closure.velocity(position, rate)
     acceleration = closure.acceleration(position, velocity, pull)
     (effort,) = mechanics.drive_efforts(position, velocity, acceleration)
-    terms = mechanics.terms(position)
+    terms = mechanics.motion_terms(position)
     parts = [terms.inertia * pull, terms.half_slope * rate**2]
     parts += [terms.potential_slope, terms.viscous * rate]
     if rate:
@@ -246,25 +250,25 @@ def test_no_equation_where_no_rates_exist():
     mechanics = Mechanics(closure, Loads((0.0, -GRAVITY)))
     stretched, beyond = closure.position(0.0), closure.position(1.0)
     assert (stretched.status, beyond.status) == (Status.TOGGLE, Status.OPEN)
-    assert mechanics.terms(stretched) is None
-    assert mechanics.terms(beyond) is None
+    assert mechanics.motion_terms(stretched) is None
+    assert mechanics.motion_terms(beyond) is None
     # At the toggle the links still lie somewhere.
-    assert mechanics.potential(stretched) == pytest.approx(0.0, abs=1e-12)
+    assert mechanics.potential_energy(stretched) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_no_equation_where_terms_are_beyond_a_double():
     linkage = CLOSED['four_bar'].linkage
     masses = {**linkage.masses, 'rocker': Mass(1e308, (1e3, 0.0), 1.0)}
     mechanics = Mechanics(Closure(replace(linkage, masses=masses)))
-    assert mechanics.terms(mechanics.closure.position(1.0)) is None
+    assert mechanics.motion_terms(mechanics.closure.position(1.0)) is None
 
 
 def test_a_spring_whose_ends_meet_pulls_nothing():
     spring = Spring('ground', 'O', 'arm', 'O', 100.0, 0.1, 5.0)
     mechanics = Mechanics(arm(Mass(2.0, (0.3, 0.4), 0.1)), Loads(springs=(spring,)))
     position = mechanics.closure.position(1.0)
-    assert_terms(mechanics.terms(position), Terms(0.6, 0.0, 0.0, 0.0, 0.0), tolerance=1e-15)
-    assert mechanics.potential(position) == pytest.approx(0.5 * 100.0 * 0.01)
+    assert_terms(mechanics.motion_terms(position), Terms(0.6, 0.0, 0.0, 0.0, 0.0), tolerance=1e-15)
+    assert mechanics.potential_energy(position) == pytest.approx(0.5 * 100.0 * 0.01)
 
 
 def test_units_of_a_sliding_input():
@@ -276,6 +280,6 @@ def test_units_of_a_sliding_input():
         y = (0.12**2 - x * x) ** 0.5
         # ẏ = −x/y·ẋ, and θ̇ = ẋ/y.
         speed, turn = hypot(0.5, 0.5 * x / y), 1.0 / y
-        terms = mechanics.terms(mechanics.closure.position(x))
+        terms = mechanics.motion_terms(mechanics.closure.position(x))
         assert terms.inertia == pytest.approx(0.5 + 2.0 * speed**2 + 3e-3 * turn**2, rel=1e-13)
         assert terms.potential_slope == pytest.approx(-2.0 * GRAVITY * 0.5 * x / y, rel=1e-13)

@@ -17,9 +17,9 @@ from math import cos, exp, inf, isfinite, pi, sin, sqrt
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.laws import LawTerm, Table
+from linkage_ros.dynamics.laws import LawTerm, TorqueTable
 from linkage_ros.dynamics.mechanics import Terms
-from linkage_ros.dynamics.motion import LARGEST, OneFreedom
+from linkage_ros.dynamics.motion import LARGEST, SingleDofMechanism
 import pytest
 
 STEP = {name: method.step for name, method in METHODS.items()}
@@ -51,8 +51,8 @@ def run(mass, motion, steps, force=0.0, brake=0.0, step=MS):
 @pytest.mark.parametrize(('friction', 'brake'), [(2.0, 0.0), (0.0, 2.0), (0.5, 1.5)])
 @pytest.mark.parametrize('rate', [3.0, -3.0])
 def test_it_slides_as_far_as_its_energy_lasts(method, friction, brake, rate):
-    mass = OneFreedom(sliding(friction=friction), STEP[method])
-    last = run(mass, mass.at(0.1, rate), 1600, brake=brake)[-1]
+    mass = SingleDofMechanism(sliding(friction=friction), STEP[method])
+    last = run(mass, mass.state_at(0.1, rate), 1600, brake=brake)[-1]
     assert last.rate == 0.0
     assert last.value == pytest.approx(0.1 + rate * abs(rate) / (2 * 2.0), abs=1e-12)
     assert mass.acceleration(last, 0.0, brake) == 0.0
@@ -64,18 +64,18 @@ def test_it_slides_as_far_as_its_energy_lasts(method, friction, brake, rate):
     [(1.5, 0), (-1.0, 0), (1.5 + 0.3, 0), (-1.5 + 0.3, 0), (1.81, 1), (-1.21, -1)],
 )
 def test_it_sticks_up_to_the_limit_of_friction(method, force, moves):
-    mass = OneFreedom(sliding(slope=0.3, friction=1.5), STEP[method])
-    last = run(mass, mass.at(0.0, 0.0), 100, force)[-1]
+    mass = SingleDofMechanism(sliding(slope=0.3, friction=1.5), STEP[method])
+    last = run(mass, mass.state_at(0.0, 0.0), 100, force)[-1]
     net = force - 0.3 - moves * 1.5
     assert last.rate == pytest.approx(moves * abs(net) * 0.1, abs=1e-12)
-    assert mass.acceleration(mass.at(0.0, 0.0), force) == pytest.approx(moves * abs(net))
+    assert mass.acceleration(mass.state_at(0.0, 0.0), force) == pytest.approx(moves * abs(net))
     assert (last.value == 0.0) is (moves == 0)
 
 
 @pytest.mark.parametrize('method', METHODS)
 def test_a_brake_holds_it_and_lets_it_go(method):
-    mass = OneFreedom(sliding(slope=2.0), STEP[method])
-    held = run(mass, mass.at(0.0, 0.0), 50, brake=2.5)[-1]
+    mass = SingleDofMechanism(sliding(slope=2.0), STEP[method])
+    held = run(mass, mass.state_at(0.0, 0.0), 50, brake=2.5)[-1]
     assert (held.value, held.rate) == (0.0, 0.0)
     assert mass.acceleration(held, 0.0, 2.5) == 0.0
     assert mass.acceleration(held, 0.0, 1.5) == pytest.approx(-0.5)
@@ -84,8 +84,8 @@ def test_a_brake_holds_it_and_lets_it_go(method):
 
 @pytest.mark.parametrize('method', EXACT)
 def test_a_viscous_one_slows_down_exponentially(method):
-    mass = OneFreedom(sliding(viscous=4.0), STEP[method])
-    for k, motion in enumerate(run(mass, mass.at(0.0, 2.0), 500)):
+    mass = SingleDofMechanism(sliding(viscous=4.0), STEP[method])
+    for k, motion in enumerate(run(mass, mass.state_at(0.0, 2.0), 500)):
         lasting = exp(-4.0 * k * MS)
         assert motion.rate == pytest.approx(2.0 * lasting, rel=1e-10)
         assert motion.value == pytest.approx(0.5 * (1.0 - lasting), abs=1e-10)
@@ -94,8 +94,8 @@ def test_a_viscous_one_slows_down_exponentially(method):
 
 @pytest.mark.parametrize('method', METHODS)
 def test_without_friction_a_step_in_which_it_turns_is_one_step(method):
-    mass = OneFreedom(on_spring(100.0, 0.0), STEP[method])
-    motion = mass.advance(mass.at(0.2, 0.01), 5 * MS, 0.0)
+    mass = SingleDofMechanism(on_spring(100.0, 0.0), STEP[method])
+    motion = mass.advance(mass.state_at(0.2, 0.01), 5 * MS, 0.0)
     assert motion.rate < 0.0
     assert motion[:2] == STEP[method](lambda q, _w, _t: -100.0 * q, 0.2, 0.01, -20.0, 5 * MS)
 
@@ -104,9 +104,9 @@ def test_without_friction_a_step_in_which_it_turns_is_one_step(method):
 def test_up_a_slope_and_down_again(method):
     # Up it is held back by weight and friction, down it is drawn by their difference.
     up, down, rate = 5.0 + 1.0, 5.0 - 1.0, 3.0
-    mass = OneFreedom(sliding(slope=5.0, friction=1.0), STEP[method])
+    mass = SingleDofMechanism(sliding(slope=5.0, friction=1.0), STEP[method])
     turn = rate / up
-    for k, motion in enumerate(run(mass, mass.at(0.0, rate), 1000)):
+    for k, motion in enumerate(run(mass, mass.state_at(0.0, rate), 1000)):
         t = k * MS
         if t < turn:
             expected = (rate * t - 0.5 * up * t * t, rate - up * t)
@@ -120,8 +120,8 @@ def test_on_a_spring_with_friction_each_half_swing_is_shorter_by_the_same():
     # Each half swing is a cosine about ±F/k, shorter by 2·F/k, and it rests within F/k.
     stiffness, friction = 100.0, 3.0
     centre, omega = friction / stiffness, sqrt(stiffness)
-    mass = OneFreedom(on_spring(stiffness, friction), STEP['gauss_legendre'])
-    motions = run(mass, mass.at(0.2, 0.0), 1500)
+    mass = SingleDofMechanism(on_spring(stiffness, friction), STEP['gauss_legendre'])
+    motions = run(mass, mass.state_at(0.2, 0.0), 1500)
     for k, motion in enumerate(motions):
         t, amplitude, side = k * MS, 0.2, 1.0
         while t > pi / omega and amplitude > centre:
@@ -145,10 +145,10 @@ def test_each_bounce_is_as_high_as_the_restitution_squared(method, restitution, 
     side = -1.0 if upwards else 1.0
     stops = (-inf, 0.0) if upwards else (0.0, inf)
     weight, height = 10.0, 0.8
-    ball = OneFreedom(sliding(slope=side * weight), STEP[method], stops, restitution)
+    ball = SingleDofMechanism(sliding(slope=side * weight), STEP[method], stops, restitution)
     t = sqrt(2 * height / weight)
     impact = weight * t
-    motion = ball.advance(ball.at(side * height, 0.0), t + 1e-12, 0.0)
+    motion = ball.advance(ball.state_at(side * height, 0.0), t + 1e-12, 0.0)
     for _ in range(3):
         impact *= restitution
         # Half way through the flight it is as high as it comes, and stands.
@@ -159,9 +159,9 @@ def test_each_bounce_is_as_high_as_the_restitution_squared(method, restitution, 
 
 
 def test_steps_do_not_matter_to_bounces():
-    ball = OneFreedom(sliding(slope=10.0), STEP['rk4'], (0.0, inf), 0.7)
-    fine = run(ball, ball.at(0.8, 0.0), 2000, step=MS)[-1]
-    coarse = run(ball, ball.at(0.8, 0.0), 50, step=40 * MS)[-1]
+    ball = SingleDofMechanism(sliding(slope=10.0), STEP['rk4'], (0.0, inf), 0.7)
+    fine = run(ball, ball.state_at(0.8, 0.0), 2000, step=MS)[-1]
+    coarse = run(ball, ball.state_at(0.8, 0.0), 50, step=40 * MS)[-1]
     assert fine.value == pytest.approx(coarse.value, abs=1e-10)
     assert fine.rate == pytest.approx(coarse.rate, abs=1e-10)
 
@@ -169,10 +169,10 @@ def test_steps_do_not_matter_to_bounces():
 @pytest.mark.parametrize('method', METHODS)
 @pytest.mark.parametrize('restitution', [0.0, 0.5, 0.9])
 def test_in_the_end_it_rests_at_the_stop_until_it_is_drawn_away(method, restitution):
-    ball = OneFreedom(sliding(slope=10.0), STEP[method], (0.25, inf), restitution)
+    ball = SingleDofMechanism(sliding(slope=10.0), STEP[method], (0.25, inf), restitution)
     bounce = sqrt(2 * 0.01 / 10.0)  # all flights together last (1 + e)/(1 − e) as long
     lasts = bounce * (1 + restitution) / (1 - restitution)
-    rest = run(ball, ball.at(0.26, 0.0), round(lasts / MS) + 20)[-1]
+    rest = run(ball, ball.state_at(0.26, 0.0), round(lasts / MS) + 20)[-1]
     assert (rest.value, rest.rate) == (0.25, 0.0)
     assert ball.acceleration(rest, 0.0) == 0.0
     assert ball.acceleration(rest, 9.0) == 0.0
@@ -181,18 +181,18 @@ def test_in_the_end_it_rests_at_the_stop_until_it_is_drawn_away(method, restitut
 
 
 def test_without_restitution_it_stops_dead():
-    ball = OneFreedom(sliding(), STEP['rk4'], (-1.0, 1.0))
-    motions = run(ball, ball.at(0.0, 50.0), 40)
+    ball = SingleDofMechanism(sliding(), STEP['rk4'], (-1.0, 1.0))
+    motions = run(ball, ball.state_at(0.0, 50.0), 40)
     assert (motions[19].value, motions[19].rate) == pytest.approx((0.95, 50.0))
     assert {(m.value, m.rate) for m in motions[21:]} == {(1.0, 0.0)}
 
 
 def test_in_one_step_the_stop_comes_before_the_turn_that_it_prevents():
     # Friction alone would let it turn at 2.25 m, after 1.5 s.
-    mass = OneFreedom(sliding(slope=1.0, friction=1.0), STEP['rk4'], (-inf, 2.0), 0.5)
-    motion = mass.advance(mass.at(0.0, 3.0), 1.0 + 1e-9, 0.0)
+    mass = SingleDofMechanism(sliding(slope=1.0, friction=1.0), STEP['rk4'], (-inf, 2.0), 0.5)
+    motion = mass.advance(mass.state_at(0.0, 3.0), 1.0 + 1e-9, 0.0)
     assert (motion.value, motion.rate) == pytest.approx((2.0, -0.5), abs=1e-8)
-    motion = mass.advance(mass.at(0.0, 3.0), 2.0, 0.0)
+    motion = mass.advance(mass.state_at(0.0, 3.0), 2.0, 0.0)
     assert motion.value == pytest.approx(2.0 - 0.5 * 1.0)
     assert motion.rate == pytest.approx(-0.5)
 
@@ -201,8 +201,8 @@ def test_in_one_step_the_stop_comes_before_the_turn_that_it_prevents():
 def test_bounces_without_number_come_to_their_end(method):
     # All flights together last 1.9 ms, or without loss for ever.
     for restitution in (0.9, 1.0):
-        ball = OneFreedom(sliding(slope=10.0), STEP[method], (0.0, inf), restitution)
-        motion = ball.advance(ball.at(0.0, -5e-4), 0.5, 0.0)
+        ball = SingleDofMechanism(sliding(slope=10.0), STEP[method], (0.0, inf), restitution)
+        motion = ball.advance(ball.state_at(0.0, -5e-4), 0.5, 0.0)
         assert (motion.value, motion.rate) == (0.0, 0.0)
 
 
@@ -212,8 +212,8 @@ def test_nothing_is_asked_for_beyond_what_is_a_motion(method):
         assert abs(value) <= LARGEST
         return Terms(1e-90, 1.0, 0.0, 0.0, 0.0)
 
-    mass = OneFreedom(terms, STEP[method])
-    for motion in run(mass, mass.at(0.0, LARGEST), 5, force=LARGEST, step=10.0):
+    mass = SingleDofMechanism(terms, STEP[method])
+    for motion in run(mass, mass.state_at(0.0, LARGEST), 5, force=LARGEST, step=10.0):
         assert abs(motion.rate) <= LARGEST
         assert isfinite(mass.acceleration(motion, LARGEST))
 
@@ -230,8 +230,8 @@ def weighs_nothing_at_1(value):
 @pytest.mark.parametrize('terms', [ends_at_1, weighs_nothing_at_1])
 @pytest.mark.parametrize('method', METHODS)
 def test_where_there_is_no_more_motion_it_is_held(method, terms):
-    mass = OneFreedom(terms, STEP[method])
-    motions = run(mass, mass.at(0.5, 10.0), 80, force=3.0)
+    mass = SingleDofMechanism(terms, STEP[method])
+    motions = run(mass, mass.state_at(0.5, 10.0), 80, force=3.0)
     assert all(motion.value < 1.0 for motion in motions)
     assert motions[-1].value == pytest.approx(1.0, abs=1e-6)
     assert motions[-1].rate == 0.0
@@ -240,18 +240,18 @@ def test_where_there_is_no_more_motion_it_is_held(method, terms):
 
 def test_where_nothing_is_to_be_moved_there_is_no_state():
     for inertia in (0.0, 1e-101):
-        massless = OneFreedom(lambda _value, i=inertia: Terms(i, 0, 0, 0, 0), STEP['rk4'])
-        assert massless.at(0.0, 0.0) is None
-    assert OneFreedom(ends_at_1, STEP['rk4']).at(1.0, 0.0) is None
-    assert OneFreedom(sliding(), STEP['rk4'], (0.0, 1.0)).at(1.5, 0.0) is None
-    assert OneFreedom(sliding(), STEP['rk4']).at(0.0, 2 * LARGEST) is None
+        massless = SingleDofMechanism(lambda _value, i=inertia: Terms(i, 0, 0, 0, 0), STEP['rk4'])
+        assert massless.state_at(0.0, 0.0) is None
+    assert SingleDofMechanism(ends_at_1, STEP['rk4']).state_at(1.0, 0.0) is None
+    assert SingleDofMechanism(sliding(), STEP['rk4'], (0.0, 1.0)).state_at(1.5, 0.0) is None
+    assert SingleDofMechanism(sliding(), STEP['rk4']).state_at(0.0, 2 * LARGEST) is None
 
 
 def test_a_step_too_long_to_converge_is_cut():
     omega = 1e3
-    mass = OneFreedom(on_spring(omega * omega, 0.0), STEP['gauss_legendre'])
+    mass = SingleDofMechanism(on_spring(omega * omega, 0.0), STEP['gauss_legendre'])
     seconds = 8 * MS
-    motion = mass.advance(mass.at(1.0, 0.0), seconds, 0.0)
+    motion = mass.advance(mass.state_at(1.0, 0.0), seconds, 0.0)
     assert motion.value == pytest.approx(cos(omega * seconds), abs=5e-3)
 
 
@@ -265,8 +265,8 @@ def test_a_step_too_long_to_converge_is_cut():
 def test_whatever_the_force_it_stays_between_its_stops(
     method, forces, friction, brake, restitution
 ):
-    mass = OneFreedom(on_spring(30.0, friction), STEP[method], (-0.5, 0.75), restitution)
-    motion = mass.at(0.0, 1.0)
+    mass = SingleDofMechanism(on_spring(30.0, friction), STEP[method], (-0.5, 0.75), restitution)
+    motion = mass.state_at(0.0, 1.0)
     for force in forces:
         for _ in range(3):
             motion = mass.advance(motion, MS, force, brake)
@@ -286,7 +286,7 @@ def pushed(rows, friction=0.0, slope=0.0, calls=None):
             calls.append(value)
         return Terms(1.0, 0.0, slope, 0.0, friction, laws=(LawTerm(1.0, value, 1.0),))
 
-    return terms, (Table('time', tuple(rows)),)
+    return terms, (TorqueTable('time', tuple(rows)),)
 
 
 @pytest.mark.parametrize('steps', [1, 3, 150])
@@ -298,8 +298,8 @@ def test_it_rests_at_a_stop_until_the_load_draws_it_away(side, friction, slope, 
     rows = [(0.05, slope + 5.0 * side), (0.15, slope - 5.0 * side)]
     terms, laws = pushed(rows, friction, slope)
     stops = (-inf, 0.0) if side > 0.0 else (0.0, inf)
-    mass = OneFreedom(terms, STEP['rk4'], stops, laws=laws)
-    motion, seconds = mass.at(0.0, 0.0), 0.15 / steps
+    mass = SingleDofMechanism(terms, STEP['rk4'], stops, laws=laws)
+    motion, seconds = mass.state_at(0.0, 0.0), 0.15 / steps
     for step in range(steps):
         motion = mass.advance(motion, seconds, 0.0, time=step * seconds)
     after = 0.15 - (0.05 + (5.0 + friction) / 100.0)
@@ -312,8 +312,8 @@ def test_it_rests_at_a_stop_until_the_load_draws_it_away(side, friction, slope, 
 def test_a_step_across_a_row_of_a_table_is_exact(kink, start):
     # 0 N until the kink, then 40 N/s: rk4 is exact on both sides of it.
     terms, laws = pushed([(start + kink, 0.0), (start + 1.0, 40.0 * (1.0 - kink))])
-    mass = OneFreedom(terms, STEP['rk4'], laws=laws)
-    motion = mass.advance(mass.at(0.0, 1.0), 0.1, 0.0, time=start)
+    mass = SingleDofMechanism(terms, STEP['rk4'], laws=laws)
+    motion = mass.advance(mass.state_at(0.0, 1.0), 0.1, 0.0, time=start)
     after = 0.1 - kink
     assert motion.rate == pytest.approx(1.0 + 20.0 * after**2, rel=1e-12)
     assert motion.value == pytest.approx(0.1 + 20.0 / 3.0 * after**3, rel=1e-12)
@@ -326,8 +326,8 @@ def test_a_step_across_many_rows_goes_on_at_a_bounded_cost():
         calls = []
         rows = [(0.1 * row / count, 10.0) for row in range(count + 1)]
         terms, laws = pushed(rows, calls=calls)
-        mass = OneFreedom(terms, STEP['rk4'], laws=laws)
-        motion = mass.advance(mass.at(0.0, 0.0), 0.1, 0.0)
+        mass = SingleDofMechanism(terms, STEP['rk4'], laws=laws)
+        motion = mass.advance(mass.state_at(0.0, 0.0), 0.1, 0.0)
         assert motion.rate == pytest.approx(1.0, rel=1e-9)
         costs.append(len(calls))
     assert costs[1] < 1.5 * costs[0]

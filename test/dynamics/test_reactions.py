@@ -51,7 +51,7 @@ def at_rest(mechanics, *inputs):
 def moving(mechanics, position, velocity, acceleration):
     reactions = Reactions(mechanics)
     found = reactions.solve(position, velocity, acceleration)
-    effort = Reactions(mechanics).efforts(position, velocity, acceleration)[0]
+    effort = Reactions(mechanics).drive_efforts(position, velocity, acceleration)[0]
     return dict(zip(reactions.names, found, strict=True)), effort
 
 
@@ -145,9 +145,9 @@ def test_both_ways_to_the_effort(name):
         position = closure.position(*q)
         velocity = closure.velocity(position, *rates)
         acceleration = closure.acceleration(position, velocity, *pulls)
-        assert Reactions(mechanics).efforts(position, velocity, acceleration) == pytest.approx(
-            mechanics.drive_efforts(position, velocity, acceleration), rel=1e-10
-        )
+        assert Reactions(mechanics).drive_efforts(
+            position, velocity, acceleration
+        ) == pytest.approx(mechanics.drive_efforts(position, velocity, acceleration), rel=1e-10)
 
 
 @pytest.mark.parametrize('name', STATES)
@@ -194,7 +194,7 @@ def test_the_ground_bears_what_the_linkage_does(name):
                 force += push
                 moment += (points[joint.link, point].conjugate() * push).imag
                 moment += sign * reaction.moment
-        efforts = Reactions(mechanics).efforts(position, velocity, acceleration)
+        efforts = Reactions(mechanics).drive_efforts(position, velocity, acceleration)
         for given, effort, pull in zip(linkage.inputs, efforts, pulls, strict=True):
             moved = effort - loads.drive_inertia * pull
             if given.slider:
@@ -282,6 +282,6 @@ def test_nothing_where_no_rates_exist():
     for angle, status in ((0.0, Status.TOGGLE), (1.0, Status.OPEN)):
         position = closure.position(angle)
         assert position.status is status
-        assert reactions.shift(position, [0j] * 4) is None
+        assert reactions.joint_deflections(position, [0j] * 4) is None
         # There is no velocity to give.
         assert reactions.solve(position, None, None) is None

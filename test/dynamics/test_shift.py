@@ -54,7 +54,7 @@ def test_all_joints_off_at_once(name):
         for size in SIZES:
             offsets = [size * way for way in ways]
             moved = displaced(closure, q, offsets) - exact
-            errors.append(np.abs(moved - reactions.shift(position, offsets)).max())
+            errors.append(np.abs(moved - reactions.joint_deflections(position, offsets)).max())
         assert_quarters(errors, np.abs(moved).max())
 
 
@@ -71,7 +71,7 @@ def test_each_joint_of_a_four_bar(joint):
             offsets = [0j] * 4
             offsets[joint] = size * way
             moved = displaced(closure, (q,), offsets) - exact
-            errors.append(np.abs(moved - reactions.shift(position, offsets)).max())
+            errors.append(np.abs(moved - reactions.joint_deflections(position, offsets)).max())
         assert_quarters(errors, np.abs(moved).max())
 
 
@@ -109,7 +109,7 @@ def test_a_link_that_is_longer(name, link, pin, sign):
         stretch = size * along * rect(1.0, closure.link_angles(position)[link])
         offsets = [0j] * len(reactions.joints)
         offsets[number] = sign * stretch
-        errors.append(np.abs(moved - reactions.shift(position, offsets)).max())
+        errors.append(np.abs(moved - reactions.joint_deflections(position, offsets)).max())
     assert_quarters(errors, np.abs(moved).max())
 
 
@@ -118,7 +118,7 @@ def test_a_slider_moves_only_across():
     reactions = Reactions(Mechanics(closure))
     position = closure.position(1.0)
     along, across, both = (
-        reactions.shift(position, [0j, 0j, 0j, offset])
+        reactions.joint_deflections(position, [0j, 0j, 0j, offset])
         for offset in (1e-4 + 0j, 1e-4j, 1e-4 + 1e-4j)
     )
     assert along == pytest.approx((0.0, 0.0), abs=1e-18)
@@ -129,4 +129,4 @@ def test_a_slider_moves_only_across():
 def test_no_offset_no_shift():
     closure = closed('watt_1')
     reactions = Reactions(Mechanics(closure))
-    assert reactions.shift(closure.position(1.0), [0j] * 7) == (0.0, 0.0, 0.0, 0.0)
+    assert reactions.joint_deflections(closure.position(1.0), [0j] * 7) == (0.0, 0.0, 0.0, 0.0)

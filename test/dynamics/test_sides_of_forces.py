@@ -141,7 +141,7 @@ def test_each_link_that_is_cut_free_obeys_newton(linkage, name):
     velocity = moved.closure.velocity(position, *rates)
     acceleration = moved.closure.acceleration(position, velocity, *pulls)
     wrenches = reactions.solve(position, velocity, acceleration)
-    efforts = Reactions(mechanics).efforts(position, velocity, acceleration)
+    efforts = Reactions(mechanics).drive_efforts(position, velocity, acceleration)
     acting = {}  # for each link forces with their places, and moments
 
     def act(link, force, place, moment=0.0):

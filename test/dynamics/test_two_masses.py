@@ -18,7 +18,7 @@ from math import exp, sqrt, tau
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics, Terms
-from linkage_ros.dynamics.motion import OneFreedom
+from linkage_ros.dynamics.motion import SingleDofMechanism
 from linkage_ros.dynamics.two_masses import TwoMasses
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
@@ -35,8 +35,10 @@ EXACT = ('rk4', 'gauss_legendre')
 
 
 def wheels(restitution=0.0, method='rk4', friction=0.0, slope=0.0):
-    crank = OneFreedom(lambda _: Terms(CRANK, 0.0, slope, 0.0, friction), METHODS[method].step)
-    return TwoMasses.of(crank, MOTOR, PLAY, restitution)
+    crank = SingleDofMechanism(
+        lambda _: Terms(CRANK, 0.0, slope, 0.0, friction), METHODS[method].step
+    )
+    return TwoMasses.from_motor(crank, MOTOR, PLAY, restitution)
 
 
 def run(mechanism, seconds, force, *, step=1e-3, rate=0.0, brake=0.0, motion=None):
@@ -91,7 +93,7 @@ def test_they_bounce_as_a_ball_on_a_table(restitution):
 
 def test_a_meeting_loses_the_energy_of_the_relative_rate():
     mechanism = wheels(0.6)
-    begin = mechanism.at(0.0, 0.0)
+    begin = mechanism.state_at(0.0, 0.0)
     begin = begin._replace(motor=begin.motor._replace(rate=3.0))
     end = mechanism.advance(begin, 0.005, 0.0)  # p/2 = 10 mrad at 3 rad/s: after 3.3 ms
     energy = 0.5 * (MOTOR * end.motor.rate**2 + CRANK * end.crank.rate**2)
@@ -181,8 +183,8 @@ def test_a_stop_bears_the_crank_and_not_the_motor(name, end):
     mechanism = wheels(of_play)
     stopped = {'stops': (-1.0, 1.0), 'restitution': of_stop}
     crank = replace(mechanism.crank, **stopped)
-    mechanism = TwoMasses.of(crank, MOTOR, PLAY, of_play)
-    begin = mechanism.at(0.0, end)
+    mechanism = TwoMasses.from_motor(crank, MOTOR, PLAY, of_play)
+    begin = mechanism.state_at(0.0, end)
     begin = begin._replace(
         motor=begin.motor._replace(value=end * side * PLAY / 2.0), side=round(end * side)
     )
@@ -194,11 +196,11 @@ def test_a_stop_bears_the_crank_and_not_the_motor(name, end):
 
 
 def test_a_motor_meets_a_crank_that_is_held_at_its_stop():
-    crank = OneFreedom(
+    crank = SingleDofMechanism(
         lambda _: Terms(CRANK, 0.0, -5.0, 0.0, 0.0), METHODS['rk4'].step, (-1.0, 0.0)
     )
-    mechanism = TwoMasses.of(crank, MOTOR, PLAY, 0.5)
-    begin = mechanism.at(0.0, 0.0)
+    mechanism = TwoMasses.from_motor(crank, MOTOR, PLAY, 0.5)
+    begin = mechanism.state_at(0.0, 0.0)
     begin = begin._replace(motor=begin.motor._replace(rate=1.0))
     states = run(mechanism, 0.03, 0.0, motion=begin)
     assert [(state.crank.rate, state.motor.rate) for state in states[::15]] == [
@@ -266,8 +268,8 @@ def by_scipy(mechanics, restitution, times, force):
 def test_a_four_bar_behind_play_moves_as_scipy_says(restitution, method):
     closure = Closure(shipped('four_bar'))
     mechanics = Mechanics(closure, Loads((0.0, -9.81), drive_inertia=0.02))
-    crank = OneFreedom(mechanics.equation, METHODS[method].step)
-    mechanism = TwoMasses.of(crank, MOTOR, PLAY, restitution)
+    crank = SingleDofMechanism(mechanics.motion_equation, METHODS[method].step)
+    mechanism = TwoMasses.from_motor(crank, MOTOR, PLAY, restitution)
 
     def force(t):
         return 0.3 if t < 0.3 else -0.45
@@ -276,7 +278,7 @@ def test_a_four_bar_behind_play_moves_as_scipy_says(restitution, method):
     if restitution:
         times = [0.02, 0.05, 0.08]
     expected = by_scipy(mechanics, restitution, times, force)
-    motion, now, found = mechanism.at(1.0, 0.0), 0, []
+    motion, now, found = mechanism.state_at(1.0, 0.0), 0, []
     while now < round(times[-1] * 1000):
         motion = mechanism.advance(motion, 1e-3, force(1e-3 * now), 0.0, 1e-3 * now)
         now += 1

@@ -179,7 +179,7 @@ def held(closure, frame):
         link: PlanarWrench(1.5 - n, 0.7 * n, 0.3 + 0.1 * n) for n, link in enumerate(moving)
     }
     for link, wrench in wrenches.items():
-        mechanics.applied.wrenches[link].take(wrench, 0)
+        mechanics.applied.wrenches[link].set_wrench(wrench, 0)
     return mechanics, wrenches
 
 
@@ -226,7 +226,7 @@ def test_forces_in_pins_balance_it_on_every_link(name, frame):
         velocity = closure.velocity(position, *(0.8 for _ in q))
         acceleration = closure.acceleration(position, velocity, *(1.1 for _ in q))
         given = position, velocity, acceleration
-        assert Reactions(mechanics).efforts(*given) == pytest.approx(
+        assert Reactions(mechanics).drive_efforts(*given) == pytest.approx(
             mechanics.drive_efforts(*given), rel=1e-8, abs=1e-9
         )
 
@@ -236,7 +236,7 @@ def test_compiled_terms_equal_plain_ones_to_the_bit(name):
     closure = closed(name)
     mechanics, _ = held(closure, 'link')
     for (q,) in STATES[name]:
-        assert mechanics.equation(q) == mechanics.terms(closure.position(q))
+        assert mechanics.motion_equation(q) == mechanics.motion_terms(closure.position(q))
 
 
 def test_the_effort_of_a_crank_that_is_held_contains_a_wrench_until_it_is_too_old():

@@ -189,7 +189,7 @@ masses:
         number = within.reactions.names.index(name)
         fx, fy, _ = before.reactions[number]
         offsets[number] = -play * complex(fx, fy) / hypot(fx, fy)
-    expected = within.reactions.shift(before.position, offsets)
+    expected = within.reactions.joint_deflections(before.position, offsets)
     assert shift(within, motion, {'D': play}) == pytest.approx(expected, rel=1e-12)
 
 

@@ -252,7 +252,9 @@ def test_the_equation_of_motion_is_that_of_the_plain_steps(name):
     closure = closure_of(name)
     mechanics = Mechanics(closure, Loads(gravity=(0.5, -9.81), drive_inertia=1e-4))
     for value, *_ in states(closure, 500):
-        assert repr(mechanics.equation(value)) == repr(mechanics.terms(closure.position(value)))
+        assert repr(mechanics.motion_equation(value)) == repr(
+            mechanics.motion_terms(closure.position(value))
+        )
 
 
 def test_a_function_that_decides_has_no_straight_line():
