@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from linkage_ros.faults import Injection
     from linkage_ros.kinematics.compiling.trace import TracedMotion as CompiledMotion
     from linkage_ros.pipeline.wrench_topics import WrenchTopic
-    from linkage_ros.solvers.solver import Choice
+    from linkage_ros.solvers.solver import SolverChoice
 
 _WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
 """Effects that may suppress the message of a tick."""
@@ -432,9 +432,9 @@ class LinkagePipeline:
         return any(sensor.gap_begins for sensor in self._sensors)
 
     @property
-    def choice(self) -> Choice | None:
+    def choice(self) -> SolverChoice | None:
         """Return the chosen solver and the reason if the scene asks for an accuracy, else None."""
-        choice: Choice | None = getattr(self.closure, 'choice', None)
+        choice: SolverChoice | None = getattr(self.closure, 'choice', None)
         return choice
 
     def is_stale(self, now: int) -> bool:
@@ -490,7 +490,7 @@ def _closure(member: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
 
         if wanted.computes_forces:
             return choose.only_closed_form(linkage, 'forces start from it')
-        return choose.choose(linkage, member.accuracy)
+        return choose.choose_solver(linkage, member.accuracy)
     if member.solver is not None:
         name, solving = member.solver
         closure: Closure = import_module(SOLVERS[name]).build(solving, linkage)

@@ -35,7 +35,7 @@ from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.kinematics.topology import Dyad, Iterated
 from linkage_ros.solvers.newton import LEAST_SINE, NewtonClosure
-from linkage_ros.solvers.solver import Choice, Solver
+from linkage_ros.solvers.solver import Solver, SolverChoice
 from linkage_ros.solvers.table import TableClosure
 
 _LONGEST = 0.1
@@ -47,33 +47,33 @@ _FASTER = 0.9
 _NAMES = {'closed_form': 'closed form', 'newton': "Newton's method", 'table': 'table'}
 
 
-def choose(linkage: Linkage, accuracy: float) -> Closure:
+def choose_solver(linkage: Linkage, accuracy: float) -> Closure:
     """Return the fastest closure of those that are proven to reach an accuracy in [rad] or [m]."""
     closed = Solver(Closure(linkage))
     able: dict[str, Solver] = {'closed_form': closed}
     against = {}
-    for name, build in (('table', TableClosure), ('newton', _newton)):
-        attempt = _attempt(build, linkage, accuracy)
+    for name, build in (('table', TableClosure), ('newton', _build_newton)):
+        attempt = _try_solver(build, linkage, accuracy)
         if isinstance(attempt, Solver):
             able[name] = attempt
         else:
             against[name] = attempt
-    times = _times(closed, able)
+    times = _median_times(closed, able)
     fastest = min(times, key=lambda name: times[name])
     if times[fastest] > _FASTER * times['closed_form']:
         fastest = 'closed_form'
     chosen = able[fastest]
-    why = [f'{_NAMES[fastest]}{_proven(chosen)}, {1e6 * times[fastest]:.2g} µs a state']
+    why = [f'{_NAMES[fastest]}{_proof_text(chosen)}, {1e6 * times[fastest]:.2g} µs a state']
     why += [
         f'{_NAMES[name]} {1e6 * time:.2g} µs' for name, time in times.items() if name != fastest
     ]
     why += [f'{_NAMES[name]}: {reason}' for name, reason in against.items()]
     parameters = {} if fastest == 'closed_form' else {'tolerance': accuracy}
-    chosen.choice = Choice(fastest, parameters, '; '.join(why))
+    chosen.choice = SolverChoice(fastest, parameters, '; '.join(why))
     return chosen
 
 
-def _attempt(
+def _try_solver(
     build: Callable[[Linkage, float], Solver], linkage: Linkage, accuracy: float
 ) -> Solver | str:
     """Return a solver that is proven to reach an accuracy, or the reason why there is none."""
@@ -86,11 +86,11 @@ def _attempt(
 def only_closed_form(linkage: Linkage, why: str) -> Closure:
     """Return the closed form if no other solver is possible, with the reason."""
     closed = Solver(Closure(linkage))
-    closed.choice = Choice('closed_form', {}, f'closed form: {why}')
+    closed.choice = SolverChoice('closed_form', {}, f'closed form: {why}')
     return closed
 
 
-def _newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
+def _build_newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
     """Return Newton's method with a tolerance that proves an accuracy, or refuse."""
     newton = NewtonClosure(linkage, accuracy)
     groups = [g for g in newton.structure.groups if isinstance(g, Dyad | Iterated)]
@@ -109,15 +109,15 @@ def _newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
     return newton
 
 
-def _proven(solver: Solver) -> str:
+def _proof_text(solver: Solver) -> str:
     if not isinstance(solver, TableClosure):
         return ''
     return f' of {solver.knots} knots, proven to {solver.proven:.2g}'
 
 
-def _times(closed: Closure, able: dict[str, Solver]) -> dict[str, float]:
+def _median_times(closed: Closure, able: dict[str, Solver]) -> dict[str, float]:
     """Return the median time of a state of each solver, in [s]; the solvers take turns."""
-    states = _states(closed)
+    states = _trial_states(closed)
     spent: dict[str, list[float]] = {name: [] for name in able}
     # Call each solver as a tick does.
     ways = {
@@ -125,22 +125,22 @@ def _times(closed: Closure, able: dict[str, Solver]) -> dict[str, float]:
         for name, solver in able.items()
     }
     for way in ways.values():
-        _time(way, states)  # work that is done only once is not timed
+        _time_states(way, states)  # work that is done only once is not timed
     for _ in range(_ROUNDS):
         for name, way in ways.items():
             if sum(spent[name]) * len(states) < _LONGEST:
-                spent[name].append(_time(way, states))
+                spent[name].append(_time_states(way, states))
     return {name: median(times) for name, times in spent.items()}
 
 
-def _time(position: Callable[..., Any], states: Sequence[tuple[float, ...]]) -> float:
+def _time_states(position: Callable[..., Any], states: Sequence[tuple[float, ...]]) -> float:
     begun = perf_counter()
     for inputs in states:
         position(*inputs)
     return (perf_counter() - begun) / len(states)
 
 
-def _states(closed: Closure) -> list[tuple[float, ...]]:
+def _trial_states(closed: Closure) -> list[tuple[float, ...]]:
     """Return inputs to try: along the widest range, or about the pose of several inputs."""
     if len(closed.linkage.inputs) > 1:
         usual = usual_inputs(closed)

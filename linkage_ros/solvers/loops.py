@@ -70,26 +70,29 @@ class LoopFinder:
             if isinstance(group, Driven) and group.joint.kind == 'R':
                 self._note_turned(group.joint, 1 + group.index)
 
-    def find(self) -> list[Loops]:
+    def find_loops(self) -> list[Loops]:
         """Return the loops of every group that is not driven, in the order of solution."""
         return [
-            self._dyad(group) if isinstance(group, Dyad) else self._iterated(group)
+            self._dyad_loops(group) if isinstance(group, Dyad) else self._iterated_loops(group)
             for group in self._structure.groups
             if not isinstance(group, Driven)
         ]
 
-    def turns(self, coordinate: int) -> Turns:
+    def expand_coordinate(self, coordinate: int) -> Turns:
         """Return a coordinate as a sum of inputs and coordinates of groups."""
         if not coordinate:
             return ()
         if coordinate not in self._turned:
             return ((coordinate, 1.0),)
         arm, turn = self._turned[coordinate]
-        return (*self.turns(arm), turn)
+        return (*self.expand_coordinate(arm), turn)
 
-    def difference(self, one: int, other: int) -> Turns:
+    def expand_difference(self, one: int, other: int) -> Turns:
         """Return the difference of two coordinates as `turns` does."""
-        return (*self.turns(one), *((k, -sign) for k, sign in self.turns(other)))
+        return (
+            *self.expand_coordinate(one),
+            *((k, -sign) for k, sign in self.expand_coordinate(other)),
+        )
 
     def _note_turned(self, joint: Joint, index: int) -> None:
         coordinate = self._known.angles[joint.link].coordinate
@@ -98,7 +101,7 @@ class LoopFinder:
             arm = self._known.angles[joint.to].coordinate
             self._turned[coordinate] = (arm, (index, sign))
 
-    def _dyad(self, dyad: Dyad) -> Loops:
+    def _dyad_loops(self, dyad: Dyad) -> Loops:
         slides = [
             self._known.slides[joint.name].coordinate
             for joint in (dyad.inner, *dyad.outer)
@@ -107,77 +110,79 @@ class LoopFinder:
         # In RPR both links have one angle; in PRP and RPP they turn with the links they slide on.
         angles = [self._known.angles[joint.link].coordinate for joint in dyad.outer]
         angles = angles[: 2 - len(slides)]
-        return Loops(tuple(sorted(angles + slides)), (), (self._equation(dyad.inner),))
+        return Loops(tuple(sorted(angles + slides)), (), (self._loop_equation(dyad.inner),))
 
-    def _iterated(self, group: Iterated) -> Loops:
+    def _iterated_loops(self, group: Iterated) -> Loops:
         known = self._known
         slides, equations, balances = [], [], []
         for joint in self._structure.joints_of(group):
-            equations.append(self._equation(joint))
+            equations.append(self._loop_equation(joint))
             if joint.kind == 'P':
                 slides.append(joint.name)
                 angle = self._sliders[joint.name].angle
                 ends = known.blocks[joint.name], self._sliders[joint.name].along
-                balances.append(self._between(*ends, angle))
+                balances.append(self._balance_between(*ends, angle))
         for index, given in enumerate(self._inputs, 1):
             if given.slider in slides:
                 slide = known.slides[given.slider]
                 terms = ((slide.coordinate, slide.sign), (index, -1.0))
                 balances.append(Balance(terms, slide.constant, turning=False))
             elif given.child in group.links or given.parent in group.links:
-                turned = self._between(given.child, given.parent, 0.0)
+                turned = self._balance_between(given.child, given.parent, 0.0)
                 balances.append(Balance((*turned.terms, (index, -1.0)), turned.constant))
         coordinates = [known.angles[link].coordinate for link in group.links]
         coordinates += [known.slides[name].coordinate for name in slides]
         pins = tuple(known.attachments[link].pin for link in group.links)
         return Loops(tuple(coordinates), pins, tuple(equations), tuple(balances))
 
-    def _between(self, link: str, to: str, angle: float) -> Balance:
+    def _balance_between(self, link: str, to: str, angle: float) -> Balance:
         one, other = self._known.angles[link], self._known.angles[to]
-        terms = self.difference(one.coordinate, other.coordinate)
+        terms = self.expand_difference(one.coordinate, other.coordinate)
         return Balance(terms, one.constant - other.constant - angle)
 
-    def _equation(self, joint: Joint) -> tuple[Vector, ...]:
+    def _loop_equation(self, joint: Joint) -> tuple[Vector, ...]:
         """Return the loop that a joint closes."""
         points = self._known.points
         if joint.kind == 'R':
-            one = self._walk(joint.link, points[joint.link][joint.name])
-            other = self._walk(joint.to, points[joint.to][joint.name])
-            return _merged([*one, *_negative(other)])
+            one = self._vectors_to_point(joint.link, points[joint.link][joint.name])
+            other = self._vectors_to_point(joint.to, points[joint.to][joint.name])
+            return _merge_vectors([*one, *_negate_vectors(other)])
         slider, slide = self._sliders[joint.name], self._known.slides[joint.name]
         direction = slider.unit
         # The joint of a dyad may be given from either end.
         block, rail = self._known.blocks[joint.name], slider.along
         line = self._known.angles[rail]
         start = points[rail][slider.through] + slide.constant * direction
-        point = self._walk(block, points[block][slider.point])
-        through = self._walk(rail, start)
-        way = self._arm(line, slide.sign * direction, slide.coordinate)
-        return _merged([*point, *_negative([*through, way])])
+        point = self._vectors_to_point(block, points[block][slider.point])
+        through = self._vectors_to_point(rail, start)
+        way = self._make_vector(line, slide.sign * direction, slide.coordinate)
+        return _merge_vectors([*point, *_negate_vectors([*through, way])])
 
-    def _walk(self, link: str, point: complex) -> list[Vector]:
+    def _vectors_to_point(self, link: str, point: complex) -> list[Vector]:
         if link == GROUND:
             return [Vector(point)]
         held = self._known.attachments[link]
         way = []
         if held.point != point:
-            way.append(self._arm(self._known.angles[link], point - held.point))
+            way.append(self._make_vector(self._known.angles[link], point - held.point))
         if held.pin >= 0:
             return [*way, Vector(1.0 + 0j, pin=held.pin)]
         if held.slide is not None:
             unit = held.slide.sign * held.direction
-            way.append(self._arm(self._known.angles[held.link], unit, held.slide.coordinate))
-        return [*way, *self._walk(held.link, held.link_point)]
+            way.append(
+                self._make_vector(self._known.angles[held.link], unit, held.slide.coordinate)
+            )
+        return [*way, *self._vectors_to_point(held.link, held.link_point)]
 
-    def _arm(self, angle: Angle, vector: complex, slide: int = -1) -> Vector:
-        return Vector(angle.unit * vector, self.turns(angle.coordinate), slide)
+    def _make_vector(self, angle: Angle, vector: complex, slide: int = -1) -> Vector:
+        return Vector(angle.unit * vector, self.expand_coordinate(angle.coordinate), slide)
 
 
-def _negative(vectors: list[Vector]) -> list[Vector]:
+def _negate_vectors(vectors: list[Vector]) -> list[Vector]:
     return [vector._replace(factor=-vector.factor) for vector in vectors]
 
 
-def _merged(vectors: list[Vector]) -> tuple[Vector, ...]:
+def _merge_vectors(vectors: list[Vector]) -> tuple[Vector, ...]:
     """Add up the vectors with the same angle and slide."""
     sums: dict[tuple[Turns, int, int], complex] = {}
     for factor, turns, slide, pin in vectors:

@@ -110,7 +110,7 @@ class Knots:
         self._knots: dict[tuple[int, ...], Knot | None] = {}
         self._signs: dict[tuple[int, ...], tuple[float, ...] | None] = {}
 
-    def near(self, inputs: Sequence[float]) -> tuple[Knot | None, list[float]]:
+    def nearest_knot(self, inputs: Sequence[float]) -> tuple[Knot | None, list[float]]:
         """Return the knot nearest to inputs, given as coordinates, and their offsets from it."""
         numbers, offsets = [], []
         for value, spacing, period in zip(inputs, self._spacing, self._period, strict=True):
@@ -121,17 +121,17 @@ class Knots:
         try:
             return self._knots[key], offsets
         except KeyError:
-            return self._new(key), offsets
+            return self._add_knot(key), offsets
 
-    def _new(self, key: tuple[int, ...]) -> Knot | None:
+    def _add_knot(self, key: tuple[int, ...]) -> Knot | None:
         with BUILD_LOCK:
             if len(self._knots) >= _MOST:
                 self._knots.clear()
                 self._signs.clear()
-            self._knots[key] = knot = self._knot(key)
+            self._knots[key] = knot = self._solve_knot(key)
             return knot
 
-    def _knot(self, key: tuple[int, ...]) -> Knot | None:
+    def _solve_knot(self, key: tuple[int, ...]) -> Knot | None:
         signs = self._signs_at(key)
         around = [
             tuple(number + step * (k == i) for k, number in enumerate(key))
@@ -140,7 +140,7 @@ class Knots:
         ]
         if signs is None or any(self._signs_at(other) != signs for other in around):
             return None
-        given = self._given(key)
+        given = self._given_coordinates(key)
         closed = self._closed
         position = closed.position(*given)
         slopes = []
@@ -153,12 +153,12 @@ class Knots:
     def _signs_at(self, key: tuple[int, ...]) -> tuple[float, ...] | None:
         """Return the assembly of each dyad, or None if a loop is not closed."""
         if key not in self._signs:
-            position = self._closed.position(*self._given(key))
+            position = self._closed.position(*self._given_coordinates(key))
             closed = position.status in (Status.CLOSED, Status.LIMITED)
             self._signs[key] = self._orientations(position.state.coordinates) if closed else None
         return self._signs[key]
 
-    def _given(self, key: tuple[int, ...]) -> list[float]:
+    def _given_coordinates(self, key: tuple[int, ...]) -> list[float]:
         return [
             number * spacing * unit
             for number, spacing, unit in zip(key, self._spacing, self._units, strict=True)
@@ -232,7 +232,7 @@ class NewtonDyad:
         for factor, arm in self._arms:
             known += factor * rect(1.0, x[arm])
         for vector in self._known:
-            known += _value(vector, x, pins)
+            known += _vector_value(vector, x, pins)
         if self._two_arms is None:
             return self._close_any(x, pins, known, p, q, sign)
         first, second = self._two_arms
@@ -262,8 +262,8 @@ class NewtonDyad:
         for _ in range(_STEPS):
             off = known
             for vector in self._new:
-                off += _value(vector, x, pins)
-            by_p, by_q = self._slopes(x)
+                off += _vector_value(vector, x, pins)
+            by_p, by_q = self._partial_derivatives(x)
             across = cross_product(by_p, by_q)
             if not across:
                 break
@@ -277,10 +277,10 @@ class NewtonDyad:
 
     def orientation(self, x: list[float]) -> float:
         """Return the sine of the angle from F_p to F_q."""
-        by_p, by_q = self._slopes(x)
+        by_p, by_q = self._partial_derivatives(x)
         return cross_product(by_p, by_q) / (abs(by_p) * abs(by_q))
 
-    def rates(
+    def append_rates(
         self, x: list[float], pins: list[complex], v: list[float], speeds: list[complex]
     ) -> None:
         """Append the rates of p and q, given those of the known coordinates."""
@@ -289,10 +289,10 @@ class NewtonDyad:
         for factor, arm in self._arms:
             drift += 1j * (v[arm] * (factor * rect(1.0, x[arm])))
         for vector in (*self._known, *self._new):
-            drift += _rate(vector, x, pins, v, speeds)
-        self._solve(x, drift, v)
+            drift += _vector_rate(vector, x, pins, v, speeds)
+        self._solve_drift(x, drift, v)
 
-    def accelerations(
+    def append_accelerations(
         self,
         x: list[float],
         v: list[float],
@@ -305,16 +305,16 @@ class NewtonDyad:
         for factor, arm in self._arms:
             drift += complex(-v[arm] * v[arm], a[arm]) * (factor * rect(1.0, x[arm]))
         for vector in (*self._known, *self._new):
-            drift += _acceleration(vector, x, v, a, pulls)
-        self._solve(x, drift, a)
+            drift += _vector_acceleration(vector, x, v, a, pulls)
+        self._solve_drift(x, drift, a)
 
-    def _solve(self, x: list[float], drift: complex, into: list[float]) -> None:
-        by_p, by_q = self._slopes(x)
+    def _solve_drift(self, x: list[float], drift: complex, into: list[float]) -> None:
+        by_p, by_q = self._partial_derivatives(x)
         across = cross_product(by_p, by_q)
         into[self._first] = cross_product(by_q, drift) / across
         into[self._first + 1] = cross_product(drift, by_p) / across
 
-    def _slopes(self, x: list[float]) -> tuple[complex, complex]:
+    def _partial_derivatives(self, x: list[float]) -> tuple[complex, complex]:
         """Return F_p and F_q."""
         first = self._first
         slopes = [0j, 0j]
@@ -330,7 +330,7 @@ class NewtonDyad:
         return slopes[0], slopes[1]
 
 
-def _value(vector: Vector, x: list[float], pins: list[complex]) -> complex:
+def _vector_value(vector: Vector, x: list[float], pins: list[complex]) -> complex:
     factor, turns, slide, pin = vector
     if pin >= 0:
         return factor * pins[pin]
@@ -338,7 +338,7 @@ def _value(vector: Vector, x: list[float], pins: list[complex]) -> complex:
     return unit if slide < 0 else unit * x[slide]
 
 
-def _rate(
+def _vector_rate(
     vector: Vector, x: list[float], pins: list[complex], v: list[float], speeds: list[complex]
 ) -> complex:
     """Return the derivative: e^{iφ}·(ṡ + iφ̇·s)."""
@@ -352,7 +352,7 @@ def _rate(
     return complex(v[slide], turn * x[slide]) * unit
 
 
-def _acceleration(
+def _vector_acceleration(
     vector: Vector, x: list[float], v: list[float], a: list[float], pulls: list[complex]
 ) -> complex:
     """Return the second derivative: e^{iφ}·(s̈ − φ̇²·s + i(φ̈·s + 2φ̇·ṡ))."""
@@ -392,11 +392,11 @@ def build(parameters: NewtonParameters, linkage: Linkage) -> NewtonClosure:
 _CLOSED = Status.CLOSED
 
 
-class _Found(list[Any]):
+class _NewtonRoot(list[Any]):
     """Poses of a state that Newton's method solved, one for each step that is not a dyad."""
 
 
-_NO_POSES = _Found()
+_NO_POSES = _NewtonRoot()
 
 
 class NewtonClosure(Solver):
@@ -425,24 +425,24 @@ class NewtonClosure(Solver):
         self._given_warm = warm
         self._warm = warm is True
         self._last: list[float] | None = None
-        self._plan, self._iterates = self._planned(tolerance)
+        self._plan, self._iterates = self._plan(tolerance)
         self._dyads = [one for one in self._plan if isinstance(one, NewtonDyad)]
-        self._knots = Knots(self.closed, self._orientations, repeats=not self._iterates)
+        self._knots = Knots(self.closed, self._dyad_orientations, repeats=not self._iterates)
         self._pose: list[float] | None = None
         if warm is False:
             pose = self.closed.position(*usual_inputs(self.closed))
             self._pose = pose.state.coordinates
 
-    def _definition(self) -> tuple[Any, ...]:
+    def _build_arguments(self) -> tuple[Any, ...]:
         return self.linkage, self.tolerance, self._given_warm
 
     def position(self, *inputs: float) -> Position:
         x = self._input_coordinates('inputs', inputs, 0.0, inf)
         if x is None:
-            return self._exact(inputs)
-        knot, offsets = self._knots.near(x[1:])
+            return self._solve_exactly(inputs)
+        knot, offsets = self._knots.nearest_knot(x[1:])
         if knot is None:
-            return self._exact(inputs)
+            return self._solve_exactly(inputs)
         start = self._pose or self._last
         if start is None:
             start = knot.coordinates
@@ -453,16 +453,16 @@ class NewtonClosure(Solver):
         signs = iter(knot.signs)
         pins: list[complex] = []
         state = LinkState(x, pins)
-        poses = _Found() if self._iterates else _NO_POSES
+        poses = _NewtonRoot() if self._iterates else _NO_POSES
         for part in self._plan:
             if isinstance(part, NewtonDyad):
                 k = len(x)
                 if not part.close(x, pins, start[k], start[k + 1], next(signs)):
-                    return self._exact(inputs)
+                    return self._solve_exactly(inputs)
                 continue
             pose = part.close(state)
             if pose.status is not _CLOSED:
-                return self._exact(inputs)
+                return self._solve_exactly(inputs)
             if self._iterates:
                 poses.append(pose)
         if self._warm:
@@ -474,7 +474,7 @@ class NewtonClosure(Solver):
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
         state, poses = position.state, position.poses
-        if not isinstance(poses, _Found):
+        if not isinstance(poses, _NewtonRoot):
             return self.closed.velocity(position, *rates)
         v = self._input_coordinates('rates', rates)
         if v is None:
@@ -485,7 +485,7 @@ class NewtonClosure(Solver):
         part_rates = []
         for part in self._plan:
             if isinstance(part, NewtonDyad):
-                part.rates(x, pins, v, speeds.pins)
+                part.append_rates(x, pins, v, speeds.pins)
             else:
                 part_rates.append(part.rates(next(others, PLACED), state, speeds))
         return Velocity(self._joint_rates(v), speeds, part_rates, self)
@@ -494,7 +494,7 @@ class NewtonClosure(Solver):
         self, position: Position, velocity: Velocity, *accelerations: float
     ) -> Acceleration:
         state, poses = position.state, position.poses
-        if not isinstance(poses, _Found):
+        if not isinstance(poses, _NewtonRoot):
             return self.closed.acceleration(position, velocity, *accelerations)
         a = self._input_coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
         if a is None or velocity.rates is None:
@@ -504,14 +504,14 @@ class NewtonClosure(Solver):
         others, moving = iter(poses), iter(rates)
         for part in self._plan:
             if isinstance(part, NewtonDyad):
-                part.accelerations(state.coordinates, speeds.coordinates, a, changes.pins)
+                part.append_accelerations(state.coordinates, speeds.coordinates, a, changes.pins)
             else:
                 pose, rate = next(others, PLACED), next(moving)
                 part.accelerations(pose, rate, state, speeds, changes)
         return Acceleration(self._joint_rates(a), changes, self)
 
-    def placed(self, position: Position) -> Position:
-        if not isinstance(position.poses, _Found):
+    def place_links(self, position: Position) -> Position:
+        if not isinstance(position.poses, _NewtonRoot):
             return position
         if self._iterates:
             return position
@@ -521,7 +521,7 @@ class NewtonClosure(Solver):
                 step.close(state)
         return replace(position, state=state)
 
-    def _exact(self, inputs: tuple[float, ...]) -> Position:
+    def _solve_exactly(self, inputs: tuple[float, ...]) -> Position:
         """Return the state in closed form; with ``warm`` it is the next start."""
         self.exact_states += 1
         position = self.closed.position(*inputs)
@@ -529,10 +529,10 @@ class NewtonClosure(Solver):
             self._last = position.state.coordinates
         return position
 
-    def _planned(self, tolerance: float) -> tuple[tuple[NewtonDyad | Step, ...], bool]:
+    def _plan(self, tolerance: float) -> tuple[tuple[NewtonDyad | Step, ...], bool]:
         """Return the dyads and other steps, in order, and whether any group is iterated."""
         finder = LoopFinder(self.linkage, self.structure, self._known)
-        loops = iter(finder.find())
+        loops = iter(finder.find_loops())
         groups = self.structure.groups
         iterates = any(isinstance(group, Iterated) for group in groups)
         plan: list[NewtonDyad | Step] = []
@@ -551,5 +551,5 @@ class NewtonClosure(Solver):
                 plan.append(iteration.stopped_at(tolerance))
         return tuple(plan), iterates
 
-    def _orientations(self, x: list[float]) -> tuple[float, ...]:
+    def _dyad_orientations(self, x: list[float]) -> tuple[float, ...]:
         return tuple(copysign(1.0, dyad.orientation(x)) for dyad in self._dyads)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-class Choice(NamedTuple):
+class SolverChoice(NamedTuple):
     """The solver chosen for a scene with an accuracy, as it could have named it, and why."""
 
     solver: str
@@ -60,12 +60,12 @@ class Solver(Closure):
         vars(self).update(vars(closed))
         self._keep_limits()
         self.closed = closed
-        self.choice: Choice | None = None
+        self.choice: SolverChoice | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), self._definition(), {'name': self.name, 'choice': self.choice}
+        return type(self), self._build_arguments(), {'name': self.name, 'choice': self.choice}
 
-    def _definition(self) -> tuple[Any, ...]:
+    def _build_arguments(self) -> tuple[Any, ...]:
         """Return the arguments that build the same closure."""
         return (self.closed,)
 
@@ -88,7 +88,7 @@ class Solver(Closure):
 
         count, driven = len(batch.status), len(inputs)
         given, speeds, changes = (
-            _rows(values, driven, count)
+            _joint_values(values, driven, count)
             for values in (
                 inputs,
                 [1.0] * driven if rates is None else rates,
@@ -108,27 +108,27 @@ class Solver(Closure):
                     ).joints
         return batch
 
-    def exact(self, position: Position) -> Position:
+    def exact_position(self, position: Position) -> Position:
         """Return the position of the closed form at the same inputs."""
         return self.closed.position(*position.inputs)
 
-    def placed(self, position: Position) -> Position:
+    def place_links(self, position: Position) -> Position:
         """Return a position with the angles, slides and pins of all links."""
-        return self.exact(position)
+        return self.exact_position(position)
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:
-        return super().points(self.placed(position))
+        return super().points(self.place_links(position))
 
     def link_angles(self, position: Position) -> dict[str, float]:
-        return super().link_angles(self.placed(position))
+        return super().link_angles(self.place_links(position))
 
     def slide_values(self, position: Position) -> dict[str, float]:
-        return super().slide_values(self.placed(position))
+        return super().slide_values(self.place_links(position))
 
     def point_motion(
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> dict[tuple[str, str], PointMotion]:
-        exact = self.exact(position)
+        exact = self.exact_position(position)
         rates = self.closed.velocity(exact, *self.inputs_of(velocity.state))
         changes = self.inputs_of(acceleration.state)
         accelerations = self.closed.acceleration(exact, rates, *changes)
@@ -147,7 +147,7 @@ class Solver(Closure):
         return self.closed.closing_ranges
 
     def singularity_margin(self, position: Position) -> SingularityMargin:
-        return self.closed.singularity_margin(self.exact(position))
+        return self.closed.singularity_margin(self.exact_position(position))
 
 
 def refuse_ratios(linkage: Linkage, solver: str) -> None:
@@ -160,7 +160,7 @@ def refuse_ratios(linkage: Linkage, solver: str) -> None:
         )
 
 
-def _rows(values: Any, driven: int, count: int) -> list[list[float]]:
+def _joint_values(values: Any, driven: int, count: int) -> list[list[float]]:
     """Return the values of each driven joint, one for each state; a single joint needs no list."""
     import numpy as np  # local import: the batch alone needs it
 

@@ -84,7 +84,7 @@ def build(parameters: TableParameters, linkage: Linkage) -> TableClosure:
     return TableClosure(linkage, parameters.tolerance, span=parameters.span or None)
 
 
-class _Place(NamedTuple):
+class _TablePlace(NamedTuple):
     """A position in the table: coefficients of its cell, fraction of the cell, cells by x."""
 
     coefficients: tuple[float, ...]
@@ -92,7 +92,7 @@ class _Place(NamedTuple):
     density: float
 
 
-class _Part(NamedTuple):
+class _TablePart(NamedTuple):
     """An interval of the table: the index of its first cell, and cells by the unit of input."""
 
     low: float
@@ -158,7 +158,7 @@ class TableClosure(Solver):
                 f'needs a linkage with one input, and this one has {len(linkage.inputs)}',
                 'write solver: closed_form',
             )
-        self._period, intervals = self._intervals(span)
+        self._period, intervals = self._covered_ranges(span)
         self.proven = self.proven_rate = inf
         if knots is None:
             from linkage_ros.solvers.loops import LoopFinder  # local import: to prove only
@@ -170,20 +170,20 @@ class TableClosure(Solver):
             assert tolerance is not None
             finder = LoopFinder(linkage, self.structure, self._known)
             joints = [
-                (finder.difference(i, j), factor, constant)
+                (finder.expand_difference(i, j), factor, constant)
                 for i, j, factor, constant in self._terms
             ]
-            request = TableRequest(self.closed, finder.find(), joints, tolerance, order)
+            request = TableRequest(self.closed, finder.find_loops(), joints, tolerance, order)
             knots, self.proven, self.proven_rate = knots_for(request, intervals)
         self.knots = knots
         self._degree = ORDERS[order]
         self._parts = [
-            _Part(low, high, number * knots, knots / (high - low))
+            _TablePart(low, high, number * knots, knots / (high - low))
             for number, (low, high) in enumerate(intervals)
         ]
         self._first = self._parts[0]
         self._coefficients = np.concatenate(
-            [self._table(part.low, part.high) for part in self._parts]
+            [self._build_table(part.low, part.high) for part in self._parts]
         )
         self._data = self._coefficients.tobytes()
         _, joints, width = self._coefficients.shape
@@ -205,7 +205,7 @@ class TableClosure(Solver):
             x = to_double('inputs', x, '; solve() takes arrays')
         low, high, first, density = self._first
         if not low <= x < high:
-            part, at = self._elsewhere(x)
+            part, at = self._find_part(x)
             if part is None:
                 return self.closed.position(x)
             low, high, first, density = part
@@ -224,7 +224,7 @@ class TableClosure(Solver):
                 joints += (c[i] + t * c[i + 1],)
         given = x if self._factors is None else x * self._factors[0]
         state = LinkState([0.0, given], self._no_pins)
-        return Position(_CLOSED, 0.0, joints, state, cast('Any', _Place(c, t, density)), self)
+        return Position(_CLOSED, 0.0, joints, state, cast('Any', _TablePlace(c, t, density)), self)
 
     def residual(self, position: Position) -> float:
         """
@@ -234,16 +234,16 @@ class TableClosure(Solver):
         those of the closed form (an angle at the length of the longest link), plus the error of
         the closed form.
         """
-        exact = self.exact(position)
+        exact = self.exact_position(position)
         joints = zip(position.joints, exact.joints, self.turning, strict=True)
         arm = max(link_lengths(self.linkage.links))
         off = max(abs(ours - true) * (arm if turns else 1.0) for ours, true, turns in joints)
         return off + self.closed.residual(exact)
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
-        if not isinstance(cast('Any', position.poses), _Place):
+        if not isinstance(cast('Any', position.poses), _TablePlace):
             return self.closed.velocity(position, *rates)
-        c, t, density = cast('_Place', position.poses)
+        c, t, density = cast('_TablePlace', position.poses)
         (rate,) = rates
         if type(rate) is not float:
             rate = to_double('rates', rate, '; solve() takes arrays')
@@ -261,9 +261,9 @@ class TableClosure(Solver):
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
     ) -> Acceleration:
-        if not isinstance(cast('Any', position.poses), _Place):
+        if not isinstance(cast('Any', position.poses), _TablePlace):
             return self.closed.acceleration(position, velocity, *accelerations)
-        c, t, density = cast('_Place', position.poses)
+        c, t, density = cast('_TablePlace', position.poses)
         (factor,), (change,) = velocity.rates, accelerations
         if type(change) is not float:
             change = to_double('accelerations', change, '; solve() takes arrays')
@@ -279,7 +279,7 @@ class TableClosure(Solver):
         given = change if self._factors is None else change * self._factors[0]
         return Acceleration(joints, LinkState([0.0, given], self._no_pins), self)
 
-    def _elsewhere(self, x: float) -> tuple[_Part | None, float]:
+    def _find_part(self, x: float) -> tuple[_TablePart | None, float]:
         """Return the part of the table that holds an input, or None, and the input within it."""
         if self._period and abs(x) < _FARTHEST:
             # The exact turn is longer than the double, which this corrects.
@@ -292,7 +292,7 @@ class TableClosure(Solver):
                 return part, x
         return None, x
 
-    def _intervals(
+    def _covered_ranges(
         self, span: tuple[float, float] | None
     ) -> tuple[float, list[tuple[float, float]]]:
         """Return the period, or 0, and the ranges of the input."""
@@ -310,7 +310,7 @@ class TableClosure(Solver):
         period = whole[0].highest - whole[0].lowest if whole else 0.0
         return period, [(one.lowest, one.highest) for one in ranges]
 
-    def _table(self, low: float, high: float) -> NDArray[np.float64]:
+    def _build_table(self, low: float, high: float) -> NDArray[np.float64]:
         """Return the polynomials, of shape (cells, joints, degree + 1)."""
         x = np.linspace(low, high, self.knots + 1)
         solved = self.closed.solve(x, rates=1.0, derivatives=1)

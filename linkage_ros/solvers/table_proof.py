@@ -35,12 +35,12 @@ from linkage_ros.solvers.validated_enclosure import (
     Array,
     Cells,
     Disc,
-    enclose,
+    enclose_coordinates,
     Enclosure,
     Jet,
     Mask,
-    times,
-    total,
+    scale_disc,
+    sum_discs,
 )
 import numpy as np
 from numpy.typing import NDArray
@@ -68,10 +68,12 @@ def refuse_trouble(request: TableRequest, ranges: Sequence[tuple[float, float]])
         for singular in request.closed.singular_inputs:
             middle = 0.5 * (low + high)
             if low <= middle - signed_distance(request.closed, middle, singular.value) <= high:
-                raise refusal(request, f'cannot be proven near {place(request, singular.value)}')
+                raise unproven_error(
+                    request, f'cannot be proven near {input_text(request, singular.value)}'
+                )
 
 
-def place(request: TableRequest, value: float) -> str:
+def input_text(request: TableRequest, value: float) -> str:
     """Return a value of the input as text for a user."""
     if request.closed.linkage.inputs[0].slider:
         return f'{value:.6g} m'
@@ -83,7 +85,7 @@ def place(request: TableRequest, value: float) -> str:
     return f'the toggle or change point at {where}' if near else where
 
 
-def refusal(request: TableRequest, reason: str, remedy: str = _NARROWER) -> DefinitionError:
+def unproven_error(request: TableRequest, reason: str, remedy: str = _NARROWER) -> DefinitionError:
     """Return the error for a tolerance that is not proven."""
     # A unit in brackets is not converted to the file's: tolerances are in SI in all files.
     unit = 'rad' if any(request.closed.turning) else 'm'
@@ -112,7 +114,7 @@ _ERRORS = {'linear': (2, 2.0 / 8.0), 'hermite': (4, 24.0 / 384.0)}
 _ROUNDING = 2.0**-49
 
 
-class _Bounds(NamedTuple):
+class _ErrorBounds(NamedTuple):
     """The bounds over each cell of a range."""
 
     # The cell, in the coordinate of the input.
@@ -128,14 +130,14 @@ class _Bounds(NamedTuple):
     unknowns: Array
     boxes: Array
 
-    def chosen(self, cells: Any) -> _Bounds:
+    def choose_cells(self, cells: Any) -> _ErrorBounds:
         """Return the bounds of some cells, in their order."""
-        return _Bounds(*(field[cells] for field in self))
+        return _ErrorBounds(*(field[cells] for field in self))
 
 
-def _joined(parts: Sequence[_Bounds]) -> _Bounds:
+def _join_bounds(parts: Sequence[_ErrorBounds]) -> _ErrorBounds:
     fields: Any = zip(*parts, strict=True)
-    return _Bounds(*(np.concatenate(each) for each in fields))
+    return _ErrorBounds(*(np.concatenate(each) for each in fields))
 
 
 class RangeProof:
@@ -148,18 +150,18 @@ class RangeProof:
         self._unit = request.closed.scale if request.closed.linkage.inputs[0].slider else 1.0
         self._span = (high - low) / self._unit
         self._power, self._factor = _ERRORS[request.order]
-        self._bounds = self._refined()
+        self._bounds = self._refine_cells()
 
-    def knots(self) -> int:
+    def required_knots(self) -> int:
         """Return the number of knots that the derivatives require."""
         # The mean slope of a cell determines the whole turns of the table.
         least = self._span * float(self._bounds.slope.max()) / (0.5 * pi)
-        count = self._needed(float(self._bounds.bound.max()))
+        count = self._needed_knots(float(self._bounds.bound.max()))
         while count < least:
             count *= 2
         return count
 
-    def errors(self, knots: int) -> tuple[float, float]:
+    def error_bounds(self, knots: int) -> tuple[float, float]:
         """
         Return the errors of positions and of their derivatives, for a number of knots.
 
@@ -173,14 +175,16 @@ class RangeProof:
         for begin in range(0, knots + 1, _BLOCK):
             block = slice(begin, begin + _BLOCK)
             at = x[block]
-            enclosed = self._linked(self._bounds, at)
+            enclosed = self._enclose_points(self._bounds, at)
             for k, (turns, factor, constant) in enumerate(self._request.joints):
-                joint = _joint(turns, factor, enclosed.jets, 0)
+                joint = _joint_coefficient(turns, factor, enclosed.jets, 0)
                 off = solved.positions[k, block] - joint.center - constant
                 if self._request.closed.turning[k]:
                     off = np.remainder(off + pi, 2.0 * pi) - pi
                 value = max(value, float((np.abs(off) + joint.radius).max()))
-                joint = times(_joint(turns, factor, enclosed.jets, 1), 1.0 / self._unit)
+                joint = scale_disc(
+                    _joint_coefficient(turns, factor, enclosed.jets, 1), 1.0 / self._unit
+                )
                 off = solved.velocities[k, block] - joint.center
                 slope = max(slope, float((np.abs(off) + joint.radius).max()))
         bounds = self._bounds
@@ -197,11 +201,11 @@ class RangeProof:
         rounding = _ROUNDING * sizes
         return position + rounding, (rate + rounding / h) / self._unit
 
-    def _refined(self) -> _Bounds:
+    def _refine_cells(self) -> _ErrorBounds:
         """Return bounds over cells that are small enough."""
         low, high = self._ends
         edges = np.linspace(low / self._unit, high / self._unit, _FIRST_CELLS + 1)
-        done = self._over(edges[:-1], edges[1:])
+        done = self._bounds_over(edges[:-1], edges[1:])
         while True:
             split = ~done.proven
             if split.any():
@@ -211,78 +215,78 @@ class RangeProof:
                     self._refuse(0.5 * (done.low[where] + done.high[where]))
             else:
                 # The middles require these knots in any case: no cell need be tighter.
-                knots = self._needed(float(done.middle.max()))
-                allowed = self._allowed(knots << min(len(split) // _PLENTY, 8))
+                knots = self._needed_knots(float(done.middle.max()))
+                allowed = self._allowed_coefficient(knots << min(len(split) // _PLENTY, 8))
                 split = (done.bound > allowed) & (done.bound > _TIGHT * done.middle)
             if len(split) > _MOST_CELLS or not split.any():
-                done = done.chosen(np.argsort(done.low))
+                done = done.choose_cells(np.argsort(done.low))
                 for begin in range(0, len(done.low), _BLOCK):
                     block = slice(begin, begin + _BLOCK)
-                    self._linked(done, done.low[block] * self._unit)
-                self._linked(done, done.high[-1:] * self._unit)
+                    self._enclose_points(done, done.low[block] * self._unit)
+                self._enclose_points(done, done.high[-1:] * self._unit)
                 return done
             halves = done.low[split], 0.5 * (done.low[split] + done.high[split]), done.high[split]
-            new = self._over(np.concatenate(halves[:2]), np.concatenate(halves[1:]))
-            done = _joined([done.chosen(~split), new])
+            new = self._bounds_over(np.concatenate(halves[:2]), np.concatenate(halves[1:]))
+            done = _join_bounds([done.choose_cells(~split), new])
 
-    def _needed(self, bound: float) -> int:
+    def _needed_knots(self, bound: float) -> int:
         """Return the fewest knots at which interpolation keeps the tolerance; a power of two."""
         knots = _FEWEST_KNOTS
-        while self._allowed(knots) < bound and knots <= MOST_KNOTS:
+        while self._allowed_coefficient(knots) < bound and knots <= MOST_KNOTS:
             knots *= 2
         return knots
 
-    def _allowed(self, knots: int) -> float:
+    def _allowed_coefficient(self, knots: int) -> float:
         """Return the largest Taylor coefficient that is allowed for a number of knots."""
         share = 0.95 * self._request.tolerance
         return float(share / (self._factor * (self._span / knots) ** self._power))
 
-    def _over(self, low: Array, high: Array) -> _Bounds:
+    def _bounds_over(self, low: Array, high: Array) -> _ErrorBounds:
         """Return the bounds over cells, given in the coordinate of the input."""
         bounds = []
         for begin in range(0, len(low), _BLOCK):
             block = slice(begin, begin + _BLOCK)
             ends = low[block] * self._unit, high[block] * self._unit
-            enclosed = self._enclosed(*ends, self._power)
+            enclosed = self._enclose_cells(*ends, self._power)
             highest, slopes = (
                 [
-                    _joint(turns, factor, enclosed.jets, k)
+                    _joint_coefficient(turns, factor, enclosed.jets, k)
                     for turns, factor, _ in self._request.joints
                 ]
                 for k in (self._power, 1)
             )
             count = len(low[block])
             bounds.append(
-                _Bounds(
+                _ErrorBounds(
                     low[block],
                     high[block],
                     enclosed.proven,
-                    _largest([disc.size for disc in highest], count),
-                    _largest([np.abs(disc.center) for disc in highest], count),
-                    _largest([disc.size for disc in slopes], count),
+                    _largest_values([disc.magnitude for disc in highest], count),
+                    _largest_values([np.abs(disc.center) for disc in highest], count),
+                    _largest_values([disc.magnitude for disc in slopes], count),
                     np.concatenate([group.middle for group in enclosed.groups], axis=1),
                     np.concatenate([group.box for group in enclosed.groups], axis=1),
                 )
             )
-        return _joined(bounds)
+        return _join_bounds(bounds)
 
-    def _enclosed(self, low: Array, high: Array, order: int) -> Enclosure:
+    def _enclose_cells(self, low: Array, high: Array, order: int) -> Enclosure:
         """Enclose cells, given in [rad] or [m]."""
         middle = 0.5 * (low + high)
-        coordinates, pins = self._closed_form.at(middle)
+        coordinates, pins = self._closed_form.coordinates_at(middle)
         # Wide enough to hold its ends in spite of rounding.
         half = 0.5 * (high - low) / self._unit + _ROUNDING * np.abs(middle / self._unit)
         cells = Cells(middle / self._unit, half, coordinates, pins)
         with np.errstate(all='ignore'):
-            enclosed = enclose(self._request.groups, cells, order)
+            enclosed = enclose_coordinates(self._request.groups, cells, order)
         finite = np.isfinite(
-            _largest([jet[-1].size for jet in enclosed.jets.values()], len(middle))
+            _largest_values([jet[-1].magnitude for jet in enclosed.jets.values()], len(middle))
         )
         return enclosed._replace(proven=enclosed.proven & finite)
 
-    def _linked(self, bounds: _Bounds, x: Array) -> Enclosure:
+    def _enclose_points(self, bounds: _ErrorBounds, x: Array) -> Enclosure:
         """Enclose points; refuse if one is not the solution of the cells around it."""
-        enclosure = self._enclosed(x, x, 1)
+        enclosure = self._enclose_cells(x, x, 1)
         middle, radius, turning = (
             np.concatenate([getattr(group, name) for group in enclosure.groups], axis=-1)
             for name in ('middle', 'radius', 'turning')
@@ -300,18 +304,20 @@ class RangeProof:
         return enclosure
 
     def _refuse(self, at: float) -> NoReturn:
-        raise refusal(
-            self._request, f'cannot be proven near {place(self._request, at * self._unit)}'
+        raise unproven_error(
+            self._request, f'cannot be proven near {input_text(self._request, at * self._unit)}'
         )
 
 
-def _joint(turns: Turns, factor: float, jets: Mapping[int, Jet], order: int) -> Disc:
+def _joint_coefficient(turns: Turns, factor: float, jets: Mapping[int, Jet], order: int) -> Disc:
     """Return a Taylor coefficient of a published joint, without its constant."""
-    coefficient = times(total([times(jets[k][order], sign) for k, sign in turns]), factor)
+    coefficient = scale_disc(
+        sum_discs([scale_disc(jets[k][order], sign) for k, sign in turns]), factor
+    )
     return Disc(np.real(coefficient.center), coefficient.radius)
 
 
-def _largest(values: Sequence[Any], count: int) -> Array:
+def _largest_values(values: Sequence[Any], count: int) -> Array:
     """Return the largest value of each cell."""
     largest: Array = np.max([np.broadcast_to(value, (count,)) for value in values], axis=0)
     return largest
@@ -324,9 +330,9 @@ class _ClosedForm:
         self._numbers = [k for group in request.groups for k in group.coordinates]
         self._pins = [k for group in request.groups for k in group.pins]
         width = len(self._numbers) + 2 * len(self._pins)
-        self._solver = SolverOutline(request.closed, width, self._wanted)
+        self._solver = SolverOutline(request.closed, width, self._wanted_numbers)
 
-    def at(self, x: Array) -> tuple[Array, NDArray[np.complex128]]:
+    def coordinates_at(self, x: Array) -> tuple[Array, NDArray[np.complex128]]:
         """Return coordinates and pins, a row for each, at values in [rad] or [m]."""
         rows = self._solver.solve([x], derivatives=0).positions
         numbers, parts = np.split(rows, [len(self._numbers)])
@@ -336,7 +342,7 @@ class _ClosedForm:
         pins[self._pins] = parts[0::2] + 1j * parts[1::2]
         return coordinates, pins
 
-    def _wanted(self, motion: TracedMotion) -> list[list[float]]:
+    def _wanted_numbers(self, motion: TracedMotion) -> list[list[float]]:
         if not motion.position.joints:
             return [[]]
         x, pins = motion.position.state
@@ -371,14 +377,16 @@ def knots_for(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> P
     """
     refuse_trouble(request, ranges)
     proofs = [RangeProof(request, low, high) for low, high in ranges]
-    knots = max(one.knots() for one in proofs)
+    knots = max(one.required_knots() for one in proofs)
     while True:
         if knots > MOST_KNOTS:
-            raise refusal(request, f'takes more than {MOST_KNOTS} knots', 'ask for less')
-        position, rate = map(max, zip(*(one.errors(knots) for one in proofs), strict=True))
+            raise unproven_error(request, f'takes more than {MOST_KNOTS} knots', 'ask for less')
+        position, rate = map(max, zip(*(one.error_bounds(knots) for one in proofs), strict=True))
         if position <= request.tolerance:
             return Proven(knots, position, rate)
         if position > 2.0 * request.tolerance:
             least = f'{position:.1g}'
-            raise refusal(request, f'is finer than rounding allows here, {least}', 'ask for less')
+            raise unproven_error(
+                request, f'is finer than rounding allows here, {least}', 'ask for less'
+            )
         knots *= 2

@@ -51,7 +51,7 @@ class Disc(NamedTuple):
     radius: Any
 
     @property
-    def size(self) -> Any:
+    def magnitude(self) -> Any:
         """Return a bound of the absolute value."""
         return (np.abs(self.center) + self.radius) * _UP
 
@@ -62,28 +62,28 @@ Jet = list[Disc]
 ZERO = Disc(0.0, 0.0)
 
 
-def total(discs: Sequence[Disc]) -> Disc:
+def sum_discs(discs: Sequence[Disc]) -> Disc:
     """Return the sum."""
     center = sum(disc.center for disc in discs)
     sizes = sum(np.abs(disc.center) for disc in discs)
     return Disc(center, sum(disc.radius for disc in discs) * _UP + len(discs) * _ROUNDING * sizes)
 
 
-def product(one: Disc, other: Disc) -> Disc:
+def multiply_discs(one: Disc, other: Disc) -> Disc:
     """Return the product."""
     a, b = np.abs(one.center), np.abs(other.center)
     radius = (a * other.radius + b * one.radius + one.radius * other.radius) * _UP
     return Disc(one.center * other.center, radius + _ROUNDING * a * b + _LEAST)
 
 
-def times(disc: Disc, factor: complex) -> Disc:
+def scale_disc(disc: Disc, factor: complex) -> Disc:
     """Return the product with an exact number."""
     size = abs(factor)
     radius = disc.radius * size * _UP + _ROUNDING * size * np.abs(disc.center) + _LEAST
     return Disc(disc.center * factor, radius)
 
 
-def facing(angle: Jet) -> Jet:
+def unit_vector(angle: Jet) -> Jet:
     """
     Return e^{iφ}; its coefficient of order k is i/k·Σ j·φ_j·e_(k−j).
 
@@ -92,14 +92,17 @@ def facing(angle: Jet) -> Jet:
     center = np.exp(1j * np.asarray(angle[0].center))
     jet = [Disc(center, angle[0].radius * _UP + _ROUNDING)]
     for k in range(1, len(angle)):
-        parts = [times(product(angle[j], jet[k - j]), 1j * j) for j in range(1, k + 1)]
-        jet.append(times(total(parts), 1.0 / k))
+        parts = [scale_disc(multiply_discs(angle[j], jet[k - j]), 1j * j) for j in range(1, k + 1)]
+        jet.append(scale_disc(sum_discs(parts), 1.0 / k))
     return jet
 
 
 def jet_product(one: Jet, other: Jet) -> Jet:
     """Return the product of two series."""
-    return [total([product(one[j], other[k - j]) for j in range(k + 1)]) for k in range(len(one))]
+    return [
+        sum_discs([multiply_discs(one[j], other[k - j]) for j in range(k + 1)])
+        for k in range(len(one))
+    ]
 
 
 Array = NDArray[np.float64]
@@ -140,7 +143,7 @@ class Enclosure(NamedTuple):
     groups: list[Unknowns]  # The unknowns of each group
 
 
-def enclose(groups: Sequence[Loops], cells: Cells, order: int) -> Enclosure:
+def enclose_coordinates(groups: Sequence[Loops], cells: Cells, order: int) -> Enclosure:
     """Enclose all coordinates over the cells, up to an order of the Taylor coefficients."""
     zero = [ZERO] * (order + 1)
     given: Jet = [Disc(cells.middle, cells.half), Disc(1.0, 0.0), *zero][: order + 1]
@@ -149,14 +152,14 @@ def enclose(groups: Sequence[Loops], cells: Cells, order: int) -> Enclosure:
     proven: Mask = np.asarray(np.isfinite(cells.coordinates).all(axis=0))
     solved = []
     for loops in groups:
-        group = _Group(loops, cells, jets, pins)
-        unknowns, held = group.find(order)
+        group = _EnclosedGroup(loops, cells, jets, pins)
+        unknowns, held = group.find_unknowns(order)
         proven &= held
         solved.append(unknowns)
     return Enclosure(proven, jets, solved)
 
 
-class _Group:
+class _EnclosedGroup:
     """A group of links, and the jets known before it."""
 
     def __init__(
@@ -173,24 +176,24 @@ class _Group:
             [k in turning for k in loops.coordinates] + [False] * (2 * len(loops.pins))
         )
 
-    def find(self, order: int) -> tuple[Unknowns, Mask]:
+    def find_unknowns(self, order: int) -> tuple[Unknowns, Mask]:
         """Append the jets of the unknowns; return their solution, and where it is proven."""
         middle = self._middle
-        self._set(0, middle, np.zeros_like(middle))
-        slopes, _ = self._slopes()
-        inverse, regular = _inverse(slopes)
-        step, spread = self._step(0, inverse)
+        self._set_unknowns(0, middle, np.zeros_like(middle))
+        slopes, _ = self._equation_slopes()
+        inverse, regular = _invert_matrices(slopes)
+        step, spread = self._newton_step(0, inverse)
         first = np.abs(step) + spread
         # A pin on the ground that a group places moves only by rounding.
         box = 2.0 * first + _LEAST_BOX * (1.0 + np.abs(middle))
-        radius, held = self._within(box, first, inverse)
+        radius, held = self._distance_within(box, first, inverse)
         if not held.all():
             # The box of an unknown that does not move may be too narrow for the others' effect.
             box = np.where(held[:, None], box, np.maximum(box, 1.5 * radius))
-            radius, held = self._within(box, first, inverse)
+            radius, held = self._distance_within(box, first, inverse)
         proven = regular & held
-        self._set(0, middle, radius)
-        loss = self._loss(inverse)
+        self._set_unknowns(0, middle, radius)
+        loss = self._contraction_bound(inverse)
         worst = loss.sum(axis=2).max(axis=1)
         proven &= worst < 1.0
         for k in range(1, order + 1):
@@ -200,36 +203,40 @@ class _Group:
             ):
                 for number in numbers:
                     jets[number].append(ZERO)
-            step, spread = self._step(k, inverse)
+            step, spread = self._newton_step(k, inverse)
             with np.errstate(all='ignore'):
                 largest = (np.abs(step) + spread).max(axis=1) / (1.0 - worst)
-            self._set(k, step, (spread + loss.sum(axis=2) * largest[:, None]) * _UP_MATRIX)
+            self._set_unknowns(
+                k, step, (spread + loss.sum(axis=2) * largest[:, None]) * _UP_MATRIX
+            )
         return Unknowns(middle, box, radius, self._turning), proven
 
-    def _within(self, box: Array, first: Array, inverse: Array) -> tuple[Array, Mask]:
+    def _distance_within(self, box: Array, first: Array, inverse: Array) -> tuple[Array, Mask]:
         """Return the distance of a solution from the middle, and where it is within the box."""
-        self._set(0, self._middle, box)
-        radius: Array = (first + _image(self._loss(inverse), box)) * _UP_MATRIX
+        self._set_unknowns(0, self._middle, box)
+        radius: Array = (
+            first + _matrix_products(self._contraction_bound(inverse), box)
+        ) * _UP_MATRIX
         held: Mask = np.asarray((radius < box).all(axis=1))
         return radius, held
 
-    def _step(self, order: int, inverse: Array) -> tuple[Array, Array]:
+    def _newton_step(self, order: int, inverse: Array) -> tuple[Array, Array]:
         """Return −Y·F at an order: middles and radii."""
-        errors, spread = self._errors(order)
+        errors, spread = self._equation_values(order)
         n = errors.shape[1]
-        radius = _image(np.abs(inverse), spread + n * _ROUNDING * np.abs(errors))
-        return -_image(inverse, errors), radius * _UP_MATRIX
+        radius = _matrix_products(np.abs(inverse), spread + n * _ROUNDING * np.abs(errors))
+        return -_matrix_products(inverse, errors), radius * _UP_MATRIX
 
-    def _loss(self, inverse: Array) -> Array:
+    def _contraction_bound(self, inverse: Array) -> Array:
         """Return a bound of |1 − Y·F_y| over the current unknowns."""
-        slopes, spread = self._slopes()
+        slopes, spread = self._equation_slopes()
         n = slopes.shape[1]
         size = np.abs(inverse)
         off = np.abs(np.eye(n) - inverse @ slopes) + n * _ROUNDING * (size @ np.abs(slopes) + 1.0)
         loss: Array = (off + size @ spread) * _UP_MATRIX
         return loss
 
-    def _set(self, order: int, middle: Array, radius: Array) -> None:
+    def _set_unknowns(self, order: int, middle: Array, radius: Array) -> None:
         """Set the unknowns of an order."""
         coordinates, pins = self._loops.coordinates, self._loops.pins
         for column, k in enumerate(coordinates):
@@ -241,16 +248,16 @@ class _Group:
             place = middle[:, column] + 1j * middle[:, column + 1]
             jet[order] = Disc(place, radius[:, column] + radius[:, column + 1])
 
-    def _errors(self, order: int) -> tuple[Array, Array]:
+    def _equation_values(self, order: int) -> tuple[Array, Array]:
         """Return the values of the equations at an order: middles, radii, (cells, equations)."""
         middles, radii = [], []
         for equation in self._loops.equations:
-            residual = total([self._jet(vector, order)[order] for vector in equation])
+            residual = sum_discs([self._vector_jet(vector, order)[order] for vector in equation])
             middles += [np.real(residual.center), np.imag(residual.center)]
             radii += [residual.radius, residual.radius]
         for terms, constant, turning in self._loops.balances:
-            parts = [times(self._jets[k][order], sign) for k, sign in terms]
-            residual = total([*parts, Disc(constant if order == 0 else 0.0, 0.0)])
+            parts = [scale_disc(self._jets[k][order], sign) for k, sign in terms]
+            residual = sum_discs([*parts, Disc(constant if order == 0 else 0.0, 0.0)])
             center = np.real(residual.center)
             if turning and order == 0:
                 center = np.remainder(center + np.pi, 2.0 * np.pi) - np.pi
@@ -262,23 +269,23 @@ class _Group:
             np.stack([np.broadcast_to(one, shape) for one in radii], axis=1),
         )
 
-    def _jet(self, vector: Vector, order: int) -> Jet:
+    def _vector_jet(self, vector: Vector, order: int) -> Jet:
         factor, turns, slide, pin = vector
         if pin >= 0:
-            return [times(disc, factor) for disc in self._pins[pin][: order + 1]]
+            return [scale_disc(disc, factor) for disc in self._pins[pin][: order + 1]]
         if turns:
             angle = [
-                total([times(self._jets[k][i], sign) for k, sign in turns])
+                sum_discs([scale_disc(self._jets[k][i], sign) for k, sign in turns])
                 for i in range(order + 1)
             ]
-            way = facing(angle)
+            way = unit_vector(angle)
         else:
             way = [Disc(1.0 + 0j, 0.0), *[ZERO] * order]
         if slide >= 0:
             way = jet_product(way, self._jets[slide][: order + 1])
-        return [times(disc, factor) for disc in way]
+        return [scale_disc(disc, factor) for disc in way]
 
-    def _slopes(self) -> tuple[Array, Array]:
+    def _equation_slopes(self) -> tuple[Array, Array]:
         """Return the derivatives of equations by unknowns, (cells, equations, unknowns)."""
         coordinates, pins = self._loops.coordinates, self._loops.pins
         n = self._middle.shape[1]
@@ -290,7 +297,7 @@ class _Group:
                     middle[:, row, column] += np.real(slope.center)
                     middle[:, row + 1, column] += np.imag(slope.center)
                     radius[:, [row, row + 1], column] += np.broadcast_to(
-                        slope.size * _ROUNDING + slope.radius, (self._count,)
+                        slope.magnitude * _ROUNDING + slope.radius, (self._count,)
                     )[:, None]
         for row, balance in enumerate(self._loops.balances, 2 * len(self._loops.equations)):
             for k, sign in balance.terms:
@@ -306,23 +313,23 @@ class _Group:
             column = len(coordinates) + 2 * pins.index(pin)
             return [(column, Disc(factor, 0.0)), (column + 1, Disc(1j * factor, 0.0))]
         slopes: list[tuple[int, Disc]] = []
-        whole = self._jet(vector, 0)[0]
+        whole = self._vector_jet(vector, 0)[0]
         for k, sign in turns:
             if k in coordinates:
-                slopes.append((coordinates.index(k), times(whole, sign * 1j)))
+                slopes.append((coordinates.index(k), scale_disc(whole, sign * 1j)))
         if slide in coordinates:
-            unit = self._jet(vector._replace(slide=-1), 0)[0]
+            unit = self._vector_jet(vector._replace(slide=-1), 0)[0]
             slopes.append((coordinates.index(slide), unit))
         return slopes
 
 
-def _image(matrix: Array, vector: Array) -> Array:
+def _matrix_products(matrix: Array, vector: Array) -> Array:
     """Return the products of matrices and vectors, cell by cell."""
     image: Array = np.einsum('cij,cj->ci', matrix, vector)
     return image
 
 
-def _inverse(matrices: Array) -> tuple[Array, Mask]:
+def _invert_matrices(matrices: Array) -> tuple[Array, Mask]:
     """Return the inverse of each matrix, and which matrices have one."""
     regular: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     safe = np.where(regular[:, None, None], matrices, np.eye(matrices.shape[1]))

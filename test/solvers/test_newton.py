@@ -40,7 +40,7 @@ STARTS = {'from knots': None, 'warm': True, 'cold': False}
 def test_a_step_leaves_the_square_of_the_error(phi):
     closure = Closure(crank_rocker())
     finder = LoopFinder(closure.linkage, closure.structure, closure._known)
-    (loops,) = finder.find()
+    (loops,) = finder.find_loops()
     one_step = NewtonDyad(loops, 10.0, 10.0)
     coupler, rocker = map(float, true_joints(CRANK_ROCKER, phi))
     sign = one_step.orientation([0.0, phi, coupler + phi, rocker])

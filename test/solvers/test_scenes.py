@@ -23,7 +23,7 @@ from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.schema import scene_schema
 from linkage_ros.scene.violations import violations
 from linkage_ros.solvers import choose as choosing
-from linkage_ros.solvers.choose import choose, only_closed_form
+from linkage_ros.solvers.choose import choose_solver, only_closed_form
 from linkage_ros.solvers.newton import NewtonClosure
 from linkage_ros.solvers.solver import Solver
 from linkage_ros.solvers.table import TableClosure
@@ -265,7 +265,7 @@ KINDS = {'closed_form': Solver, 'table': TableClosure, 'newton': NewtonClosure}
 @pytest.mark.parametrize(('times', 'winner'), TIMINGS)
 def test_the_fastest_is_chosen(monkeypatch, times, winner):
     timed(monkeypatch, **{name: 1e-6 * time for name, time in times.items()})
-    found = choose(crank_rocker(), 1e-6)
+    found = choose_solver(crank_rocker(), 1e-6)
     assert type(found) is KINDS[winner]
     assert found.choice.solver == winner
     assert found.choice.parameters == ({} if winner == 'closed_form' else {'tolerance': 1e-6})
@@ -288,7 +288,7 @@ ABLE = {
 @pytest.mark.parametrize('name', ABLE)
 def test_only_solvers_that_prove_the_accuracy_are_timed(monkeypatch, name):
     asked = timed(monkeypatch, closed_form=1e-6, table=1e-6, newton=1e-6)
-    said = choose(shipped(name), 1e-6).choice.why
+    said = choose_solver(shipped(name), 1e-6).choice.why
     assert asked == [ABLE[name]]
     assert said.startswith('closed form, 1 µs a state')
     assert ('table: ' in said) == ('table' not in ABLE[name])
@@ -297,12 +297,12 @@ def test_only_solvers_that_prove_the_accuracy_are_timed(monkeypatch, name):
 
 def test_newton_does_not_prove_little(monkeypatch):
     asked = timed(monkeypatch, closed_form=1e-6, table=1e-6, newton=1e-6)
-    choose(crank_rocker((0.1, 2.0, 0.02, 1.95)), 1e-2)
+    choose_solver(crank_rocker((0.1, 2.0, 0.02, 1.95)), 1e-2)
     assert 'newton' not in asked[0]
 
 
 def test_a_real_timing_names_one_that_is_able():
-    found = choose(crank_rocker(), 1e-6)
+    found = choose_solver(crank_rocker(), 1e-6)
     assert found.choice.solver in ABLE['four_bar']
     assert found.choice.why.count(' µs') == 3
 

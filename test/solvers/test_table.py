@@ -20,11 +20,11 @@ from linkage_ros.solvers.table import TableClosure
 from linkage_ros.solvers.validated_enclosure import (
     Cells,
     Disc,
-    enclose,
-    facing,
+    enclose_coordinates,
     jet_product,
-    product,
-    total,
+    multiply_discs,
+    sum_discs,
+    unit_vector,
 )
 from mpmath import mp, mpc, mpf
 import numpy as np
@@ -271,14 +271,14 @@ def test_a_disc_holds_what_comes_of_its_numbers(a, b, c, d, r, s, p, q, t, u):
     one, other = Disc(complex(a, b), r), Disc(complex(c, d), s)
     with mp.workdps(50):
         x, y = within(one, p, t), within(other, q, u)
-        for found, true in ((product(one, other), x * y), (total([one, other]), x + y)):
+        for found, true in ((multiply_discs(one, other), x * y), (sum_discs([one, other]), x + y)):
             assert abs(mpc(complex(found.center)) - true) <= mpf(float(found.radius))
 
 
 @given(st.lists(st.tuples(reals, st.floats(0.0, 0.1)), min_size=5, max_size=5), shares)
 def test_a_direction_holds_its_series(angle, share):
     jet = [Disc(center, radius) for center, radius in angle]
-    found = facing(jet)
+    found = unit_vector(jet)
     with mp.workdps(40):
         taken = [mpf(center) + (2 * mpf(share) - 1) * radius for center, radius in angle]
 
@@ -296,11 +296,11 @@ def test_a_direction_holds_its_series(angle, share):
 def enclosed(linkage, edges):
     """Return what holds over the cells between some edges."""
     closure = Closure(linkage)
-    groups = LoopFinder(linkage, closure.structure, closure._known).find()
+    groups = LoopFinder(linkage, closure.structure, closure._known).find_loops()
     middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1:] - edges[:-1])
     states = [closure.position(x).state.coordinates for x in middle.tolist()]
     cells = Cells(middle, half, np.array(states).T, np.zeros((1, len(middle)), complex))
-    return closure, enclose(groups, cells, 4)
+    return closure, enclose_coordinates(groups, cells, 4)
 
 
 @settings(max_examples=15, deadline=None)
@@ -355,7 +355,7 @@ def test_another_assembly_is_not_taken_for_the_same():
     # What the closed form has in the middle belongs to another cell: nothing may be proven.
     linkage = crank_rocker()
     closure = Closure(linkage)
-    groups = LoopFinder(linkage, closure.structure, closure._known).find()
+    groups = LoopFinder(linkage, closure.structure, closure._known).find_loops()
     states = np.array([closure.position(x).state.coordinates for x in (1.0, 2.0)]).T
     cells = Cells(np.array([2.0, 1.0]), np.full(2, 1e-3), states, np.zeros((1, 2), complex))
-    assert not enclose(groups, cells, 1).proven.any()
+    assert not enclose_coordinates(groups, cells, 1).proven.any()
