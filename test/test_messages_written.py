@@ -23,7 +23,7 @@ from linkage_ros.messages.joint_values import (
     MULTI_DOF_JOINT_STATE,
     PlanarWrenchWriter,
 )
-from linkage_ros.messages.layout import MalformedError, packed, parsed
+from linkage_ros.messages.layout import MalformedError, pack_message, parse_message
 from linkage_ros.messages.marker_array import ADD, DELETE, Marker, MARKER_ARRAY, MarkerArrayWriter
 from linkage_ros.report.diagnostics_summary import DIAGNOSTIC_ARRAY
 import numpy as np
@@ -166,7 +166,7 @@ MESSAGES = {
     ),
     'visualization_msgs/msg/MarkerArray': Message(
         st.tuples(texts, st.lists(markers_, max_size=4), times),
-        lambda frame, markers, stamp: MarkerArrayWriter(frame, markers).message(stamp),
+        lambda frame, markers, stamp: MarkerArrayWriter(frame, markers).message_at(stamp),
         marker_array,
         [
             ('ground', [FULL], 15 * NS + 16),
@@ -262,10 +262,10 @@ def test_one_writer_writes_each_message_for_itself():
 def test_what_moves_is_written_into_its_places_and_nothing_else(at, angle, drawn, shown):
     other = FULL._replace(number=8)
     writer = MarkerArrayWriter('ground', [other, FULL, other])
-    writer.place(1, at, angle)
-    writer.paint(1, (1.0, 0.0, 0.5, 0.25))
-    writer.draw(1, drawn)
-    writer.show(1, shown)
+    writer.place_marker(1, at, angle)
+    writer.colour_marker(1, (1.0, 0.0, 0.5, 0.25))
+    writer.move_points(1, drawn)
+    writer.show_marker(1, shown)
     moved = FULL._replace(
         at=at,
         colour=(1.0, 0.0, 0.5, 0.25),
@@ -275,7 +275,7 @@ def test_what_moves_is_written_into_its_places_and_nothing_else(at, angle, drawn
     )
     expected = marker_array('ground', [other, FULL, other], 3 * NS)
     expected.markers[1] = marker_message('ground', moved, 3 * NS, angle)
-    assert writer.message(3 * NS) == serialized(expected, 'visualization_msgs/msg/MarkerArray')
+    assert writer.message_at(3 * NS) == serialized(expected, 'visualization_msgs/msg/MarkerArray')
 
 
 # Declarations, against the definitions that rosbags has of Jazzy's.
@@ -326,9 +326,11 @@ def test_fields_stand_as_ros_defines_them(kind):
 
 @pytest.mark.parametrize('kind', DECLARATIONS)
 def test_an_empty_message_is_that_of_ros_and_malformed_if_cut(kind):
-    message = packed(DECLARATIONS[kind], {})
+    message = pack_message(DECLARATIONS[kind], {})
     assert STORE.serialize_cdr(STORE.deserialize_cdr(message, kind), kind) == message
-    assert parsed(message + b'more', DECLARATIONS[kind]) == parsed(message, DECLARATIONS[kind])
+    assert parse_message(message + b'more', DECLARATIONS[kind]) == parse_message(
+        message, DECLARATIONS[kind]
+    )
     for end in range(len(message)):
         with pytest.raises(MalformedError):
-            parsed(message[:end], DECLARATIONS[kind])
+            parse_message(message[:end], DECLARATIONS[kind])

@@ -37,12 +37,12 @@ from linkage_ros.messages.joint_values import (
     FORCE_X,
     JOINT_STATE,
     Key,
+    MessageContent,
     MessageValues,
     POSITION,
     QUANTITIES,
     TYPES,
     UNITS,
-    Values,
 )
 from linkage_ros.replay.replay import own_joint_states, recorded_scene
 from linkage_ros.replay.verify import turning_joints
@@ -99,7 +99,7 @@ class _Tick(NamedTuple):
 
     published: int
     logged: int
-    messages: dict[str, Values]
+    messages: dict[str, MessageContent]
 
 
 def survey(source: Source, order: Sequence[str], report_progress: ProgressCallback) -> Found:

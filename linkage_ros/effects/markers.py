@@ -147,18 +147,18 @@ class Markers:
         points, angles = closure.points(position), closure.link_angles(position)
         red = self._red(position)
         for marker, at, colour, filled in shapes.bodies:
-            write.place(marker, points[at], angles[at.link])
-            write.paint(marker, ALARM if filled and at.link in red else colour)
+            write.place_marker(marker, points[at], angles[at.link])
+            write.colour_marker(marker, ALARM if filled and at.link in red else colour)
         pins = [points[at] for at in shapes.pin_places]
         for marker in shapes.pins:
-            write.draw(marker, pins)
+            write.move_points(marker, pins)
         for marker, at, trail in zip(
             shapes.trails, shapes.trail_places, self._trails, strict=True
         ):
             place = points[at]
             trail.append(place)
             # A line has its full number of points from the start.
-            write.draw(marker, [*trail, *(place,) * (trail.maxlen or 0)][: trail.maxlen])
+            write.move_points(marker, [*trail, *(place,) * (trail.maxlen or 0)][: trail.maxlen])
         for marker, drawn in zip(
             shapes.forces, self._arrows.forces(points, motion.reactions), strict=True
         ):
@@ -169,8 +169,8 @@ class Markers:
             strict=True,
         ):
             _show(write, marker, drawn)
-        write.show(shapes.status, False)
-        return write.message(now)
+        write.show_marker(shapes.status, False)
+        return write.message_at(now)
 
     def due(self, now: int) -> bool:
         """Return whether a message is due at a time, in [ns]."""
@@ -197,7 +197,7 @@ class Markers:
         ]
         if self._still_due(now):
             markers += shapes.still
-        return MarkerArrayWriter(self._frame, markers).message(now)
+        return MarkerArrayWriter(self._frame, markers).message_at(now)
 
     def _still_due(self, now: int) -> bool:
         """Return whether the still markers are due."""
@@ -212,8 +212,8 @@ class Markers:
 
 
 def _show(write: MarkerArrayWriter, marker: int, drawn: list[complex]) -> None:
-    write.show(marker, bool(drawn))
-    write.draw(marker, drawn)
+    write.show_marker(marker, bool(drawn))
+    write.move_points(marker, drawn)
 
 
 def _lifetimes(use: MarkersParameters, context: Context) -> tuple[int, int]:

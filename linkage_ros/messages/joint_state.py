@@ -25,18 +25,18 @@ from linkage_ros.generated_code import Lines
 from linkage_ros.messages.layout import (
     ArrayWriter,
     byte_order,
-    declared,
+    compile_pattern,
     MalformedError,
     NANOSECONDS,
-    Numbers,
-    packed,
-    parsed,
+    NumberArray,
+    pack_message,
+    parse_declaration,
+    parse_message,
     Pattern,
-    pattern,
     STAMP_END,
 )
 
-JOINT_STATE = declared(
+JOINT_STATE = parse_declaration(
     'Time stamp, string frame_id, string[] name, '
     'float64[] position, float64[] velocity, float64[] effort'
 )
@@ -105,24 +105,24 @@ class JointStateReader:
                         return Rejection.STAMP_INVALID
                     stamp = seconds * NANOSECONDS + nanoseconds
                     return CrankSample(stamp, pick_positions(values), pick_rates(values) or None)
-        layout = _pattern(data, self._joints)
+        layout = _sample_pattern(data, self._joints)
         if isinstance(layout, Rejection):
             return layout
         self._known = *layout[:4], *layout.picks
         return self.read(data)
 
 
-def arrays_of(data: bytes) -> tuple[str, list[bytes], list[Numbers]] | Rejection:
+def arrays_of(data: bytes) -> tuple[str, list[bytes], list[NumberArray]] | Rejection:
     """Return byte order, names, and the places of positions, rates and efforts."""
     try:
-        fields = parsed(data, JOINT_STATE)
+        fields = parse_message(data, JOINT_STATE)
     except MalformedError:
         return Rejection.MALFORMED
     arrays = [fields[name] for name in ('position', 'velocity', 'effort')]
     return byte_order(data), fields['name'], arrays
 
 
-def _pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection:
+def _sample_pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection:
     arrays_or_reason = arrays_of(data)
     if isinstance(arrays_or_reason, Rejection):
         return arrays_or_reason
@@ -142,7 +142,7 @@ def _pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection:
         [array.first + place for place in places] if array.length else []
         for array in (positions, rates)
     ]
-    return pattern(data, arrays, groups)
+    return compile_pattern(data, arrays, groups)
 
 
 class JointStateWriter(ArrayWriter):
@@ -164,7 +164,7 @@ class JointStateWriter(ArrayWriter):
         arrays = {'positions': 'position', 'rates': 'velocity', 'efforts': 'effort'}
         super().__init__(JOINT_STATE, {'name': names}, arrays)
 
-    def straight(
+    def compile_write(
         self,
         stamp: str,
         positions: Sequence[str],
@@ -173,7 +173,9 @@ class JointStateWriter(ArrayWriter):
     ) -> Lines:
         """Return `write` as generated lines that make ``message`` from expressions."""
         arrays = {'positions': positions, 'rates': rates, 'efforts': efforts}
-        call = self.call({name: ', '.join(given) for name, given in arrays.items() if given})
+        call = self.message_expression(
+            {name: ', '.join(given) for name, given in arrays.items() if given}
+        )
         lines = [f'seconds, nanoseconds = divmod({stamp}, {NANOSECONDS})']
         return Lines([*lines, f'message = {call.lines[0]}'], call.bound)
 
@@ -196,9 +198,9 @@ class OwnJointStates:
         linkages = tuple(linkages)
         joints = [joint for linkage in linkages for joint in linkage]
         self._all = (
-            _NO_FRAME + _COUNT.pack(len(joints)) + _names(joints) + _COUNT.pack(len(joints))
+            _NO_FRAME + _COUNT.pack(len(joints)) + _encode_names(joints) + _COUNT.pack(len(joints))
         )
-        self._linkages = [(len(linkage), _names(linkage)) for linkage in linkages]
+        self._linkages = [(len(linkage), _encode_names(linkage)) for linkage in linkages]
 
     def __call__(self, message: bytes) -> bool:
         """Return whether a serialized message is a joint state of the scene."""
@@ -219,16 +221,18 @@ class OwnJointStates:
 
 _COUNT = Struct('<I')
 
-_NO_FRAME = packed(declared('Time stamp, string frame_id'), {})[STAMP_END:].ljust(8, b'\0')
+_NO_FRAME = pack_message(parse_declaration('Time stamp, string frame_id'), {})[STAMP_END:].ljust(
+    8, b'\0'
+)
 """Bytes between the stamp and the count of the names: an empty frame_id."""
 
 _COUNT_AT = STAMP_END + len(_NO_FRAME)
 _FIRST_NAME = _COUNT_AT + _COUNT.size
 
 
-def _names(joints: Sequence[str]) -> bytes:
+def _encode_names(joints: Sequence[str]) -> bytes:
     """Return the names as encoded in a message, up to the next field."""
-    data = packed(declared('string[] name'), {'name': joints})[8:]
+    data = pack_message(parse_declaration('string[] name'), {'name': joints})[8:]
     return data + bytes(-len(data) % 4)
 
 
@@ -321,4 +325,4 @@ def _effort_pattern(
     if names.count(joint) > 1:
         return Rejection.TWICE
     commanded = names if efforts.length == len(names) else able
-    return pattern(data, arrays, [[efforts.first + 8 * commanded.index(joint)]])
+    return compile_pattern(data, arrays, [[efforts.first + 8 * commanded.index(joint)]])

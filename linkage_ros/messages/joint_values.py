@@ -27,15 +27,15 @@ from linkage_ros.messages import joint_state as declaration
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.layout import (
     ArrayWriter,
-    declared,
+    compile_packing,
+    compile_pattern,
     MalformedError,
     NANOSECONDS,
-    Numbers,
-    packed,
-    packing,
-    parsed,
+    NumberArray,
+    pack_message,
+    parse_declaration,
+    parse_message,
     Pattern,
-    pattern,
 )
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -68,7 +68,7 @@ Key = tuple[str, str]
 """A joint's name, and the quantity."""
 
 
-class Values(NamedTuple):
+class MessageContent(NamedTuple):
     """The values in a message."""
 
     stamp: int  # In [ns]
@@ -95,12 +95,12 @@ class MessageValues:
     __slots__ = ('_known', '_parse')
 
     def __init__(self, message_type: str, dependent: Collection[str] = ()) -> None:
-        self._parse = _PARSERS.get(message_type, _others)
+        self._parse = _PARSERS.get(message_type, _parse_other)
         if message_type == JOINT_STATE:
-            self._parse = partial(_joint_state, dependent=dependent)
+            self._parse = partial(_parse_joint_state, dependent=dependent)
         self._known: tuple[Pattern, tuple[Key, ...], tuple[str, ...]] | None = None
 
-    def read(self, data: bytes) -> Values | str:
+    def read(self, data: bytes) -> MessageContent | str:
         """Return the values of a message, or the reason why it is skipped."""
         if self._known is not None:
             (size, unpack_from, pick_fixed, fixed, (pick,)), keys, joints = self._known
@@ -108,7 +108,7 @@ class MessageValues:
                 values = unpack_from(data)
                 if pick_fixed(values) == fixed:
                     stamp = values[1] * NANOSECONDS + values[2]
-                    return Values(stamp, keys, joints, pick(values))
+                    return MessageContent(stamp, keys, joints, pick(values))
         try:
             parsed_or_reason = self._parse(data)
         except MalformedError:
@@ -125,21 +125,21 @@ class MessageValues:
             for place, quantity in quantities
         }
         arrays = [array for array, _, _ in columns]
-        known = pattern(data, arrays, [list(places.values())], width)
+        known = compile_pattern(data, arrays, [list(places.values())], width)
         self._known = known, tuple(places), tuple(names)
         return self.read(data)
 
 
-_Column = tuple[Numbers, Sequence[str], Sequence[tuple[int, str]]]
+_Column = tuple[NumberArray, Sequence[str], Sequence[tuple[int, str]]]
 """An array, the joints of its elements, and the quantity of each number of an element."""
 
 _Parsed = tuple[Sequence[str], Sequence[_Column], int]
 """All joints, the arrays, and the number of numbers per element."""
 
 
-def _joint_state(data: bytes, dependent: Collection[str] = ()) -> _Parsed | str:
-    fields = parsed(data, declaration.JOINT_STATE)
-    names = _texts(fields['name'])
+def _parse_joint_state(data: bytes, dependent: Collection[str] = ()) -> _Parsed | str:
+    fields = parse_message(data, declaration.JOINT_STATE)
+    names = _decode_names(fields['name'])
     able = [name for name in names if name not in dependent]
     columns: list[_Column] = []
     for name, quantity in (('position', POSITION), ('velocity', RATE), ('effort', EFFORT)):
@@ -151,9 +151,9 @@ def _joint_state(data: bytes, dependent: Collection[str] = ()) -> _Parsed | str:
     return names, columns, 1
 
 
-def _trajectory(data: bytes) -> _Parsed | str:
-    fields = parsed(data, JOINT_TRAJECTORY)
-    names = _texts(fields['joint_names'])
+def _parse_trajectory(data: bytes) -> _Parsed | str:
+    fields = parse_message(data, JOINT_TRAJECTORY)
+    names = _decode_names(fields['joint_names'])
     if len(fields['points']) != 1:
         return POINTS
     (point,) = fields['points']
@@ -165,9 +165,9 @@ def _trajectory(data: bytes) -> _Parsed | str:
     return names, [(array, names, [(0, quantity)]) for array, quantity in columns], 1
 
 
-def _wrenches(data: bytes) -> _Parsed | str:
-    fields = parsed(data, MULTI_DOF_JOINT_STATE)
-    names, wrenches = _texts(fields['joint_names']), fields['wrench']
+def _parse_wrenches(data: bytes) -> _Parsed | str:
+    fields = parse_message(data, MULTI_DOF_JOINT_STATE)
+    names, wrenches = _decode_names(fields['joint_names']), fields['wrench']
     if fields['transforms'].length or fields['twist'].length:
         return POSES
     if wrenches.length not in (0, len(names)):
@@ -175,27 +175,27 @@ def _wrenches(data: bytes) -> _Parsed | str:
     return names, [(wrenches, names, [(0, FORCE_X), (1, FORCE_Y), (5, TORQUE)])], 6
 
 
-def _others(_: bytes) -> str:
+def _parse_other(_: bytes) -> str:
     return NO_JOINTS
 
 
 _PARSERS: dict[str, Callable[[bytes], _Parsed | str]] = {
-    JOINT_STATE: _joint_state,
-    TRAJECTORY: _trajectory,
-    WRENCHES: _wrenches,
+    JOINT_STATE: _parse_joint_state,
+    TRAJECTORY: _parse_trajectory,
+    WRENCHES: _parse_wrenches,
 }
 
 TYPES = tuple(_PARSERS)
 """Message types that can be read."""
 
 
-def _texts(names: Sequence[bytes]) -> list[str]:
+def _decode_names(names: Sequence[bytes]) -> list[str]:
     return [name.decode('utf-8', 'backslashreplace') for name in names]
 
 
-JOINT_TRAJECTORY = declared(
+JOINT_TRAJECTORY = parse_declaration(
     'Time stamp, string frame_id, string[] joint_names, JointTrajectoryPoint[] points',
-    JointTrajectoryPoint=declared(
+    JointTrajectoryPoint=parse_declaration(
         'float64[] positions, float64[] velocities, float64[] accelerations, float64[] effort, '
         'Duration time_from_start'
     ),
@@ -226,7 +226,7 @@ class JointTrajectoryWriter(ArrayWriter):
         super().__init__(JOINT_TRAJECTORY, {'joint_names': names}, arrays, 'points')
 
 
-MULTI_DOF_JOINT_STATE = declared(
+MULTI_DOF_JOINT_STATE = parse_declaration(
     'Time stamp, string frame_id, string[] joint_names, '
     'Transform[] transforms, Twist[] twist, Wrench[] wrench'
 )
@@ -239,10 +239,12 @@ class PlanarWrenchWriter:
 
     def __init__(self, names: Sequence[str]) -> None:
         values = {'joint_names': names, 'wrench': [(0.0,) * 6] * len(names)}
-        message = packed(MULTI_DOF_JOINT_STATE, values)
-        wrenches = parsed(message, MULTI_DOF_JOINT_STATE)['wrench']
+        message = pack_message(MULTI_DOF_JOINT_STATE, values)
+        wrenches = parse_message(message, MULTI_DOF_JOINT_STATE)['wrench']
         # Force z and torque x, y of a wrench are zeros between the changing numbers.
-        self._pack, self._constants = packing(message, [(wrenches.first, 'dd24xd' * len(names))])
+        self._pack, self._constants = compile_packing(
+            message, [(wrenches.first, 'dd24xd' * len(names))]
+        )
 
     def write(self, stamp: int, wrenches: Sequence[tuple[float, float, float]]) -> bytes:
         """

@@ -71,7 +71,7 @@ class Field(NamedTuple):
     many: bool
 
 
-def declared(text: str, **nested: tuple[Field, ...]) -> tuple[Field, ...]:
+def parse_declaration(text: str, **nested: tuple[Field, ...]) -> tuple[Field, ...]:
     """
     Parse the declaration of a message.
 
@@ -95,7 +95,7 @@ class MalformedError(ValueError):
     """Bytes that are not a message of the declared type."""
 
 
-class Numbers(NamedTuple):
+class NumberArray(NamedTuple):
     """Place of a sequence: its count, and its first number; a single number has no count."""
 
     count_at: int
@@ -110,7 +110,7 @@ def byte_order(data: bytes) -> str:
     return _COUNTS[data[:2]].format[0]
 
 
-def parsed(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str, Any]:
+def parse_message(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str, Any]:
     """
     Return the declared fields of a message by name; bytes after its end are ignored.
 
@@ -120,7 +120,7 @@ def parsed(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str,
     """
     byte_order(data)
     try:
-        values, end = _parse(data, 4, fields, _COUNTS[data[:2]], most)
+        values, end = _parse_fields(data, 4, fields, _COUNTS[data[:2]], most)
     except StructError:
         raise MalformedError('ends too early') from None
     if end > len(data):
@@ -128,7 +128,7 @@ def parsed(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str,
     return values
 
 
-def _parse(
+def _parse_fields(
     data: bytes, at: int, fields: Iterable[Field], number: Struct, most: int
 ) -> tuple[dict[str, Any], int]:
     """Return the fields from a position on, and the position of their end."""
@@ -140,10 +140,10 @@ def _parse(
             (count,) = number.unpack_from(data, count_at)
             at = count_at + 4
         if isinstance(kind, str) and kind != _TEXT:
-            size, total = _sizes(kind)
+            size, total = _type_sizes(kind)
             first = at + (4 - at) % size if count else at
             at = first + total * count
-            values[name] = Numbers(count_at if many else first, count, first)
+            values[name] = NumberArray(count_at if many else first, count, first)
             continue
         if count > most:
             raise MalformedError(f'more than {most:,} elements')
@@ -157,19 +157,19 @@ def _parse(
                 end = at - 1
                 elements.append(data[start:end])
             else:
-                element, at = _parse(data, at, kind, number, most)
+                element, at = _parse_fields(data, at, kind, number, most)
                 elements.append(element)
         values[name] = elements if many else elements[0]
     return values, at
 
 
 @cache
-def _sizes(kind: str) -> tuple[int, int]:
+def _type_sizes(kind: str) -> tuple[int, int]:
     """Return the size of each number of a type, and of all of them."""
     return calcsize(f'<{kind[-1]}'), calcsize(f'<{kind}')
 
 
-def packed(fields: Iterable[Field], values: Mapping[str, Any]) -> bytes:
+def pack_message(fields: Iterable[Field], values: Mapping[str, Any]) -> bytes:
     """
     Serialize a message, little-endian.
 
@@ -183,31 +183,31 @@ def packed(fields: Iterable[Field], values: Mapping[str, Any]) -> bytes:
 
     """
     data = bytearray(ENCAPSULATION)
-    _pack(data, fields, values)
+    _pack_fields(data, fields, values)
     return bytes(data)
 
 
-def _pack(data: bytearray, fields: Iterable[Field], values: Mapping[str, Any]) -> None:
-    def add(kind: str, *numbers: float) -> None:
-        size, _ = _sizes(kind)
+def _pack_fields(data: bytearray, fields: Iterable[Field], values: Mapping[str, Any]) -> None:
+    def add_numbers(kind: str, *numbers: float) -> None:
+        size, _ = _type_sizes(kind)
         data.extend(bytes((4 - len(data)) % size))
         data.extend(pack(f'<{kind}', *numbers))
 
     for name, kind, many in fields:
         value = values.get(name)
         if many:
-            add(_COUNT, len(value or ()))
+            add_numbers(_COUNT, len(value or ()))
         for element in (value or ()) if many else (value,):
             if not isinstance(kind, str):
-                _pack(data, kind, element or {})
+                _pack_fields(data, kind, element or {})
             elif kind == _TEXT:
                 text = (element or '').encode() + b'\0'
-                add(_COUNT, len(text))
+                add_numbers(_COUNT, len(text))
                 data.extend(text)
             elif element is None:
-                add(kind, *unpack(f'<{kind}', bytes(_sizes(kind)[1])))
+                add_numbers(kind, *unpack(f'<{kind}', bytes(_type_sizes(kind)[1])))
             else:
-                add(kind, *(element if isinstance(element, tuple) else (element,)))
+                add_numbers(kind, *(element if isinstance(element, tuple) else (element,)))
 
 
 class Pattern(NamedTuple):
@@ -226,8 +226,8 @@ class Pattern(NamedTuple):
     picks: tuple[Callable[[tuple[Any, ...]], tuple[Any, ...]], ...]
 
 
-def pattern(
-    data: bytes, arrays: Iterable[Numbers], groups: Sequence[Sequence[int]], width: int = 1
+def compile_pattern(
+    data: bytes, arrays: Iterable[NumberArray], groups: Sequence[Sequence[int]], width: int = 1
 ) -> Pattern:
     """
     Compile the layout of a message whose first field is a header.
@@ -263,24 +263,24 @@ def pattern(
             fixed.append(number)
         number += len(kind) if kind == 'iI' else 1
     fields += f'{end - at}x'
-    struct, pick_fixed = Struct(fields), _pick(fixed)
+    struct, pick_fixed = Struct(fields), _make_picker(fixed)
     return Pattern(
         size=struct.size,
         unpack_from=struct.unpack_from,
         pick_fixed=pick_fixed,
         fixed=pick_fixed(struct.unpack_from(data)),
-        picks=tuple(_pick([places[first] for first in group]) for group in groups),
+        picks=tuple(_make_picker([places[first] for first in group]) for group in groups),
     )
 
 
-def _pick(places: Sequence[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
+def _make_picker(places: Sequence[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
     """Return a function that picks values of a tuple, as a tuple, in one C call."""
     if len(places) > 1:
         return itemgetter(*places)
     return itemgetter(slice(places[0], places[0] + 1) if places else slice(0))
 
 
-def packing(
+def compile_packing(
     message: bytes, arrays: Iterable[tuple[int, str]]
 ) -> tuple[Callable[..., bytes], list[bytes]]:
     """
@@ -350,7 +350,7 @@ class ArrayWriter:
         for size in range(len(others), -1, -1):
             for number, filled in enumerate(combinations(others, size)):
                 numbers = {name: f'*{name}' for name in (first, *filled)}
-                call = self.call(numbers, f'pack{size}{number}_')
+                call = self.message_expression(numbers, f'pack{size}{number}_')
                 condition = f'if {" and ".join(filled)}: ' if filled else ''
                 lines.append(f'    {condition}return {call.lines[0]}')
                 bound |= call.bound
@@ -358,7 +358,7 @@ class ArrayWriter:
         # arrays but the first may be empty, which is their default.
         self.write = written('\n'.join(lines), 'write', bound)
 
-    def call(self, numbers: Mapping[str, str], name: str = 'pack') -> Lines:
+    def message_expression(self, numbers: Mapping[str, str], name: str = 'pack') -> Lines:
         """
         Return an expression for a message from ``seconds``, ``nanoseconds`` and numbers.
 
@@ -374,10 +374,10 @@ class ArrayWriter:
         (joints,) = self._names.values()
         values = dict.fromkeys((self._arrays[array] for array in numbers), (0.0,) * len(joints))
         within = {self._within: [values]} if self._within else values
-        message = packed(self._fields, {**self._names, **within})
-        places_by_name = parsed(message, self._fields)
+        message = pack_message(self._fields, {**self._names, **within})
+        places_by_name = parse_message(message, self._fields)
         places = places_by_name[self._within][0] if self._within else places_by_name
-        pack, constants = packing(
+        pack, constants = compile_packing(
             message, [(places[field].first, f'{len(joints)}d') for field in values]
         )
         bound = {f'{name}{i}': constant for i, constant in enumerate(constants)}

@@ -20,7 +20,13 @@ from math import cos, sin
 from struct import Struct
 from typing import Any, NamedTuple
 
-from linkage_ros.messages.layout import declared, NANOSECONDS, Numbers, packed, parsed
+from linkage_ros.messages.layout import (
+    NANOSECONDS,
+    NumberArray,
+    pack_message,
+    parse_declaration,
+    parse_message,
+)
 
 ARROW, LINE_STRIP, LINE_LIST, SPHERE_LIST = 0, 4, 5, 7
 TEXT_VIEW_FACING, TRIANGLE_LIST = 9, 11
@@ -59,21 +65,23 @@ _STAMP = Struct('<iI')
 _COLOUR = Struct('<4f')
 _XY = _TURN = Struct('<2d')
 
-MARKER_ARRAY = declared(
+MARKER_ARRAY = parse_declaration(
     'Marker[] markers',
-    Marker=declared(
+    Marker=parse_declaration(
         'Time stamp, string frame_id, string ns, int32 id, int32 type, int32 action, Pose pose, '
         'Vector3 scale, ColorRGBA color, Duration lifetime, bool frame_locked, Point[] points, '
         'ColorRGBA[] colors, string texture_resource, CompressedImage texture, '
         'UVCoordinate[] uv_coordinates, string text, string mesh_resource, MeshFile mesh_file, '
         'bool mesh_use_embedded_materials',
-        CompressedImage=declared('Time stamp, string frame_id, string format, uint8[] data'),
-        MeshFile=declared('string filename, uint8[] data'),
+        CompressedImage=parse_declaration(
+            'Time stamp, string frame_id, string format, uint8[] data'
+        ),
+        MeshFile=parse_declaration('string filename, uint8[] data'),
     ),
 )
 
 
-def _values(frame: str, marker: Marker) -> dict[str, Any]:
+def _field_values(frame: str, marker: Marker) -> dict[str, Any]:
     """Return the fields of a marker that are not zero or empty."""
     return {
         'frame_id': frame,
@@ -96,35 +104,37 @@ class MarkerArrayWriter:
     __slots__ = ('_buffer', '_where')
 
     def __init__(self, frame: str, markers: Sequence[Marker]) -> None:
-        message = packed(MARKER_ARRAY, {'markers': [_values(frame, one) for one in markers]})
+        message = pack_message(
+            MARKER_ARRAY, {'markers': [_field_values(frame, one) for one in markers]}
+        )
         self._buffer = bytearray(message)
         self._where = [
-            {name: field.first for name, field in marker.items() if isinstance(field, Numbers)}
-            for marker in parsed(message, MARKER_ARRAY)['markers']
+            {name: field.first for name, field in marker.items() if isinstance(field, NumberArray)}
+            for marker in parse_message(message, MARKER_ARRAY)['markers']
         ]
 
-    def message(self, stamp: int) -> bytes:
+    def message_at(self, stamp: int) -> bytes:
         """Return the message for a time, in [ns]."""
         time = divmod(stamp, NANOSECONDS)
         for where in self._where:
             _STAMP.pack_into(self._buffer, where['stamp'], *time)
         return bytes(self._buffer)
 
-    def show(self, number: int, shown: bool) -> None:
+    def show_marker(self, number: int, shown: bool) -> None:
         """Show or delete a marker."""
         _COUNT.pack_into(self._buffer, self._where[number]['action'], ADD if shown else DELETE)
 
-    def place(self, number: int, place: complex, angle: float) -> None:
+    def place_marker(self, number: int, place: complex, angle: float) -> None:
         """Move a marker's frame to a place in [m], turned by an angle in [rad]."""
         at = self._where[number]['pose']
         _XY.pack_into(self._buffer, at, place.real, place.imag)
         _TURN.pack_into(self._buffer, at + 40, sin(0.5 * angle), cos(0.5 * angle))
 
-    def paint(self, number: int, colour: Colour) -> None:
+    def colour_marker(self, number: int, colour: Colour) -> None:
         """Give a marker another colour."""
         _COLOUR.pack_into(self._buffer, self._where[number]['color'], *colour)
 
-    def draw(self, number: int, places: Iterable[complex]) -> None:
+    def move_points(self, number: int, places: Iterable[complex]) -> None:
         """Move the points of a marker, which stay as many, to places in its frame, in [m]."""
         at = self._where[number]['points']
         for place in places:

@@ -10,10 +10,18 @@
 
 from __future__ import annotations
 
-from linkage_ros.messages.layout import declared, NANOSECONDS, packed, packing, parsed
+from linkage_ros.messages.layout import (
+    compile_packing,
+    NANOSECONDS,
+    pack_message,
+    parse_declaration,
+    parse_message,
+)
 
-_PACK_TIME, (_ENCAPSULATION,) = packing(packed(declared('Time time'), {}), ())
-_STRING = declared('string data')
+_PACK_TIME, (_ENCAPSULATION,) = compile_packing(
+    pack_message(parse_declaration('Time time'), {}), ()
+)
+_STRING = parse_declaration('string data')
 
 TIME_END = 2**31 * NANOSECONDS
 """Upper bound of message stamps (exclusive), in [ns]."""
@@ -26,7 +34,7 @@ def time_message(time: int) -> bytes:
 
 def text_message(text: str) -> bytes:
     """Return a ``std_msgs/msg/String``."""
-    return packed(_STRING, {'data': text})
+    return pack_message(_STRING, {'data': text})
 
 
 def text_of(message: bytes) -> str:
@@ -39,5 +47,5 @@ def text_of(message: bytes) -> str:
         The bytes are no such message, or no text.
 
     """
-    data: bytes = parsed(message, _STRING)['data']
+    data: bytes = parse_message(message, _STRING)['data']
     return data.decode()

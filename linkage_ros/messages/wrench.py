@@ -14,11 +14,16 @@ from struct import Struct
 from typing import NamedTuple
 
 from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.messages.layout import byte_order, declared, MalformedError, parsed
+from linkage_ros.messages.layout import (
+    byte_order,
+    MalformedError,
+    parse_declaration,
+    parse_message,
+)
 
 WRENCH_STAMPED = 'geometry_msgs/msg/WrenchStamped'
 
-_FIELDS = declared('Time stamp, string frame_id, Wrench wrench')
+_FIELDS = parse_declaration('Time stamp, string frame_id, Wrench wrench')
 _NUMBERS = {order: Struct(f'{order}6d') for order in '<>'}
 
 
@@ -39,7 +44,7 @@ def read_wrench(data: bytes) -> PlanarWrench | Rejection:
     in the frame that the scene names. The numbers may be any.
     """
     try:
-        first = parsed(data, _FIELDS)['wrench'].first
+        first = parse_message(data, _FIELDS)['wrench'].first
     except MalformedError:
         return Rejection.MALFORMED
     fx, fy, _, _, _, moment = _NUMBERS[byte_order(data)].unpack_from(data, first)

@@ -251,7 +251,7 @@ def straight_tick(
     """
     bound: dict[str, Any] = {'Tick': tick, 'linkages': linkages, 'plain': plain}
     bound |= {f'write{number}': extra.write for number, extra in enumerate(extras)}
-    packed = writer.straight('now', usual.joints, usual.rates, usual.efforts)
+    packed = writer.compile_write('now', usual.joints, usual.rates, usual.efforts)
     lines = [f'reading = {_reading(usual)}', *packed.lines]
     if extras:
         lines.append('reading = new(Reading, reading)')

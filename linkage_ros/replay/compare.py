@@ -20,7 +20,7 @@ from math import copysign, isfinite, isnan, sqrt, tau, ulp
 from struct import Struct
 from typing import NamedTuple
 
-from linkage_ros.messages.joint_values import Key, MessageValues, POSITION, Values
+from linkage_ros.messages.joint_values import Key, MessageContent, MessageValues, POSITION
 
 _DOUBLE, _BITS = Struct('<d'), Struct('<q')
 
@@ -243,7 +243,7 @@ def _equal(a: float, b: float) -> bool:
 
 
 def _unturned(
-    then: Values, numbers: Mapping[Key, float], turning: Mapping[str, bool]
+    then: MessageContent, numbers: Mapping[Key, float], turning: Mapping[str, bool]
 ) -> dict[Key, float]:
     """Return the positions, with whole-turn differences replaced by the recorded values."""
     unturned = {}
@@ -258,7 +258,7 @@ def _unturned(
     return unturned
 
 
-def _why(then: Values, again: Values) -> str:
+def _why(then: MessageContent, again: MessageContent) -> str:
     """Return the difference of two messages whose numbers are equal, as text."""
     if then.names != again.names:
         return f'joints: {", ".join(then.names)} then, {", ".join(again.names)} now'

@@ -29,7 +29,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.messages.joint_values import MessageValues, Values, WRENCHES
+from linkage_ros.messages.joint_values import MessageContent, MessageValues, WRENCHES
 from linkage_ros.messages.wrench import read_wrench
 from linkage_ros.replay.verify import turning_joints
 from linkage_ros.report.decimation import (
@@ -333,7 +333,7 @@ class PinForces:
 
     def add(self, times: Times, messages: Sequence[bytes]) -> None:
         """Add messages at run times in [ns]; those of one time, of several linkages, are a row."""
-        good: list[tuple[int, Values]] = []
+        good: list[tuple[int, MessageContent]] = []
         for time, message in zip(times.tolist(), messages, strict=True):
             values = self._reader.read(message)
             if isinstance(values, str):

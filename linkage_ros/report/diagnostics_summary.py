@@ -18,15 +18,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from linkage_ros.messages.layout import declared, MalformedError, parsed
+from linkage_ros.messages.layout import MalformedError, parse_declaration, parse_message
 from linkage_ros.report.labels import short
 from linkage_ros.report.run import Lane
 
-DIAGNOSTIC_ARRAY = declared(
+DIAGNOSTIC_ARRAY = parse_declaration(
     'Time stamp, string frame_id, DiagnosticStatus[] status',
-    DiagnosticStatus=declared(
+    DiagnosticStatus=parse_declaration(
         'uint8 level, string name, string message, string hardware_id, KeyValue[] values',
-        KeyValue=declared('string key, string value'),
+        KeyValue=parse_declaration('string key, string value'),
     ),
 )
 
@@ -46,7 +46,7 @@ class Status(NamedTuple):
 def statuses(data: bytes) -> list[Status]:
     """Return the statuses of a message; none if it is damaged."""
     try:
-        found = parsed(data, DIAGNOSTIC_ARRAY, _MOST_ITEMS)['status']
+        found = parse_message(data, DIAGNOSTIC_ARRAY, _MOST_ITEMS)['status']
     except MalformedError:
         return []
     return [
