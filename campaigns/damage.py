@@ -36,7 +36,7 @@ from campaigns.campaign import (
     publish,
     results_of,
 )
-from linkage_ros.bag.mcap_records import Message, Source
+from linkage_ros.bag.mcap_records import Message, RecordSource
 from linkage_ros.bag.reader import BagMessage, read_bag, topic_of
 from linkage_ros.bag.salvage import Salvage
 from linkage_ros.bag.topic import QosProfile, Topic
@@ -189,8 +189,8 @@ def judge_salvage(subject: Subject) -> str:
     channels = {}
     try:
         with subject.file.open('rb') as stream:
-            salvage = Salvage(Source(stream))
-            for found in salvage.found():
+            salvage = Salvage(RecordSource(stream))
+            for found in salvage.find_records():
                 if isinstance(found, Message):
                     channels[id(found.channel)] = found.channel
                     given.append(

@@ -22,7 +22,7 @@ from campaigns.kills.plan import ATTACHMENTS, expected, message, TOPICS
 from linkage_ros.bag.metadata import BagSummary, FAILURE, METADATA_FILE, ROOT_KEY, UNFINISHED
 from linkage_ros.bag.reader import Bag, BagMessage, read_bag
 from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.recover import recover
+from linkage_ros.bag.recover import recover_bag
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError, RecordingError
@@ -117,7 +117,7 @@ def offer_all(folder: Path, storage: Storage, count: int) -> Recorded:
 
 
 def _waiting(recorder: Recorder) -> int:
-    return sum(counts.waiting for counts in recorder.inspect())
+    return sum(counts.waiting for counts in recorder.read_counts())
 
 
 def _end(done: Recorded, recorder: Recorder) -> None:
@@ -334,7 +334,7 @@ def _ended_early(
 def _recovered(counted: range, folder: Path, expectation: Expectation, target: Path) -> list[str]:
     """Return the faults of the recovered bag."""
     try:
-        recover(folder, target)
+        recover_bag(folder, target)
         messages = list(read_bag(target).messages())
         if expectation.may_leave:
             # An old file of the ring that could not be removed comes after the named files.

@@ -144,7 +144,7 @@ def _run(plan: Plan, folder: Path) -> Run:
 
 def _wait_for(recorder: Recorder, most: int) -> None:
     """Wait until the recorder's queue has at most so many messages."""
-    while recorder.failure is None and sum(c.waiting for c in recorder.inspect()) > most:
+    while recorder.failure is None and sum(c.waiting for c in recorder.read_counts()) > most:
         time.sleep(0.001)
 
 

@@ -63,7 +63,7 @@ class _MarkedWriter(BagWriter):
     def _split(self) -> None:
         self._signal(Phase.SPLITTING)
         with self._marks.pause(Phase.SPLITTING):
-            super()._split()
+            super()._begin_next_file()
             self._marks.safe = self._written
 
     def _enter(self, phase: Phase) -> None:

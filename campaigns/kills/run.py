@@ -28,7 +28,7 @@ from campaigns.campaign import results_of
 from campaigns.kills.plan import expected, Marks, PERIOD_NS, Phase, Plan, TOPICS
 from linkage_ros.bag.metadata import DISCARDED, METADATA_FILE, ROOT_KEY, UNFINISHED
 from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.bag.recover import recover
+from linkage_ros.bag.recover import recover_bag
 from linkage_ros.errors import BagError
 from rosbags.highlevel import AnyReader
 import yaml
@@ -194,7 +194,7 @@ def _recovered(
     """Recover the bag, and read the result by rosbags and by our reader."""
     target = folder.with_name(f'{folder.name}_recovered')
     try:
-        recover(folder, target)
+        recover_bag(folder, target)
     except BagError:
         empty = not messages and not marks.safe
         return 'nothing to recover, reported' if empty else f'{FAULT}nothing recovered'

@@ -63,12 +63,12 @@ def compression_type(name: str, folder: Path) -> CompressionType:
     return kind
 
 
-def start(mcap: Writer, profile: str = 'ros2') -> None:
+def start_file(mcap: Writer, profile: str = 'ros2') -> None:
     """Begin a file of this package."""
     mcap.start(profile=profile, library=f'linkage_ros {__version__}')
 
 
-def register(mcap: Writer, topics: Sequence[Topic]) -> list[int]:
+def register_topics(mcap: Writer, topics: Sequence[Topic]) -> list[int]:
     """Register topics with a writer; return their channel numbers, equal for equal topics."""
     schemas: dict[str, int] = {}
     channels = []
@@ -97,8 +97,8 @@ def channels_file(topics: Sequence[Topic]) -> bytes:
         use_statistics=False,
         use_summary_offsets=False,
     )
-    start(mcap)
-    register(mcap, topics)
+    start_file(mcap)
+    register_topics(mcap, topics)
     mcap.finish()  # type: ignore[no-untyped-call]
     return file.getvalue()
 
@@ -146,17 +146,17 @@ class BagFile:
         self.path = path
         self.counts = [0] * len(topics)
         self.first: int | None = None
-        self.finished = self.forgotten = False
+        self.finished = self.removed = False
         self._start, self._end = NO_START, 0
         self._flushes, self._flushed = 0, 0
-        self._safe = (tuple(self.counts), self._start, self._end)
+        self._flushed_counts = (tuple(self.counts), self._start, self._end)
         with ExitStack() as undo:
             self._file = RecordFile(path)
             undo.callback(path.unlink)
             undo.callback(self._file.close)
             self._reserve = Reserve(path.parent)
             undo.callback(self._reserve.release)
-            self._begin(topics, attachments, compression)
+            self._begin_file(topics, attachments, compression)
             undo.pop_all()
 
     @property
@@ -170,9 +170,9 @@ class BagFile:
         return self._file.in_doubt
 
     @property
-    def ended(self) -> bool:
+    def has_ended(self) -> bool:
         """Return whether its end is on the disk, so that readers find all counted messages."""
-        return self._file.ended
+        return self._file.has_end
 
     @property
     def size(self) -> int:
@@ -182,9 +182,9 @@ class BagFile:
     @property
     def has_chunks(self) -> bool:
         """Return whether messages have been passed to the operating system."""
-        return self._file.position > self._begun
+        return self._file.position > self._start_position
 
-    def add(
+    def add_message(
         self, topic: int, log_time: int, publish_time: int, data: bytes, sequence: int
     ) -> None:
         """Add a message with 63-bit times; never raises: check `error`."""
@@ -200,7 +200,7 @@ class BagFile:
 
         mcap before 1.6 cannot close a chunk early: with it, only full chunks are safe.
         """
-        self._file.check()
+        self._file.check_intact()
         if hasattr(self._mcap, 'flush'):
             self._mcap.flush()  # type: ignore[no-untyped-call]
         if self._file.position == self._flushed:
@@ -212,7 +212,7 @@ class BagFile:
             raise self._file.error
         self._file.sync()
         if hasattr(self._mcap, 'flush'):
-            self._safe = (tuple(self.counts), self._start, self._end)
+            self._flushed_counts = (tuple(self.counts), self._start, self._end)
         # Each chunk adds about this much to the index at the end.
         self._reserve.grow(FIRST_RESERVE + chunks * (90 + 10 * len(self.counts)))
         return True
@@ -236,11 +236,11 @@ class BagFile:
         self._mcap.finish()  # type: ignore[no-untyped-call]
         self._reserve.release()
         with suppress(OSError):
-            self._file.check()
+            self._file.check_intact()
         error = self._file.error
         try:
             try:
-                self._file.drain()
+                self._file.write_waiting()
             except OSError as full:
                 error = error or full
                 self._count_only(self._file.cut_back())
@@ -257,9 +257,9 @@ class BagFile:
             error = error or worse
         return error
 
-    def forget(self) -> None:
+    def mark_removed(self) -> None:
         """Set all counts to 0, since another process has removed the file."""
-        self.forgotten = True
+        self.removed = True
         self.counts = [0] * len(self.counts)
         self._start, self._end = NO_START, 0
 
@@ -268,7 +268,7 @@ class BagFile:
         self._reserve.release()
         self._file.close()
 
-    def summary(self, topics: tuple[Topic, ...]) -> BagSummary:
+    def summarize(self, topics: tuple[Topic, ...]) -> BagSummary:
         """Return a summary of the current content."""
         return BagSummary(
             folder=self.path.parent,
@@ -281,7 +281,7 @@ class BagFile:
             size=self._file.size,
         )
 
-    def _begin(
+    def _begin_file(
         self,
         topics: Sequence[Topic],
         attachments: Mapping[str, tuple[str, bytes]],
@@ -291,13 +291,13 @@ class BagFile:
         self._mcap = Writer(
             cast('IO[bytes]', self._file), chunk_size=CHUNK_SIZE, compression=compression
         )
-        start(self._mcap)
+        start_file(self._mcap)
         for name, (media_type, content) in attachments.items():
             self._mcap.add_attachment(0, time.time_ns(), name, media_type, content)
-        self._channels = register(self._mcap, topics)
+        self._channels = register_topics(self._mcap, topics)
         if self._file.error:
             raise self._file.error
-        self._begun = self._file.position
+        self._start_position = self._file.position
         self._file.sync()
 
     def _count_only(self, kept: Statistics) -> None:
@@ -310,6 +310,6 @@ class BagFile:
 
     def _count_safe(self) -> None:
         """Count only the messages before the last successful flush."""
-        if sum(self._safe[0]) < sum(self.counts):
-            counts, self._start, self._end = self._safe
+        if sum(self._flushed_counts[0]) < sum(self.counts):
+            counts, self._start, self._end = self._flushed_counts
             self.counts = list(counts)

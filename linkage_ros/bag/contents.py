@@ -15,8 +15,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.mcap_records import chunk_head, DamagedError, HEAD, Source, strict
-from linkage_ros.bag.reader import Bag, MOST_METADATA, unreadable
+from linkage_ros.bag.mcap_records import (
+    chunk_head,
+    DamagedError,
+    HEAD,
+    parse_strictly,
+    RecordSource,
+)
+from linkage_ros.bag.reader import Bag, MOST_METADATA, unreadable_error
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError
 from mcap.opcode import Opcode
@@ -40,7 +46,7 @@ class TopicContents(NamedTuple):
     last: int
 
     @property
-    def rate(self) -> float | None:
+    def mean_rate(self) -> float | None:
         """Return the mean number of messages per second; None if they all have one time."""
         span = self.last - self.first
         return (self.messages - 1) * 1e9 / span if span > 0 else None
@@ -67,7 +73,7 @@ class Tally:
         self.messages = self.size = self.last = 0
         self.first = 2**64
 
-    def add(self, messages: int, size: int, first: int, last: int) -> None:
+    def add_messages(self, messages: int, size: int, first: int, last: int) -> None:
         """Add messages with their size [bytes], and least and greatest log time, in [ns]."""
         self.messages += messages
         self.size += size
@@ -94,7 +100,7 @@ class Tallies(dict[str, Tally]):
         tally = self[name] = Tally(Topic(name, '', '', ''))
         return tally
 
-    def contents(self, damage: str, stopped: bool) -> Contents:
+    def to_contents(self, damage: str, stopped: bool) -> Contents:
         """Return the counts."""
         held = [tally for tally in self.values() if tally.messages]
         return Contents(
@@ -133,7 +139,7 @@ def contents_of(
     try:
         for number, (name, log_time, _, data) in enumerate(bag.messages(), 1):
             size = len(data)
-            tallies[name].add(1, size, log_time, log_time)
+            tallies[name].add_messages(1, size, log_time, log_time)
             read += size + RECORD_SIZE
             if not number % REPORT_EVERY:
                 progress(read)
@@ -142,7 +148,7 @@ def contents_of(
                     break
     except BagError as error:
         damage = f'{error.where}: {error.reason}'
-    return tallies.contents(damage, halted)
+    return tallies.to_contents(damage, halted)
 
 
 class Layout(NamedTuple):
@@ -165,9 +171,9 @@ def layout_of(file: Path) -> Layout:
     at = len(MCAP0_MAGIC)
     try:
         with file.open('rb') as stream, suppress(DamagedError):
-            source = Source(stream)
+            source = RecordSource(stream)
             while True:
-                opcode, end = source.head(at)
+                opcode, end = source.read_head(at)
                 if end > source.size or opcode in (Opcode.DATA_END, Opcode.FOOTER):
                     break
                 length = unpacked = end - at - HEAD.size
@@ -181,11 +187,11 @@ def layout_of(file: Path) -> Layout:
                     elif opcode in (Opcode.HEADER, Opcode.METADATA) and length <= MOST_METADATA:
                         data = source.read(at + HEAD.size, length)
                         if opcode == Opcode.HEADER:
-                            library = strict(Header, data).library
-                        elif (record := strict(Metadata, data)).name == 'rosbag2':
+                            library = parse_strictly(Header, data).library
+                        elif (record := parse_strictly(Metadata, data)).name == 'rosbag2':
                             rosbag2 = record
                 content += unpacked
                 at = end
     except OSError as error:
-        raise unreadable(file, error) from None
+        raise unreadable_error(file, error) from None
     return Layout(library, compressions, content, rosbag2)

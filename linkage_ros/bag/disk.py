@@ -68,7 +68,7 @@ class RecordFile:
         self.position = 0  # of the next record, once the waiting ones are on the disk
         self.size = 0  # end of the last record that the system accepted completely [bytes]
         self.error: OSError | None = None
-        self.ended = False  # whether the system has its last record, and so its index
+        self.has_end = False  # whether the system has its last record, and so its index
         self.in_doubt = False  # whether the system has ever failed to write it to the disk
         self._unsynced: list[tuple[int, bytes]] = []  # (offset, data) since the last sync
         self._unsynced_size = 0
@@ -84,7 +84,7 @@ class RecordFile:
             self._tail.append(records)
         if not self.error:
             try:
-                self.drain()
+                self.write_waiting()
             except OSError as error:
                 self.error = error
 
@@ -94,7 +94,7 @@ class RecordFile:
     def flush(self) -> None:
         """Do nothing: there is no buffer between `write` and the system."""
 
-    def check(self) -> None:
+    def check_intact(self) -> None:
         """
         Raise LostError if another process has truncated, moved or removed the file.
 
@@ -125,7 +125,7 @@ class RecordFile:
         """
         if self.in_doubt:
             for offset, data in self._unsynced:
-                self._put(data, offset)
+                self._write_at(data, offset)
         try:
             os.fsync(self._descriptor)
         except OSError:
@@ -141,19 +141,19 @@ class RecordFile:
         """Keep in memory what is written from now on: the index that `cut_back` needs."""
         self._tail = []
 
-    def drain(self) -> None:
+    def write_waiting(self) -> None:
         """Write the waiting records; raises OSError, and can then be called again."""
         if self.error and self._is_cut:
             raise self.error
         while self._waiting:
-            self.check()
-            self._put(self._waiting[0], self.size)
+            self.check_intact()
+            self._write_at(self._waiting[0], self.size)
             self._unsynced.append((self.size, self._waiting.pop(0)))
             self.size += len(self._unsynced[-1][1])
             self._unsynced_size += len(self._unsynced[-1][1])
             if self._unsynced_size > _MOST_UNSYNCED:
                 self.sync()
-        self.ended = self._tail is not None
+        self.has_end = self._tail is not None
 
     def cut_back(self) -> Statistics:
         """
@@ -175,7 +175,7 @@ class RecordFile:
         chunks = [chunk for chunk in whole if _end_of(chunk) <= self.size]
         while chunks:
             start = _end_of(chunks[-1])
-            ending = _ending(records, chunks, start)
+            ending = _ending_bytes(records, chunks, start)
             if self._is_cut or start + len(ending) <= self.size:
                 if not self._end_with(ending, start):
                     chunks = whole
@@ -183,7 +183,7 @@ class RecordFile:
             chunks.pop()
         with suppress(OSError):
             os.ftruncate(self._descriptor, self.size)
-        return _statistics(records, chunks or whole)
+        return _chunk_statistics(records, chunks or whole)
 
     def _end_with(self, ending: bytes, start: int) -> bool:
         """Write an ending over existing content; return False if nothing was changed."""
@@ -199,13 +199,13 @@ class RecordFile:
             if not count:
                 # A copy-on-write file system needs the space first.
                 os.ftruncate(self._descriptor, start)
-            self._put(ending[count:], start + count)
+            self._write_at(ending[count:], start + count)
             self._unsynced.append((start, ending))
             self.size = start + len(ending)
-            self.ended = True
+            self.has_end = True
         return True
 
-    def _put(self, data: bytes, offset: int) -> None:
+    def _write_at(self, data: bytes, offset: int) -> None:
         view = memoryview(data)
         while view:
             count = os.pwrite(self._descriptor, view, offset)
@@ -251,7 +251,7 @@ def _end_of(chunk: ChunkIndex) -> int:
     return chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
 
 
-def _statistics(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex]) -> Statistics:
+def _chunk_statistics(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex]) -> Statistics:
     """Return the statistics of these chunks from their indexes alone."""
     counts: dict[int, int] = {}
     for chunk in chunks:
@@ -275,7 +275,9 @@ def _statistics(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex]) -> 
     )
 
 
-def _ending(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex], start: int) -> bytes:
+def _ending_bytes(
+    records: Sequence[McapRecord], chunks: Sequence[ChunkIndex], start: int
+) -> bytes:
     """Return the bytes after the last of these chunks: end of data, index, footer, magic."""
     builder = RecordBuilder()
     DataEnd(0).write(builder)
@@ -283,7 +285,7 @@ def _ending(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex], start: 
     for record in records:
         if isinstance(record, Schema | Channel | AttachmentIndex):
             record.write(builder)
-    _statistics(records, chunks).write(builder)
+    _chunk_statistics(records, chunks).write(builder)
     for chunk in chunks:
         chunk.write(builder)
     Footer(summary_start, 0, 0).write(builder)

@@ -53,7 +53,7 @@ class DamagedError(Exception):
     """An incomplete or invalid record; the text gives the reason."""
 
 
-def unpacked(data: bytes, compression: str, size: int) -> bytes:
+def decompress(data: bytes, compression: str, size: int) -> bytes:
     """
     Decompress a chunk.
 
@@ -92,20 +92,23 @@ def unpacked(data: bytes, compression: str, size: int) -> bytes:
     return content
 
 
-def _lz4(data: bytes, most: int) -> bytes:
+def _decompress_lz4(data: bytes, most: int) -> bytes:
     lz4: Any = import_module('lz4.frame')
     content: bytes = lz4.LZ4FrameDecompressor().decompress(data, max_length=most)
     return content
 
 
-def _zstd(data: bytes, most: int) -> bytes:
+def _decompress_zstd(data: bytes, most: int) -> bytes:
     zstandard: Any = import_module('zstandard')
     with zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True) as stream:
         content: bytes = stream.read(most)
     return content
 
 
-_UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {'lz4': _lz4, 'zstd': _zstd}
+_UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {
+    'lz4': _decompress_lz4,
+    'zstd': _decompress_zstd,
+}
 
 HEAD = Struct('<BQ')
 """Head of a record: its kind, and the length of its content."""
@@ -124,7 +127,7 @@ MOST_CHANNELS = 10_000
 """Most channels, and most schemas, of a file; MCAP has numbers for 65,535."""
 
 
-class Source:
+class RecordSource:
     """A file open for reading, with its size at the time of opening."""
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -147,7 +150,7 @@ class Source:
             raise DamagedError('goes beyond the end of the file')
         return data
 
-    def head(self, at: int) -> tuple[int, int]:
+    def read_head(self, at: int) -> tuple[int, int]:
         """Return a record's kind and the position of its end, which may be beyond the file's."""
         opcode, length = HEAD.unpack(self.read(at, HEAD.size))
         return opcode, at + HEAD.size + length
@@ -190,19 +193,19 @@ class Definitions:
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
 
-    def add(self, opcode: int, content: bytes) -> None:
+    def add_record(self, opcode: int, content: bytes) -> None:
         if opcode == Opcode.SCHEMA:
-            schema = strict(Schema, content)
+            schema = parse_strictly(Schema, content)
             if self.schemas.setdefault(schema.id, schema) != schema:
                 raise DamagedError(f'makes schema {schema.id} another one')
         else:
-            channel = strict(Channel, content)
+            channel = parse_strictly(Channel, content)
             if self.channels.setdefault(channel.id, channel) != channel:
                 raise DamagedError(f'makes channel {channel.id} another one')
         if max(len(self.schemas), len(self.channels)) > MOST_CHANNELS:
             raise DamagedError(f'describes more than {MOST_CHANNELS:,} channels or schemas')
 
-    def complete(self, others: Definitions) -> None:
+    def add_missing(self, others: Definitions) -> None:
         """Add the schemas and channels whose numbers are new."""
         self.schemas = others.schemas | self.schemas
         self.channels = others.channels | self.channels
@@ -212,7 +215,7 @@ class Definitions:
         return self.schemas.get(channel.schema_id)
 
 
-def strict(kind: Any, content: bytes) -> Any:
+def parse_strictly(kind: Any, content: bytes) -> Any:
     """Parse a record of this kind; its fields must fill the content to the last byte."""
     if len(content) > _LONGEST_RECORD:
         raise DamagedError(
@@ -232,7 +235,7 @@ def strict(kind: Any, content: bytes) -> Any:
     return record
 
 
-def chunk_head(source: Source, at: int) -> ChunkHead:
+def chunk_head(source: RecordSource, at: int) -> ChunkHead:
     """Return the head of the chunk whose record begins at a position."""
     begin = at + HEAD.size
     _, _, size, crc, letters = _CHUNK.unpack(source.read(begin, _CHUNK.size))
@@ -245,7 +248,7 @@ def chunk_head(source: Source, at: int) -> ChunkHead:
     return ChunkHead(size, crc, compression, begin + len(name), length)
 
 
-def chunk_at(source: Source, at: int) -> Chunk:
+def chunk_at(source: RecordSource, at: int) -> Chunk:
     """Return the chunk whose record begins at a position, without checking its content."""
     size, crc, compression, begin, length = chunk_head(source, at)
     return Chunk(size, crc, compression, source.read(begin, length), begin + length)
@@ -253,13 +256,13 @@ def chunk_at(source: Source, at: int) -> Chunk:
 
 def content_of(chunk: Chunk) -> bytes:
     """Decompress the content of a chunk, and check its CRC if it has one."""
-    content = unpacked(chunk.data, chunk.compression, chunk.size)
+    content = decompress(chunk.data, chunk.compression, chunk.size)
     if chunk.crc and crc32(content) != chunk.crc:
         raise DamagedError('its checksum does not fit')
     return content
 
 
-def attachment_at(source: Source, at: int) -> tuple[Attachment, int, int]:
+def attachment_at(source: RecordSource, at: int) -> tuple[Attachment, int, int]:
     """Return the attachment that begins at a position, its content's end, and its CRC."""
     begin = end = at + HEAD.size + 16
     for _ in ('name', 'media type'):
@@ -272,7 +275,7 @@ def attachment_at(source: Source, at: int) -> tuple[Attachment, int, int]:
     if crc and crc32(content) != crc:
         raise DamagedError('its checksum does not fit')
     # If the length is damaged, zeros of the content may take the place of the checksum.
-    if not crc and source.head(at)[1] != end + _INT.size:
+    if not crc and source.read_head(at)[1] != end + _INT.size:
         raise DamagedError('is not as long as it says')
     try:
         attachment = Attachment.read(ReadDataStream(BytesIO(content + _INT.pack(crc))))
@@ -281,20 +284,20 @@ def attachment_at(source: Source, at: int) -> tuple[Attachment, int, int]:
     return attachment, end + _INT.size, crc
 
 
-def is_whole_chunk(source: Source, at: int) -> bool:
+def is_whole_chunk(source: RecordSource, at: int) -> bool:
     """Return whether a chunk with a matching CRC begins there, whatever kind its record states."""
     try:
         chunk = chunk_at(source, at)
-        return chunk.end == source.head(at)[1] and chunk.crc != 0 and bool(content_of(chunk))
+        return chunk.end == source.read_head(at)[1] and chunk.crc != 0 and bool(content_of(chunk))
     except DamagedError:
         return False
 
 
-def is_whole_attachment(source: Source, at: int) -> bool:
+def is_whole_attachment(source: RecordSource, at: int) -> bool:
     """Return whether an attachment with a matching CRC begins there, whatever its kind."""
     try:
         _, end, crc = attachment_at(source, at)
-        return end == source.head(at)[1] and crc != 0
+        return end == source.read_head(at)[1] and crc != 0
     except DamagedError:
         return False
 
@@ -314,7 +317,7 @@ def messages_in(content: bytes, definitions: Definitions) -> Iterator[Message]:
         if opcode == Opcode.MESSAGE:
             yield message_of(content, at, end, definitions)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            definitions.add(opcode, content[at:end])
+            definitions.add_record(opcode, content[at:end])
         elif not opcode:  # a zeroed area may hold millions of such records
             raise DamagedError('holds a record of no kind')
         at = end
@@ -332,7 +335,7 @@ def message_of(content: bytes, at: int, end: int, definitions: Definitions) -> M
     return Message(channel, sequence, log_time, publish_time, content[begin:end])
 
 
-Found = Message | Attachment | Metadata
+FoundRecord = Message | Attachment | Metadata
 
 _INDEX = Struct('<HI')
 _CRC = Struct('<I')
@@ -374,23 +377,25 @@ class DataSection:
 
     """
 
-    def __init__(self, source: Source, definitions: Definitions, index_start: int = 0) -> None:
+    def __init__(
+        self, source: RecordSource, definitions: Definitions, index_start: int = 0
+    ) -> None:
         self.source = source
         self.definitions = definitions
         self.finished = False
-        self.loose = True  # whether messages may be outside of chunks
+        self.allows_unchunked = True  # whether messages may be outside of chunks
         self.unchecked = 0
         self.unknown: list[tuple[int, int]] = []
-        self.misfits: list[int] = []
+        self.wrong_lengths: list[int] = []
         self.profile = ''
         self.compression = ''
         self._crc_seen = False
         self._end = max(index_start - HEAD.size - _CRC.size, 0)
         self._unpacked = 0
         self._covered: bool | None = None
-        self._misfit: DamagedError | None = None
+        self._checksum_error: DamagedError | None = None
 
-    def take(self, at: int) -> tuple[Iterable[Found], int]:
+    def read_record(self, at: int) -> tuple[Iterable[FoundRecord], int]:
         """
         Read the record at a position.
 
@@ -407,32 +412,34 @@ class DataSection:
             It is incomplete or invalid; also raised while `found` is consumed.
 
         """
-        opcode, end = self.source.head(at)
+        opcode, end = self.source.read_head(at)
         if opcode == Opcode.CHUNK:
             chunk = chunk_at(self.source, at)
-            return self.chunk(chunk, fits=self._fits(at, chunk.end, end, chunk.crc)), chunk.end
+            return self.read_chunk(
+                chunk, fits=self._ends_at_content(at, chunk.end, end, chunk.crc)
+            ), chunk.end
         if opcode == Opcode.ATTACHMENT:
             attachment, inner, crc = attachment_at(self.source, at)
-            if not crc and self._crc_seen and not self.covered():
+            if not crc and self._crc_seen and not self.has_checksum():
                 raise DamagedError('has no checksum, others have')
             self._crc_seen |= bool(crc)
-            self._fits(at, inner, end, crc)
+            self._ends_at_content(at, inner, end, crc)
             return (attachment,), inner
-        if opcode == Opcode.MESSAGE and not self.loose:
+        if opcode == Opcode.MESSAGE and not self.allows_unchunked:
             raise DamagedError('is a message outside of the chunks')
         if opcode in _ELSEWHERE:
             raise DamagedError('is of a kind that is not for this place')
         content = self.source.read(at + HEAD.size, end - at - HEAD.size)
-        found: tuple[Found, ...] = ()
+        found: tuple[FoundRecord, ...] = ()
         if opcode == Opcode.MESSAGE:
             found = (message_of(content, 0, len(content), self.definitions),)
-            self.unchecked += not self.covered()
+            self.unchecked += not self.has_checksum()
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            self.definitions.add(opcode, content)
+            self.definitions.add_record(opcode, content)
         elif opcode == Opcode.HEADER:
-            self.profile = strict(Header, content).profile
+            self.profile = parse_strictly(Header, content).profile
         elif opcode == Opcode.METADATA:
-            found = (strict(Metadata, content),)
+            found = (parse_strictly(Metadata, content),)
         elif opcode == Opcode.MESSAGE_INDEX:
             if (
                 len(content) < _INDEX.size
@@ -450,7 +457,7 @@ class DataSection:
             self.unknown.append((at, end))
         return found, end
 
-    def chunk(self, chunk: Chunk, *, fits: bool = True) -> Iterable[Message]:
+    def read_chunk(self, chunk: Chunk, *, fits: bool = True) -> Iterable[Message]:
         """Return a chunk's messages; `fits`: it begins and ends where its record does."""
         if self._unpacked > max(MOST_UNPACKED, MOST_TIMES * self.source.size):
             raise DamagedError(
@@ -463,40 +470,40 @@ class DataSection:
             if not fits:
                 raise DamagedError('is not as long as it says')
             # No writer gives a checksum to only some of the chunks.
-            if self._crc_seen and not self.covered():
+            if self._crc_seen and not self.has_checksum():
                 raise DamagedError('has no checksum, others have')
             known = Definitions()
             known.schemas |= self.definitions.schemas
             known.channels |= self.definitions.channels
             count = sum(1 for _ in messages_in(content, known))
-            self.unchecked += 0 if self.covered() else count
+            self.unchecked += 0 if self.has_checksum() else count
         self._crc_seen |= bool(chunk.crc)
-        self.loose = False
+        self.allows_unchunked = False
         self.compression = self.compression or chunk.compression
         return messages_in(content, self.definitions)
 
-    def covered(self) -> bool:
+    def has_checksum(self) -> bool:
         """Return whether a checksum covers the data section; a DamagedError if it differs."""
-        if self._misfit:
-            raise self._misfit
+        if self._checksum_error:
+            raise self._checksum_error
         if self._covered is None:
             try:
                 end = self._end or self._find_end()
-                if self.source.head(end) != (Opcode.DATA_END, end + HEAD.size + _CRC.size):
+                if self.source.read_head(end) != (Opcode.DATA_END, end + HEAD.size + _CRC.size):
                     raise DamagedError('is no end of the data')
                 (crc,) = _CRC.unpack(self.source.read(end + HEAD.size, _CRC.size))
             except DamagedError:
                 crc = 0
             self._covered = bool(crc)
             if crc and crc != self._crc_to(end):
-                self._misfit = DamagedError('the checksum of all data does not fit')
-                raise self._misfit
+                self._checksum_error = DamagedError('the checksum of all data does not fit')
+                raise self._checksum_error
         return self._covered
 
     def _find_end(self) -> int:
         at = len(MCAP0_MAGIC)
         while True:
-            opcode, end = self.source.head(at)
+            opcode, end = self.source.read_head(at)
             if opcode == Opcode.DATA_END:
                 return at
             at = end
@@ -507,23 +514,23 @@ class DataSection:
             crc = crc32(self.source.read(place, min(_WINDOW, end - place)), crc)
         return crc
 
-    def _fits(self, at: int, inner: int, end: int, crc: int) -> bool:
+    def _ends_at_content(self, at: int, inner: int, end: int, crc: int) -> bool:
         """Return whether a record ends where its content does; required without a checksum."""
         if inner == end:
             return True
         if not crc:
             raise DamagedError('is not as long as it says')
-        self.misfits.append(at)
+        self.wrong_lengths.append(at)
         return False
 
 
 def definitions_in(content: bytes) -> Definitions:
     """Return the schemas and channels of a small MCAP file, as far as it can be read."""
     definitions = Definitions()
-    data, at = DataSection(Source(BytesIO(content)), definitions), len(MCAP0_MAGIC)
+    data, at = DataSection(RecordSource(BytesIO(content)), definitions), len(MCAP0_MAGIC)
     with suppress(DamagedError):
         while not data.finished:
-            _, at = data.take(at)
+            _, at = data.read_record(at)
     return definitions
 
 
@@ -560,7 +567,7 @@ class FileIndex(NamedTuple):
     statistics: Statistics | None  # Counts stated by the file; None if it states none
 
 
-def index_of(source: Source) -> FileIndex:
+def index_of(source: RecordSource) -> FileIndex:
     """Return a file's index, empty if the file has none; raise DamagedError if it is damaged."""
     footer_at = source.size - _FOOTER.size - len(MCAP0_MAGIC)
     footer = source.read(footer_at, _FOOTER.size)
@@ -587,7 +594,7 @@ def index_of(source: Source) -> FileIndex:
         at += HEAD.size
         end = at + length
         if opcode in _KINDS:
-            record = strict(_KINDS[opcode], content[at:end])
+            record = parse_strictly(_KINDS[opcode], content[at:end])
             if opcode in _PLACES:
                 place = getattr(record, _PLACES[opcode])
                 if place in places:
@@ -595,7 +602,7 @@ def index_of(source: Source) -> FileIndex:
                 places.add(place)
             by_kind[_KINDS[opcode]].append(record)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            definitions.add(opcode, content[at:end])
+            definitions.add_record(opcode, content[at:end])
         at = end
     return FileIndex(
         start=start,

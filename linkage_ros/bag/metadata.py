@@ -59,7 +59,7 @@ class BagSummary:
 @lru_cache
 def qos_text(qos: QosProfile) -> str:
     """Return an MCAP channel's ``offered_qos_profiles``: YAML, a list of one profile."""
-    return _dump([qos.to_mapping()]).strip()
+    return _dump_yaml([qos.to_mapping()]).strip()
 
 
 def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool = True) -> str:
@@ -84,18 +84,18 @@ def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool 
     ]
     text = ''.join(
         [
-            _dump({'version': 9, 'storage_identifier': 'mcap'}),
-            _extent(summary.duration, summary.start, sum(summary.counts)),
+            _dump_yaml({'version': 9, 'storage_identifier': 'mcap'}),
+            _extent_text(summary.duration, summary.start, sum(summary.counts)),
             'topics_with_message_count:\n' if topics else 'topics_with_message_count: []\n',
             *topics,
-            _dump({'compression_format': '', 'compression_mode': ''}),
-            _dump({'relative_file_paths': [part.file for part in files]}),
+            _dump_yaml({'compression_format': '', 'compression_mode': ''}),
+            _dump_yaml({'relative_file_paths': [part.file for part in files]}),
             'files:\n',
             *(
                 _file_text(part.file, part.duration, part.start, sum(part.counts))
                 for part in files
             ),
-            _dump(
+            _dump_yaml(
                 {
                     'custom_data': dict(custom) or None,
                     # rosbag2 takes it from the environment; the message definitions are Jazzy's
@@ -105,10 +105,10 @@ def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool 
             ),
         ]
     )
-    return f'{ROOT_KEY}:\n{_indented(text)}' if root else text
+    return f'{ROOT_KEY}:\n{_indent(text)}' if root else text
 
 
-def together(
+def merge_summaries(
     parts: Sequence[BagSummary], refused: Sequence[int], discarded: Sequence[int]
 ) -> BagSummary:
     """Return the summary of a bag of these files; of a single file, its own summary."""
@@ -169,13 +169,13 @@ def sync_folder(folder: Path) -> None:
 
 def _topic_text(topic: Topic) -> str:
     if _PLAIN.fullmatch(topic.name):
-        return _described(replace(topic, name=_NAME)).replace(_NAME, topic.name, 1)
-    return _described(topic)
+        return _describe_topic(replace(topic, name=_NAME)).replace(_NAME, topic.name, 1)
+    return _describe_topic(topic)
 
 
 # Types and names are constant: a bag of a thousand files repeats them for each.
 @lru_cache(maxsize=256)
-def _described(topic: Topic) -> str:
+def _describe_topic(topic: Topic) -> str:
     metadata = {
         'name': topic.name,
         'type': topic.type,
@@ -183,12 +183,12 @@ def _described(topic: Topic) -> str:
         'offered_qos_profiles': [topic.qos.to_mapping()],
         'type_description_hash': topic.type_hash,
     }
-    return _dump([{'topic_metadata': metadata}])
+    return _dump_yaml([{'topic_metadata': metadata}])
 
 
 def _file_text(file: str, duration: int, start: int, messages: int) -> str:
     # The keys of a file are in another order than those of the bag, as rosbag2 writes them.
-    return _path_text(file) + _indented(
+    return _path_text(file) + _indent(
         f'starting_time:\n  nanoseconds_since_epoch: {start}\n'
         f'duration:\n  nanoseconds: {duration}\n'
         f'message_count: {messages}\n'
@@ -198,10 +198,10 @@ def _file_text(file: str, duration: int, start: int, messages: int) -> str:
 # Cached by name only: the counts of the newest file change each second.
 @lru_cache(maxsize=8192)
 def _path_text(file: str) -> str:
-    return _dump([{'path': file}])
+    return _dump_yaml([{'path': file}])
 
 
-def _extent(duration: int, start: int, messages: int) -> str:
+def _extent_text(duration: int, start: int, messages: int) -> str:
     return (
         f'duration:\n  nanoseconds: {duration}\n'
         f'starting_time:\n  nanoseconds_since_epoch: {start}\n'
@@ -209,11 +209,11 @@ def _extent(duration: int, start: int, messages: int) -> str:
     )
 
 
-def _indented(text: str) -> str:
+def _indent(text: str) -> str:
     return ''.join(f'  {line}\n' for line in text[:-1].split('\n'))
 
 
-def _dump(content: Any) -> str:
+def _dump_yaml(content: Any) -> str:
     text: str = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=1000)
     return text
 

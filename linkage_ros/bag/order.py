@@ -31,9 +31,9 @@ from linkage_ros.bag.mcap_records import (
     FileIndex,
     index_of,
     messages_in,
-    Source,
+    RecordSource,
 )
-from linkage_ros.bag.reader import Bag, BagMessage, unreadable
+from linkage_ros.bag.reader import Bag, BagMessage, unreadable_error
 from linkage_ros.errors import BagError
 
 WINDOW = 1_000_000_000
@@ -71,7 +71,7 @@ class LogTimeOrder:
         self._chunks: list[tuple[int, _Entry]] = []  # with the last time of each
         unindexed = []
         for number, file in enumerate(bag.files):
-            index = _index(file)
+            index = _usable_index(file)
             if index is None:
                 unindexed.append(file)
                 continue
@@ -81,7 +81,7 @@ class LogTimeOrder:
                 if chunk.message_end_time or chunk.message_index_offsets:
                     place = chunk.message_start_time, number, chunk.chunk_start_offset, 0, None
                     self._chunks.append((chunk.message_end_time, place))
-        self._rest = replace(bag, files=tuple(unindexed))
+        self._unindexed = replace(bag, files=tuple(unindexed))
         # Greatest log time, in [ns]; None if this requires reading the whole bag.
         self.end = None if unindexed else max((last for last, _ in self._chunks), default=None)
         first = next(self.messages(), None)
@@ -99,14 +99,14 @@ class LogTimeOrder:
 
         """
         yield from merge(
-            self._indexed(since),
-            self._ordered(
-                message for message in self._rest.messages() if message.log_time >= since
+            self._read_indexed(since),
+            self._order_messages(
+                message for message in self._unindexed.messages() if message.log_time >= since
             ),
             key=attrgetter('log_time'),
         )
 
-    def _indexed(self, since: int) -> Iterator[BagMessage]:
+    def _read_indexed(self, since: int) -> Iterator[BagMessage]:
         heap = [place for last, place in self._chunks if last >= since]
         heapify(heap)
         held = 0
@@ -116,18 +116,18 @@ class LogTimeOrder:
                 held -= len(message.data) + _BESIDE
                 yield message
                 continue
-            for index, following in enumerate(self._read(number, place), 1):
+            for index, following in enumerate(self._read_chunk(number, place), 1):
                 if following.log_time >= since:
-                    held = self._hold(held, following)
+                    held = self._count_held(held, following)
                     heappush(heap, (following.log_time, number, place, index, following))
 
-    def _ordered(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
+    def _order_messages(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
         """Yield messages by log time, each as soon as one is a window later."""
         heap: list[tuple[int, int, BagMessage]] = []
         numbers = count()
         held = 0
         for message in messages:
-            held = self._hold(held, message)
+            held = self._count_held(held, message)
             heappush(heap, (message.log_time, next(numbers), message))
             while heap[0][0] < message.log_time - WINDOW:
                 first = heappop(heap)[2]
@@ -136,7 +136,7 @@ class LogTimeOrder:
         while heap:
             yield heappop(heap)[2]
 
-    def _hold(self, held: int, message: BagMessage) -> int:
+    def _count_held(self, held: int, message: BagMessage) -> int:
         """Count the bytes held with one more message."""
         held += len(message.data) + _BESIDE
         if held > MOST_HELD:
@@ -147,19 +147,19 @@ class LogTimeOrder:
             )
         return held
 
-    def _read(self, number: int, place: int) -> list[BagMessage]:
+    def _read_chunk(self, number: int, place: int) -> list[BagMessage]:
         """Return the messages of one chunk of a file."""
         file = self._files[number]
         try:
             with file.open('rb') as stream:
-                content = content_of(chunk_at(Source(stream), place))
+                content = content_of(chunk_at(RecordSource(stream), place))
             messages = messages_in(content, self._definitions[number])
             return [
                 BagMessage(each.channel.topic, each.log_time, each.publish_time, each.data)
                 for each in messages
             ]
         except OSError as error:
-            raise unreadable(file, error) from None
+            raise unreadable_error(file, error) from None
         except DamagedError as error:
             raise BagError(
                 file,
@@ -168,13 +168,13 @@ class LogTimeOrder:
             ) from None
 
 
-def _index(file: Path) -> FileIndex | None:
+def _usable_index(file: Path) -> FileIndex | None:
     """Return the index of a file; None if it has none, or one without chunks or channels."""
     try:
         with file.open('rb') as stream:
-            index = index_of(Source(stream))
+            index = index_of(RecordSource(stream))
     except OSError as error:
-        raise unreadable(file, error) from None
+        raise unreadable_error(file, error) from None
     except DamagedError:
         return None
     return index if index.chunks and index.definitions.channels else None

@@ -83,11 +83,11 @@ def unpacked_file(file: Path) -> Path:
         status = file.stat()
     except OSError:
         return file  # whoever reads it says why it cannot be read
-    return _unpacked(file, status.st_size, status.st_mtime_ns)
+    return _decompressed_file(file, status.st_size, status.st_mtime_ns)
 
 
 @cache
-def _unpacked(file: Path, size: int, _changed: int) -> Path:
+def _decompressed_file(file: Path, size: int, _changed: int) -> Path:
     try:
         zstandard: Any = import_module('zstandard')
     except ImportError:
@@ -97,7 +97,7 @@ def _unpacked(file: Path, size: int, _changed: int) -> Path:
     most = max(MOST_UNPACKED, MOST_TIMES * size)
     name = file.name.removesuffix('.zstd')
     try:
-        target = Path(mkdtemp(dir=_folder())) / name
+        target = Path(mkdtemp(dir=_temporary_folder())) / name
         with file.open('rb') as packed, target.open('wb') as content:
             pieces = zstandard.ZstdDecompressor().read_to_iter(packed, write_size=_PIECE)
             for piece in pieces:
@@ -122,7 +122,7 @@ def _unpacked(file: Path, size: int, _changed: int) -> Path:
 
 
 @cache
-def _folder() -> Path:
+def _temporary_folder() -> Path:
     """Return a folder that is removed when the process ends."""
     folder = mkdtemp(prefix='linkage_')
     atexit.register(shutil.rmtree, folder, ignore_errors=True)

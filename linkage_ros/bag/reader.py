@@ -26,12 +26,12 @@ from linkage_ros.bag.mcap_records import (
     DamagedError,
     DataSection,
     Definitions,
-    Found,
+    FoundRecord,
     HEAD,
     index_of,
     Message,
-    Source,
-    strict,
+    parse_strictly,
+    RecordSource,
 )
 from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY, STATS_RECORD, UNFINISHED
 from linkage_ros.bag.other_formats import (
@@ -70,7 +70,7 @@ def information_of(folder: Path) -> dict[str, Any]:
     except FileNotFoundError:
         return {}
     except OSError as error:
-        raise unreadable(file, error) from None
+        raise unreadable_error(file, error) from None
     try:
         if len(text) > MOST_METADATA:
             raise ValueError(f'it is larger than {MOST_METADATA:,} bytes')
@@ -104,7 +104,7 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
         # By name only, as rosbag2 does: old bags also name the folder, which may have moved.
         names = [_name_of(path, PurePosixPath(str(name))) for name in named]
     else:
-        names = mcap_names(path) or _names(path, BAG_SUFFIXES)
+        names = mcap_names(path) or _file_names(path, BAG_SUFFIXES)
     if not names:
         raise BagError(path, 'holds no .mcap file', "name a bag's folder")
     for number, name in enumerate(names):
@@ -120,10 +120,10 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
 
 def mcap_names(folder: Path) -> list[str]:
     """Return the names of the MCAP files in a folder, packed ones too, by number."""
-    return _names(folder, MCAP_SUFFIXES)
+    return _file_names(folder, MCAP_SUFFIXES)
 
 
-def _names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
+def _file_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
     found = [file for file in folder.iterdir() if file.name.endswith(suffixes)]
     return [file.name for file in sorted(found, key=by_number)]
 
@@ -167,7 +167,7 @@ def is_finished(file: Path) -> bool:
     except FileNotFoundError:
         raise BagError(file, 'does not exist', 'name the folder of a bag, or its file') from None
     except OSError as error:
-        raise unreadable(file, error) from None
+        raise unreadable_error(file, error) from None
     if not start:
         raise BagError(file, 'is empty', 'its recording never began, or the power failed in it')
     refuse_other_format(file, start)
@@ -181,7 +181,7 @@ def is_finished(file: Path) -> bool:
     return size > length and end == MCAP0_MAGIC
 
 
-def unreadable(file: Path, error: OSError) -> BagError:
+def unreadable_error(file: Path, error: OSError) -> BagError:
     """Return the error for a file that the system cannot read."""
     reason = f'cannot be read: {error.strerror or error}'
     return BagError(file, reason, 'check its permissions and the disk')
@@ -226,7 +226,7 @@ def footer_metadata(file: Path) -> FooterMetadata:
     accounted = False
     try:
         with file.open('rb') as stream:
-            source = Source(stream)
+            source = RecordSource(stream)
             records = index_of(source).metadata
             accounted = any(each.name == STATS_RECORD for each in records)
             # Of several records, the last one has the final outcome.
@@ -236,7 +236,7 @@ def footer_metadata(file: Path) -> FooterMetadata:
                 # Other records may take seconds to parse, and are not needed.
                 if b'linkage_ros.' in content:
                     head = HEAD.size
-                    record = strict(Metadata, content[head:])
+                    record = parse_strictly(Metadata, content[head:])
                     custom = custom_of(serialized_metadata(record))
     except (DamagedError, OSError):
         pass  # reading the messages reports the error
@@ -315,7 +315,7 @@ class Bag:
         """
         for file in self.files:
             until_damage = self.truncated and file == self.files[-1]
-            for record in _contents(file, Definitions(), until_damage=until_damage):
+            for record in _read_contents(file, Definitions(), until_damage=until_damage):
                 if isinstance(record, Message):
                     yield BagMessage(
                         record.channel.topic, record.log_time, record.publish_time, record.data
@@ -364,7 +364,7 @@ def read_bag(
     attachments: dict[str, bytes] = {}
     passed_over: dict[str, None] = {}
     for file, finished in zip(files, whole, strict=True):
-        definitions, attached, beyond = _description(file, progress, finished=finished)
+        definitions, attached, beyond = _read_description(file, progress, finished=finished)
         passed_over |= dict.fromkeys(beyond)
         for channel in definitions.channels.values():
             topic = topic_of(channel, definitions.schema_of(channel))
@@ -390,7 +390,7 @@ def read_bag(
     )
 
 
-def _description(
+def _read_description(
     file: Path, progress: ProgressCallback, *, finished: bool
 ) -> tuple[Definitions, list[Attachment], list[str]]:
     """
@@ -399,19 +399,21 @@ def _description(
     They come from the file's index, if it has one.
     """
     if finished:
-        with _translated(file), file.open('rb') as stream:
-            source = Source(stream)
+        with _translate_errors(file), file.open('rb') as stream:
+            source = RecordSource(stream)
             index = index_of(source)
             if index.definitions.channels:
-                return index.definitions, *_kept(
+                return index.definitions, *_fitting_attachments(
                     attachment_at(source, each.offset)[0] for each in index.attachments
                 )
     definitions = Definitions()
-    contents = _contents(file, definitions, progress, until_damage=not finished)
-    return definitions, *_kept(record for record in contents if isinstance(record, Attachment))
+    contents = _read_contents(file, definitions, progress, until_damage=not finished)
+    return definitions, *_fitting_attachments(
+        record for record in contents if isinstance(record, Attachment)
+    )
 
 
-def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str]]:
+def _fitting_attachments(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str]]:
     """Return the attachments that fit into memory, and the names of the others."""
     kept, beyond, left = [], [], MOST_ATTACHED
     for attachment in attachments:
@@ -423,17 +425,17 @@ def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str
     return kept, beyond
 
 
-def _contents(
+def _read_contents(
     file: Path,
     definitions: Definitions,
     progress: ProgressCallback = lambda _: None,
     *,
     until_damage: bool,
-) -> Iterator[Found]:
+) -> Iterator[FoundRecord]:
     """Yield messages, attachments and metadata in file order, with checksums verified."""
     finished = is_finished(file)
-    with _translated(file), file.open('rb') as stream:
-        source = Source(stream)
+    with _translate_errors(file), file.open('rb') as stream:
+        source = RecordSource(stream)
         index = index_of(source) if finished else None
         if index and index.checked:
             # What the data says must be what the index says.
@@ -444,7 +446,7 @@ def _contents(
         try:
             while not data.finished:
                 progress(at)
-                records, end = data.take(at)
+                records, end = data.read_record(at)
                 for record in records:
                     messages += isinstance(record, Message)
                     yield record
@@ -455,7 +457,7 @@ def _contents(
             raise DamagedError(f'the record at byte {at:,}: {error}') from None
         if index is None:
             return
-        data.covered()
+        data.has_checksum()
         if at != index.start:
             raise DamagedError('its index begins elsewhere than it says')
         promised = index.statistics
@@ -464,11 +466,11 @@ def _contents(
 
 
 @contextmanager
-def _translated(file: Path) -> Iterator[None]:
+def _translate_errors(file: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise unreadable(file, error) from None
+        raise unreadable_error(file, error) from None
     except DamagedError as error:
         raise BagError(
             file, f'is damaged: {error}', 'linkage recover saves what is whole'
@@ -482,12 +484,12 @@ def topic_of(channel: Channel, schema: Schema | None) -> Topic:
         type=schema.name if schema else '',
         definition=schema.data.decode('utf-8', 'replace') if schema else '',
         type_hash=channel.metadata.get('topic_type_hash', ''),
-        qos=_qos(channel.metadata.get('offered_qos_profiles', '')),
+        qos=_parse_qos(channel.metadata.get('offered_qos_profiles', '')),
     )
 
 
 @lru_cache(maxsize=256)
-def _qos(text: str) -> QosProfile:
+def _parse_qos(text: str) -> QosProfile:
     """Return the first profile; the default if there is none or it is invalid."""
     # The list has one profile per publisher: for /tf possibly hundreds.
     first = text.partition('\n- ')[0]

@@ -52,7 +52,7 @@ So a bound on the places is one on the bytes too, at most one message more for e
 offers. To count bytes, these threads would need a lock, and a tick would wait for it.
 """
 
-Offered = tuple[int, int, int, bytes]
+OfferedMessage = tuple[int, int, int, bytes]
 """A message in the queue: topic, log time, publish time [ns] and its CDR bytes."""
 
 
@@ -71,7 +71,7 @@ class ThreadCounter:
         self._readings = 0
         self._reading = threading.Lock()
 
-    def value(self) -> int:
+    def read_count(self) -> int:
         with self._reading:
             steps = self.add() - self._readings
             self._readings += 1
@@ -92,9 +92,9 @@ class MessageQueue:
     """
 
     def __init__(self, topics: int, capacity: int) -> None:
-        self.open = True  # Whether messages are accepted; else they are dropped
+        self.is_open = True  # Whether messages are accepted; else they are dropped
         self._capacity = capacity
-        self._waiting: deque[Offered | None] = deque()
+        self._waiting: deque[OfferedMessage | None] = deque()
         # A counter for each topic.
         self.received = [ThreadCounter() for _ in range(topics)]
         self.dropped = [ThreadCounter() for _ in range(topics)]
@@ -117,7 +117,7 @@ class MessageQueue:
 
         """
         self._add_received[topic]()
-        if not self.open or len(self._waiting) >= self._capacity:
+        if not self.is_open or len(self._waiting) >= self._capacity:
             self._add_dropped[topic]()
         elif len(data) < PLACE:
             self._waiting.append((topic, log_time, publish_time, data))
@@ -129,7 +129,7 @@ class MessageQueue:
         """Return the number of occupied places."""
         return len(self._waiting)
 
-    def take(self, most: int) -> Iterator[Offered]:
+    def take_messages(self, most: int) -> Iterator[OfferedMessage]:
         """Yield the waiting messages, of at most this number of places."""
         for _ in range(min(most, len(self._waiting))):
             if message := self._waiting.popleft():
@@ -197,29 +197,29 @@ class Recorder:
         # Written by the recorder's thread: counts of messages taken by the writer, and of lost
         # ones. One tuple, so that another thread never sees a message in both counts, or in
         # neither.
-        self._done = ([0] * len(writer.topics), [0] * len(writer.topics))
-        self._safe = (0,) * len(writer.topics)
+        self._taken_and_lost = ([0] * len(writer.topics), [0] * len(writer.topics))
+        self._flushed_counts = (0,) * len(writer.topics)
         self._custom: dict[str, str] = {}
-        writer.account = self._account
+        writer.make_statistics = self._final_statistics
         self._summary: RecordingSummary | None = None
         self._stopping = threading.Event()
         # A daemon thread: a disk that never answers must not keep the process alive.
-        self._thread = threading.Thread(target=self._run, name='bag recorder', daemon=True)
+        self._thread = threading.Thread(target=self._run_thread, name='bag recorder', daemon=True)
         self._thread.start()
 
-    def inspect(self) -> tuple[TopicCounts, ...]:
+    def read_counts(self) -> tuple[TopicCounts, ...]:
         """Return the current counts; after a failure, ``recorded`` counts the messages kept."""
         counts = []
         # Read first, so that no message is let go before it is recorded.
         discarded = self._writer.discarded
-        opened = self._writer.opened
-        taken, lost = self._done
+        opened = self._writer.opening_counts
+        taken, lost = self._taken_and_lost
         for number, topic in enumerate(self._writer.topics):
             gone = discarded[number]
             recorded = taken[number] + opened[number] - gone
-            dropped = self._queue.dropped[number].value() + lost[number]
+            dropped = self._queue.dropped[number].read_count() + lost[number]
             # Read last, so that a message in transit counts as waiting, and never twice.
-            received = self._queue.received[number].value() + opened[number]
+            received = self._queue.received[number].read_count() + opened[number]
             waiting = received - recorded - dropped - gone
             counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting, gone))
         return tuple(counts)
@@ -242,7 +242,7 @@ class Recorder:
         if self._summary:
             return self._summary
         self._custom = dict(custom or {})
-        self._queue.open = False
+        self._queue.is_open = False
         self._stopping.set()
         self._thread.join(timeout)
         stuck = self._thread.is_alive()
@@ -253,10 +253,10 @@ class Recorder:
                 'what was flushed before is readable; check the disk',
             )
         topics = []
-        for number, counts in enumerate(self.inspect()):
+        for number, counts in enumerate(self.read_counts()):
             recorded = counts.recorded
             if stuck:
-                recorded = max(0, self._safe[number] - counts.discarded)
+                recorded = max(0, self._flushed_counts[number] - counts.discarded)
             dropped = counts.received - recorded - counts.discarded
             topics.append(replace(counts, recorded=recorded, dropped=dropped, waiting=0))
         self._summary = RecordingSummary(
@@ -268,32 +268,32 @@ class Recorder:
         return self._summary
 
     @property
-    def recording(self) -> bool:
+    def is_recording(self) -> bool:
         """Return whether messages reach the bag; False after a failure, until there is space."""
         return self._recording
 
     @property
-    def ended(self) -> bool:
+    def has_ended(self) -> bool:
         """Return whether it has failed for good, and accepts no more messages."""
-        return self.failure is not None and not self._queue.open
+        return self.failure is not None and not self._queue.is_open
 
-    def _run(self) -> None:
+    def _run_thread(self) -> None:
         going = True
         while going:
             try:
-                if self._goes_on():
-                    self._record()
+                if self._wait_for_space():
+                    self._record_messages()
                 going = False
             except Exception as error:  # noqa: BLE001, PERF203 (no error may end it silently)
-                self._fail(error)
+                self._store_failure(error)
         try:
             self._writer.close(self._custom)
         except Exception as error:  # noqa: BLE001 (as above)
-            self._fail(error)
+            self._store_failure(error)
         self._count_kept()
         self._lose_queue()
 
-    def _goes_on(self) -> bool:
+    def _wait_for_space(self) -> bool:
         """Wait after a failure until there is space again; return False when stopped."""
         while not self._recording:
             patience = ROOM_POLL if self._writer.out_of_room else None
@@ -302,7 +302,7 @@ class Recorder:
             self._recording = self._writer.resume()
         return True
 
-    def _record(self) -> None:
+    def _record_messages(self) -> None:
         """Write the offered messages until the recorder is to stop."""
         due = time.monotonic() + self._flush_after
         stopping = False
@@ -316,17 +316,19 @@ class Recorder:
                 # A backlog comes first, else a slow disk would only flush.
                 if now >= due + self._flush_after * more:
                     self._writer.flush()
-                    self._safe = tuple(self._done[0])
+                    self._flushed_counts = tuple(self._taken_and_lost[0])
                     # Messages that arrived during the flush have not reached the system yet.
                     due = max(now + self._flush_after, time.monotonic())
                 if more:
                     time.sleep(NAP)
 
-    def _account(self, summary: BagSummary) -> RecordingStats:
+    def _final_statistics(self, summary: BagSummary) -> RecordingStats:
         """Return the final statistics, when no more are taken; `dropped` is the remainder."""
         received = [
-            tally.value() + opened
-            for tally, opened in zip(self._queue.received, self._writer.opened, strict=True)
+            tally.read_count() + opened
+            for tally, opened in zip(
+                self._queue.received, self._writer.opening_counts, strict=True
+            )
         ]
         dropped = [
             came - there - gone
@@ -336,8 +338,8 @@ class Recorder:
 
     def _write_batch(self) -> bool:
         """Write up to a batch of messages; return whether there may be more."""
-        queue, write, (taken, lost) = self._queue, self._writer.write, self._done
-        for message in queue.take(BATCH):
+        queue, write, (taken, lost) = self._queue, self._writer.write, self._taken_and_lost
+        for message in queue.take_messages(BATCH):
             topic = message[0]
             # Until the writer returns, the message is not counted, and so it waits.
             try:
@@ -348,7 +350,7 @@ class Recorder:
             (taken if kept else lost)[topic] += 1
         return bool(queue)
 
-    def _fail(self, error: Exception) -> None:
+    def _store_failure(self, error: Exception) -> None:
         """Store the failure, and count only the messages kept by the writer as recorded."""
         self._recording = False
         if not isinstance(error, RecordingError):
@@ -356,21 +358,21 @@ class Recorder:
             error = RecordingError(self._writer.folder, reason, 'please report this')
         self._count_kept()
         if not self._writer.out_of_room:
-            self._queue.open = False
+            self._queue.is_open = False
             self._lose_queue()
         self.failure = error
 
     def _count_kept(self) -> None:
         """Count messages as lost that the writer took and could not keep."""
-        kept = self._writer.kept
-        taken, lost = self._done
+        kept = self._writer.kept_counts
+        taken, lost = self._taken_and_lost
         lost = [gone + had - has for gone, had, has in zip(lost, taken, kept, strict=True)]
-        self._done = (list(kept), lost)
-        self._safe = kept
+        self._taken_and_lost = (list(kept), lost)
+        self._flushed_counts = kept
 
     def _lose_queue(self) -> None:
         """Count the waiting messages as lost."""
-        _, lost = self._done
+        _, lost = self._taken_and_lost
         while self._queue:
-            for topic, *_ in self._queue.take(BATCH):
+            for topic, *_ in self._queue.take_messages(BATCH):
                 lost[topic] += 1

@@ -18,9 +18,9 @@ from pathlib import Path
 import shutil
 from typing import Any, NamedTuple
 
-from linkage_ros.bag.bag_file import COMPRESSION_TYPES, start
+from linkage_ros.bag.bag_file import COMPRESSION_TYPES, start_file
 from linkage_ros.bag.disk import CHUNK_SIZE
-from linkage_ros.bag.mcap_records import Definitions, Found, Message, Source
+from linkage_ros.bag.mcap_records import Definitions, FoundRecord, Message, RecordSource
 from linkage_ros.bag.metadata import (
     BagSummary,
     METADATA_FILE,
@@ -40,9 +40,9 @@ from linkage_ros.bag.reader import (
     mcap_names,
     serialized_metadata,
     topic_of,
-    unreadable,
+    unreadable_error,
 )
-from linkage_ros.bag.salvage import BEGINNING, Loss, Salvage
+from linkage_ros.bag.salvage import BEGINNING, LostRange, Salvage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError, quoted, RecordingError
 from mcap.exceptions import UnsupportedCompressionError
@@ -61,7 +61,7 @@ class TopicRecovery(NamedTuple):
 
     name: str
     saved: int
-    promised: int | None
+    expected: int | None
 
 
 class Recovery(NamedTuple):
@@ -70,31 +70,31 @@ class Recovery(NamedTuple):
     folder: Path  # The new bag
     topics: tuple[TopicRecovery, ...]  # Saved and original messages of each topic
     attachments: tuple[str, ...]  # Names of the saved attachments
-    losses: tuple[tuple[str, Loss], ...]  # Losses, each with the name of its file
+    losses: tuple[tuple[str, LostRange], ...]  # Losses, each with the name of its file
     repaired: tuple[str, ...]  # Damage or missing parts without loss, one line each
     remarks: tuple[str, ...]  # Further remarks, one line each
 
     @property
-    def missing(self) -> int:
+    def missing_count(self) -> int:
         """Return the number of messages that the bag should have and that are missing."""
-        return sum(max((topic.promised or 0) - topic.saved, 0) for topic in self.topics)
+        return sum(max((topic.expected or 0) - topic.saved, 0) for topic in self.topics)
 
     @property
-    def whole(self) -> bool:
+    def is_whole(self) -> bool:
         """Return whether there is no loss."""
-        return not self.losses and not self.missing
+        return not self.losses and not self.missing_count
 
     def in_short(self, path: Path) -> str:
         """Return the outcome for the bag of this name, as one line."""
         saved = sum(topic.saved for topic in self.topics)
         lost = NOTHING_LOST
-        if not self.whole:
+        if not self.is_whole:
             size = sum(loss.end - loss.start for _, loss in self.losses)
             lost = f'{size} bytes lost in {len(self.losses)} places'
         return f'from {path.absolute().name}: {saved} messages, {lost}'
 
 
-def promised_counts(information: Mapping[str, Any]) -> dict[str, int]:
+def expected_counts(information: Mapping[str, Any]) -> dict[str, int]:
     """Return the message count of each topic in ``metadata.yaml``, if it has them."""
     counts = {}
     try:
@@ -109,7 +109,7 @@ MOST_CHANNELS = 10_000
 """Most channels of a new bag: its metadata, 700 bytes for each, must stay readable."""
 
 
-class NewBag:
+class RecoveredBag:
     """
     A new bag that is open for writing.
 
@@ -150,10 +150,10 @@ class NewBag:
             self._mcap = Writer(
                 self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE
             )
-        start(self._mcap, profile)
+        start_file(self._mcap, profile)
 
     @property
-    def topics(self) -> tuple[str, ...]:
+    def topic_names(self) -> tuple[str, ...]:
         """Return the names of its topics."""
         return tuple(self._topics)
 
@@ -161,11 +161,11 @@ class NewBag:
         """Forget the channel numbers, which are valid for one file."""
         self._numbers.clear()
 
-    def add(self, found: Found, definitions: Definitions) -> None:
+    def add_item(self, found: FoundRecord, definitions: Definitions) -> None:
         """Add an item found in a file, with the file's schemas and channels so far."""
         if isinstance(found, Message):
             if not self._numbers:
-                self.describe(definitions)
+                self.add_channels(definitions)
             number = self._numbers.get(found.channel.id)
             if number is None:
                 # Not all channels known so far: each of thousands comes with its first message.
@@ -189,7 +189,7 @@ class NewBag:
         else:
             self.information = serialized_metadata(found)
 
-    def describe(self, definitions: Definitions) -> None:
+    def add_channels(self, definitions: Definitions) -> None:
         """Add all channels, also those without a message."""
         for channel in definitions.channels.values():
             if channel.id not in self._numbers:
@@ -197,13 +197,13 @@ class NewBag:
 
     def close(self, custom: Mapping[str, str]) -> BagSummary:
         """Finish the bag, and return its summary."""
-        summary = self._summary()
+        summary = self._make_summary()
         text = metadata_text(summary, custom, root=False)
         self._mcap.add_metadata('rosbag2', {'serialized_metadata': text})
         self._mcap.finish()  # type: ignore[no-untyped-call]
         self._file.flush()
         os.fsync(self._file.fileno())
-        summary = self._summary()
+        summary = self._make_summary()
         self._file.close()
         write_metadata(summary, custom)
         sync_folder(self._folder.absolute().parent)
@@ -237,7 +237,7 @@ class NewBag:
             self._topics.setdefault(channel.topic, topic_of(channel, schema))
         return self._channels[described]
 
-    def _summary(self) -> BagSummary:
+    def _make_summary(self) -> BagSummary:
         return BagSummary(
             folder=self._folder,
             file=Path(self._file.name).name,
@@ -258,11 +258,11 @@ class _Findings:
     """Collected losses, repairs and remarks."""
 
     def __init__(self) -> None:
-        self.losses: list[tuple[str, Loss]] = []
+        self.losses: list[tuple[str, LostRange]] = []
         self.repaired: list[str] = []
         self.remarks: list[str] = []
-        self.promised: Counter[str] = Counter()
-        self.all_promised = True  # whether the index of each file is trusted
+        self.expected: Counter[str] = Counter()
+        self.all_expected = True  # whether the index of each file is trusted
 
 
 def recovered_name(path: Path) -> Path:
@@ -271,7 +271,7 @@ def recovered_name(path: Path) -> Path:
     return whole.with_name(f'{whole.name if path.is_dir() else whole.stem}_recovered')
 
 
-def recover(
+def recover_bag(
     path: Path,
     target: Path | None = None,
     progress: ProgressCallback = lambda done, of: None,
@@ -302,24 +302,24 @@ def recover(
     """
     target = target or recovered_name(path)
     findings = _Findings()
-    information = _information(path, findings)
-    files = _files(path, information, findings)
+    information = _read_information(path, findings)
+    files = _find_files(path, information, findings)
     if os.path.lexists(target):
-        raise _exists(target)
-    profile, compression = _foretaste(path, files, stopped)
+        raise _exists_error(target)
+    profile, compression = _detect_profile(path, files, stopped)
     sizes = [file.stat().st_size for file in files]
     with _new_folder(target):
-        bag = NewBag(target, profile, compression)
+        bag = RecoveredBag(target, profile, compression)
         try:
             for number, file in enumerate(files):
                 before, of = sum(sizes[:number]), sum(sizes)
-                for done in _save(file, bag, findings):
+                for done in _copy_file(file, bag, findings):
                     progress(before + done, of)
                     if stopped():
                         bag.abandon()
                         shutil.rmtree(target)
                         return None
-            recovery = _recovery(target, bag, information, findings)
+            recovery = _make_recovery(target, bag, information, findings)
             custom = custom_of(information or bag.information)
             # Unlike the old bag, the new one has an end.
             custom = {key: text for key, text in custom.items() if key != UNFINISHED}
@@ -329,7 +329,7 @@ def recover(
     return recovery
 
 
-def _information(path: Path, findings: _Findings) -> dict[str, Any]:
+def _read_information(path: Path, findings: _Findings) -> dict[str, Any]:
     """Return the metadata; empty if damaged."""
     if not path.is_dir():
         return {}
@@ -342,7 +342,7 @@ def _information(path: Path, findings: _Findings) -> dict[str, Any]:
     return information
 
 
-def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> list[Path]:
+def _find_files(path: Path, information: Mapping[str, Any], findings: _Findings) -> list[Path]:
     """Return the files of a bag: those in its metadata, and others in its folder."""
     if path.is_dir():
         named = files_of(path, information) if information else []
@@ -364,10 +364,10 @@ def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> l
                 continue
             reason = 'is no file' if file.exists() else 'does not exist'
         except OSError as error:
-            reason = unreadable(file, error).reason
+            reason = unreadable_error(file, error).reason
         if len(files) == 1:
             raise BagError(file, reason, "name a bag's folder, or its file")
-        findings.losses.append((file.name, Loss(0, 0, reason)))
+        findings.losses.append((file.name, LostRange(0, 0, reason)))
     findings.remarks += [
         f'{file.name} is still being written; what comes after this is not in the new bag'
         for file in present
@@ -383,13 +383,13 @@ def _in_order(named: Sequence[Path], others: Sequence[Path]) -> list[Path]:
     return [*older, *named, *(file for file in others if file not in older)]
 
 
-def _foretaste(path: Path, files: Sequence[Path], stopped: Stopped) -> tuple[str, str]:
+def _detect_profile(path: Path, files: Sequence[Path], stopped: Stopped) -> tuple[str, str]:
     """Return profile and compression for the new bag; raise BagError if no part is whole."""
     profile, anything, reason = '', False, 'holds no file'
     for file in files:
         with file.open('rb') as stream:
-            salvage = Salvage(Source(stream))
-            for record in salvage.found():
+            salvage = Salvage(RecordSource(stream))
+            for record in salvage.find_records():
                 anything = True
                 if isinstance(record, Message):
                     ros = record.channel.message_encoding == 'cdr'
@@ -417,19 +417,19 @@ def _why_nothing(file: Path, salvage: Salvage) -> str:
     return f'{file.name} is whole, and empty'
 
 
-def _save(file: Path, bag: NewBag, findings: _Findings) -> Iterator[int]:
+def _copy_file(file: Path, bag: RecoveredBag, findings: _Findings) -> Iterator[int]:
     """Copy the whole parts of a file; yield the number of bytes examined, now and then."""
     bag.begin_file()
     with file.open('rb') as stream:
-        salvage = Salvage(Source(stream))
+        salvage = Salvage(RecordSource(stream))
         definitions = salvage.data.definitions
         reported = 0
-        for record in salvage.found():
-            bag.add(record, definitions)
-            if salvage.seen != reported:
-                reported = salvage.seen
+        for record in salvage.find_records():
+            bag.add_item(record, definitions)
+            if salvage.examined_to != reported:
+                reported = salvage.examined_to
                 yield reported
-        bag.describe(definitions)
+        bag.add_channels(definitions)
     findings.losses += [(file.name, loss) for loss in salvage.losses]
     findings.repaired += [f'{file.name}: {what}' for what in salvage.repaired]
     if salvage.data.unchecked:
@@ -439,26 +439,26 @@ def _save(file: Path, bag: NewBag, findings: _Findings) -> Iterator[int]:
         )
     statistics = salvage.index.statistics if salvage.index else None
     if statistics is None:
-        findings.all_promised = False
+        findings.all_expected = False
         return
     for number, count in statistics.channel_message_counts.items():
         if number in definitions.channels:
-            findings.promised[definitions.channels[number].topic] += count
+            findings.expected[definitions.channels[number].topic] += count
 
 
-def _recovery(
-    target: Path, bag: NewBag, information: Mapping[str, Any], findings: _Findings
+def _make_recovery(
+    target: Path, bag: RecoveredBag, information: Mapping[str, Any], findings: _Findings
 ) -> Recovery:
-    promised: Mapping[str, int] = findings.promised
-    exact = findings.all_promised
+    promised: Mapping[str, int] = findings.expected
+    exact = findings.all_expected
     if not exact:
-        promised = promised_counts(information)
+        promised = expected_counts(information)
         exact = UNFINISHED not in custom_of(information)
-    names = dict.fromkeys([*bag.topics, *promised])
+    names = dict.fromkeys([*bag.topic_names, *promised])
     return Recovery(
         folder=target,
         topics=tuple(
-            TopicRecovery(name, saved, _true_promise(promised, name, saved, exact))
+            TopicRecovery(name, saved, _known_expected_count(promised, name, saved, exact))
             for name, saved in ((name, bag.counts[name]) for name in names)
         ),
         attachments=tuple(bag.attachments),
@@ -468,7 +468,9 @@ def _recovery(
     )
 
 
-def _true_promise(promised: Mapping[str, int], name: str, saved: int, exact: bool) -> int | None:
+def _known_expected_count(
+    promised: Mapping[str, int], name: str, saved: int, exact: bool
+) -> int | None:
     """
     Return the original number of messages; None if unknown.
 
@@ -487,7 +489,7 @@ def _new_folder(target: Path) -> Iterator[None]:
     try:
         target.mkdir(parents=True)
     except FileExistsError:
-        raise _exists(target) from None
+        raise _exists_error(target) from None
     except OSError as error:
         reason = f'cannot be made: {error.strerror or error}'
         raise RecordingError(target, reason, remedy) from None
@@ -502,5 +504,5 @@ def _new_folder(target: Path) -> Iterator[None]:
         raise
 
 
-def _exists(target: Path) -> RecordingError:
+def _exists_error(target: Path) -> RecordingError:
     return RecordingError(target, 'exists already', 'name a new folder with -o')

@@ -66,7 +66,7 @@ class FaultEvent(NamedTuple):
     data: bytes
 
 
-class Reset(NamedTuple):
+class ResetEvent(NamedTuple):
     """Message that the pipeline was reset before this tick, with its time, in [ns]."""
 
     log_time: int
@@ -85,10 +85,10 @@ class TickEvent(NamedTuple):
     messages: tuple[bytes, ...]
 
 
-Event = SampleEvent | WrenchEvent | FaultEvent | Reset | TickEvent
+Event = SampleEvent | WrenchEvent | FaultEvent | ResetEvent | TickEvent
 
 
-class RunAccount(NamedTuple):
+class RunMetadata(NamedTuple):
     """The run's account in its bag; '' for missing topics."""
 
     # Name of the scene, and the folder for its paths, relative to that of the bag; '' without any.
@@ -111,7 +111,7 @@ class RunAccount(NamedTuple):
     seed: int = 0
 
 
-class StoredRun(Protocol):
+class RunFiles(Protocol):
     """Holds the files of a run's scene: a bag, or a node's message."""
 
     @property
@@ -123,7 +123,7 @@ class StoredRun(Protocol):
         """Return the files by name."""
 
 
-def run_account(bag: StoredRun) -> RunAccount:
+def read_run_metadata(bag: RunFiles) -> RunMetadata:
     """
     Return the run's account in its bag.
 
@@ -137,7 +137,7 @@ def run_account(bag: StoredRun) -> RunAccount:
         raise BagError(
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'
         )
-    account = raw_account(bag)
+    account = read_raw_metadata(bag)
     extras, wrenches = account.get('extra_topics', []), account.get(WRENCH_TOPICS, [])
     texts = {
         key: value
@@ -158,7 +158,7 @@ def run_account(bag: StoredRun) -> RunAccount:
     # Only displayed; the name of a file may contain any character.
     if not texts['scene'].isprintable():
         texts['scene'] = repr(texts['scene'])[1:-1]
-    return RunAccount(
+    return RunMetadata(
         **{key: texts[key] for key in _TEXTS if key in texts},
         extras=tuple(extras),
         wrenches=tuple(wrenches),
@@ -189,7 +189,7 @@ def _are_names(values: Any) -> bool:
     )
 
 
-def raw_account(bag: StoredRun) -> dict[str, Any]:
+def read_raw_metadata(bag: RunFiles) -> dict[str, Any]:
     """Return the run's account as stored in its bag; empty if it is damaged."""
     try:
         text = bag.attachments[RUN_FILE]
@@ -200,8 +200,8 @@ def raw_account(bag: StoredRun) -> dict[str, Any]:
 
 
 def recorded_events(
-    run: RunAccount,
-    own: Callable[[bytes], bool],
+    run: RunMetadata,
+    is_own: Callable[[bytes], bool],
     messages: Iterable[BagMessage],
     crank_topic: str | None = None,
 ) -> Iterator[Event]:
@@ -231,7 +231,7 @@ def recorded_events(
     withheld: tuple[int, int] | None = None
     for topic, log_time, publish_time, data in messages:
         output = outputs.get(topic)
-        if shared and output == 0 and not own(data):
+        if shared and output == 0 and not is_own(data):
             output = None
         taken = topic == crank and (output is None or crank != run.crank_topic)
         if output is None and not taken and topic not in others:
@@ -257,7 +257,7 @@ def recorded_events(
         elif topic == run.faults_topic:
             yield FaultEvent(log_time, publish_time, data)
         elif topic == run.resets_topic:
-            yield Reset(log_time, publish_time, data)
+            yield ResetEvent(log_time, publish_time, data)
         elif topic == run.withheld_topic:
             withheld = log_time, publish_time
             if not again:
@@ -270,7 +270,7 @@ def recorded_events(
 _NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
 
 
-def lost_beginning(bag: Bag, run: RunAccount) -> str:
+def missing_start_reason(bag: Bag, run: RunMetadata) -> str:
     """
     Return text on why the first messages of a run are not in its bag; '' if they are.
 

@@ -34,14 +34,14 @@ from linkage_ros.bag.mcap_records import (
     Definitions,
     definitions_in,
     FileIndex,
-    Found,
+    FoundRecord,
     HEAD,
     index_of,
     is_whole_attachment,
     is_whole_chunk,
     LARGEST,
     Message,
-    Source,
+    RecordSource,
 )
 from linkage_ros.bag.topic import CHANNELS_FILE
 from mcap.opcode import Opcode
@@ -58,7 +58,7 @@ _MOST_IN_VAIN = 16
 """Limit for reading false candidates of chunks, in multiples of the file size."""
 
 
-def next_whole(source: Source, at: int) -> int:
+def find_next_whole(source: RecordSource, at: int) -> int:
     """
     Return the position of the next chunk or attachment; the file's size if there is none.
 
@@ -67,7 +67,7 @@ def next_whole(source: Source, at: int) -> int:
     """
     budget = _MOST_IN_VAIN * source.size + LARGEST
     while at < source.size:
-        window, size = _window(source, at)
+        window, size = _read_window(source, at)
         goes_on = at + size
         for match in _BEGINNING.finditer(window):
             place = at + match.start()
@@ -81,14 +81,14 @@ def next_whole(source: Source, at: int) -> int:
             elif _is_whole(source, place):
                 return place
             else:
-                budget -= max(source.head(place)[1] - place, 0)
+                budget -= max(source.read_head(place)[1] - place, 0)
                 if budget < 0:
                     return source.size
         at = goes_on
     return source.size
 
 
-def _window(source: Source, at: int) -> tuple[bytes, int]:
+def _read_window(source: RecordSource, at: int) -> tuple[bytes, int]:
     """Return some bytes, and the number of them at which a record may begin."""
     to_next_block = _BLOCK - at % _BLOCK
     # The disk cannot read all of a window, but what is before and after a bad block.
@@ -98,8 +98,8 @@ def _window(source: Source, at: int) -> tuple[bytes, int]:
     return b'', to_next_block
 
 
-def _is_whole(source: Source, at: int) -> bool:
-    opcode, end = source.head(at)
+def _is_whole(source: RecordSource, at: int) -> bool:
+    opcode, end = source.read_head(at)
     if end > source.size:
         return False
     if opcode == Opcode.CHUNK:
@@ -107,11 +107,11 @@ def _is_whole(source: Source, at: int) -> bool:
     return is_whole_attachment(source, at)
 
 
-def _end_of_file_at(source: Source, at: int) -> int:
+def _end_of_file_at(source: RecordSource, at: int) -> int:
     """Return the end of an MCAP file that begins at a position within this file; else 0."""
     place = at + len(MCAP0_MAGIC)
     while place < source.size:
-        window, size = _window(source, place)
+        window, size = _read_window(source, place)
         offset = window.find(MCAP0_MAGIC)
         if offset >= 0:
             end = place + offset + len(MCAP0_MAGIC)
@@ -133,7 +133,7 @@ _IN_DATA = {*_KINDS.values(), Opcode.MESSAGE_INDEX, Opcode.DATA_END}
 BEGINNING = 'the beginning, which is not that of an MCAP file'
 
 
-class Loss(NamedTuple):
+class LostRange(NamedTuple):
     """Lost bytes of a file, from `start` to before `end`, and the reason."""
 
     start: int
@@ -152,9 +152,11 @@ class Salvage:
 
     """
 
-    def __init__(self, source: Source) -> None:
-        self.seen = 0  # Position up to which it has been examined
-        self.losses: list[Loss] = []  # Lost ranges; grows during the search, as do the next two
+    def __init__(self, source: RecordSource) -> None:
+        self.examined_to = 0  # Position up to which it has been examined
+        self.losses: list[
+            LostRange
+        ] = []  # Lost ranges; grows during the search, as do the next two
         self.repaired: list[str] = []  # Damage without a loss
         self.index = _trusted_index(source)  # The file's index, if its checksum matches
         index = self.index
@@ -165,49 +167,49 @@ class Salvage:
             index.start if index else 0,
         )
         self._source = source
-        self._promised = _promised(self.index)
-        self._places = sorted(self._promised)
+        self._expected = _promised_records(self.index)
+        self._expected_positions = sorted(self._expected)
         # If all positions are known there is nothing to search for, and nothing else to lose.
         self._all_known = self.index is not None and _is_complete(self.index)
         self._end = self.index.start if self.index else source.size
-        self._spare = Definitions()
+        self._spare_definitions = Definitions()
         self._messages = 0
         self._indexes_end = 0  # end of the previous chunk's message indexes
 
-    def found(self) -> Iterator[Found]:
+    def find_records(self) -> Iterator[FoundRecord]:
         """Yield messages, attachments and metadata in file order."""
         at = len(MCAP0_MAGIC)
         if self._source.size < at or self._source.read(0, at) != MCAP0_MAGIC:
             self.repaired.append(BEGINNING)
         while at < self._end and not self.data.finished:
             try:
-                records, end = self._take(at)
+                records, end = self._read_record(at)
             except DamagedError as error:
-                end = self._resume(at)
-                self._lose(at, end, str(error))
+                end = self._resume_position(at)
+                self._add_loss(at, end, str(error))
             else:
                 if self.data.unknown[-1:] == [(at, end)]:
-                    self._lose(at, end, 'is of a kind that nobody has defined')
+                    self._add_loss(at, end, 'is of a kind that nobody has defined')
                 try:
-                    yield from self._wanted(self._counted(records, end))
+                    yield from self._wanted_records(self._count_messages(records, end))
                 except DamagedError as error:
-                    self._lose(at, end, str(error))
+                    self._add_loss(at, end, str(error))
             at = end
-            self.seen = at
-        self._conclude()
+            self.examined_to = at
+        self._check_end()
 
-    def _take(self, at: int) -> tuple[Iterable[Found], int]:
+    def _read_record(self, at: int) -> tuple[Iterable[FoundRecord], int]:
         """Read the record at a position, or what the index says about it."""
-        promised = self._promised.get(at)
+        promised = self._expected.get(at)
         try:
-            opcode, end = self._source.head(at)
+            opcode, end = self._source.read_head(at)
             if promised and opcode != _KINDS[type(promised)]:
                 raise DamagedError('is not what the index says')
             if opcode not in (Opcode.CHUNK, Opcode.ATTACHMENT) and end > self._next_place(at):
                 raise DamagedError('reaches into what the index says to be another')
-            return self.data.take(at)
+            return self.data.read_record(at)
         except DamagedError:
-            taken: tuple[Iterable[Found], int]
+            taken: tuple[Iterable[FoundRecord], int]
             if isinstance(promised, ChunkIndex):
                 taken = self._chunk_by_index(promised)
             elif isinstance(promised, AttachmentIndex):
@@ -229,9 +231,9 @@ class Salvage:
         end = start + promised.chunk_length
         data = self._source.read(end - length, length)
         chunk = Chunk(promised.uncompressed_size, crc, promised.compression, data, end)
-        return self.data.chunk(chunk), end
+        return self.data.read_chunk(chunk), end
 
-    def _counted(self, records: Iterable[Found], end: int) -> Iterator[Found]:
+    def _count_messages(self, records: Iterable[FoundRecord], end: int) -> Iterator[FoundRecord]:
         """Pass on the records, and compute the length of the message indexes after them."""
         counts: Counter[int] = Counter()
         for record in records:
@@ -242,39 +244,43 @@ class Salvage:
             self._messages += counts.total()
             self._indexes_end = end + sum(15 + 16 * count for count in counts.values())
 
-    def _wanted(self, items: Iterable[Found]) -> Iterator[Found]:
+    def _wanted_records(self, items: Iterable[FoundRecord]) -> Iterator[FoundRecord]:
         """Pass on the records for the caller; keep those for internal use."""
         for one in items:
             if isinstance(one, Attachment) and one.name == CHANNELS_FILE:
-                self._spare = definitions_in(one.data)
+                self._spare_definitions = definitions_in(one.data)
             else:
                 yield one
 
-    def _resume(self, at: int) -> int:
+    def _resume_position(self, at: int) -> int:
         """Return the position to continue at after a damaged record."""
-        self.data.loose = False
+        self.data.allows_unchunked = False
         if self._all_known:
             return self._next_place(at)
         ends = [self._indexes_end]
         try:
-            ends.append(self._source.head(at)[1])
+            ends.append(self._source.read_head(at)[1])
             ends.append(chunk_at(self._source, at).end)
         except DamagedError:
             pass
         for end in ends:
-            if end > at and self._goes_on_at(end):
+            if end > at and self._records_follow(end):
                 return end
-        return next_whole(self._source, at + 1)
+        return find_next_whole(self._source, at + 1)
 
     def _next_place(self, at: int) -> int:
-        number = bisect_right(self._places, at)
-        return self._places[number] if number < len(self._places) else self._end
+        number = bisect_right(self._expected_positions, at)
+        return (
+            self._expected_positions[number]
+            if number < len(self._expected_positions)
+            else self._end
+        )
 
-    def _goes_on_at(self, at: int) -> bool:
+    def _records_follow(self, at: int) -> bool:
         """Return whether records follow there: two at this place, or the end of the data."""
         try:
             for _ in range(2):
-                opcode, end = self._source.head(at)
+                opcode, end = self._source.read_head(at)
                 if opcode not in _IN_DATA or end > self._source.size:
                     return False
                 if opcode == Opcode.DATA_END:
@@ -284,21 +290,23 @@ class Salvage:
             return False
         return True
 
-    def _lose(self, start: int, end: int, reason: str) -> None:
+    def _add_loss(self, start: int, end: int, reason: str) -> None:
         # The lost range may contain schemas and channels.
-        self.data.definitions.complete(self._spare)
-        promised = self._promised.get(start)
+        self.data.definitions.add_missing(self._spare_definitions)
+        promised = self._expected.get(start)
         ours = (type(promised), getattr(promised, 'name', '')) in _MADE_ANEW
         if (self._all_known and not promised) or ours or end <= self._indexes_end:
             self.repaired.append(f'what marks and describes, at byte {start:,}: {reason}')
         else:
-            self.losses.append(Loss(start, end, reason))
+            self.losses.append(LostRange(start, end, reason))
 
-    def _conclude(self) -> None:
+    def _check_end(self) -> None:
         size, length = self._source.size, len(MCAP0_MAGIC)
-        self.repaired += [f'the length of the record at byte {at:,}' for at in self.data.misfits]
+        self.repaired += [
+            f'the length of the record at byte {at:,}' for at in self.data.wrong_lengths
+        ]
         if self.index is None and not self.data.finished:
-            self.losses.append(Loss(size, size, 'it ends here, without its end'))
+            self.losses.append(LostRange(size, size, 'it ends here, without its end'))
         elif self.index is None:
             self.repaired.append('the index')
         elif self._source.read(size - length, length) != MCAP0_MAGIC:
@@ -309,14 +317,14 @@ class Salvage:
         missing = promised.message_count - self._messages if promised else 0
         if missing > 0:
             reason = f'{missing:,} messages that the index counts are nowhere'
-            self.losses.append(Loss(size, size, reason))
+            self.losses.append(LostRange(size, size, reason))
         try:
-            _ = self.data.finished and self.data.covered()
+            _ = self.data.finished and self.data.has_checksum()
         except DamagedError as error:
             self.repaired.append(str(error))
 
 
-def _trusted_index(source: Source) -> FileIndex | None:
+def _trusted_index(source: RecordSource) -> FileIndex | None:
     """Return the index if its checksum matches; an index without one is not trusted."""
     try:
         index = index_of(source)
@@ -337,7 +345,9 @@ def _is_complete(index: FileIndex) -> bool:
     )
 
 
-def _promised(index: FileIndex | None) -> dict[int, ChunkIndex | AttachmentIndex | MetadataIndex]:
+def _promised_records(
+    index: FileIndex | None,
+) -> dict[int, ChunkIndex | AttachmentIndex | MetadataIndex]:
     promised: dict[int, ChunkIndex | AttachmentIndex | MetadataIndex] = {}
     if index:
         promised |= {chunk.chunk_start_offset: chunk for chunk in index.chunks}

@@ -48,10 +48,10 @@ class Extent(NamedTuple):
     seconds: float = 0.0  # Time between the oldest message and the newest [s]
     size: int = 0  # Size of the messages [bytes]
     # Whether messages that were not too old had to be removed for lack of memory.
-    crowded: bool = False
+    over_budget: bool = False
 
 
-class Kept(NamedTuple):
+class KeptMessages(NamedTuple):
     """
     Content of the memory at an instant, as packed messages; immutable.
 
@@ -63,7 +63,7 @@ class Kept(NamedTuple):
     begin: int
     counts: tuple[int, ...]
     seconds: float
-    whole: bool
+    is_complete: bool
 
     def messages(self) -> Iterator[tuple[int, int, int, bytes]]:
         """Yield topic, log time, publish time and bytes, in order of arrival."""
@@ -110,8 +110,8 @@ class LastSeconds:
         self._newest: list[bytes] = []
         self._newest_size, self._newest_since = 0, 0
         self._size = 0
-        self._gone: int | None = None  # log time of the message that was removed last
-        self._crowded: int | None = None  # time of the last removal for lack of memory
+        self._last_removed: int | None = None  # log time of the message that was removed last
+        self._last_overflow: int | None = None  # time of the last removal for lack of memory
 
     def add(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
         """Add a message with 63-bit times."""
@@ -122,7 +122,7 @@ class LastSeconds:
             self._clocks[topic] = log_time, self._now
         age = self._now - self._newest_since
         if self._newest_size >= _BLOCK_SIZE or age > self._span // _BLOCKS_IN_SPAN:
-            self._seal()
+            self._seal_block()
         if not self._newest:
             self._newest_since = self._now
         head = _HEAD.pack(topic, self._now, log_time, publish_time, len(data))
@@ -142,11 +142,11 @@ class LastSeconds:
             topic, at, log_time, _, size = _HEAD.unpack_from(block, self._begin)
             crowded = self._size > self._most
             # Messages taken and made by one tick stay together.
-            if self._now - at <= self._span and not crowded and log_time != self._gone:
+            if self._now - at <= self._span and not crowded and log_time != self._last_removed:
                 return False
             if crowded:
-                self._crowded = self._now
-            self._gone = log_time
+                self._last_overflow = self._now
+            self._last_removed = log_time
             self.discarded[topic] += 1
             self._counts[topic] -= 1
             self._begin += _HEAD.size + size
@@ -156,28 +156,28 @@ class LastSeconds:
                 self._begin = 0
         return True
 
-    def kept(self) -> Kept:
+    def kept_content(self) -> KeptMessages:
         """Return the content of the memory."""
-        self._seal()
-        seconds, _, _ = self.extent()
+        self._seal_block()
+        seconds, _, _ = self.measure_extent()
         whole = not any(self.discarded)
-        return Kept(tuple(self._blocks), self._begin, tuple(self._counts), seconds, whole)
+        return KeptMessages(tuple(self._blocks), self._begin, tuple(self._counts), seconds, whole)
 
-    def extent(self) -> Extent:
+    def measure_extent(self) -> Extent:
         """Return the amount of messages in memory."""
         oldest = self._newest_since if self._newest else self._now
         if self._blocks:
             oldest = _HEAD.unpack_from(self._blocks[0], self._begin)[1]
-        crowded = self._crowded is not None and self._now - self._crowded <= self._span
+        crowded = self._last_overflow is not None and self._now - self._last_overflow <= self._span
         return Extent((self._now - oldest) * 1e-9, self._size, crowded)
 
-    def forget(self, limit: int) -> bool:
+    def free_blocks(self, limit: int) -> bool:
         """Free the memory of up to `limit` blocks; return whether there are more."""
         for _ in range(min(limit, len(self._blocks))):
             self._blocks.popleft()
         return bool(self._blocks)
 
-    def _seal(self) -> None:
+    def _seal_block(self) -> None:
         if self._newest:
             self._blocks.append(b''.join(self._newest))
             self._newest, self._newest_size = [], 0
@@ -245,21 +245,26 @@ class SnapshotMemory:
         self._lock = threading.Lock()
         self._last = LastSeconds(len(topics), round(seconds * 1e9), most)
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='snapshot memory', daemon=True)
+        self._thread = threading.Thread(
+            target=self._run_thread, name='snapshot memory', daemon=True
+        )
         self._thread.start()
 
-    def inspect(self) -> tuple[KeptCounts, ...]:
+    def read_counts(self) -> tuple[KeptCounts, ...]:
         """Return the current counts; messages that wait for the thread count as kept."""
         counts = []
         for number, topic in enumerate(self.topics):
-            discarded, dropped = self._last.discarded[number], self._queue.dropped[number].value()
+            discarded, dropped = (
+                self._last.discarded[number],
+                self._queue.dropped[number].read_count(),
+            )
             # Read last, so that a message in transit counts as kept, and never twice.
-            received = self._queue.received[number].value()
+            received = self._queue.received[number].read_count()
             kept = received - discarded - dropped
             counts.append(KeptCounts(topic.name, received, kept, discarded, dropped))
         return tuple(counts)
 
-    def take(self) -> Kept:
+    def take_content(self) -> KeptMessages:
         """
         Return the content of the memory: all messages offered before that are not too old.
 
@@ -268,57 +273,57 @@ class SnapshotMemory:
         with self._lock:
             if self.failure:
                 raise self.failure
-            if not self._queue.open:
+            if not self._queue.is_open:
                 raise RecordingError(_WHERE, 'has ended', 'ask while the node is active')
-            self._put_away(len(self._queue))
+            self._store_waiting(len(self._queue))
             while self._last.discard_old(BATCH):
                 pass
-            return self._last.kept()
+            return self._last.kept_content()
 
     def stop(self) -> tuple[KeptCounts, ...]:
         """End the memory; return the last counts, with the messages kept to the end."""
-        self._queue.open = False
+        self._queue.is_open = False
         self._stopping.set()
         self._thread.join()
-        return self.inspect()
+        return self.read_counts()
 
-    def _run(self) -> None:
+    def _run_thread(self) -> None:
         try:
             stopping = False
             while not stopping:
                 # Checked before the queue is emptied: messages offered until then are counted.
                 stopping = self._stopping.wait(POLL)
-                while self._work():
+                while self._process_batch():
                     time.sleep(NAP)
         except Exception as error:  # noqa: BLE001 (no error may end the thread silently)
-            self._fail(error)
+            self._store_failure(error)
         # Not all at once: a tick may be running, and would wait for it.
-        while self._last.forget(_BLOCKS):
+        while self._last.free_blocks(_BLOCKS):
             time.sleep(NAP)
 
-    def _work(self) -> bool:
+    def _process_batch(self) -> bool:
         """Add a batch of messages, and remove as many; return whether there may be more."""
         with self._lock:
-            self._put_away(BATCH)
+            self._store_waiting(BATCH)
             more = self._last.discard_old(2 * BATCH)
-            self.extent = self._last.extent()
+            self.extent = self._last.measure_extent()
         return more or bool(self._queue)
 
-    def _put_away(self, count: int) -> None:
-        for message in self._queue.take(count):
+    def _store_waiting(self, count: int) -> None:
+        for message in self._queue.take_messages(count):
             topic, log_time, publish_time, _ = message
             if 0 <= log_time < TIME_END and 0 <= publish_time < TIME_END:
                 self._last.add(*message)
             else:
                 self._queue.dropped[topic].add()
 
-    def _fail(self, error: Exception) -> None:
+    def _store_failure(self, error: Exception) -> None:
         """Store the failure; the content of the memory is lost."""
-        self._queue.open = False
+        self._queue.is_open = False
         self.failure = RecordingError(
             _WHERE, f'has ended early: {type(error).__name__}: {error}', 'please report this'
         )
-        for number, counts in enumerate(self.inspect()):
+        for number, counts in enumerate(self.read_counts()):
             self._last.discarded[number] += counts.kept
 
 
@@ -345,75 +350,75 @@ class SnapshotWriting:
     """
 
     def __init__(
-        self, kept: Kept, make: Callable[[], BagWriter], done: Callable[[], None]
+        self, kept: KeptMessages, make_writer: Callable[[], BagWriter], on_done: Callable[[], None]
     ) -> None:
         self.kept = kept
         # Summary of the recording, or the error that prevented it; None until then.
         self.outcome: RecordingSummary | RecordingError | None = None
-        self._make = make
-        self._done = done
-        self._seen = time.monotonic()
+        self._make_writer = make_writer
+        self._on_done = on_done
+        self._last_progress = time.monotonic()
         # A daemon thread: a disk that never answers must not keep the process alive.
-        self._thread = threading.Thread(target=self._run, name='snapshot', daemon=True)
+        self._thread = threading.Thread(target=self._run_thread, name='snapshot', daemon=True)
         self._thread.start()
 
     def wait(self) -> RecordingSummary | RecordingError:
         """Wait for the outcome, but not too long for a disk that does not answer; return it."""
         # The thread has its own time limit, and then has to close a bag.
-        while self.outcome is None and time.monotonic() - self._seen < 3.0 * _PATIENCE:
+        while self.outcome is None and time.monotonic() - self._last_progress < 3.0 * _PATIENCE:
             self._thread.join(POLL)
         return self.outcome or RecordingError(
             'snapshot', 'the disk does not answer', 'what was flushed before is readable'
         )
 
-    def _run(self) -> None:
+    def _run_thread(self) -> None:
         try:
-            self.outcome = self._write(self._make())
+            self.outcome = self._write_bag(self._make_writer())
         except RecordingError as error:
             self.outcome = error
         except Exception as error:  # noqa: BLE001 (no error may end the thread silently)
             reason = f'{type(error).__name__}: {error}'
             self.outcome = RecordingError('snapshot', reason, 'please report this')
-        self._done()
+        self._on_done()
 
-    def _write(self, writer: BagWriter) -> RecordingSummary:
+    def _write_bag(self, writer: BagWriter) -> RecordingSummary:
         recorder = Recorder(writer, capacity=_AHEAD + BATCH)
-        writer.account = partial(self._account, writer)
+        writer.make_statistics = partial(self._final_statistics, writer)
         for number, message in enumerate(self.kept.messages()):
             if number % BATCH == 0:
                 time.sleep(NAP)
-                if not self._is_taken(recorder, _AHEAD):
+                if not self._wait_for_recorder(recorder, _AHEAD):
                     break
             recorder.offer(*message)
-        self._is_taken(recorder, 0)
+        self._wait_for_recorder(recorder, 0)
         summary = recorder.stop(timeout=_PATIENCE)
         # After a failure some messages were not offered.
         topics = [
             replace(topic, received=there, dropped=there - topic.recorded)
-            for topic, there in zip(summary.topics, self._received(writer), strict=True)
+            for topic, there in zip(summary.topics, self._received_counts(writer), strict=True)
         ]
         return replace(summary, topics=tuple(topics))
 
-    def _is_taken(self, recorder: Recorder, most: int) -> bool:
+    def _wait_for_recorder(self, recorder: Recorder, most: int) -> bool:
         """Wait until at most `most` messages wait; return whether the disk still works."""
         left = -1
         while not recorder.failure:
-            before, left = left, sum(topic.waiting for topic in recorder.inspect())
+            before, left = left, sum(topic.waiting for topic in recorder.read_counts())
             if left != before:
-                self._seen = time.monotonic()
+                self._last_progress = time.monotonic()
             if left <= most:
                 return True
-            if time.monotonic() - self._seen > _PATIENCE:
+            if time.monotonic() - self._last_progress > _PATIENCE:
                 break
             time.sleep(POLL)
         return False
 
-    def _received(self, writer: BagWriter) -> list[int]:
+    def _received_counts(self, writer: BagWriter) -> list[int]:
         """Return the number of messages of each topic to write."""
-        return list(map(sum, zip(self.kept.counts, writer.opened, strict=True)))
+        return list(map(sum, zip(self.kept.counts, writer.opening_counts, strict=True)))
 
-    def _account(self, writer: BagWriter, summary: BagSummary) -> RecordingStats:
-        received = self._received(writer)
+    def _final_statistics(self, writer: BagWriter, summary: BagSummary) -> RecordingStats:
+        received = self._received_counts(writer)
         dropped = [
             there - written for there, written in zip(received, summary.counts, strict=True)
         ]

@@ -51,7 +51,7 @@ class Storage:
     snapshot_bytes: int = 256_000_000  # Most memory for it [bytes]
 
 
-def scarcity(folder: Path, least: int) -> str:
+def describe_scarcity(folder: Path, least: int) -> str:
     """Return how much free space a folder's disk lacks, as text; '' if there is enough."""
     if not least:
         return ''

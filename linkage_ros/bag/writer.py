@@ -31,13 +31,13 @@ from linkage_ros.bag.metadata import (
     custom_data,
     FAILURE,
     last_records,
+    merge_summaries,
     RecordingStats,
     sync_folder,
-    together,
     UNFINISHED_DATA,
     write_metadata,
 )
-from linkage_ros.bag.storage import scarcity, Storage
+from linkage_ros.bag.storage import describe_scarcity, Storage
 from linkage_ros.bag.topic import CHANNELS_FILE, Topic
 from linkage_ros.errors import RecordingError
 
@@ -93,7 +93,7 @@ class BagWriter:
         self.discarded = (0,) * len(self.topics)
         # Returns the statistics of all messages, given the summary of the bag; None for a bag
         # without statistics.
-        self.account: Callable[[BagSummary], RecordingStats | None] = lambda summary: None
+        self.make_statistics: Callable[[BagSummary], RecordingStats | None] = lambda summary: None
         channels = 'application/mcap', channels_file(self.topics)
         self._attachments = {**(attachments or {}), CHANNELS_FILE: channels}
         self._split_time = round(self.storage.split_seconds * 1e9)  # [ns]
@@ -101,11 +101,11 @@ class BagWriter:
         self._paths = (self.folder / f'{self.folder.name}_{number}.mcap' for number in count())
         self._opening = tuple(opening)
         # Number of messages of each topic written because of `opening`, not by `write`.
-        self.opened = (0,) * len(self.topics)
+        self.opening_counts = (0,) * len(self.topics)
         self._sequences = [0] * len(self.topics)
         self._refused = [0] * len(self.topics)
-        self._ended: list[BagSummary] = []
-        self._gone: list[Path] = []  # files to remove that still exist
+        self._ended_files: list[BagSummary] = []
+        self._files_to_remove: list[Path] = []  # files to remove that still exist
         self._due = 0.0
         self._checked = 0  # size of the file at the last check of free space [bytes]
         self._summary: BagSummary | None = None
@@ -123,11 +123,11 @@ class BagWriter:
             self._give_up(error)
         try:
             with ExitStack() as undo:
-                undo.callback(_remove, self.folder)
+                undo.callback(_remove_folder, self.folder)
                 self._file = self._next_file()
                 undo.callback(self._file.abandon)
                 self._refuse_if_scarce('cannot be recorded to', _MAKE_ROOM)
-                self._renew(self._summarize())
+                self._renew_metadata(self._summarize())
                 sync_folder(self.folder.absolute().parent)
                 undo.pop_all()
         except OSError as error:
@@ -164,26 +164,26 @@ class BagWriter:
             self._refused[topic] += 1
             return False
         if self._splits and self._is_full(log_time):
-            self._split()
+            self._begin_next_file()
         if self.storage.min_free_bytes and self._file.size != self._checked:
             self._check_space()
         if self._opening and self._file.first is None:
             self._open_file(log_time)
-        self._add(topic, log_time, publish_time, data)
+        self._add_message(topic, log_time, publish_time, data)
         if self._file.error:
-            self._end(self._file.error)
+            self._end_recording(self._file.error)
         return True
 
     def _open_file(self, log_time: int) -> None:
-        opened = list(self.opened)
+        opened = list(self.opening_counts)
         for topic, data in self._opening:
-            self._add(topic, log_time, log_time, data)
+            self._add_message(topic, log_time, log_time, data)
             opened[topic] += 1
-        self.opened = tuple(opened)
+        self.opening_counts = tuple(opened)
 
-    def _add(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
+    def _add_message(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
         sequence = self._sequences[topic]
-        self._file.add(topic, log_time, publish_time, data, sequence % _SEQUENCE_END)
+        self._file.add_message(topic, log_time, publish_time, data, sequence % _SEQUENCE_END)
         self._sequences[topic] = sequence + 1
 
     def flush(self) -> None:
@@ -195,7 +195,7 @@ class BagWriter:
                 self._try_to_renew(self._summarize())
             self._refuse_if_scarce('the recording was interrupted')
         except (OSError, RecordingError) as error:
-            self._end(error)
+            self._end_recording(error)
 
     def resume(self) -> bool:
         """
@@ -203,7 +203,7 @@ class BagWriter:
 
         The failure stays recorded in the metadata.
         """
-        if not self.out_of_room or not self._file.ended:
+        if not self.out_of_room or not self._file.has_ended:
             return False
         try:
             reserve = Reserve(self.folder)
@@ -216,7 +216,7 @@ class BagWriter:
             file = self._next_file()
         except (OSError, RecordingError):
             return False
-        self._ended, self._file = self._parts(), file
+        self._ended_files, self._file = self._file_summaries(), file
         self._failure, self.out_of_room = None, False
         self._renew_and_discard()
         return True
@@ -238,7 +238,7 @@ class BagWriter:
         """
         if self._summary:
             return self._summary
-        failed, error = self._failure, self._finish(custom or {})
+        failed, error = self._failure, self._finish_bag(custom or {})
         self._summary = self._summarize()
         if error and not failed:
             self._failure = self._ended_by(error)
@@ -246,16 +246,16 @@ class BagWriter:
         return self._summary
 
     @property
-    def kept(self) -> tuple[int, ...]:
+    def kept_counts(self) -> tuple[int, ...]:
         """Return how many messages of each topic `write` has taken and not lost since."""
         summary = self._summarize()
-        there = zip(summary.counts, summary.discarded, self.opened, strict=True)
+        there = zip(summary.counts, summary.discarded, self.opening_counts, strict=True)
         return tuple(counts + gone - opened for counts, gone, opened in there)
 
     @property
     def size(self) -> int:
         """Return the current size of the MCAP files [bytes]."""
-        return sum(part.size for part in self._ended) + self._file.size
+        return sum(part.size for part in self._ended_files) + self._file.size
 
     def _is_full(self, log_time: int) -> bool:
         file = self._file
@@ -272,39 +272,43 @@ class BagWriter:
         try:
             self._refuse_if_scarce('the recording was interrupted')
         except (OSError, RecordingError) as error:
-            self._end(error)
+            self._end_recording(error)
 
-    def _split(self) -> None:
+    def _begin_next_file(self) -> None:
         """End the file and begin the next; with too many files, remove the oldest."""
         try:
             self._refuse_if_scarce('the recording was interrupted')
-            error = self._file.finish(last_records(self._unfinished, self._summarize(), None))
+            error = self._file.finish(
+                last_records(self._unfinished_metadata, self._summarize(), None)
+            )
             if error:
                 raise error
             file = self._next_file()
-            self._ended, self._file = self._parts(), file
+            self._ended_files, self._file = self._file_summaries(), file
             self._renew_and_discard()
         except (OSError, RecordingError) as worse:
-            self._end(worse)
+            self._end_recording(worse)
 
     def _renew_and_discard(self) -> None:
         """List the kept files, then remove the others: every listed file exists."""
-        parts, most = self._parts(), self.storage.keep_files
+        parts, most = self._file_summaries(), self.storage.keep_files
         excess = max(0, len(parts) - most) if most else 0
         gone, kept = parts[:excess], parts[excess:]
         discarded = [self.discarded, *(part.counts for part in gone)]
-        summary = together(kept, self._refused, tuple(map(sum, zip(*discarded, strict=True))))
+        summary = merge_summaries(
+            kept, self._refused, tuple(map(sum, zip(*discarded, strict=True)))
+        )
         if not self._try_to_renew(summary):
             return
-        self._ended, self.discarded = kept[:-1], summary.discarded
-        self._gone += [self.folder / part.file for part in gone]
+        self._ended_files, self.discarded = kept[:-1], summary.discarded
+        self._files_to_remove += [self.folder / part.file for part in gone]
         self._remove_gone()
 
     def _remove_gone(self) -> None:
         """Remove the files that are due; retry later if one cannot be removed."""
-        self._gone = [file for file in self._gone if not _is_removed(file)]
+        self._files_to_remove = [file for file in self._files_to_remove if not _is_removed(file)]
 
-    def _finish(self, custom: Mapping[str, str], *, accounted: bool = True) -> OSError | None:
+    def _finish_bag(self, custom: Mapping[str, str], *, accounted: bool = True) -> OSError | None:
         """
         Close the bag as well as the disk allows; return the error, if any, of this call.
 
@@ -313,16 +317,16 @@ class BagWriter:
         error = None
         if not self._file.finished:
             summary = self._summarize()
-            account = self.account(summary) if accounted else None
+            account = self.make_statistics(summary) if accounted else None
             entries = {**custom, **self._outcome}
             error = self._file.finish(last_records(entries, summary, account))
-        gone = self._lose_what_is_gone()
+        gone = self._discount_lost_files()
         error = error or gone
         if error and not self._failure:
             self._outcome = {FAILURE: str(self._ended_by(error))}
         summary = self._summarize()
         self._remove_gone()
-        account = self.account(summary) if accounted else None
+        account = self.make_statistics(summary) if accounted else None
         last = custom_data({**self._outcome, **custom}, summary, account)
         try:
             try:
@@ -334,31 +338,31 @@ class BagWriter:
             error = error or worse
         return error
 
-    def _lose_what_is_gone(self) -> LostError | None:
+    def _discount_lost_files(self) -> LostError | None:
         """Remove from the counts the messages in files that another process has cut or removed."""
-        parts = self._parts()
+        parts = self._file_summaries()
         gone = [part for part in parts if not _is_there(self.folder / part.file, part.size)]
         if not gone:
             return None
-        self._ended = [part for part in self._ended if part not in gone]
+        self._ended_files = [part for part in self._ended_files if part not in gone]
         if parts[-1] in gone:
-            self._file.forget()
+            self._file.mark_removed()
         names = ', '.join(part.file for part in gone)
         return LostError(f'{names}: cut or removed by another process')
 
     def _try_to_renew(self, summary: BagSummary) -> bool:
         """Update the metadata, or keep the old ones on failure: no message depends on them."""
         try:
-            self._renew(summary)
+            self._renew_metadata(summary)
         except OSError:
             self._due = time.monotonic() + _RENEWAL
             return False
         return True
 
-    def _renew(self, summary: BagSummary) -> None:
+    def _renew_metadata(self, summary: BagSummary) -> None:
         """Write the messages on the disk by now into the metadata."""
         begin = time.monotonic()
-        write_metadata(summary, custom_data(self._unfinished, summary, None))
+        write_metadata(summary, custom_data(self._unfinished_metadata, summary, None))
         end = time.monotonic()
         # With many files the metadata are long, and must not keep a slow disk busy.
         self._due = end + max(_RENEWAL, 20.0 * (end - begin))
@@ -367,25 +371,25 @@ class BagWriter:
         return BagFile(next(self._paths), self.topics, self._attachments, self._compression)
 
     @property
-    def _unfinished(self) -> dict[str, str]:
+    def _unfinished_metadata(self) -> dict[str, str]:
         """Return the custom data of a recording in progress."""
         return {**UNFINISHED_DATA, **self._outcome}
 
     def _refuse_if_scarce(self, what: str, remedy: str = _GO_ON) -> None:
         """Raise RecordingError if too little is free, without the files' reserve."""
-        scarce = scarcity(self.folder, self.storage.min_free_bytes)
+        scarce = describe_scarcity(self.folder, self.storage.min_free_bytes)
         if scarce:
             raise RecordingError(self.folder, f'{what}: {scarce}', remedy)
 
-    def _end(self, error: OSError | RecordingError) -> NoReturn:
+    def _end_recording(self, error: OSError | RecordingError) -> NoReturn:
         self._failure = error if isinstance(error, RecordingError) else self._ended_by(error)
         self._outcome = {FAILURE: str(self._failure)}
         # Only `_refuse_if_scarce` raises RecordingError.
         self.out_of_room = isinstance(error, RecordingError) or error.errno in NO_ROOM
         if self.out_of_room:
-            self._finish(UNFINISHED_DATA, accounted=False)
+            self._finish_bag(UNFINISHED_DATA, accounted=False)
         else:
-            self._finish({})
+            self._finish_bag({})
         raise self._failure
 
     def _ended_by(self, error: OSError) -> RecordingError:
@@ -408,16 +412,16 @@ class BagWriter:
             'name a folder on a disk that can be written to',
         ) from None
 
-    def _parts(self) -> list[BagSummary]:
-        if self._file.forgotten and self._ended:
-            return self._ended
-        return [*self._ended, self._file.summary(self.topics)]
+    def _file_summaries(self) -> list[BagSummary]:
+        if self._file.removed and self._ended_files:
+            return self._ended_files
+        return [*self._ended_files, self._file.summarize(self.topics)]
 
     def _summarize(self) -> BagSummary:
-        return together(self._parts(), self._refused, self.discarded)
+        return merge_summaries(self._file_summaries(), self._refused, self.discarded)
 
 
-def _remove(folder: Path) -> None:
+def _remove_folder(folder: Path) -> None:
     """Remove a folder that only this process has written to."""
     for leftover in folder.iterdir():
         leftover.unlink()

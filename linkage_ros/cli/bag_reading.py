@@ -30,8 +30,13 @@ from linkage_ros.bag.reader import (
     read_bag,
     serialized_metadata,
 )
-from linkage_ros.bag.recover import NOTHING_LOST, promised_counts, RECOVERED
-from linkage_ros.bag.run_events import lost_beginning, raw_account, run_account, RunAccount
+from linkage_ros.bag.recover import expected_counts, NOTHING_LOST, RECOVERED
+from linkage_ros.bag.run_events import (
+    missing_start_reason,
+    read_raw_metadata,
+    read_run_metadata,
+    RunMetadata,
+)
 from linkage_ros.cli.arguments import finite
 from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import BagError, clean, listed
@@ -112,17 +117,17 @@ def unfinished_text(bag: Bag) -> str:
     return text if bag.path.is_dir() else f'{text}, or goes on in another file'
 
 
-def run_or_blank(bag: Bag) -> RunAccount:
+def run_or_blank(bag: Bag) -> RunMetadata:
     """Return the run account in a bag; a blank one if it is missing or damaged."""
     try:
-        return run_account(bag)
+        return read_run_metadata(bag)
     except BagError:
-        return RunAccount()
+        return RunMetadata()
 
 
 def gaps(bag: Bag) -> Iterator[str]:
     """Yield the gaps within a bag; what follows a gap may differ in a replay."""
-    diagnostics = raw_account(bag).get('diagnostics_topic')
+    diagnostics = read_raw_metadata(bag).get('diagnostics_topic')
     dropped = sum(
         count for topic, count in counts_in(bag.custom, 'dropped').items() if topic != diagnostics
     )
@@ -173,7 +178,7 @@ class BagReading:
                 self.damage = f'{error.where}: {error.reason}'
                 return
             if message is None:
-                promised = promised_counts(_metadata(self._bag))
+                promised = expected_counts(_metadata(self._bag))
                 self.missing = max(0, sum(promised.values()) - (number - 1))
                 return
             read += len(message.data) + _BESIDE
@@ -195,7 +200,7 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
     within = next((layout.rosbag2 for layout in layouts if layout.rosbag2), None)
     if not metadata and within is not None:
         metadata = serialized_metadata(within)
-    run = raw_account(bag)
+    run = read_raw_metadata(bag)
     # Only bags that have metadata left out say so.
     discarded = counts_in(bag.custom, 'let_go')
     counted = {word: counts_in(bag.custom, word) for word in ('received', 'dropped')}
@@ -211,7 +216,7 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
         'compressions': _compressions(layouts),
         'truncated': bag.truncated,
         'unfinished': unfinished_text(bag) if bag.truncated else None,
-        'beginning_missing': lost_beginning(bag, run_or_blank(bag)) or None,
+        'beginning_missing': missing_start_reason(bag, run_or_blank(bag)) or None,
         'damage': contents.damage or None,
         'stopped': contents.stopped,
         'recording_failure': bag.custom.get(FAILURE),
@@ -221,7 +226,7 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
                 'name': topic.name,
                 'type': topic.type,
                 'messages': messages,
-                'rate_hz': each.rate,
+                'rate_hz': each.mean_rate,
                 'size_bytes': size,
                 'reliability': topic.qos.reliability,
                 'durability': topic.qos.durability,

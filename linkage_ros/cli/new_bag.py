@@ -20,9 +20,9 @@ from linkage_ros.bag.reader import Bag, RUN_FILE
 from linkage_ros.bag.run_events import (
     BEGUN,
     FaultEvent,
-    raw_account,
-    Reset,
-    RunAccount,
+    read_raw_metadata,
+    ResetEvent,
+    RunMetadata,
     SampleEvent,
     SEED,
     USER_EFFECTS,
@@ -47,7 +47,7 @@ class Source(NamedTuple):
     """The origin of a new bag."""
 
     bag: Bag  # The bag
-    run: RunAccount  # The bag's run account; blank if it has none
+    run: RunMetadata  # The bag's run account; blank if it has none
     recorded: Scene | None  # The scene in the bag; None if there is none that can be read
     crank_topic: str  # Topic of the crank samples
 
@@ -153,7 +153,7 @@ class NewBag:
             **versions_here(),
             'made_from': {
                 'bag': os.path.relpath(bag.path.resolve(), folder.resolve()),
-                'run': raw_account(bag),
+                'run': read_raw_metadata(bag),
             },
         }
         files = {name: ('application/yaml', data) for name, data in scene.files.items()}
@@ -174,7 +174,7 @@ class NewBag:
             self._write(self._numbers['crank_topic'], *event)
         elif isinstance(event, FaultEvent):
             self._write(self._numbers['faults_topic'], *event)
-        elif isinstance(event, Reset):
+        elif isinstance(event, ResetEvent):
             self._write(self._numbers['resets_topic'], *event)
         else:
             log_time, time, _, tick = event

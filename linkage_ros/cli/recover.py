@@ -15,7 +15,7 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.recover import recover, recovered_name, Recovery
+from linkage_ros.bag.recover import recover_bag, recovered_name, Recovery
 from linkage_ros.cli.arguments import add_bag, add_force, output_or
 from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import clean
@@ -45,18 +45,18 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     with heeded(), progress('bytes') as advance:
         folder = output_or(arguments, recovered_name(arguments.bag))
         remove_bag(folder, force=arguments.force)
-        recovery = recover(arguments.bag, folder, advance, stop.is_set)
+        recovery = recover_bag(arguments.bag, folder, advance, stop.is_set)
     if recovery is None:
         print('stopped; nothing was written', file=sys.stderr)
         return STOPPED
     _say(recovery)
-    return WHOLE if recovery.whole else LOSS
+    return WHOLE if recovery.is_whole else LOSS
 
 
 def _say(recovery: Recovery) -> None:
     rows = []
     for topic in recovery.topics:
-        promised = '?' if topic.promised is None else f'{topic.promised:,}'
+        promised = '?' if topic.expected is None else f'{topic.expected:,}'
         rows.append((topic.name, f'{topic.saved:,}', promised))
     if rows:
         show(Table('', ('topic', '>saved', '>of'), rows))
@@ -68,10 +68,10 @@ def _say(recovery: Recovery) -> None:
     for file, (start, end, reason) in recovery.losses:
         size = f', {end - start:,} bytes' if end > start else ''
         lost.append(f'{file} at byte {start:,}{size}: {reason}')
-    if recovery.missing:
-        lost.append(f'{recovery.missing:,} messages that the bag promises')
+    if recovery.missing_count:
+        lost.append(f'{recovery.missing_count:,} messages that the bag promises')
     _lines('LOST', lost)
-    if recovery.whole:
+    if recovery.is_whole:
         print('nothing lost')
     print(f'bag          {recovery.folder}')
 

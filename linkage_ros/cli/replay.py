@@ -32,7 +32,7 @@ from threading import Event
 from typing import Any
 
 from linkage_ros.bag.reader import Bag, RUN_FILE
-from linkage_ros.bag.run_events import recorded_events, run_account, RunAccount
+from linkage_ros.bag.run_events import read_run_metadata, recorded_events, RunMetadata
 from linkage_ros.cli.arguments import add_bag, add_force, add_set, finite, SCENE_HELP
 from linkage_ros.cli.bag_reading import (
     add_trust,
@@ -348,16 +348,16 @@ def _replayed_with(
     }
 
 
-def _own_account(bag: Bag) -> tuple[RunAccount, Scene | None]:
+def _own_account(bag: Bag) -> tuple[RunMetadata, Scene | None]:
     """Return the run account and the scene in a bag; a blank account and None if unreadable."""
     try:
-        return run_account(bag), recorded_scene(bag)
+        return read_run_metadata(bag), recorded_scene(bag)
     except LinkageError as error:
         print(
             f'linkage replay: nothing to compare with: {error.where}: {error.reason}',
             file=sys.stderr,
         )
-        return RunAccount(), None
+        return RunMetadata(), None
 
 
 def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path | None) -> None:
@@ -373,7 +373,7 @@ def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path |
 
 
 def _side_by_side(
-    event: Remade, run: RunAccount, names: Names, shared: list[str]
+    event: Remade, run: RunMetadata, names: Names, shared: list[str]
 ) -> tuple[list[bytes], list[bytes]]:
     """Return the messages of a tick, recorded and new, on each topic that both runs have."""
     then = dict(zip((run.joint_states_topic, *run.extras), event.recorded, strict=False))
@@ -423,7 +423,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         scene = _other_scene(bag, arguments)
         if RUN_FILE in bag.attachments and 'seed' not in scene.members[0].content:
             # The same seeds: the scene makes the difference, not the noise.
-            scene = replace(scene, seed=run_account(bag).seed)
+            scene = replace(scene, seed=read_run_metadata(bag).seed)
         account = _replayed_with(
             bag,
             reading,
@@ -474,7 +474,7 @@ def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> d
         proof = verify_replay(bag, scene, messages, observe)
     if not begin and not reading.damage and not reading.stopped:
         raise BagError(bag.path, 'holds no joint states', 'record a run with a crank')
-    run = run_account(bag)
+    run = read_run_metadata(bag)
     versions = {
         'bag': {**run.versions, **run.user_effects},
         'here': {**versions_here(), **user_effects_here(scene)},

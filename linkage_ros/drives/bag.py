@@ -31,7 +31,7 @@ from itertools import pairwise
 from math import nan
 
 from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.bag.run_events import raw_account
+from linkage_ros.bag.run_events import read_raw_metadata
 from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import BagError, DefinitionError, listed
@@ -189,7 +189,7 @@ def _why(samples_of: Mapping[str, Samples]) -> str:
 
 def _crank_topic_of_run(bag: Bag) -> str:
     """Return the crank topic from the run's account in a bag; '' if the bag has none."""
-    name = raw_account(bag).get('crank_topic')
+    name = read_raw_metadata(bag).get('crank_topic')
     return name if isinstance(name, str) else ''
 
 

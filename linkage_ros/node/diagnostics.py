@@ -350,7 +350,7 @@ class DiagnosticsSummary:
         recorder = self.loop.recorder
         if recorder is not None:
             level, message = OK, 'Recording'
-            topics = recorder.inspect()
+            topics = recorder.read_counts()
             for topic in topics:
                 values[f'Received: {topic.name}'] = topic.received
                 values[f'Recorded: {topic.name}'] = topic.recorded
@@ -362,7 +362,7 @@ class DiagnosticsSummary:
                 level, message = WARN, 'The disk does not keep up: messages dropped'
             if recorder.failure is not None:
                 level, message = ERROR, str(recorder.failure)
-            if recorder.failure is not None and recorder.recording:
+            if recorder.failure is not None and recorder.is_recording:
                 level, message = WARN, f'Recording again, in a new file: {recorder.failure}'
         elif self.recording_failure:
             level, message = ERROR, self.recording_failure
@@ -372,7 +372,7 @@ class DiagnosticsSummary:
         memory = snapshots.memory
         seconds, size, crowded = memory.extent
         level, message = OK, f'In memory: the last {memory.seconds:g} s'
-        topics = memory.inspect()
+        topics = memory.read_counts()
         values: dict[str, object] = {}
         for topic in topics:
             values[f'Received: {topic.name}'] = topic.received

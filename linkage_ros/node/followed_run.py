@@ -20,7 +20,7 @@ from math import dist, isfinite, nan
 from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from linkage_ros.bag.run_events import run_account, RunAccount
+from linkage_ros.bag.run_events import read_run_metadata, RunMetadata
 from linkage_ros.errors import LinkageError, quoted
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
@@ -46,7 +46,7 @@ class FollowedRun(NamedTuple):
     """The scene of a running node."""
 
     scene: Scene  # The scene
-    account: RunAccount  # The run's account of itself: its topics
+    account: RunMetadata  # The run's account of itself: its topics
     shown: SceneLinkage  # The first linkage, which is drawn
     closure: Closure  # The closure of that one
     # The linkage whose crank or effort comes from a topic; None if there is none.
@@ -126,7 +126,7 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
     """
     try:
         announced = read_announced(message, topic)
-        scene, account = recorded_scene(announced), run_account(announced)
+        scene, account = recorded_scene(announced), read_run_metadata(announced)
         shown = scene.members[0]
         closure = Closure(shown.linkage)
         model = model_of(closure, scene.name)

@@ -130,12 +130,12 @@ class RunRecording:
             return str(self.snapshots)
         if loop.recorder is None:
             return ''
-        waits = '' if loop.recorder.recording else f'; {loop.recorder.failure}'
+        waits = '' if loop.recorder.is_recording else f'; {loop.recorder.failure}'
         return f'recording to {loop.recorder.folder}{waits}'
 
     def has_ended(self, loop: TickLoop) -> bool:
         """Return whether a bag has failed for good and is not reported on yet."""
-        return self.snapshots is None and loop.recorder is not None and loop.recorder.ended
+        return self.snapshots is None and loop.recorder is not None and loop.recorder.has_ended
 
     def snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
         """Begin to write the memory to a bag; as `RunSnapshots.begin`."""
@@ -167,11 +167,11 @@ class RunRecording:
         if self.snapshots is not None:
             self.stop(loop)
             return True
-        state = recorder.failure, recorder.recording
+        state = recorder.failure, recorder.is_recording
         if state == self._seen:
             return False
         self._seen, self.failure = state, str(recorder.failure)
-        if recorder.recording:
+        if recorder.is_recording:
             line = f'recording to {recorder.folder} again, in a new file'
             self._logger.info(line)
         else:
@@ -345,13 +345,13 @@ class RunSnapshots:
         if self._writing is not None:
             return 'a snapshot is being written; ask again when it is: the memory goes on'
         try:
-            kept = self.memory.take()
+            kept = self.memory.take_content()
         except RecordingError as error:
             return str(error)
         if not kept.blocks:
             return 'nothing is in memory yet; ask again when there are messages'
         self._answer = answer
-        self._writing = SnapshotWriting(kept, partial(self._new_bag, kept.whole), wake)
+        self._writing = SnapshotWriting(kept, partial(self._new_bag, kept.is_complete), wake)
         return ''
 
     def collect(self) -> SnapshotOutcome | None:

@@ -29,8 +29,8 @@ from linkage_ros.bag.reader import Bag, BagMessage
 from linkage_ros.bag.run_events import (
     Event,
     FaultEvent,
-    Reset,
-    RunAccount,
+    ResetEvent,
+    RunMetadata,
     SampleEvent,
     TickEvent,
     WrenchEvent,
@@ -72,8 +72,8 @@ class Remade(NamedTuple):
     tick: Tick | None  # Result of the scene; None if it does not tick then
 
 
-HeardEvent = SampleEvent | FaultEvent | Reset | TickEvent
-ReplayEvent = SampleEvent | FaultEvent | Reset | Remade
+HeardEvent = SampleEvent | FaultEvent | ResetEvent | TickEvent
+ReplayEvent = SampleEvent | FaultEvent | ResetEvent | Remade
 
 
 def check_drives(scene: Scene, where: str) -> None:
@@ -172,7 +172,7 @@ class Counterfactual:
                 made = None
             if isinstance(event, FaultEvent):
                 yield from self._follow(event)
-            elif isinstance(event, Reset):
+            elif isinstance(event, ResetEvent):
                 yield self._reset(event)
             elif (yield from self._offer(event)):
                 now = self._clock(event.log_time)
@@ -200,7 +200,7 @@ class Counterfactual:
             if isinstance(event, FaultEvent):
                 yield from self._follow(event)
                 continue
-            if isinstance(event, Reset):
+            if isinstance(event, ResetEvent):
                 yield self._reset(event)
                 continue
             yield from self._offer(event)
@@ -271,11 +271,11 @@ class Counterfactual:
         yield event._replace(log_time=now)
         return good
 
-    def _reset(self, event: Reset) -> Reset:
+    def _reset(self, event: ResetEvent) -> ResetEvent:
         """Reset where the run did."""
         self._last = now = self._clock(event.log_time)
         self._pipeline = Pipeline(self._scene, self._closures, self._injection)
-        return Reset(now, now, event.data)
+        return ResetEvent(now, now, event.data)
 
     def _follow(self, event: FaultEvent) -> Iterator[FaultEvent]:
         """Let a fault begin or end as in the run."""
@@ -316,7 +316,7 @@ def find_crank_topic(
     bag: Bag,
     messages: Iterable[BagMessage],
     scene: Scene,
-    run: RunAccount,
+    run: RunMetadata,
     recorded: Scene | None,
     typed: str | None,
 ) -> str:
@@ -395,7 +395,7 @@ def _reader(member: SceneLinkage, dependent: Collection[str]) -> Callable[[bytes
 
 
 def _candidates(
-    bag: Bag, drive: str, run: RunAccount, recorded: Scene | None, typed: str | None
+    bag: Bag, drive: str, run: RunMetadata, recorded: Scene | None, typed: str | None
 ) -> Sequence[str]:
     held = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
     if typed is not None:

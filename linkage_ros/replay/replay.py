@@ -27,11 +27,11 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 from linkage_ros import __version__
 from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
 from linkage_ros.bag.run_events import (
+    read_run_metadata,
     recorded_events,
-    Reset,
-    run_account,
+    ResetEvent,
+    RunFiles,
     SampleEvent,
-    StoredRun,
     TickEvent,
     VERSIONS,
     WrenchEvent,
@@ -75,7 +75,7 @@ class ReplayedTick(NamedTuple):
 
 
 def recorded_scene(
-    bag: StoredRun, *, trust_effects: bool = False, settings: Sequence[str] = ()
+    bag: RunFiles, *, trust_effects: bool = False, settings: Sequence[str] = ()
 ) -> Scene:
     """
     Return the scene stored in a bag.
@@ -104,7 +104,7 @@ def recorded_scene(
             f'carries no {listed(sorted(missing))}',
             'name a bag that linkage_ros has recorded',
         )
-    run = run_account(bag)
+    run = read_run_metadata(bag)
     files = {name: data for name, data in bag.attachments.items() if name.endswith('.yaml')}
     if len(files) < 2:
         raise BagError(
@@ -185,11 +185,11 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
     pipeline = Pipeline(scene)
     closures, injection = pipeline.closures, pipeline.injection
     last = 0
-    for event in recorded_events(run_account(bag), own_joint_states(scene), messages):
+    for event in recorded_events(read_run_metadata(bag), own_joint_states(scene), messages):
         if event.log_time < last:
             pipeline = Pipeline(scene, closures, injection)
         last = event.log_time
-        if isinstance(event, Reset):
+        if isinstance(event, ResetEvent):
             pipeline = Pipeline(scene, closures, injection)
         elif isinstance(event, TickEvent):
             if event.time >= TIME_END:

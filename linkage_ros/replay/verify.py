@@ -22,7 +22,7 @@ from math import inf
 from typing import NamedTuple
 
 from linkage_ros.bag.reader import Bag, BagMessage
-from linkage_ros.bag.run_events import lost_beginning, run_account
+from linkage_ros.bag.run_events import missing_start_reason, read_run_metadata
 from linkage_ros.errors import BagError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import RevoluteJoint
@@ -92,12 +92,12 @@ def verify_replay(
         The scene cannot be run.
 
     """
-    run = run_account(bag)
+    run = read_run_metadata(bag)
     types = [extra.message for extra in Pipeline(scene).extras]
     types += [JOINT_STATE] * len(run.extras)  # for topics that the scene does not know
     topics = [(run.joint_states_topic, JOINT_STATE), *zip(run.extras, types, strict=False)]
     silent = (b'',) * len(topics)
-    beginning = lost_beginning(bag, run)
+    beginning = missing_start_reason(bag, run)
     turning = turning_joints(scene) if beginning and not scene.wrapped else {}
     comparison, probe = Comparison(topics, turning), Comparison(topics, turning)
     undecided, in_step = 0, not beginning

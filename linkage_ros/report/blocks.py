@@ -172,7 +172,7 @@ class Blocks:
 
     def contents(self) -> Contents:
         """Return the counts of what has been read."""
-        return self._tallies.contents(self._damage, self._stopped)
+        return self._tallies.to_contents(self._damage, self._stopped)
 
     def _whole(self, messages: Iterable[BagMessage]) -> Iterator[BagMessage]:
         try:
@@ -195,7 +195,7 @@ class Blocks:
 
     def _count(self, name: str, entries: list[tuple[int, int]]) -> None:
         logs, sizes = zip(*entries, strict=True)
-        self._tallies[name].add(len(entries), sum(sizes), min(logs), max(logs))
+        self._tallies[name].add_messages(len(entries), sum(sizes), min(logs), max(logs))
         self._read += sum(sizes) + RECORD_SIZE * len(entries)
 
 

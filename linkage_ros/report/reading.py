@@ -20,7 +20,12 @@ from pathlib import Path
 
 from linkage_ros.bag.contents import Contents
 from linkage_ros.bag.reader import Bag
-from linkage_ros.bag.run_events import lost_beginning, raw_account, run_account, RunAccount
+from linkage_ros.bag.run_events import (
+    missing_start_reason,
+    read_raw_metadata,
+    read_run_metadata,
+    RunMetadata,
+)
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.status import Status
@@ -169,7 +174,7 @@ def read_run(
     reader: SceneRun | ForeignRun
     try:
         scene = scene_of(bag)
-        reader = SceneRun(bag, run_account(bag), scene, window)
+        reader = SceneRun(bag, read_run_metadata(bag), scene, window)
     except LinkageError as error:
         # A page is passed on to others: it shows the bag's name, not its path.
         missing = f'{Path(error.where).name}: {error.reason}'
@@ -206,15 +211,15 @@ _NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving 
 class SceneRun:
     """Reads a window of a scene's run, block by block; a LinkageError if it cannot be built."""
 
-    def __init__(self, bag: Bag, run: RunAccount, scene: Scene, window: Window) -> None:
-        from_beginning = not lost_beginning(bag, run)
+    def __init__(self, bag: Bag, run: RunMetadata, scene: Scene, window: Window) -> None:
+        from_beginning = not missing_start_reason(bag, run)
         self._judge = SampleJudge(bag, scene, from_beginning)
         pipeline = self._judge.pipeline
         self._rate, self._window, self._clock = scene.rate, window, RunClock()
         self._lanes = {
             name: Lane(_TOGETHER, alike=name in _ALIKE, window=window) for name in LANES
         }
-        topic = raw_account(bag).get('diagnostics_topic')
+        topic = read_raw_metadata(bag).get('diagnostics_topic')
         self._topics = {
             topic if isinstance(topic, str) else '/diagnostics': 'health',
             run.crank_topic: 'samples',

@@ -14,7 +14,7 @@ from bisect import bisect_right
 from typing import Any, NamedTuple
 
 from linkage_ros.bag.reader import Bag
-from linkage_ros.bag.run_events import raw_account
+from linkage_ros.bag.run_events import read_raw_metadata
 from linkage_ros.drives import topic as topic_drive
 from linkage_ros.drives import torque as torque_drive
 from linkage_ros.dynamics.motion import LARGEST
@@ -95,7 +95,7 @@ def _samples_of(motion: MemberMotion, bag: Bag, topic: str) -> list[_Sample]:
         read = topic_drive.reader(use, motion.context)
     else:
         use = topic_drive.TopicParameters(max_age=use.max_age)
-    topic = topic or str(raw_account(bag).get('crank_topic') or '')
+    topic = topic or str(read_raw_metadata(bag).get('crank_topic') or '')
     of_type = {each.name for each in bag.topics if each.type == JOINT_STATE}
     received: dict[str, list[tuple[int, Any]]] = {}
     for heard, log_time, _, data in bag.messages():
@@ -134,7 +134,7 @@ def _cubic(
 def follow_commands(motion: MemberMotion, bag: Bag) -> MemberMotion:
     """Return the motion of a torque drive by the commands of a bag, as they came; or by none."""
     read = torque_drive.reader(motion.member.drive[1], motion.context)
-    topic = raw_account(bag).get('crank_topic')
+    topic = read_raw_metadata(bag).get('crank_topic')
     of_type = {each.name for each in bag.topics if each.type == JOINT_STATE}
     heard: dict[str, list[Command]] = {}
     begin = end = None

@@ -41,7 +41,7 @@ def test_each_topic_has_its_own_count_bytes_and_times(folder, topics, messages):
             topic, len(own), sum(len(message.data) for message in own), min(times), max(times)
         )  # fmt: skip
         rate = (len(own) - 1) / ((max(times) - min(times)) / 1e9)
-        assert found.topics[number].rate == pytest.approx(rate, rel=1e-12)
+        assert found.topics[number].mean_rate == pytest.approx(rate, rel=1e-12)
     times = [message.log_time for message in messages]
     assert (found.begin, found.end) == (min(times), max(times))
     assert (found.damage, found.stopped) == ('', False)
@@ -54,7 +54,7 @@ def test_without_a_span_there_is_no_rate(tmp_path, topics, count, span):
         writer.write(0, 5 + span, 5, b'\0\1\0\0')
     writer.close()
     first, second = contents_of(read_bag(tmp_path / 'run')).topics
-    assert (first.rate, second.rate) == (None, None)
+    assert (first.mean_rate, second.mean_rate) == (None, None)
     assert (second.first, second.last) == (0, 0)
 
 
@@ -65,7 +65,7 @@ def test_log_times_stand_in_any_order(tmp_path, topics):
     writer.close()
     found = contents_of(read_bag(tmp_path / 'run'))
     assert (found.begin, found.end) == (5_000, 9_000)
-    assert found.topics[1].rate == 3 / 4e-6
+    assert found.topics[1].mean_rate == 3 / 4e-6
 
 
 def test_what_lies_before_a_damage_is_counted(folder, messages):

@@ -15,7 +15,7 @@ import shutil
 
 from linkage_ros.bag.metadata import BagSummary, RecordingStats
 from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.bag.recover import recover
+from linkage_ros.bag.recover import recover_bag
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
@@ -113,7 +113,7 @@ class TestOutside:
     """Metadata and links that lead out of the folder: neither read nor recovered."""
 
     def _refused(self, run, match):
-        for act in (read_bag, recover):
+        for act in (read_bag, recover_bag):
             with pytest.raises(BagError, match=match):
                 act(run)
         assert not run.with_name('run_recovered').exists()
@@ -164,7 +164,7 @@ class Recording:
     def __init__(self, folder: Path, topics: object, keep_files: int = 0) -> None:
         storage = Storage(split_seconds=1.0, keep_files=keep_files)
         self.writer = BagWriter(folder / 'run', topics, {'run.json': ('', b'{}')}, storage)
-        self.writer.account = self._account
+        self.writer.make_statistics = self._account
         self._kept = folder
         self._number = 0
 
@@ -237,7 +237,7 @@ def the_last_file(folder: Path, topics: object) -> Path:
 
 
 def recovered(folder: Path, topics: object) -> Path:
-    recovery = recover(killed_between_files(folder, topics))
+    recovery = recover_bag(killed_between_files(folder, topics))
     assert recovery is not None
     return recovery.folder
 
@@ -282,7 +282,7 @@ def test_of_a_ring_the_older_files_that_a_kill_has_left_come_first(tmp_path, top
         'run_0.mcap', 'run_1.mcap', 'run_2.mcap'
     ]  # fmt: skip
     assert len(list(read_bag(killed, allow_truncated=True).messages())) == 19
-    recovery = recover(killed)
+    recovery = recover_bag(killed)
     assert recovery is not None
     times = [message.log_time for message in read_bag(recovery.folder).messages()]
     assert times == [number * SECOND // 10 for number in range(1, 30)]

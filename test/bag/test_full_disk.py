@@ -27,7 +27,7 @@ import time
 from linkage_ros.bag.disk import Reserve
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.recover import recover
+from linkage_ros.bag.recover import recover_bag
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError, RecordingError
@@ -394,7 +394,7 @@ def readable(folder, beside):
     except BagError:
         pass
     try:
-        recover(folder, beside)
+        recover_bag(folder, beside)
     except BagError:
         return []
     return list(read_bag(beside).messages())
@@ -412,7 +412,9 @@ def test_what_another_process_does_is_said_at_once_and_counted(
     if then == 'the end':
         for message in messages[:8000]:
             recorder.offer(*message)
-        wait_for(lambda: not any(counts.waiting for counts in recorder.inspect()), 'all written')
+        wait_for(
+            lambda: not any(counts.waiting for counts in recorder.read_counts()), 'all written'
+        )
     else:
         offered(recorder, messages[:8000])
     number = len(list(folder.glob('*.mcap'))) - 1
@@ -464,7 +466,7 @@ def test_what_was_cut_does_not_come_back_as_zeros(tmp_path, topics, messages):
     file = tmp_path / 'run' / 'run_0.mcap'
     for message in messages[:4000]:
         recorder.offer(*message)
-    wait_for(lambda: not any(counts.waiting for counts in recorder.inspect()), 'all written')
+    wait_for(lambda: not any(counts.waiting for counts in recorder.read_counts()), 'all written')
     size = file.stat().st_size
     os.truncate(file, 0)
     for message in messages[4000:]:

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from linkage_ros.bag.metadata import (
     BagSummary,
+    merge_summaries,
     metadata_text,
     NO_START,
     qos_text,
-    together,
     write_metadata,
 )
 from linkage_ros.bag.topic import QosProfile
@@ -127,14 +127,16 @@ def test_files_together_are_a_bag(summary):
     early = replace(
         summary, file='run_2.mcap', counts=(1, 0), start=summary.start - 10, duration=11, size=6
     )
-    whole = together([summary, empty, early], (1, 2), (3, 4))
+    whole = merge_summaries([summary, empty, early], (1, 2), (3, 4))
     assert (whole.counts, whole.refused, whole.discarded) == ((4, 4), (1, 2), (3, 4))
     assert (whole.start, whole.duration) == (summary.start - 10, summary.duration + 10)
     assert (whole.size, whole.file) == (1234 + 5 + 6, 'run_2.mcap')
     information = yaml.safe_load(metadata_text(whole, {}, root=False))
     assert information['relative_file_paths'] == ['run_0.mcap', 'run_1.mcap', 'run_2.mcap']
     assert [each['message_count'] for each in information['files']] == [7, 0, 1]
-    assert together([empty], (0, 0), (0, 0)) == replace(empty, refused=(0, 0), discarded=(0, 0))
+    assert merge_summaries([empty], (0, 0), (0, 0)) == replace(
+        empty, refused=(0, 0), discarded=(0, 0)
+    )
 
 
 def test_the_record_in_the_file_has_no_root_key(summary):

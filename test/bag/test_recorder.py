@@ -83,7 +83,7 @@ def test_a_stalled_disk_stalls_nobody_and_the_overflow_is_counted(
         recorder.offer(*message)
     # All 500 offers are back, and the writer still holds the first message in its hands.
     assert not writer.answer.is_set()
-    counts = recorder.inspect()
+    counts = recorder.read_counts()
     assert sum(c.received for c in counts) == 501
     assert sum(c.recorded for c in counts) == 0
     assert all(c.received == c.recorded + c.dropped + c.waiting for c in counts)
@@ -99,7 +99,7 @@ def test_a_message_in_hand_waits_and_is_not_lost(tmp_path, topics, messages):
     for message in messages[:4]:
         recorder.offer(*message)
     assert writer.reached.wait(10)
-    looks = [(c.received, c.recorded, c.dropped, c.waiting) for c in recorder.inspect()]
+    looks = [(c.received, c.recorded, c.dropped, c.waiting) for c in recorder.read_counts()]
     assert looks == [(2, 0, 0, 2), (2, 0, 0, 2)]
     writer.answer.set()
     assert _counts(recorder.stop()) == [(2, 2, 0), (2, 2, 0)]
@@ -110,9 +110,9 @@ def test_at_every_look_the_counts_close_and_nothing_is_lost(tmp_path, topics, me
     looks = []
     for message in messages:
         recorder.offer(*message)
-        looks += recorder.inspect()
-    while any(counts.waiting for counts in recorder.inspect()):
-        looks += recorder.inspect()
+        looks += recorder.read_counts()
+    while any(counts.waiting for counts in recorder.read_counts()):
+        looks += recorder.read_counts()
     recorder.stop()
     assert not [counts for counts in looks if counts.dropped]
     assert all(c.received == c.recorded + c.waiting for c in looks)
@@ -132,7 +132,7 @@ def test_the_queue_is_bounded_in_bytes(tmp_path, topics, messages, size, wait):
     data = bytes(size)  # the same for all: what counts is what they would take
     for message in messages[2:402:2]:
         recorder.offer(*message._replace(data=data))
-    counts = recorder.inspect()[0]
+    counts = recorder.read_counts()[0]
     in_hand = 1
     assert (counts.dropped, counts.waiting) == (200 - wait, wait + in_hand)
     assert wait * size <= 100 * PLACE + size
@@ -165,7 +165,7 @@ def test_a_failure_stops_no_process_and_all_that_was_offered_is_accounted_for(
     tmp_path, topics, messages, readers, monkeypatch, number, said, for_good
 ):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.01)
-    assert not recorder.ended
+    assert not recorder.has_ended
     pwrite = os.pwrite
 
     def failing(descriptor, data, offset):
@@ -185,18 +185,18 @@ def test_a_failure_stops_no_process_and_all_that_was_offered_is_accounted_for(
             break
         threading.Event().wait(0.01)
     assert f'run: the recording {said}' in str(recorder.failure)
-    assert not recorder.recording
+    assert not recorder.is_recording
     # A full disk may have room again.
-    assert recorder.ended is for_good
+    assert recorder.has_ended is for_good
     for message in messages[6000:]:
         recorder.offer(*message)
-    looks = recorder.inspect()
+    looks = recorder.read_counts()
     assert all(c.received == c.recorded + c.dropped + c.waiting for c in looks)
     summary = recorder.stop()
     assert summary.failure == str(recorder.failure)
     assert [counts.received for counts in summary.topics] == [6000, 6000]
     assert all(c.received == c.recorded + c.dropped for c in summary.topics)
-    assert [(c.dropped, c.waiting) for c in recorder.inspect()] == [
+    assert [(c.dropped, c.waiting) for c in recorder.read_counts()] == [
         (c.dropped, 0) for c in summary.topics
     ]
     kept = sum(counts.recorded for counts in summary.topics)
@@ -242,7 +242,7 @@ def test_after_the_end_an_offer_is_counted_and_forgotten(tmp_path, topics, messa
     summary = recorder.stop()
     recorder.offer(*messages[0])
     assert recorder.stop() is summary
-    assert [c.dropped for c in recorder.inspect()] == [1, 0]
+    assert [c.dropped for c in recorder.read_counts()] == [1, 0]
 
 
 @pytest.mark.parametrize('capacity', [50, 10**6])
@@ -259,7 +259,7 @@ def test_threads_that_offer_at_once_lose_no_count(tmp_path, topics, messages, re
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):
-        for counts in recorder.inspect():
+        for counts in recorder.read_counts():
             assert counts.waiting >= 0
             assert counts.recorded >= 0
     summary = recorder.stop(timeout=60)
@@ -306,7 +306,7 @@ def test_what_waits_for_long_is_flushed_in_between(tmp_path, topics, messages):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.02)
     recorder.offer(*messages[0])
     for _ in range(500):
-        if recorder._safe == (1, 0):
+        if recorder._flushed_counts == (1, 0):
             break
         threading.Event().wait(0.02)
     found = list(read_bag(tmp_path / 'run', allow_truncated=True).messages())

@@ -17,10 +17,10 @@ from io import BytesIO
 
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
-from linkage_ros.bag.mcap_records import Message, Source
+from linkage_ros.bag.mcap_records import Message, RecordSource
 from linkage_ros.bag.metadata import UNFINISHED, UNFINISHED_DATA
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recover import recover
+from linkage_ros.bag.recover import recover_bag
 from linkage_ros.bag.salvage import Salvage
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
@@ -50,11 +50,11 @@ def run(tmp_path, topics, messages):
 
 def test_a_whole_bag_is_copied_to_the_byte_of_each_message(run, topics, messages, readers):
     before = {path: path.read_bytes() for path in run.iterdir()}
-    recovery = recover(run)
-    assert recovery.whole
+    recovery = recover_bag(run)
+    assert recovery.is_whole
     assert (recovery.losses, recovery.repaired, recovery.remarks) == ((), (), ())
     assert recovery.folder == run.with_name('run_recovered')
-    assert [(t.name, t.saved, t.promised) for t in recovery.topics] == [
+    assert [(t.name, t.saved, t.expected) for t in recovery.topics] == [
         (topic.name, COUNT // 2, COUNT // 2) for topic in topics
     ]
     assert recovery.attachments == ('scene.yaml', 'linkage.yaml')
@@ -82,7 +82,7 @@ def test_channels_and_sequence_numbers_stay(run):
                 for schema, channel, message in make_reader(stream).iter_messages()
             ]
 
-    new = recover(run).folder
+    new = recover_bag(run).folder
     assert described(new / 'run_recovered_0.mcap') == described(run / 'run_0.mcap')
 
 
@@ -107,10 +107,10 @@ NO_LOSS = {
 def test_what_only_describes_is_made_anew_without_a_loss(
     run, topics, messages, readers, change, said
 ):
-    recovery = recover(damaged(run, change))
+    recovery = recover_bag(damaged(run, change))
     readers.agree(recovery.folder, topics, messages[:COUNT])
     assert recovery.attachments == ('scene.yaml', 'linkage.yaml')
-    assert recovery.whole, recovery.losses
+    assert recovery.is_whole, recovery.losses
     assert said in '\n'.join(recovery.repaired)
 
 
@@ -164,30 +164,30 @@ SOME_LOSS = {
 
 @pytest.mark.parametrize(('change', 'lost'), SOME_LOSS.values(), ids=SOME_LOSS.keys())
 def test_only_what_is_damaged_is_lost(run, topics, messages, readers, change, lost):
-    recovery = recover(damaged(run, change))
+    recovery = recover_bag(damaged(run, change))
     kept = [m for number, m in enumerate(messages[:COUNT]) if number not in lost]
     readers.agree(recovery.folder, topics, kept)
     assert data_of(recovery.folder) == without(messages, lost)
-    assert not recovery.whole
+    assert not recovery.is_whole
     assert recovery.losses
     assert all(0 <= loss.start <= loss.end for _, loss in recovery.losses)
     assert recovery.attachments == ('scene.yaml', 'linkage.yaml')
 
 
 def test_what_was_promised_is_said(run):
-    recovery = recover(damaged(run, in_chunk(2, 500)))
-    assert [(t.saved, t.promised) for t in recovery.topics] == [(250, 300), (250, 300)]
+    recovery = recover_bag(damaged(run, in_chunk(2, 500)))
+    assert [(t.saved, t.expected) for t in recovery.topics] == [(250, 300), (250, 300)]
     ((file, loss),) = recovery.losses
     assert file == 'run_0.mcap'
     assert loss.reason == 'its checksum does not fit'
-    assert recovery.missing == 100
+    assert recovery.missing_count == 100
 
 
 def test_without_an_index_the_metadata_tells_what_was_promised(run):
-    recovery = recover(damaged(run, cut_at_chunk(3, 0)))
-    assert [(t.saved, t.promised) for t in recovery.topics] == [(200, 300), (200, 300)]
-    recovery = recover(run / 'run_0.mcap')
-    assert [(t.saved, t.promised) for t in recovery.topics] == [(200, None), (200, None)]
+    recovery = recover_bag(damaged(run, cut_at_chunk(3, 0)))
+    assert [(t.saved, t.expected) for t in recovery.topics] == [(200, 300), (200, 300)]
+    recovery = recover_bag(run / 'run_0.mcap')
+    assert [(t.saved, t.expected) for t in recovery.topics] == [(200, None), (200, None)]
     assert recovery.folder == run / 'run_0_recovered'
 
 
@@ -214,12 +214,12 @@ def test_more_than_there_were_are_never_saved(
         information['custom_data'] = dict(UNFINISHED_DATA)
     (run / 'metadata.yaml').write_text(yaml.safe_dump(metadata))
     told = told_if_finished if finished else told_if_not
-    assert [(t.saved, t.promised) for t in recover(run).topics] == 2 * [(200, told)]
+    assert [(t.saved, t.expected) for t in recover_bag(run).topics] == 2 * [(200, told)]
 
 
 def test_a_damaged_copy_of_the_topics_is_no_loss(run, messages):
-    recovery = recover(damaged(run, lambda c: flip(c.index(b'channels.mcap') + 500)(c)))
-    assert recovery.whole
+    recovery = recover_bag(damaged(run, lambda c: flip(c.index(b'channels.mcap') + 500)(c)))
+    assert recovery.is_whole
     assert 'what marks and describes' in '\n'.join(recovery.repaired)
     assert data_of(recovery.folder) == without(messages, range(0))
 
@@ -229,7 +229,7 @@ def test_without_a_description_messages_are_lost_too(run):
         flip(content.index(b'channels.mcap') + 500)(content)
         return cut_with(0, 500)(content)
 
-    recovery = recover(damaged(run, change))
+    recovery = recover_bag(damaged(run, change))
     assert [topic.saved for topic in recovery.topics if topic.saved] == []
     reasons = [loss.reason for _, loss in recovery.losses]
     assert sum('nowhere described' in reason for reason in reasons) == 5
@@ -237,10 +237,10 @@ def test_without_a_description_messages_are_lost_too(run):
 
 
 def test_a_damaged_attachment_is_lost_alone(run, messages):
-    recovery = recover(damaged(run, lambda c: flip(c.index(b'four_bar: {}'))(c)))
+    recovery = recover_bag(damaged(run, lambda c: flip(c.index(b'four_bar: {}'))(c)))
     assert recovery.attachments == ('scene.yaml',)
     assert data_of(recovery.folder) == without(messages, range(0))
-    assert not recovery.whole
+    assert not recovery.is_whole
 
 
 @pytest.mark.parametrize('text', [None, '', 'a: [', '[' * 9999, 'a: 2001-99-99', '\xff'])
@@ -249,8 +249,8 @@ def test_metadata_that_are_none_are_made_anew(run, messages, text):
     file.unlink()
     if text is not None:
         file.write_text(text, encoding='latin-1')
-    recovery = recover(run)
-    assert recovery.whole
+    recovery = recover_bag(run)
+    assert recovery.is_whole
     assert recovery.repaired == ('metadata.yaml',)
     assert data_of(recovery.folder) == without(messages, range(0))
     assert read_bag(recovery.folder).custom['seed'] == '7', 'from the record in the file'
@@ -260,7 +260,7 @@ def test_what_was_killed_and_is_recovered_is_finished(run):
     custom = yaml.safe_load((run / 'metadata.yaml').read_text())
     custom['rosbag2_bagfile_information']['custom_data'] = {**UNFINISHED_DATA, 'seed': '7'}
     (run / 'metadata.yaml').write_text(yaml.safe_dump(custom))
-    found = read_bag(recover(run).folder).custom
+    found = read_bag(recover_bag(run).folder).custom
     assert UNFINISHED not in found
     assert found['seed'] == '7'
 
@@ -304,8 +304,8 @@ def test_whatever_is_done_to_it_what_is_found_is_true(run, messages, damages, ra
             content[at:at] = content[at:end]
         elif kind == 'cut':
             del content[at:]
-    salvage = Salvage(Source(BytesIO(content)))
-    found = [each for each in salvage.found() if isinstance(each, Message)]
+    salvage = Salvage(RecordSource(BytesIO(content)))
+    found = [each for each in salvage.find_records() if isinstance(each, Message)]
     true = iter([('/crank', '/arm/joint_states')[m.topic], *m[1:]] for m in messages[:COUNT])
     assert all([m.channel.topic, m.log_time, m.publish_time, m.data] in true for m in found)
     assert len(found) == COUNT or salvage.losses
@@ -330,8 +330,8 @@ def test_around_a_bad_block_of_the_disk_all_is_saved(run, messages, cut):
     content = (run / 'run_0.mcap').read_bytes()
     start, _ = chunks_of(content)[2]
     worn = Worn(content[: len(content) - cut], range(start + 500, start + 1012))
-    salvage = Salvage(Source(worn))
-    found = [each.data for each in salvage.found() if isinstance(each, Message)]
+    salvage = Salvage(RecordSource(worn))
+    found = [each.data for each in salvage.find_records() if isinstance(each, Message)]
     assert found == without(messages, range(200, 300))
     assert 'Input/output error' in salvage.losses[0].reason
 
@@ -341,15 +341,15 @@ def test_a_bag_that_is_being_written_is_saved_as_far_as_it_got(tmp_path, topics,
     for message in messages[:300]:
         writer.write(*message)
     writer.flush()
-    recovery = recover(tmp_path / 'run')
+    recovery = recover_bag(tmp_path / 'run')
     assert data_of(recovery.folder) == [m.data for m in messages[:300]]
     assert recovery.remarks[0].startswith('run_0.mcap is still being written')
-    assert not recovery.whole
+    assert not recovery.is_whole
     for message in messages[300:400]:
         writer.write(*message)
     assert sum(writer.close().counts) == 400
-    recovery = recover(tmp_path / 'run', tmp_path / 'later')
-    assert recovery.whole
+    recovery = recover_bag(tmp_path / 'run', tmp_path / 'later')
+    assert recovery.is_whole
     assert recovery.remarks == ()
 
 
@@ -363,7 +363,7 @@ def test_what_is_there_is_never_written_over(run, tmp_path, kind):
     else:
         target.symlink_to(tmp_path / 'nowhere')
     with pytest.raises(RecordingError, match='exists already'):
-        recover(run, target)
+        recover_bag(run, target)
     assert sorted(path.name for path in tmp_path.iterdir()) == ['new', 'run']
     if kind == 'file':
         assert target.read_text() == 'mine'
@@ -372,12 +372,12 @@ def test_what_is_there_is_never_written_over(run, tmp_path, kind):
 def test_a_full_disk_leaves_nothing_behind(run, small_disk):
     (small_disk / 'other').write_bytes(bytes(2_000_000))
     with pytest.raises(RecordingError, match='cannot be written: No space left'):
-        recover(run, small_disk / 'new')
+        recover_bag(run, small_disk / 'new')
     assert list(small_disk.iterdir()) == [small_disk / 'other']
 
 
 def test_stopped_it_leaves_nothing_behind(run, tmp_path):
-    assert recover(run, tmp_path / 'new', stopped=lambda: True) is None
+    assert recover_bag(run, tmp_path / 'new', stopped=lambda: True) is None
     assert list(tmp_path.iterdir()) == [run]
 
 
@@ -396,7 +396,7 @@ NO_BAG = {
 def test_where_nothing_can_be_saved_nothing_is_made(tmp_path, content, reason):
     (tmp_path / 'x.mcap').write_bytes(content)
     with pytest.raises(BagError) as caught:
-        recover(tmp_path / 'x.mcap')
+        recover_bag(tmp_path / 'x.mcap')
     assert reason in str(caught.value)
     assert list(tmp_path.iterdir()) == [tmp_path / 'x.mcap']
 
@@ -417,5 +417,5 @@ def test_a_file_that_made_way_is_recovered_before_those_that_are_kept(tmp_path, 
     assert [m.log_time for m in read_bag(tmp_path / 'run', allow_truncated=True).messages()] == [
         *range(100, 120)
     ]
-    recover(tmp_path / 'run', tmp_path / 'whole')
+    recover_bag(tmp_path / 'run', tmp_path / 'whole')
     assert [m.log_time for m in read_bag(tmp_path / 'whole').messages()] == [*range(120)]

@@ -14,7 +14,7 @@ import sys
 import tracemalloc
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recover import MOST_CHANNELS, recover
+from linkage_ros.bag.recover import MOST_CHANNELS, recover_bag
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.main import main
 from linkage_ros.errors import BagError
@@ -80,11 +80,11 @@ def test_as_many_channels_as_may_be_are_saved_over_all_files(tmp_path, monkeypat
     monkeypatch.setattr('linkage_ros.bag.recover.MOST_CHANNELS', 20)
     for number, count in enumerate((15, 20)):
         with_channels(tmp_path / 'bag' / f'bag_{number}.mcap', count)
-    recovery = recover(tmp_path / 'bag')
+    recovery = recover_bag(tmp_path / 'bag')
     assert [topic.saved for topic in recovery.topics] == 15 * [2] + 5 * [1]
     with_channels(tmp_path / 'bag' / 'bag_2.mcap', 21)
     with pytest.raises(BagError, match='more than 20 channels'):
-        recover(tmp_path / 'bag', tmp_path / 'again')
+        recover_bag(tmp_path / 'bag', tmp_path / 'again')
 
 
 @pytest.mark.parametrize('compression', [CompressionType.LZ4, CompressionType.ZSTD])
@@ -94,7 +94,7 @@ def test_compressed_chunks_are_unpacked_checked_and_packed_again(tmp_path, messa
     start, end = chunks_of(content)[1]
     content[(start + end) // 2] ^= 4
     file.write_bytes(content)
-    recovery = recover(file)
+    recovery = recover_bag(file)
     saved = data_of(recovery.folder)
     assert 40 < len(saved) < 90
     rest = iter(message.data for message in messages[:90])
@@ -107,8 +107,8 @@ def test_compressed_chunks_are_unpacked_checked_and_packed_again(tmp_path, messa
 def test_without_the_library_it_says_so(tmp_path, messages, monkeypatch):
     file = written(tmp_path / 'a.mcap', messages, compression=CompressionType.ZSTD)
     monkeypatch.setitem(sys.modules, 'zstandard', None)
-    recovery = recover(file)
-    assert not recovery.whole
+    recovery = recover_bag(file)
+    assert not recovery.is_whole
     assert {loss.reason for _, loss in recovery.losses} == {
         'is packed with zstd, and Python knows no zstd here'
     }
@@ -145,7 +145,7 @@ def test_a_bomb_does_not_go_off(tmp_path, size, reason, open_end):
     file = forged(tmp_path / 'bomb.mcap', bomb, size)
     tracemalloc.start()
     try:
-        recovery = recover(file)
+        recovery = recover_bag(file)
         with pytest.raises(BagError, match='is damaged'):
             list(read_bag(file).messages())
         _, peak = tracemalloc.get_traced_memory()
@@ -164,7 +164,7 @@ def test_a_chunk_without_a_checksum_is_taken_if_it_parses_to_its_end(tmp_path, m
     for start, _ in chunks:
         struct.pack_into('<I', content, start + CHECKSUM, 0)
     file.write_bytes(content)
-    recovery = recover(file, tmp_path / 'whole')
+    recovery = recover_bag(file, tmp_path / 'whole')
     assert data_of(recovery.folder) == [m.data for m in messages[:90]]
     assert recovery.remarks == (
         'a.mcap: 90 messages that no checksum covers, taken as they stand',
@@ -172,7 +172,7 @@ def test_a_chunk_without_a_checksum_is_taken_if_it_parses_to_its_end(tmp_path, m
     # A length within the second chunk: now its records do not fill it.
     content[chunks[1][0] + 9 + 40 + 1] ^= 1
     file.write_bytes(content)
-    saved = data_of(recover(file, tmp_path / 'part').folder)
+    saved = data_of(recover_bag(file, tmp_path / 'part').folder)
     assert 0 < len(saved) < 90
     rest = iter(message.data for message in messages[:90])
     assert all(data in rest for data in saved)
@@ -186,7 +186,7 @@ def test_one_chunk_without_a_checksum_among_others_is_not_believed(tmp_path, mes
     file.write_bytes(content)
     with pytest.raises(BagError, match='has no checksum, others have'):
         list(read_bag(file).messages())
-    assert any('checksum' in loss.reason for _, loss in recover(file).losses)
+    assert any('checksum' in loss.reason for _, loss in recover_bag(file).losses)
 
 
 def test_messages_outside_of_chunks_are_taken_up_to_the_damage_and_called_unchecked(
@@ -201,26 +201,26 @@ def test_messages_outside_of_chunks_are_taken_up_to_the_damage_and_called_unchec
     assert [m.data for m in read_bag(file, allow_truncated=True).messages()] == [
         m.data for m in messages[:50]
     ]
-    recovery = recover(file)
+    recovery = recover_bag(file)
     assert data_of(recovery.folder) == [m.data for m in messages[:50]]
-    assert not recovery.whole
+    assert not recovery.is_whole
     assert 'no checksum covers' in recovery.remarks[0]
 
 
 def test_one_checksum_over_all_data_is_held_against_them(tmp_path, messages):
     options = {'use_chunking': False, 'enable_data_crcs': True}
     file = written(tmp_path / 'a.mcap', messages, compression=CompressionType.NONE, **options)
-    recovery = recover(file, tmp_path / 'whole')
-    assert recovery.whole
+    recovery = recover_bag(file, tmp_path / 'whole')
+    assert recovery.is_whole
     assert recovery.remarks == ()
     content = bytearray(file.read_bytes())
     content[content.index(messages[50].data) + 9] ^= 1
     file.write_bytes(content)
     with pytest.raises(BagError, match='checksum of all data'):
         list(read_bag(file).messages())
-    recovery = recover(file, tmp_path / 'part')
+    recovery = recover_bag(file, tmp_path / 'part')
     assert [topic.saved for topic in recovery.topics] == [0]
-    assert not recovery.whole
+    assert not recovery.is_whole
 
 
 class TestSplit:
@@ -238,8 +238,8 @@ class TestSplit:
         return folder
 
     def test_files_become_one_in_their_order(self, split, messages):
-        recovery = recover(split)
-        assert recovery.whole
+        recovery = recover_bag(split)
+        assert recovery.is_whole
         assert data_of(recovery.folder) == [m.data for m in messages[:90]]
 
     def test_an_empty_file_and_one_that_is_cut(self, split, messages):
@@ -247,7 +247,7 @@ class TestSplit:
         content = (split / 'split_1.mcap').read_bytes()
         start, _ = chunks_of(content)[-1]
         (split / 'split_1.mcap').write_bytes(content[: start + 5])
-        recovery = recover(split)
+        recovery = recover_bag(split)
         saved = data_of(recovery.folder)
         assert 30 < len(saved) < 60
         assert saved == [m.data for m in messages[: len(saved)]]
@@ -257,7 +257,7 @@ class TestSplit:
         named = {'relative_file_paths': ['split_0.mcap', 'split_1.mcap', 'split_7.mcap']}
         text = yaml.safe_dump({'rosbag2_bagfile_information': named})
         (split / 'metadata.yaml').write_text(text)
-        recovery = recover(split)
+        recovery = recover_bag(split)
         assert [(file, loss.reason) for file, loss in recovery.losses] == [
             ('split_7.mcap', 'does not exist')
         ]
@@ -277,7 +277,7 @@ def test_a_bag_within_a_damaged_attachment_stays_in_it(tmp_path, topics, message
     content[content.index(b'inner.mcap') - 4 - 16 - 8] ^= 1  # the length of the record
     content[content.index(messages[60].data)] ^= 1  # and the content
     file.write_bytes(content if index else content[: chunks_of(content)[0][1]])
-    recovery = recover(tmp_path / 'run')
+    recovery = recover_bag(tmp_path / 'run')
     assert data_of(recovery.folder) == [m.data for m in messages[1000:1100]]
     assert recovery.attachments == ()
-    assert not recovery.whole
+    assert not recovery.is_whole

@@ -11,8 +11,8 @@
 import io
 from zlib import crc32
 
-from linkage_ros.bag.mcap_records import Source
-from linkage_ros.bag.salvage import next_whole
+from linkage_ros.bag.mcap_records import RecordSource
+from linkage_ros.bag.salvage import find_next_whole
 from mcap.data_stream import RecordBuilder
 from mcap.records import Attachment, Chunk, Message
 import pytest
@@ -58,7 +58,7 @@ def test_a_whole_record_is_found_wherever_it_lies(kind, start):
     for place in PLACES:
         for after in (0, 100):
             content = bytes(start + place) + record + bytes(after)
-            assert next_whole(Source(io.BytesIO(content)), start) == start + place
+            assert find_next_whole(RecordSource(io.BytesIO(content)), start) == start + place
 
 
 @pytest.mark.parametrize('kind', RECORDS)
@@ -69,7 +69,7 @@ def test_a_record_with_a_changed_bit_is_not_taken(kind):
         changed = bytearray(record)
         changed[at] ^= 0x10
         content = bytes(50) + bytes(changed) + bytes(50)
-        assert next_whole(Source(io.BytesIO(content)), 0) == len(content)
+        assert find_next_whole(RecordSource(io.BytesIO(content)), 0) == len(content)
 
 
 class BadBlocks(io.BytesIO):
@@ -96,6 +96,6 @@ def test_around_bad_blocks_what_can_be_read_is_found(kind, bad, start):
         for offset in (start, 100, BLOCK - len(record)):
             place = block * BLOCK + offset
             content = bytes(place) + record + bytes(12 * BLOCK - place)
-            source = Source(BadBlocks(content, bad))
-            found = next_whole(source, start)
+            source = RecordSource(BadBlocks(content, bad))
+            found = find_next_whole(source, start)
             assert found == (source.size if block in bad else place), (block, offset)

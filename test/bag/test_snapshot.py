@@ -41,11 +41,11 @@ def kept_of(offers, seconds, most=PLENTY):
         last.add(topic, round(time * NS), number, b'%d' % number)
     while last.discard_old(7):
         pass
-    kept = last.kept()
+    kept = last.kept_content()
     messages = list(kept.messages())
     assert len(messages) == sum(kept.counts)
     assert all(data == b'%d' % number for _, _, number, data in messages)
-    assert kept.whole == (not any(last.discarded))
+    assert kept.is_complete == (not any(last.discarded))
     assert sum(kept.counts) + sum(last.discarded) == len(offers)
     return [(topic, log_time / NS) for topic, log_time, _, _ in messages]
 
@@ -100,7 +100,7 @@ def test_by_one_clock_the_last_seconds_are_kept_and_nothing_else(steps, hundredt
         last.add(topic, time, 0, b'')
         while last.discard_old(1):
             pass
-    found = [(topic, time) for topic, time, _, _ in last.kept().messages()]
+    found = [(topic, time) for topic, time, _, _ in last.kept_content().messages()]
     newest = max(time for _, time in offers)
     assert found == [(topic, time) for topic, time in offers if newest - time <= span]
 
@@ -112,10 +112,10 @@ def test_where_room_is_scarce_the_oldest_ticks_go_as_a_whole():
             last.add(topic, tick * NS // 1000, tick, bytes(100))
         while last.discard_old(100):
             pass
-    seconds, size, crowded = last.extent()
+    seconds, size, crowded = last.measure_extent()
     assert crowded
     assert 1_000_000 - A_BLOCK < size <= 1_000_000
-    kept = last.kept()
+    kept = last.kept_content()
     # Of each message 100 bytes are its own; what else it takes is told in the documents.
     assert 100 < size / sum(kept.counts) < 135
     assert seconds == pytest.approx(kept.counts[0] / 1000, abs=0.0015)
@@ -128,12 +128,12 @@ def test_what_was_taken_stays_as_it_was_while_the_memory_goes_on():
     last = LastSeconds(1, NS, PLENTY)
     for number in range(1000):
         last.add(0, number * 1_000_000, number, b'before')
-    kept = last.kept()
+    kept = last.kept_content()
     for number in range(1000, 9000):
         last.add(0, number * 1_000_000, number, b'since')
         last.discard_old(10)
     assert [number for _, _, number, _ in kept.messages()] == list(range(1000))
-    assert min(number for _, _, number, _ in last.kept().messages()) == 7999
+    assert min(number for _, _, number, _ in last.kept_content().messages()) == 7999
 
 
 # The buffer: messages from any thread.

@@ -267,7 +267,7 @@ def test_each_file_begins_with_it_and_the_counts_close(
     looks = []
     for message in messages:
         recorder.offer(*message)
-        looks += recorder.inspect()
+        looks += recorder.read_counts()
     summary = recorder.stop()
     assert all(c.received == c.recorded + c.dropped + c.discarded + c.waiting for c in looks)
     assert min(c.waiting for c in looks) >= 0
@@ -294,7 +294,7 @@ def test_a_snapshot_begins_with_it(tmp_path, with_model, messages):
         memory.offer(*message)
     done = threading.Event()
     writing = SnapshotWriting(
-        memory.take(),
+        memory.take_content(),
         lambda: BagWriter(tmp_path / 'run', with_model, opening=[(2, MODEL)]),
         done.set,
     )

@@ -126,7 +126,7 @@ def test_usage_counts_memory_files_and_threads() -> None:
 def write_bag(folder: Path, stats: RecordingStats | None) -> Path:
     """Write three messages of one topic, with counts of messages."""
     writer = BagWriter(folder, [Topic('/a', 'std_msgs/msg/Empty', '', '')])
-    writer.account = lambda summary: stats
+    writer.make_statistics = lambda summary: stats
     for time in range(3):
         writer.write(0, time, time, b'\0\1\0\0')
     writer.close()

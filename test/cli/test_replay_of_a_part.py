@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.bag.recover import recover
+from linkage_ros.bag.recover import recover_bag
 from linkage_ros.bag.storage import Storage
 from linkage_ros.cli import info, replay
 import pytest
@@ -134,7 +134,7 @@ def test_what_recovery_has_lost_is_told_where_something_differs(tmp_path, capsys
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1
     file.write_bytes(data)
-    recovery = recover(bag)
+    recovery = recover_bag(bag)
     assert recovery is not None
     code, account = told(capsys, recovery.folder)
     assert code == 3

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.bag.contents import Contents
 from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.bag.run_events import run_account
+from linkage_ros.bag.run_events import read_run_metadata
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.report import report
@@ -115,7 +115,7 @@ def long(tmp_path_factory):
     """Return a run of two minutes, and what was held block by block."""
     scene = 'effects: {velocity: {}}\n'
     bag = Long(recorded(tmp_path_factory.mktemp('long'), scene), 120_000)
-    reader = SceneRun(bag, run_account(bag), recorded_scene(bag), Window())
+    reader = SceneRun(bag, read_run_metadata(bag), recorded_scene(bag), Window())
     blocks, sizes = Blocks(bag, reader.topics, Progress()), []
     for block in blocks:
         reader.take(block)
@@ -289,7 +289,7 @@ def test_the_same_bag_makes_the_same_page(tmp_path):
     bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
 
     def made():
-        reader = SceneRun(bag, run_account(bag), recorded_scene(bag), Window())
+        reader = SceneRun(bag, read_run_metadata(bag), recorded_scene(bag), Window())
         blocks = Blocks(bag, reader.topics, Progress())
         for block in blocks:
             reader.take(block)

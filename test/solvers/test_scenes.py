@@ -12,7 +12,7 @@ from math import tau
 from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.run_events import CHOSEN, run_account
+from linkage_ros.bag.run_events import CHOSEN, read_run_metadata
 from linkage_ros.errors import FileError
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
@@ -173,7 +173,9 @@ def test_the_bag_s_account_tells_what_was_chosen(tmp_path):
     account = '{"scene": "s", "crank_topic": "/crank", "joint_states_topic": "/joint_states"}'
     run = Run(tmp_path / 'bag', 'accuracy: 1.0e-6', f'{account[:-1]}, {said}}}'.encode())
     run.recorder.stop()
-    assert run_account(read_bag(tmp_path / 'bag')).solvers == {'': {'table': {'tolerance': 1e-6}}}
+    assert read_run_metadata(read_bag(tmp_path / 'bag')).solvers == {
+        '': {'table': {'tolerance': 1e-6}}
+    }
 
 
 def test_forces_leave_the_closed_form_alone():
