@@ -27,7 +27,7 @@ from linkage_ros.cli.scene import parameters_of, REGISTRIES, table_of
 from linkage_ros.dynamics.loads import AppliedLoads
 from linkage_ros.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
 from linkage_ros.errors import FileError
-from linkage_ros.files.parameters import parameter_rows, summary
+from linkage_ros.files.parameters import first_docstring_line, parameter_rows
 from linkage_ros.pages import markdown
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
@@ -200,7 +200,7 @@ def _neighbours(name: str) -> str:
 
 
 def _summary(kind: str, name: str) -> str:
-    return summary(parameters_of(kind, name))
+    return first_docstring_line(parameters_of(kind, name))
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -110,7 +110,7 @@ class BrokenLink:
     determine its pose, so nothing is published.
     """
 
-    link: str = name('the broken link', 'link')
+    link: str = part_name('the broken link', 'link')
 
     def mechanism(self, switch: Switch, context: Context) -> Callable[[Position], Position] | None:
         """Build a function that removes the pose; None if the link is not in this linkage."""
@@ -134,7 +134,7 @@ class Stuck:
     are 0. Without an earlier reading nothing is published.
     """
 
-    joint: str = name('the joint of the sensor', 'joint')
+    joint: str = part_name('the joint of the sensor', 'joint')
 
     def sensor(self, switch: Switch, joints: Sequence[str]) -> Sensor | None:
         """Build a function that holds the joint; None if it is not among these."""

@@ -33,7 +33,7 @@ from linkage_ros.effects.stage import EFFECTS, NEEDS
 from linkage_ros.effects.tolerance import ToleranceParameters
 from linkage_ros.errors import FileError
 from linkage_ros.faults import FAULTS
-from linkage_ros.files.parameters import declared
+from linkage_ros.files.parameters import declared_fields
 import pytest
 
 from .support.scenes import LINKAGES, pipeline_of, scene_of
@@ -368,7 +368,7 @@ def test_an_effect_without_rows_needs_no_key(effect):
 def test_each_has_its_module_and_its_parameters(names):
     for name, module in names.items():
         assert module.rpartition('.')[2] == name
-        assert declared(import_module(module).PARAMETERS) is not None
+        assert declared_fields(import_module(module).PARAMETERS) is not None
 
 
 def test_each_fault_has_its_type_and_one_place():
@@ -381,7 +381,7 @@ def test_each_fault_has_its_type_and_one_place():
 
 @pytest.mark.parametrize('effect', ['velocity', 'acceleration'])
 def test_rates_and_accelerations_have_no_parameters(effect):
-    assert declared(import_module(EFFECTS[effect]).PARAMETERS) == []
+    assert declared_fields(import_module(EFFECTS[effect]).PARAMETERS) == []
 
 
 def test_in_the_order_of_the_effects_each_stands_behind_what_it_needs():

@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     content = linkage_content(file)
     closure = read_closure(content, file.stem)
     for note in linkage_notes(closure.linkage, content.units):
-        print(f'linkage check: note: {content.located(note)}', file=sys.stderr)
+        print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
     with progress('parts examined') as advance:
         account = {'file': arguments.file, **account_of(closure, advance)}
         if arguments.branches:

@@ -31,7 +31,7 @@ from linkage_ros.drawing.dxf import links_dxf
 from linkage_ros.drawing.figure import assemblies_picture, picture
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import atomic_write
-from linkage_ros.files.linkage_file import assemblies, load, written_linkage
+from linkage_ros.files.linkage_file import find_assemblies, load, written_linkage
 from linkage_ros.files.linkage_text import pose_text
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
@@ -98,7 +98,7 @@ def _write_parts(closure: Closure, arguments: argparse.Namespace) -> int:
 
 def _draw_assemblies(arguments: argparse.Namespace) -> int:
     """Draw all assemblies at the same inputs; one that is open there, at inputs of its own."""
-    found = list(assemblies(arguments.file).values())
+    found = list(find_assemblies(arguments.file).values())
     first = found[0]
     if arguments.at:
         pose = inputs(first.linkage, arguments.at[0], '--at')

@@ -33,7 +33,13 @@ from linkage_ros.effects.dispatch import bringing, module_of
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, listed
 from linkage_ros.faults import FAULTS
-from linkage_ros.files.parameters import declared, default_of, is_required, parameter_rows, summary
+from linkage_ros.files.parameters import (
+    declared_fields,
+    default_of,
+    first_docstring_line,
+    is_required,
+    parameter_rows,
+)
 from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.messages.joint_values import JOINT_STATE
@@ -140,7 +146,7 @@ def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
             str(number),
             stage.name,
             stage.where,
-            summary(type(stage.parameters)),
+            first_docstring_line(type(stage.parameters)),
             _parameters_text(stage.parameters),
             f'brought in by {", ".join(stage.needed_by)}' if stage.needed_by else '',
         )
@@ -172,7 +178,7 @@ def _parameters_text(parameters: Any) -> str:
     texts = [
         f'{entry.name} {_shown(getattr(parameters, entry.name))}'
         + (f' {kind.unit}' if kind.unit else '')
-        for entry, kind in declared(type(parameters))
+        for entry, kind in declared_fields(type(parameters))
         if is_required(entry)
         or _shown(getattr(parameters, entry.name)) != _shown(default_of(entry))
     ]
@@ -238,7 +244,9 @@ def _named_parameters(name: str, parameters: Any) -> dict[str, Any]:
 def _as_json(value: Any) -> Any:
     """Return the value of a parameter as JSON holds it; null stands for infinity."""
     if hasattr(value, '__dataclass_fields__'):
-        return {entry.name: _as_json(getattr(value, entry.name)) for entry, _ in declared(value)}
+        return {
+            entry.name: _as_json(getattr(value, entry.name)) for entry, _ in declared_fields(value)
+        }
     if isinstance(value, dict):
         return {key: _as_json(one) for key, one in value.items()}
     if isinstance(value, tuple | list):
@@ -279,7 +287,7 @@ def parameters_of(what: str, name: str) -> Any:
 def table_of(what: str, name: str) -> Table:
     """Return the table of a drive, effect, fault or solver; ``what`` is a key of `REGISTRIES`."""
     parameters = parameters_of(what, name)
-    title = f'{what} {name}: {summary(parameters)}'
+    title = f'{what} {name}: {first_docstring_line(parameters)}'
     rows = list(parameter_rows(parameters))
     return Table(title, _HEADS, rows) if rows else Table(title, ('',), [('no parameters',)])
 

@@ -32,7 +32,7 @@ from math import cos, exp, expm1, inf, log, sin, tau
 from typing import NamedTuple
 
 from linkage_ros.drives.clocked import as_integers, build_clocked, Curve, LARGEST
-from linkage_ros.files.parameters import choice, each, flag, number
+from linkage_ros.files.parameters import choice, each_part, flag, number
 from linkage_ros.messages.layout import NANOSECONDS
 
 
@@ -53,7 +53,7 @@ class Chirp:
 class ChirpParameters(Chirp):
     """A sine of the inputs whose frequency sweeps through a range, from the first tick on."""
 
-    inputs: Mapping[str, Chirp] = each('inputs with a different chirp', 'input', Chirp)
+    inputs: Mapping[str, Chirp] = each_part('inputs with a different chirp', 'input', Chirp)
 
 
 PARAMETERS = ChirpParameters

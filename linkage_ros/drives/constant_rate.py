@@ -22,7 +22,7 @@ from functools import partial
 from math import inf
 
 from linkage_ros.drives.clocked import as_integers, build_clocked, Curve, LARGEST
-from linkage_ros.files.parameters import each, number
+from linkage_ros.files.parameters import each_part, number
 from linkage_ros.messages.layout import NANOSECONDS
 
 
@@ -40,7 +40,7 @@ class ConstantRate:
 class ConstantRateParameters(ConstantRate):
     """A constant rate of the inputs, from the first tick on."""
 
-    inputs: Mapping[str, ConstantRate] = each(
+    inputs: Mapping[str, ConstantRate] = each_part(
         'inputs with a different rate and start', 'input', ConstantRate
     )
 

@@ -34,7 +34,7 @@ from math import copysign, inf, sqrt
 
 from linkage_ros.drives.clocked import build_clocked, Curve, LARGEST
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, each, flag, rows
+from linkage_ros.files.parameters import choice, each_part, flag, number_rows
 from linkage_ros.messages.layout import NANOSECONDS
 
 
@@ -42,7 +42,7 @@ from linkage_ros.messages.layout import NANOSECONDS
 class Profile:
     """A table of one input."""
 
-    table: tuple[tuple[float, float], ...] = rows(
+    table: tuple[tuple[float, float], ...] = number_rows(
         'times, counted from the first tick, and values',
         ('time [s]', 'value [rad or m]'),
         most=LARGEST,
@@ -57,7 +57,7 @@ class Profile:
 class ProfileParameters(Profile):
     """A table of times and values that the inputs follow, from the first tick on."""
 
-    inputs: Mapping[str, Profile] = each('inputs with a different table', 'input', Profile)
+    inputs: Mapping[str, Profile] = each_part('inputs with a different table', 'input', Profile)
 
 
 PARAMETERS = ProfileParameters

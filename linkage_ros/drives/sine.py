@@ -21,7 +21,7 @@ from functools import partial
 from math import cos, sin, tau
 
 from linkage_ros.drives.clocked import as_integers, build_clocked, Curve, LARGEST
-from linkage_ros.files.parameters import each, number
+from linkage_ros.files.parameters import each_part, number
 from linkage_ros.messages.layout import NANOSECONDS
 
 
@@ -39,7 +39,7 @@ class Sine:
 class SineParameters(Sine):
     """A sine of the inputs, from the first tick on."""
 
-    inputs: Mapping[str, Sine] = each('inputs with a different sine', 'input', Sine)
+    inputs: Mapping[str, Sine] = each_part('inputs with a different sine', 'input', Sine)
 
 
 PARAMETERS = SineParameters

@@ -31,7 +31,7 @@ from math import expm1, isfinite, isnan, nan, remainder, tau
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, LARGEST, Reader
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, flag, name, number, whole
+from linkage_ros.files.parameters import choice, flag, number, part_name, whole_number
 from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics.linkage import Input
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
@@ -74,13 +74,13 @@ class TopicParameters:
     cutoff: float = number(
         'of the low-pass behind the differences; 0: none', 0.0, unit='Hz', least=0.0, most=1e6
     )
-    joint: str = name(
+    joint: str = part_name(
         'dependent joint that the samples name instead of the input, whose crank is computed; '
         'absent, they name the input',
         'joint',
         '',
     )
-    branch: int = whole(
+    branch: int = whole_number(
         'branch of that joint on which the crank is, as linkage check --branches lists them; 0: '
         'the only one',
         0,

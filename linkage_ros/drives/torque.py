@@ -29,7 +29,7 @@ from linkage_ros.drives.drive import Context, CrankAtRest, CrankState, Drive, Re
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.motion import LARGEST, Motion, SingleDofMechanism
 from linkage_ros.errors import DefinitionError, LinkageError
-from linkage_ros.files.parameters import choice, number, option, whole
+from linkage_ros.files.parameters import choice, number, optional_section, whole_number
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe_ranges
 from linkage_ros.messages.joint_state import EffortCommand, JointEffortReader, Rejection
@@ -142,7 +142,7 @@ class PlayParameters:
 class MotorEncoderParameters:
     """The encoder on the motor's shaft, on ~/motor."""
 
-    counts: int = whole(
+    counts: int = whole_number(
         'counts in a turn of the motor; 0: exact readings', 0, unit='1/turn', least=0, most=2**32
     )
 
@@ -178,13 +178,13 @@ class TorqueParameters:
         above=0.0,
         most=0.49,
     )
-    motor: MotorParameters | None = option(  # noqa: RUF009 (a field, as the others are)
+    motor: MotorParameters | None = optional_section(  # noqa: RUF009 (a field, as the others are)
         'the motor at the input; without, the command acts on the input itself', MotorParameters
     )
-    play: PlayParameters | None = option(  # noqa: RUF009 (as above)
+    play: PlayParameters | None = optional_section(  # noqa: RUF009 (as above)
         'play between motor and crank; without, they are one', PlayParameters
     )
-    motor_encoder: MotorEncoderParameters | None = option(  # noqa: RUF009 (as above)
+    motor_encoder: MotorEncoderParameters | None = optional_section(  # noqa: RUF009 (as above)
         'publishes the motor, as its own encoder reads it, on ~/motor', MotorEncoderParameters
     )
 

@@ -18,7 +18,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from linkage_ros.errors import DefinitionError, listed, quoted
-from linkage_ros.files.parameters import choice, each, number, point, rows, text
+from linkage_ros.files.parameters import choice, each_part, number, number_rows, point, text
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 
 
@@ -83,19 +83,19 @@ class JointLoad:
     constant: float = number(
         'constant part', 0.0, unit=_EFFORT, least=-GREATEST_LOAD, most=GREATEST_LOAD
     )
-    over_time: tuple[tuple[float, float], ...] = rows(
+    over_time: tuple[tuple[float, float], ...] = number_rows(
         'part over the time since the first pose',
         ('time [s]', f'effort [{_EFFORT}]'),
         default=(),
         most=GREATEST_LOAD,
     )
-    over_position: tuple[tuple[float, float], ...] = rows(
+    over_position: tuple[tuple[float, float], ...] = number_rows(
         'part over the position of the joint',
         ('position [rad or m]', f'effort [{_EFFORT}]'),
         default=(),
         most=GREATEST_LOAD,
     )
-    over_rate: tuple[tuple[float, float], ...] = rows(
+    over_rate: tuple[tuple[float, float], ...] = number_rows(
         'part over the rate of the joint',
         ('rate [rad/s or m/s]', f'effort [{_EFFORT}]'),
         default=(),
@@ -112,19 +112,19 @@ class PointLoad:
     constant: float = number(
         'constant part', 0.0, unit='N', least=-GREATEST_LOAD, most=GREATEST_LOAD
     )
-    over_time: tuple[tuple[float, float], ...] = rows(
+    over_time: tuple[tuple[float, float], ...] = number_rows(
         'part over the time since the first pose',
         ('time [s]', 'force [N]'),
         default=(),
         most=GREATEST_LOAD,
     )
-    over_position: tuple[tuple[float, float], ...] = rows(
+    over_position: tuple[tuple[float, float], ...] = number_rows(
         'part over the position of the input',
         ('position [rad or m]', 'force [N]'),
         default=(),
         most=GREATEST_LOAD,
     )
-    over_rate: tuple[tuple[float, float], ...] = rows(
+    over_rate: tuple[tuple[float, float], ...] = number_rows(
         'part over the rate of the input',
         ('rate [rad/s or m/s]', 'force [N]'),
         default=(),
@@ -158,15 +158,17 @@ class WrenchLoad:
 class AppliedLoads:
     """Loads on joints, points and links."""
 
-    joint_springs: Mapping[str, JointSpring] = each('springs at joints', 'any_joint', JointSpring)
-    stops: Mapping[str, SoftStop] = each(
+    joint_springs: Mapping[str, JointSpring] = each_part(
+        'springs at joints', 'any_joint', JointSpring
+    )
+    stops: Mapping[str, SoftStop] = each_part(
         'stops that yield, at the limits of joints; without, a limit is a hard stop',
         'any_joint',
         SoftStop,
     )
-    efforts: Mapping[str, JointLoad] = each('efforts on joints', 'any_joint', JointLoad)
-    forces: Mapping[str, PointLoad] = each('forces on points', 'point', PointLoad)
-    wrenches: Mapping[str, WrenchLoad] = each(
+    efforts: Mapping[str, JointLoad] = each_part('efforts on joints', 'any_joint', JointLoad)
+    forces: Mapping[str, PointLoad] = each_part('forces on points', 'point', PointLoad)
+    wrenches: Mapping[str, WrenchLoad] = each_part(
         'forces and torques on links, as messages give them', 'link', WrenchLoad
     )
 

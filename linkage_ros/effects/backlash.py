@@ -40,7 +40,7 @@ from math import pi, tau
 
 from linkage_ros.drives.drive import Context, CrankBehindPlay, CrankState
 from linkage_ros.effects.stage import DriveStage
-from linkage_ros.files.parameters import each, Number, number
+from linkage_ros.files.parameters import each_part, Number, number
 
 _LARGEST = 6.0
 
@@ -52,7 +52,7 @@ class BacklashParameters:
     play: float = number(
         'from one end to the other, of every input', unit='rad or m', least=0.0, most=_LARGEST
     )
-    inputs: Mapping[str, float] = each(
+    inputs: Mapping[str, float] = each_part(
         'inputs with a different play',
         'input',
         Number('from one end to the other', 'rad or m', least=0.0, most=_LARGEST),

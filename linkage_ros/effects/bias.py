@@ -35,7 +35,7 @@ from operator import add
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import each, Number, number
+from linkage_ros.files.parameters import each_part, Number, number
 
 _Systematic = tuple[int, float, float, float]
 """Index of a joint, its scale error, and amplitude and phase of its eccentric disc."""
@@ -53,32 +53,32 @@ class EccentricDisc:
 class BiasParameters:
     """Systematic errors of measured joints: of the zero, of the scale, and once a turn."""
 
-    joints: Mapping[str, float] = each(
+    joints: Mapping[str, float] = each_part(
         'constant error of a joint',
         'joint',
         Number('error, added to the position', 'rad or m', -1e6, 1e6),
     )
-    deviations: Mapping[str, float] = each(
+    deviations: Mapping[str, float] = each_part(
         'a further constant error, drawn from the seed',
         'joint',
         Number('its standard deviation', 'rad or m', 0.0, 1e6),
     )
-    rates: Mapping[str, float] = each(
+    rates: Mapping[str, float] = each_part(
         'constant error of a measured rate',
         'joint',
         Number('error, added to the rate', 'rad/s or m/s', -1e6, 1e6),
     )
-    efforts: Mapping[str, float] = each(
+    efforts: Mapping[str, float] = each_part(
         'constant error of a measured effort',
         'joint',
         Number('error, added to the effort', 'N·m or N', -1e9, 1e9),
     )
-    scales: Mapping[str, float] = each(
+    scales: Mapping[str, float] = each_part(
         'scale error of a joint',
         'joint',
         Number('part of the position that is added to it', '', -0.5, 0.5),
     )
-    eccentricities: Mapping[str, EccentricDisc] = each(
+    eccentricities: Mapping[str, EccentricDisc] = each_part(
         'eccentric disc of a joint', 'joint', EccentricDisc
     )
 

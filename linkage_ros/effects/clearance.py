@@ -37,7 +37,7 @@ from math import hypot
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import MechanismState, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
-from linkage_ros.files.parameters import each, Number
+from linkage_ros.files.parameters import each_part, Number
 from linkage_ros.kinematics.arithmetic import call, make_vector
 
 _SMALLEST = 1e-12
@@ -48,7 +48,7 @@ _SMALLEST = 1e-12
 class ClearanceParameters:
     """Pins displaced by their radial play, along the force that they carry."""
 
-    pins: Mapping[str, float] = each(
+    pins: Mapping[str, float] = each_part(
         'radial play of each pin: half the difference of the diameters of hole and pin',
         'pin',
         Number('radial play', 'm', least=0.0, most=1e6),

@@ -32,7 +32,7 @@ from typing import NamedTuple
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import MechanismState, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
-from linkage_ros.files.parameters import each, Number
+from linkage_ros.files.parameters import each_part, Number
 from linkage_ros.kinematics.arithmetic import unit_vector
 from linkage_ros.kinematics.topology import Joint
 
@@ -43,7 +43,7 @@ _STIFFEST = 1e15
 class ComplianceParameters:
     """Links that stretch under their axial force."""
 
-    links: Mapping[str, float] = each(
+    links: Mapping[str, float] = each_part(
         'axial stiffness of links with two pins; the other links are rigid',
         'link',
         Number('axial stiffness E·A/L', 'N/m', above=0.0, most=_STIFFEST),

@@ -57,7 +57,7 @@ from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
 from linkage_ros.effects.stage import restamped, Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, flag, number, own
+from linkage_ros.files.parameters import choice, flag, number, own_parameters
 
 _AUTOMATIC = 'automatic'
 
@@ -99,7 +99,7 @@ class DelayParameters(JointDelay):
         ('arrival', 'measured'),
         'arrival',
     )
-    joints: Mapping[str, JointDelay] | None = own('own line of a joint', JointDelay)
+    joints: Mapping[str, JointDelay] | None = own_parameters('own line of a joint', JointDelay)
 
     @property
     def lines(self) -> tuple[JointDelay, ...]:

@@ -43,7 +43,7 @@ from random import Random
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import restamped, Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, number, own
+from linkage_ros.files.parameters import choice, number, own_parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class DropoutParameters(JointDropout):
         ('silent', 'repeat'),
         'silent',
     )
-    joints: Mapping[str, JointDropout] | None = own('own line of a joint', JointDropout)
+    joints: Mapping[str, JointDropout] | None = own_parameters('own line of a joint', JointDropout)
 
 
 PARAMETERS = DropoutParameters

@@ -53,14 +53,14 @@ from math import expm1, floor, tau
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import choice, each, flag, number, whole
+from linkage_ros.files.parameters import choice, each_part, flag, number, whole_number
 
 
 @dataclass(frozen=True, slots=True)
 class JointEncoder:
     """The encoder of a joint."""
 
-    counts: int = whole(
+    counts: int = whole_number(
         'counts in a turn, or in a metre of a slide', unit='1/turn or 1/m', least=1, most=2**32
     )
     offset: float = number('where count 0 begins', 0.0, unit='rad or m', least=-1e6, most=1e6)
@@ -75,7 +75,7 @@ class JointEncoder:
 class EncoderParameters:
     """Joints are read in whole counts."""
 
-    joints: Mapping[str, JointEncoder] = each(
+    joints: Mapping[str, JointEncoder] = each_part(
         'encoder of a joint', 'joint', JointEncoder, required=True
     )
     rates: str = choice(

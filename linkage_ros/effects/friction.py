@@ -32,14 +32,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from linkage_ros.dynamics.loads import Friction, JointFriction
-from linkage_ros.files.parameters import each, flag
+from linkage_ros.files.parameters import each_part, flag
 
 
 @dataclass(frozen=True, slots=True)
 class FrictionParameters:
     """Friction in pins and sliders, for all effects and drives that use forces."""
 
-    joints: Mapping[str, JointFriction] = each(
+    joints: Mapping[str, JointFriction] = each_part(
         'of each pin or slider', 'pin', JointFriction, required=True
     )
     holds: bool = flag(

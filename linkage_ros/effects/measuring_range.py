@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import each, number
+from linkage_ros.files.parameters import each_part, number
 
 _LARGEST = 1e9
 """Beyond what a sensor reads: a limit that is none."""
@@ -59,7 +59,7 @@ class JointRange:
 class MeasuringRangeParameters:
     """Readings end at the limits of their sensors."""
 
-    joints: Mapping[str, JointRange] = each(
+    joints: Mapping[str, JointRange] = each_part(
         "range of a joint's sensors", 'joint', JointRange, required=True
     )
 

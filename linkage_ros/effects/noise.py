@@ -42,7 +42,7 @@ from math import exp, sqrt
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import each, number
+from linkage_ros.files.parameters import each_part, number
 
 _Source = tuple[int, float, Callable[[float, float], float]]
 """Index of the joint, size of its noise, and its generator: normal(mean, deviation)."""
@@ -91,7 +91,9 @@ class JointNoise:
 class NoiseParameters:
     """White noise, a random walk and a drift in the readings of joints."""
 
-    joints: Mapping[str, JointNoise] = each('noise of a joint', 'joint', JointNoise, required=True)
+    joints: Mapping[str, JointNoise] = each_part(
+        'noise of a joint', 'joint', JointNoise, required=True
+    )
 
 
 PARAMETERS = NoiseParameters

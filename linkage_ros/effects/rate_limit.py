@@ -40,7 +40,7 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import restamped, Sensor, SensorReading
-from linkage_ros.files.parameters import choice, number, own
+from linkage_ros.files.parameters import choice, number, own_parameters
 
 if TYPE_CHECKING:
     from linkage_ros.effects.encoder import Encoder
@@ -68,7 +68,9 @@ class RateLimitParameters(JointRateLimit):
         ('repeat', 'silent'),
         'repeat',
     )
-    joints: Mapping[str, JointRateLimit] | None = own('own sensor of a joint', JointRateLimit)
+    joints: Mapping[str, JointRateLimit] | None = own_parameters(
+        'own sensor of a joint', JointRateLimit
+    )
 
 
 PARAMETERS = RateLimitParameters

@@ -40,7 +40,7 @@ from dataclasses import dataclass, replace
 from random import Random
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import each, names, number, Point
+from linkage_ros.files.parameters import each_part, number, part_names, Point
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 
@@ -66,10 +66,10 @@ class ToleranceParameters:
         least=0.0,
         most=_FARTHEST,
     )
-    links: tuple[str, ...] = names(
+    links: tuple[str, ...] = part_names(
         'links with such deviations, which may include the ground', 'body'
     )
-    given: Mapping[str, tuple[float, float]] = each(
+    given: Mapping[str, tuple[float, float]] = each_part(
         'known deviations, in the frame of the link; they replace the drawn ones',
         'point',
         Point('from the place in the file to the real one', 'm', _FARTHEST),

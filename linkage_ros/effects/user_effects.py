@@ -34,7 +34,7 @@ from typing import Any
 
 from linkage_ros.effects.stage import EFFECTS, NEEDS
 from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
-from linkage_ros.files.parameters import declared
+from linkage_ros.files.parameters import declared_fields
 
 QUANTITIES = ('velocity', 'acceleration', 'effort', 'pin_forces')
 """Quantities that an effect can request."""
@@ -141,7 +141,7 @@ def _check(name: str, module: ModuleType) -> None:
     """Refuse a module that is no effect."""
     parameters: Any = getattr(module, 'PARAMETERS', None)
     try:
-        known = isinstance(parameters, type) and declared(parameters) is not None
+        known = isinstance(parameters, type) and declared_fields(parameters) is not None
     except (TypeError, KeyError):
         known = False
     if not known:

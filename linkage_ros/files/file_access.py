@@ -47,11 +47,11 @@ def open_regular(file: str | Path) -> BinaryIO:
         Its name contains a NUL.
 
     """
-    _check(Path(file).stat(), file)
+    _check_regular(Path(file).stat(), file)
     # The file may have been replaced since the check.
     descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
-        _check(os.fstat(descriptor), file)
+        _check_regular(os.fstat(descriptor), file)
         return os.fdopen(descriptor, 'rb')
     except BaseException:
         os.close(descriptor)
@@ -64,7 +64,7 @@ def read_regular(file: str | Path, largest: int) -> bytes:
         return stream.read(largest + 1)
 
 
-def _check(status: os.stat_result, file: str | Path) -> None:
+def _check_regular(status: os.stat_result, file: str | Path) -> None:
     if stat.S_ISREG(status.st_mode):
         return
     if stat.S_ISDIR(status.st_mode):
@@ -131,7 +131,7 @@ def atomic_write(file: str | Path, data: bytes) -> None:
             raise LinkageError(file, 'is there already and is no file', 'name another file')
         if target.exists() and not os.access(target, os.W_OK):
             raise PermissionError(0, 'Permission denied')
-        with replaced(target) as stream:
+        with replace_file(target) as stream:
             stream.write(data)
     except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a circle of links
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
@@ -139,7 +139,7 @@ def atomic_write(file: str | Path, data: bytes) -> None:
 
 
 @contextmanager
-def replaced(target: Path) -> Iterator[BinaryIO]:
+def replace_file(target: Path) -> Iterator[BinaryIO]:
     """
     Yield a stream for the new content of a file, whatever exists there; do not follow a link.
 

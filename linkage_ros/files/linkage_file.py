@@ -138,7 +138,7 @@ def read_closure(content: Section, name: str = '', *, publish_inputs: bool = Fal
 
     """
     linkage, shorthand = written_linkage(content, publish_inputs=publish_inputs)
-    return closable(content, linkage, name, shorthand)
+    return checked_closure(content, linkage, name, shorthand)
 
 
 def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[Linkage, str]:
@@ -150,19 +150,21 @@ def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[
     for shorthand, expand in _SHORTHANDS.items():
         if shorthand in content:
             short = content.section(shorthand)
-            written_out = Section(content.file, '', _posed(_limited(expand(short), short), short))
+            written_out = Section(
+                content.file, '', _add_pose(_add_limits(expand(short), short), short)
+            )
             short.finish()
             content.finish()
-            return _linkage(written_out, publish_inputs), shorthand
+            return _parse_linkage(written_out, publish_inputs), shorthand
     for key in _KEYS:
-        content.taken(key)
+        content.remove_key(key)
     content.finish(tuple(_SHORTHANDS))
-    return _linkage(content, publish_inputs), ''
+    return _parse_linkage(content, publish_inputs), ''
 
 
-def _linkage(content: Section, publish_inputs: bool) -> Linkage:
+def _parse_linkage(content: Section, publish_inputs: bool) -> Linkage:
     links = content.section('links')
-    _bound(content, links, 'links', _MOST_LINKS)
+    _check_count(content, links, 'links', _MOST_LINKS)
     points = {}
     for name in links:
         link = links.section(name)
@@ -176,7 +178,7 @@ def _linkage(content: Section, publish_inputs: bool) -> Linkage:
 
     if 'input' not in content:
         raise content.error('', "the key 'input' is missing", f'add {_input_line(points)}')
-    inputs = tuple(_input(driven) for driven in content.sections('input'))
+    inputs = tuple(_read_input(driven) for driven in content.sections('input'))
 
     sliders = content.section('sliders', required=False)
     assembly = content.section('assembly', required=False)
@@ -186,30 +188,30 @@ def _linkage(content: Section, publish_inputs: bool) -> Linkage:
     }
 
     joints = content.section('joints')
-    _bound(content, sliders, 'sliders', _MOST_LINKS)
-    _bound(content, joints, 'joints', _MOST_LINKS)
+    _check_count(content, sliders, 'sliders', _MOST_LINKS)
+    _check_count(content, joints, 'joints', _MOST_LINKS)
     if not list(joints):
         raise content.error('joints', 'publishes nothing', 'name a joint')
     for driven in inputs:
         if driven.joint in joints:
             raise joints.error(driven.joint, 'is the input joint', 'publish the dependent joints')
-    published = {name: _joint(joints.section(name)) for name in joints}
+    published = {name: _read_joint(joints.section(name)) for name in joints}
     if publish_inputs:
-        published = {driven.joint: _published(driven) for driven in inputs} | published
+        published = {driven.joint: _published_joint(driven) for driven in inputs} | published
     return Linkage(
         points,
         inputs,
         sides,  # type: ignore[arg-type]  # one of the words of the Literal, by `choice`
         published,
-        {name: _slider(sliders.section(name)) for name in sliders},
+        {name: _read_slider(sliders.section(name)) for name in sliders},
         tuple(content.texts('traced')),
-        _pose(content.section('pose'), inputs) if 'pose' in content else None,
-        _masses(content.section('masses', required=False), tuple(points)),
-        _ratios(content.section('ratios', required=False), inputs, published),
+        _read_pose(content.section('pose'), inputs) if 'pose' in content else None,
+        _read_masses(content.section('masses', required=False), tuple(points)),
+        _read_ratios(content.section('ratios', required=False), inputs, published),
     )
 
 
-def _bound(content: Section, named: Section, key: str, most: int) -> None:
+def _check_count(content: Section, named: Section, key: str, most: int) -> None:
     count = len(named.mapping)
     if count > most:
         raise content.error(key, f'there are {count}', f'write at most {most}')
@@ -222,23 +224,25 @@ def _input_line(points: Mapping[str, Collection[str]]) -> str:
     return f'input: {{joint: {crank}_joint, parent: {GROUND}, child: {crank}}}'
 
 
-def _input(content: Section) -> Input:
+def _read_input(content: Section) -> Input:
     joint = content.text('joint', expected='a name for the driven joint, as in crank messages')
     if 'slider' in content:
-        driven = Input(joint, slider=content.text('slider'), limits=_limits(content, slides=True))
+        driven = Input(
+            joint, slider=content.text('slider'), limits=_read_limits(content, slides=True)
+        )
     else:
-        driven = Input(joint, *_ends(content), limits=_limits(content))
+        driven = Input(joint, *_read_ends(content), limits=_read_limits(content))
     content.finish(('slider',))
     return driven
 
 
-def _published(driven: Input) -> RevoluteJoint | SlideJoint:
+def _published_joint(driven: Input) -> RevoluteJoint | SlideJoint:
     if driven.slider:
         return SlideJoint(driven.slider)
     return RevoluteJoint(driven.parent, driven.child)
 
 
-def _ends(content: Section) -> tuple[str, str]:
+def _read_ends(content: Section) -> tuple[str, str]:
     """Return parent and child of a joint."""
     return (
         content.text('parent', expected='the link from which the angle is measured'),
@@ -246,7 +250,7 @@ def _ends(content: Section) -> tuple[str, str]:
     )
 
 
-def _limits(content: Section, *, slides: bool = False) -> Limits:
+def _read_limits(content: Section, *, slides: bool = False) -> Limits:
     """Return the limits of a joint; `kinematics.checks` decides whether they are possible."""
     content.units = replace(content.units, slides=slides)
     low, high = content.interval('limits', most=FARTHEST, unit='rad or m')
@@ -262,11 +266,11 @@ def _limits(content: Section, *, slides: bool = False) -> Limits:
     )
 
 
-def _pose(content: Section, driven: Sequence[Input]) -> AssemblyPose:
+def _read_pose(content: Section, driven: Sequence[Input]) -> AssemblyPose:
     # A wrong number of values is refused with the other parts that do not match.
     values = content.numbers('inputs', most=FARTHEST)
     units = chain((given.unit for given in driven), repeat(''))
-    inputs = tuple(map(content.units.read, values, units))
+    inputs = tuple(map(content.units.to_si, values, units))
     points = content.section('points', required=False)
     angles = content.section('angles', required=False)
     pose = AssemblyPose(
@@ -278,7 +282,7 @@ def _pose(content: Section, driven: Sequence[Input]) -> AssemblyPose:
     return pose
 
 
-def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
+def _read_masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
     masses = {}
     for name in content:
         if name == GROUND:
@@ -298,14 +302,14 @@ def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
     return masses
 
 
-def _ratios(
+def _read_ratios(
     content: Section,
     inputs: Sequence[Input],
     joints: Mapping[str, RevoluteJoint | SlideJoint],
 ) -> dict[str, Ratio]:
     units = {name: joint.unit for name, joint in joints.items()}
     units |= {given.joint: given.unit for given in inputs}
-    _bound(content, content, '', _MOST_LINKS)
+    _check_count(content, content, '', _MOST_LINKS)
     ratios = {}
     for name in content:
         one = content.section(name)
@@ -313,16 +317,16 @@ def _ratios(
         unit = units.get(name, 'rad')
         # In the file's units of length: metres for a radian, or radians for a metre.
         ratio = one.number('ratio', 1.0, least=-FARTHEST, most=FARTHEST)
-        ratio = one.units.read(ratio, unit if unit == 'm' else '')
+        ratio = one.units.to_si(ratio, unit if unit == 'm' else '')
         if units.get(of) == 'm':
-            ratio /= one.units.read(1.0, 'm')
+            ratio /= one.units.to_si(1.0, 'm')
         offset = one.number('offset', 0.0, least=-FARTHEST, most=FARTHEST, unit=unit)
         ratios[name] = Ratio(of, ratio, offset)
         one.finish()
     return ratios
 
 
-def _slider(content: Section) -> Slider:
+def _read_slider(content: Section) -> Slider:
     block = content.text('block', '')
     slider = Slider(
         content.text('point', expected='the point that stays on the line'),
@@ -336,17 +340,17 @@ def _slider(content: Section) -> Slider:
     return slider
 
 
-def _joint(content: Section) -> RevoluteJoint | SlideJoint:
+def _read_joint(content: Section) -> RevoluteJoint | SlideJoint:
     joint: RevoluteJoint | SlideJoint
     if 'slider' in content:
-        joint = SlideJoint(content.text('slider'), _limits(content, slides=True))
+        joint = SlideJoint(content.text('slider'), _read_limits(content, slides=True))
     else:
-        joint = RevoluteJoint(*_ends(content), _limits(content))
+        joint = RevoluteJoint(*_read_ends(content), _read_limits(content))
     content.finish(('slider',))
     return joint
 
 
-def closable(content: Section, linkage: Linkage, name: str, shorthand: str = '') -> Closure:
+def checked_closure(content: Section, linkage: Linkage, name: str, shorthand: str = '') -> Closure:
     """Return a linkage of a file as a closure, and check that it closes."""
     try:
         closure = Closure(linkage, name)
@@ -362,11 +366,11 @@ def closable(content: Section, linkage: Linkage, name: str, shorthand: str = '')
         remedy = error.remedy
         if where == 'assembly':
             remedy += f'; linkage draw {content.file} --assemblies draws the choices'
-        raise content.located(DefinitionError(where, error.reason, remedy)) from None
+        raise content.locate_error(DefinitionError(where, error.reason, remedy)) from None
     return closure
 
 
-def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
+def _add_limits(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
     """Return an expanded shorthand, with the limits that the shorthand gives to its joints."""
     driven, joints = written_out['input'], written_out['joints']
     limited = content.section('joints', required=False)
@@ -378,7 +382,7 @@ def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
     places = [(driven, content.section('input', required=False))]
     places += [(joints[name], limited.section(name)) for name in limited]
     for joint, of in places:
-        limits = _limits(of, slides='slider' in joint)
+        limits = _read_limits(of, slides='slider' in joint)
         of.finish()
         in_si = {
             'limits': [limits.low, limits.high],
@@ -389,10 +393,10 @@ def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
     return written_out
 
 
-def _posed(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
+def _add_pose(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
     """Return an expanded shorthand with the pose that it gives; a drawn one tells the side."""
     if 'pose' in content:
-        pose = _pose(content.section('pose'), [_DRIVEN_CRANK])
+        pose = _read_pose(content.section('pose'), [_DRIVEN_CRANK])
         if pose.is_drawn and 'assembly' not in content:
             del written_out['assembly']
         written_out['pose'] = {
@@ -455,7 +459,7 @@ def _inverted_slider_crank(content: Section) -> dict[str, Any]:
 _SHORTHANDS = {'four_bar': _four_bar, 'inverted_slider_crank': _inverted_slider_crank}
 
 
-def assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
+def find_assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
     """
     Return a linkage in each choice of assembly sides in which it closes.
 
@@ -478,10 +482,10 @@ def assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
 
     """
     file = named_file(linkage, 'linkages')
-    return closures(linkage_content(file), file.stem)
+    return find_closures(linkage_content(file), file.stem)
 
 
-def closures(content: Section, name: str) -> dict[str, Closure]:
+def find_closures(content: Section, name: str) -> dict[str, Closure]:
     """Return the closures of a linkage file by name, as `assemblies` does."""
     written, shorthand = written_linkage(content)
     try:
@@ -506,7 +510,7 @@ def closures(content: Section, name: str) -> dict[str, Closure]:
         text = ', '.join(chosen if shorthand else (f'{k}: {v}' for k, v in assembly.items()))
         text = f'assembly: {text if shorthand else f"{{{text}}}"}'
         try:
-            found[text] = closable(content, one, name, shorthand)
+            found[text] = checked_closure(content, one, name, shorthand)
         except FileError as error:
             errors.append(error)
     if not found:

@@ -55,7 +55,7 @@ _SHORT_LENGTHS = {
 """The lengths of a shorthand: link and two points by key."""
 
 
-def rewritten(text: str, name: str, linkage: Linkage) -> str:
+def rewrite_linkage(text: str, name: str, linkage: Linkage) -> str:
     """
     Return the text of a linkage file, which is bounded, with another linkage in it.
 
@@ -74,17 +74,19 @@ def rewritten(text: str, name: str, linkage: Linkage) -> str:
     yaml.indent(mapping=2, sequence=indent or 2, offset=offset or 0)
     yaml.width = _WIDE
     if shorthand:
-        changed = _shorthand(document[shorthand], shorthand, before, linkage, content.units)
+        changed = _rewrite_shorthand(
+            document[shorthand], shorthand, before, linkage, content.units
+        )
         if not changed:
-            return linkage_text(linkage, _comment(text))
+            return linkage_text(linkage, _top_comment(text))
     else:
-        _merge(document, content_of(before), content_of(linkage), content.units, 'm')
+        _merge_mapping(document, content_of(before), content_of(linkage), content.units, 'm')
     written = StringIO()
     yaml.dump(document, written)
     return written.getvalue()
 
 
-def _merge(
+def _merge_mapping(
     node: Any, before: Mapping[str, Any], after: Mapping[str, Any], units: Units, unit: str
 ) -> None:
     """Write into a mapping of the file what differs between two contents."""
@@ -96,49 +98,51 @@ def _merge(
             own = ''
         if key not in before:
             if key in node:  # an empty part, as `traced: []`
-                node[key] = _made(value, units, own)
+                node[key] = _make_value(value, units, own)
             else:
-                node.insert(min(place, len(node)), key, _made(value, units, own))
+                node.insert(min(place, len(node)), key, _make_value(value, units, own))
         elif value != before[key]:
-            _replace(node, key, before[key], value, units, own)
+            _replace_value(node, key, before[key], value, units, own)
 
 
-def _replace(node: Any, key: Any, before: Any, after: Any, units: Units, unit: str) -> None:
+def _replace_value(node: Any, key: Any, before: Any, after: Any, units: Units, unit: str) -> None:
     """Write a value where another one stands, in its style."""
     held = node[key]
     if isinstance(held, list) and isinstance(after, dict):
-        _merge(held[0], before, after, units, unit)  # a list of one input
+        _merge_mapping(held[0], before, after, units, unit)  # a list of one input
     elif isinstance(after, dict):
-        _merge(held, before, after, units, unit)
+        _merge_mapping(held, before, after, units, unit)
     elif isinstance(after, list) and len(after) == len(held) == len(before):
         for place, (old, new) in enumerate(zip(before, after, strict=True)):
             if old != new:
-                _replace(held, place, old, new, units, unit)
+                _replace_value(held, place, old, new, units, unit)
     else:
-        node[key] = _made(after, units, unit)
+        node[key] = _make_value(after, units, unit)
 
 
-def _made(value: Any, units: Units, unit: str) -> Any:
+def _make_value(value: Any, units: Units, unit: str) -> Any:
     """Return a new value in the file's units; mappings and lists on one line."""
     from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
     if isinstance(value, dict):
         made = CommentedMap(
-            {key: _made(one, units, _UNITS.get(key, unit)) for key, one in value.items()}
+            {key: _make_value(one, units, _UNITS.get(key, unit)) for key, one in value.items()}
         )
         made.fa.set_flow_style()
         return made
     if isinstance(value, list):
-        listed = CommentedSeq([_made(one, units, unit) for one in value])
+        listed = CommentedSeq([_make_value(one, units, unit) for one in value])
         listed.fa.set_flow_style()
         return listed
     if isinstance(value, str):
         return value
-    number = float(f'{units.shown(float(value), unit) if unit else value:.{_DIGITS}g}')
+    number = float(f'{units.to_file_unit(float(value), unit) if unit else value:.{_DIGITS}g}')
     return int(number) if number.is_integer() and abs(number) < 1e6 else number
 
 
-def _shorthand(node: Any, kind: str, before: Linkage, after: Linkage, units: Units) -> bool:
+def _rewrite_shorthand(
+    node: Any, kind: str, before: Linkage, after: Linkage, units: Units
+) -> bool:
     """Write lengths and side into a shorthand; return whether that is all that changed."""
     lengths = {
         key: dist(after.links[link][one], after.links[link][other])
@@ -153,7 +157,7 @@ def _shorthand(node: Any, kind: str, before: Linkage, after: Linkage, units: Uni
     }
     for key, value in lengths.items():
         if value != old[key]:
-            node[key] = _made(value, units, 'm')
+            node[key] = _make_value(value, units, 'm')
     if after.assembly != before.assembly:
         node['assembly'] = next(iter(after.assembly.values()))
     if before.pose is not None and before.pose != after.pose:
@@ -171,7 +175,7 @@ def _is_written(node: Any, kind: str, linkage: Linkage, units: Units) -> bool:
     return found.links == linkage.links and found.inputs == linkage.inputs
 
 
-def _comment(text: str) -> list[str]:
+def _top_comment(text: str) -> list[str]:
     """Return the comment at the top of a file."""
     lines = takewhile(lambda line: line.startswith('#'), text.splitlines())
     return [' '.join(line.lstrip('# ') for line in lines)] if text.startswith('#') else []

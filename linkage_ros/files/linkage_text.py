@@ -70,9 +70,9 @@ def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
         Paragraphs of the comment at the top.
 
     """
-    lines = list(_comment(comment))
+    lines = list(_comment_lines(comment))
     for key, value in content_of(linkage).items():
-        lines += _entry(key, value, '', in_rows=key in _IN_ROWS)
+        lines += _entry_lines(key, value, '', in_rows=key in _IN_ROWS)
     return '\n'.join(lines) + '\n'
 
 
@@ -106,18 +106,18 @@ _IN_ROWS = ('links', 'sliders', 'joints', 'ratios', 'masses')
 
 def content_of(linkage: Linkage) -> dict[str, Content]:
     """Return the content of the file in its order, without optional entries that are empty."""
-    inputs: list[Content] = [_input(given) for given in linkage.inputs]
+    inputs: list[Content] = [_input_content(given) for given in linkage.inputs]
     content: dict[str, Content] = {
         'links': {
             link: {name: [*point] for name, point in points.items()}
             for link, points in linkage.links.items()
         },
-        'sliders': {name: _slider(slider) for name, slider in linkage.sliders.items()},
+        'sliders': {name: _slider_content(slider) for name, slider in linkage.sliders.items()},
         'input': inputs[0] if len(inputs) == 1 else inputs,
         'assembly': dict(linkage.assembly),
-        'pose': _pose(linkage.pose),
-        'joints': {name: _joint(joint) for name, joint in linkage.joints.items()},
-        'ratios': {name: _ratio(ratio) for name, ratio in linkage.ratios.items()},
+        'pose': _pose_content(linkage.pose),
+        'joints': {name: _joint_content(joint) for name, joint in linkage.joints.items()},
+        'ratios': {name: _ratio_content(ratio) for name, ratio in linkage.ratios.items()},
         'traced': [*linkage.traced],
         'masses': {
             link: {'mass': mass.mass, 'center': [*mass.center], 'inertia': mass.inertia}
@@ -128,7 +128,7 @@ def content_of(linkage: Linkage) -> dict[str, Content]:
     return {key: value for key, value in content.items() if value or key in needed}
 
 
-def _slider(slider: Slider) -> dict[str, Content]:
+def _slider_content(slider: Slider) -> dict[str, Content]:
     block: dict[str, Content] = (
         {'block': slider.block, 'angle': slider.angle} if slider.block else {}
     )
@@ -141,26 +141,26 @@ def _slider(slider: Slider) -> dict[str, Content]:
     }
 
 
-def _input(given: Input) -> dict[str, Content]:
-    limits = _limits(given.limits)
+def _input_content(given: Input) -> dict[str, Content]:
+    limits = _limits_content(given.limits)
     if given.slider:
         return {'joint': given.joint, 'slider': given.slider, **limits}
     return {'joint': given.joint, 'parent': given.parent, 'child': given.child, **limits}
 
 
-def _joint(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
-    limits = _limits(joint.limits)
+def _joint_content(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
+    limits = _limits_content(joint.limits)
     if isinstance(joint, SlideJoint):
         return {'slider': joint.slider, **limits}
     return {'parent': joint.parent, 'child': joint.child, **limits}
 
 
-def _ratio(given: Ratio) -> dict[str, Content]:
+def _ratio_content(given: Ratio) -> dict[str, Content]:
     offset: dict[str, Content] = {'offset': given.offset} if given.offset else {}
     return {'of': given.of, 'ratio': given.ratio, **offset}
 
 
-def _limits(limits: Limits) -> dict[str, Content]:
+def _limits_content(limits: Limits) -> dict[str, Content]:
     bounds: dict[str, Content] = {'limits': [limits.low, limits.high]} if limits.is_bounded else {}
     for key in ('velocity', 'effort'):
         if isfinite(value := getattr(limits, key)):
@@ -168,7 +168,7 @@ def _limits(limits: Limits) -> dict[str, Content]:
     return bounds
 
 
-def _pose(pose: AssemblyPose | None) -> dict[str, Content]:
+def _pose_content(pose: AssemblyPose | None) -> dict[str, Content]:
     if pose is None:
         return {}
     content: dict[str, Content] = {'inputs': [*pose.inputs]}
@@ -182,19 +182,22 @@ def _pose(pose: AssemblyPose | None) -> dict[str, Content]:
 def pose_text(linkage: Linkage, pose: AssemblyPose, units: Units) -> str:
     """Return the line of a pose for a linkage file in some units, with seven digits."""
 
-    def shown(value: float, unit: str) -> float:
-        return float(f'{units.shown(value, unit):.7g}') + 0.0
+    def in_file_unit(value: float, unit: str) -> float:
+        return float(f'{units.to_file_unit(value, unit):.7g}') + 0.0
 
     driven = zip(pose.inputs, linkage.inputs, strict=True)
     rounded = AssemblyPose(
-        tuple(shown(value, given.unit) for value, given in driven),
-        {name: (shown(x, 'm'), shown(y, 'm')) for name, (x, y) in pose.points.items()},
-        {link: shown(angle, 'rad') for link, angle in pose.angles.items()},
+        tuple(in_file_unit(value, given.unit) for value, given in driven),
+        {
+            name: (in_file_unit(x, 'm'), in_file_unit(y, 'm'))
+            for name, (x, y) in pose.points.items()
+        },
+        {link: in_file_unit(angle, 'rad') for link, angle in pose.angles.items()},
     )
-    return f'pose: {_flow(_pose(rounded))}'
+    return f'pose: {_flow_text(_pose_content(rounded))}'
 
 
-def _comment(paragraphs: Sequence[str]) -> Iterator[str]:
+def _comment_lines(paragraphs: Sequence[str]) -> Iterator[str]:
     for paragraph in paragraphs:
         for line in paragraph.splitlines() or ['']:
             printing = ''.join(c if c.isprintable() else ' ' for c in line)
@@ -203,10 +206,12 @@ def _comment(paragraphs: Sequence[str]) -> Iterator[str]:
             yield from (f'# {part}' for part in wrapped) if wrapped else ['#']
 
 
-def _entry(name: str, value: Content, indent: str, *, in_rows: bool = False) -> Iterator[str]:
+def _entry_lines(
+    name: str, value: Content, indent: str, *, in_rows: bool = False
+) -> Iterator[str]:
     """Yield the lines of a key: one line if it fits and need not be in rows, else one per part."""
-    key = f'{indent}{_name(name)}:'
-    line = f'{key} {_flow(value)}'
+    key = f'{indent}{_name_text(name)}:'
+    line = f'{key} {_flow_text(value)}'
     inner = indent + '  '
     if not isinstance(value, dict | list) or not value or not (in_rows or len(line) > _WIDTH):
         yield line
@@ -214,20 +219,20 @@ def _entry(name: str, value: Content, indent: str, *, in_rows: bool = False) -> 
     yield key
     if isinstance(value, dict):
         for part, of in value.items():
-            yield from _entry(part, of, inner)
+            yield from _entry_lines(part, of, inner)
     else:
-        yield from (f'{inner}- {_flow(part)}' for part in value)
+        yield from (f'{inner}- {_flow_text(part)}' for part in value)
 
 
-def _flow(value: Content) -> str:
+def _flow_text(value: Content) -> str:
     if isinstance(value, dict):
-        return f'{{{", ".join(f"{_name(key)}: {_flow(part)}" for key, part in value.items())}}}'
+        return f'{{{", ".join(f"{_name_text(key)}: {_flow_text(part)}" for key, part in value.items())}}}'
     if isinstance(value, list):
-        return f'[{", ".join(map(_flow, value))}]'
-    return _name(value) if isinstance(value, str) else number_text(value)
+        return f'[{", ".join(map(_flow_text, value))}]'
+    return _name_text(value) if isinstance(value, str) else number_text(value)
 
 
-def _name(name: str) -> str:
+def _name_text(name: str) -> str:
     if _PLAIN.fullmatch(name) and name.lower() not in _WORDS:
         return name
     return json.dumps(name, ensure_ascii=False)  # its escapes are valid in YAML
@@ -253,15 +258,15 @@ def scene_text_for(closure: Closure, file: str) -> str:
         '# What a linkage file alone stands for where a scene is expected.\n'
         f'linkage: {file}\n'
         'rate: 1000\n'
-        f'drive: {_drive(closure)}\n'
+        f'drive: {_drive_text(closure)}\n'
         'effects: {velocity: {}}\n'
     )
 
 
-def _drive(closure: Closure) -> str:
+def _drive_text(closure: Closure) -> str:
     if len(closure.linkage.inputs) > 1:
         return '{topic: {}}'
-    start, interval = _start(closure)
+    start, interval = _find_start(closure)
     if interval.is_whole:
         return f'{{constant_rate: {{rate: 1, start: {number_text(start)}}}}}'
     left_out = 0.5 * (1.0 - _PART) * (interval.highest - interval.lowest)
@@ -282,7 +287,7 @@ def _drive(closure: Closure) -> str:
     return f'{{sine: {{{", ".join(f"{key}: {number_text(of)}" for key, of in entries.items())}}}}}'
 
 
-def _start(closure: Closure) -> tuple[float, InputRange]:
+def _find_start(closure: Closure) -> tuple[float, InputRange]:
     """Return the start of the single input, and the range that contains it."""
     way, pose = InputSweep(closure), closure.linkage.pose
     if pose is None or not starts_at_pose(closure):

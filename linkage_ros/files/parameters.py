@@ -64,22 +64,22 @@ class Kind(ABC):
         """Read the value of a key; arguments and errors as in `read_parameters`."""
 
     @abstractmethod
-    def schema(self) -> Schema:
+    def json_schema(self) -> Schema:
         """Return the JSON Schema of the value."""
 
     @abstractmethod
-    def values(self) -> str:
+    def values_text(self) -> str:
         """Return the allowed values, for a table."""
 
-    def shown(self, default: Any) -> str:
+    def default_text(self, default: Any) -> str:
         """Return a default, for a table."""
         return str(default) or "''"
 
-    def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
+    def table_rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
         """Yield rows of a table: key, unit, default, values, meaning."""
-        yield key, self.unit, default, self.values(), self.meaning
+        yield key, self.unit, default, self.values_text(), self.meaning
 
-    def _described(self, **schema: Any) -> Schema:
+    def _described_schema(self, **schema: Any) -> Schema:
         return {'description': self.meaning + (f' [{self.unit}]' if self.unit else ''), **schema}
 
 
@@ -95,16 +95,18 @@ class Number(Kind):
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> float | int:
         if self.whole:
-            return content.whole(key, least=self.least, most=self.most, unit=self.unit)
+            return content.whole_number(key, least=self.least, most=self.most, unit=self.unit)
         bounds = {'least': self.least, 'most': self.most, 'above': self.above}
         return content.number(key, **bounds, unit=self.unit)
 
-    def schema(self) -> Schema:
+    def json_schema(self) -> Schema:
         kind = 'integer' if self.whole else 'number'
-        return self._described(type=kind, **_bounds(self.least, self.most, self.above, self.unit))
+        return self._described_schema(
+            type=kind, **_bounds_schema(self.least, self.most, self.above, self.unit)
+        )
 
-    def values(self) -> str:
-        least, most, above = map(written, (self.least, self.most, self.above))
+    def values_text(self) -> str:
+        least, most, above = map(number_text, (self.least, self.most, self.above))
         if self.above > -inf:
             bounds = f'more than {above}' + (f', to {most}' if self.most < inf else '')
         elif self.least > -inf:
@@ -113,12 +115,12 @@ class Number(Kind):
             bounds = f'at most {most}' if self.most < inf else 'any number'
         return f'whole: {bounds}' if self.whole else bounds
 
-    def shown(self, default: Any) -> str:
-        return written(default)
+    def default_text(self, default: Any) -> str:
+        return number_text(default)
 
 
 @dataclass(frozen=True, slots=True)
-class Numbers(Kind):
+class NumberList(Kind):
     """A list of finite numbers, each within ±most."""
 
     unit: str = ''  # type: ignore[misc]
@@ -127,30 +129,30 @@ class Numbers(Kind):
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, ...]:
         return tuple(content.numbers(key, most=self.most, unit=self.unit))
 
-    def schema(self) -> Schema:
-        items = {'type': 'number', **_bounds(-self.most, self.most, unit=self.unit)}
-        return self._described(type='array', items=items)
+    def json_schema(self) -> Schema:
+        items = {'type': 'number', **_bounds_schema(-self.most, self.most, unit=self.unit)}
+        return self._described_schema(type='array', items=items)
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return f'a list of numbers{_each_at_most(self.most)}'
 
 
 @dataclass(frozen=True, slots=True)
-class Point(Numbers):
+class Point(NumberList):
     """Two finite numbers [x, y], each within ±most."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, float]:
         return content.point(key, most=self.most, unit=self.unit)
 
-    def schema(self) -> Schema:
-        return {**Numbers.schema(self), 'minItems': 2, 'maxItems': 2}
+    def json_schema(self) -> Schema:
+        return {**NumberList.json_schema(self), 'minItems': 2, 'maxItems': 2}
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return f'[x, y]{_each_at_most(self.most)}'
 
 
 @dataclass(frozen=True, slots=True)
-class Rows(Kind):
+class RowsOf(Kind):
     """A list of rows of finite numbers, one per column, each within ±most."""
 
     columns: tuple[str, ...]  # The meaning of each column, with its unit
@@ -159,11 +161,13 @@ class Rows(Kind):
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
         return content.rows(key, self.columns, most=self.most)
 
-    def schema(self) -> Schema:
+    def json_schema(self) -> Schema:
         row, count = f'[{", ".join(self.columns)}]', len(self.columns)
-        bounds = _bounds(-self.most, self.most, unit=' or '.join(map(unit_of, self.columns)))
+        bounds = _bounds_schema(
+            -self.most, self.most, unit=' or '.join(map(unit_of, self.columns))
+        )
         items = {
-            **Numbers(row).schema(),
+            **NumberList(row).json_schema(),
             'items': {'type': 'number', **bounds},
             'minItems': count,
             'maxItems': count,
@@ -171,7 +175,7 @@ class Rows(Kind):
         description = f'{self.meaning}: rows of {row}'
         return {'description': description, 'type': 'array', 'minItems': 1, 'items': items}
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return f'rows of [{", ".join(self.columns)}]{_each_at_most(self.most)}'
 
 
@@ -182,18 +186,18 @@ class Flag(Kind):
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> bool:
         return content.flag(key)
 
-    def schema(self) -> Schema:
-        return self._described(type='boolean')
+    def json_schema(self) -> Schema:
+        return self._described_schema(type='boolean')
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return 'true or false'
 
-    def shown(self, default: Any) -> str:
+    def default_text(self, default: Any) -> str:
         return 'true' if default else 'false'
 
 
 @dataclass(frozen=True, slots=True)
-class Choice(Kind):
+class ChoiceOf(Kind):
     """One of a set of words."""
 
     words: tuple[str, ...]
@@ -201,15 +205,15 @@ class Choice(Kind):
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
         return content.choice(key, self.words)
 
-    def schema(self) -> Schema:
-        return self._described(enum=list(self.words))
+    def json_schema(self) -> Schema:
+        return self._described_schema(enum=list(self.words))
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return ' or '.join(self.words)
 
 
 @dataclass(frozen=True, slots=True)
-class Text(Kind):
+class TextOf(Kind):
     """A string; without a pattern, a printable one that is not empty."""
 
     pattern: str = f'^{CHARACTER}+$'
@@ -217,21 +221,21 @@ class Text(Kind):
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
         return content.text(key)
 
-    def schema(self) -> Schema:
-        return self._described(type='string', pattern=self.pattern)
+    def json_schema(self) -> Schema:
+        return self._described_schema(type='string', pattern=self.pattern)
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return 'a text'
 
 
 @dataclass(frozen=True, slots=True)
-class File(Text):
+class File(TextOf):
     """A path, relative to the folder of the scene file."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
         return join(folder, content.text(key))  # noqa: PTH118 (Path's raises on a NUL)
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return 'a file'
 
 
@@ -242,16 +246,16 @@ class Name(Kind):
     kind: str
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
-        return self._known(content, key, content.text(key), parts)
+        return self._known_name(content, key, content.text(key), parts)
 
-    def schema(self) -> Schema:
+    def json_schema(self) -> Schema:
         # It cannot know the existing names.
-        return Text(f'{self.meaning} (name of a {KINDS[self.kind]})').schema()
+        return TextOf(f'{self.meaning} (name of a {KINDS[self.kind]})').json_schema()
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return f'a {KINDS[self.kind]}'
 
-    def _known(self, content: Section, key: str, name: str, parts: Parts) -> str:
+    def _known_name(self, content: Section, key: str, name: str, parts: Parts) -> str:
         """Return the name if such a part exists."""
         names = parts[self.kind]
         if name in names:
@@ -264,20 +268,24 @@ class Name(Kind):
 
 
 @dataclass(frozen=True, slots=True)
-class Names(Name):
+class NamesOf(Name):
     """A list of names of parts of the linkage."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
-        return tuple(self._known(content, key, name, parts) for name in content.texts(key))
+        return tuple(self._known_name(content, key, name, parts) for name in content.texts(key))
 
-    def schema(self) -> Schema:
+    def json_schema(self) -> Schema:
         description = f'{self.meaning} (names, each of a {KINDS[self.kind]})'
-        return {'description': description, 'type': 'array', 'items': Text('a name').schema()}
+        return {
+            'description': description,
+            'type': 'array',
+            'items': TextOf('a name').json_schema(),
+        }
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return f'names, each of a {KINDS[self.kind]}'
 
-    def shown(self, default: Any) -> str:
+    def default_text(self, default: Any) -> str:
         return ', '.join(default) or 'all'
 
 
@@ -288,46 +296,46 @@ class Each(Name):
     of: Any
 
     @property
-    def _value(self) -> Kind:
-        return Group('', self.of) if isinstance(self.of, type) else self.of
+    def _value_kind(self) -> Kind:
+        return ParameterGroup('', self.of) if isinstance(self.of, type) else self.of
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
         inner, values = content.section(key), {}
         for name in inner:
-            part = self._known(inner, name, name, parts)
+            part = self._known_name(inner, name, name, parts)
             if sliding := _SLIDING.get(self.kind):
                 inner.units = replace(inner.units, slides=name in parts.get(sliding, ()))
-            values[part] = self._value.read(inner, name, parts, folder)
+            values[part] = self._value_kind.read(inner, name, parts, folder)
         return values
 
-    def schema(self) -> Schema:
+    def json_schema(self) -> Schema:
         of = parameters_schema(self.of) if isinstance(self.of, type) else self.of.schema()
-        return named(f'{self.meaning} (by the name of a {KINDS[self.kind]})', of)
+        return named_mapping(f'{self.meaning} (by the name of a {KINDS[self.kind]})', of)
 
     @property
-    def keys(self) -> tuple[str, ...]:
+    def part_keys(self) -> tuple[str, ...]:
         """Return the keys of each part; none if it has a single value."""
         return tuple(e.name for e in fields(self.of)) if isinstance(self.of, type) else ()
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return f'for each {KINDS[self.kind]}'
 
-    def shown(self, default: Any) -> str:
+    def default_text(self, default: Any) -> str:
         return ''  # its own rows have the defaults
 
-    def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
+    def table_rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
         """Yield one row, and the rows of the values."""
-        yield from Kind.rows(self, key, default)
+        yield from Kind.table_rows(self, key, default)
         one = 'LINK.POINT' if self.kind == 'point' else self.kind.removeprefix('any_').upper()
         part = f'{key}.{one}'
-        rows = self._value.rows(part, '')
+        rows = self._value_kind.table_rows(part, '')
         if isinstance(self.of, type):
             next(rows)
         yield from rows
 
 
 @dataclass(frozen=True, slots=True)
-class Group(Kind):
+class ParameterGroup(Kind):
     """A section of parameters within a section."""
 
     of: Any
@@ -335,18 +343,18 @@ class Group(Kind):
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
         return read_parameters(content.section(key), self.of, parts, folder)
 
-    def schema(self) -> Schema:
+    def json_schema(self) -> Schema:
         return {**parameters_schema(self.of), 'description': self.meaning}
 
-    def values(self) -> str:
+    def values_text(self) -> str:
         return 'a mapping'
 
-    def shown(self, default: Any) -> str:
+    def default_text(self, default: Any) -> str:
         return ''  # its own rows have the defaults
 
-    def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
+    def table_rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
         """Yield one row, and the rows of the parameters."""
-        yield from Kind.rows(self, key, default)
+        yield from Kind.table_rows(self, key, default)
         yield from parameter_rows(self.of, f'{key}.')
 
 
@@ -360,91 +368,91 @@ def number(
     above: float = -inf,
 ) -> Any:
     """Declare a number; it is required if it has no default."""
-    return _declared(Number(meaning, unit, least, most, above), default)
+    return _declare(Number(meaning, unit, least, most, above), default)
 
 
-def whole(
+def whole_number(
     meaning: str, default: Any = MISSING, *, unit: str = '', least: float, most: float
 ) -> Any:
     """Declare a whole number."""
-    return _declared(Number(meaning, unit, least, most, whole=True), default)
+    return _declare(Number(meaning, unit, least, most, whole=True), default)
 
 
-def numbers(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
+def number_list(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
     """Declare a list of numbers, read as a tuple."""
-    return _declared(Numbers(meaning, unit, most), default)
+    return _declare(NumberList(meaning, unit, most), default)
 
 
-def rows(
+def number_rows(
     meaning: str, columns: Sequence[str], *, default: Any = MISSING, most: float = inf
 ) -> Any:
     """Declare a list of rows of numbers, read as a tuple of tuples."""
-    return _declared(Rows(meaning, tuple(columns), most), default)
+    return _declare(RowsOf(meaning, tuple(columns), most), default)
 
 
 def flag(meaning: str, default: Any = MISSING) -> Any:
     """Declare a boolean."""
-    return _declared(Flag(meaning), default)
+    return _declare(Flag(meaning), default)
 
 
 def choice(meaning: str, words: Sequence[str], default: Any = MISSING) -> Any:
     """Declare one of a set of words."""
-    return _declared(Choice(meaning, tuple(words)), default)
+    return _declare(ChoiceOf(meaning, tuple(words)), default)
 
 
 def text(meaning: str, default: Any = MISSING) -> Any:
     """Declare a string."""
-    return _declared(Text(meaning), default)
+    return _declare(TextOf(meaning), default)
 
 
 def file(meaning: str) -> Any:
     """Declare the path of a file, read as a string with the scene's folder prepended."""
-    return _declared(File(meaning), MISSING)
+    return _declare(File(meaning), MISSING)
 
 
 def point(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
     """Declare a point or a vector, read as a tuple of two."""
-    return _declared(Point(meaning, unit, most), default)
+    return _declare(Point(meaning, unit, most), default)
 
 
-def name(meaning: str, kind: str, default: Any = MISSING) -> Any:
+def part_name(meaning: str, kind: str, default: Any = MISSING) -> Any:
     """Declare the name of a part of the linkage."""
-    return _declared(Name(meaning, kind), default)
+    return _declare(Name(meaning, kind), default)
 
 
-def names(meaning: str, kind: str, default: Any = ()) -> Any:
+def part_names(meaning: str, kind: str, default: Any = ()) -> Any:
     """Declare names of parts, read as a tuple; the default () stands for all parts."""
-    return _declared(Names(meaning, kind), default)
+    return _declare(NamesOf(meaning, kind), default)
 
 
-def each(meaning: str, kind: str, of: Any, *, required: bool = False) -> Any:
+def each_part(meaning: str, kind: str, of: Any, *, required: bool = False) -> Any:
     """Declare values for parts by name, read as a mapping; empty if not required."""
     declared = Each(meaning, kind, of)
     if required:
-        return _declared(declared, MISSING)
+        return _declare(declared, MISSING)
     return field(default_factory=dict, metadata={_KEY: declared})
 
 
-def own(meaning: str, of: Any) -> Any:
+def own_parameters(meaning: str, of: Any) -> Any:
     """Declare parameters that joints have of their own, read as a mapping; if absent, None."""
-    return _declared(Each(meaning, 'joint', of), None)
+    return _declare(Each(meaning, 'joint', of), None)
 
 
-def group(meaning: str, of: Any) -> Any:
+def parameter_section(meaning: str, of: Any) -> Any:
     """Declare a section of parameters; if absent, all have their defaults."""
-    return field(default_factory=of, metadata={_KEY: Group(meaning, of)})
+    return field(default_factory=of, metadata={_KEY: ParameterGroup(meaning, of)})
 
 
-def option(meaning: str, of: Any) -> Any:
+def optional_section(meaning: str, of: Any) -> Any:
     """Declare a section of parameters; if absent, None."""
-    return _declared(Group(meaning, of), None)
+    return _declare(ParameterGroup(meaning, of), None)
 
 
-def _declared(kind: Kind, default: Any) -> Any:
+def _declare(kind: Kind, default: Any) -> Any:
     return field(default=default, metadata={_KEY: kind})
 
 
-def declared(parameters: Any) -> list[tuple[Field[Any], Kind]]:
+def declared_fields(parameters: Any) -> list[tuple[Field[Any], Kind]]:
     """Return the fields of a parameter type, each with its kind."""
     return [(entry, entry.metadata[_KEY]) for entry in fields(parameters)]
 
@@ -464,7 +472,7 @@ def default_of(entry: Field[Any]) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-def summary(parameters: Any) -> str:
+def first_docstring_line(parameters: Any) -> str:
     """Return the first line of the docstring of a parameter type."""
     return str(parameters.__doc__).strip().splitlines()[0]
 
@@ -475,7 +483,7 @@ def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -
 
     A FileError has line and key of a wrong value, the expected values, and the nearest name.
     """
-    entries = declared(of)
+    entries = declared_fields(of)
     _refuse_misplaced(content, entries, parts)
     values = {
         entry.name: kind.read(content, entry.name, parts, folder)
@@ -495,7 +503,7 @@ def _refuse_misplaced(
         for entry, kind in entries:
             if key in known or not isinstance(kind, Each):
                 continue
-            if remedy := under_part(key, entry.name, kind.keys, parts.get(kind.kind, ())):
+            if remedy := under_part(key, entry.name, kind.part_keys, parts.get(kind.kind, ())):
                 raise content.error(key, f'is for each {KINDS[kind.kind]}', remedy)
 
 
@@ -513,11 +521,11 @@ def under_part(key: str, section: str, keys: Sequence[str], names: Sequence[str]
 
 def parameters_schema(of: Any) -> Schema:
     """Return the JSON Schema of the section of a parameter type."""
-    entries = declared(of)
-    return mapping(
-        summary(of),
+    entries = declared_fields(of)
+    return mapping_schema(
+        first_docstring_line(of),
         {
-            entry.name: kind.schema()
+            entry.name: kind.json_schema()
             | (
                 {}
                 if is_required(entry) or entry.default is None
@@ -531,12 +539,12 @@ def parameters_schema(of: Any) -> Schema:
 
 def parameter_rows(of: Any, prefix: str = '') -> Iterator[tuple[str, ...]]:
     """Yield rows of a table of parameters: key, unit, default, values, meaning."""
-    for entry, kind in declared(of):
-        default = 'required' if is_required(entry) else kind.shown(default_of(entry))
-        yield from kind.rows(prefix + entry.name, default)
+    for entry, kind in declared_fields(of):
+        default = 'required' if is_required(entry) else kind.default_text(default_of(entry))
+        yield from kind.table_rows(prefix + entry.name, default)
 
 
-def mapping(
+def mapping_schema(
     description: str, properties: Mapping[str, Schema], *, required: tuple[str, ...] = ()
 ) -> Schema:
     """Return the JSON Schema of a mapping with these keys only."""
@@ -546,12 +554,12 @@ def mapping(
     return {**schema, 'properties': dict(properties), 'additionalProperties': False}
 
 
-def named(description: str, of: Schema) -> Schema:
+def named_mapping(description: str, of: Schema) -> Schema:
     """Return the JSON Schema of a mapping whose keys are names."""
     return {'description': description, 'type': 'object', 'additionalProperties': of}
 
 
-def written(value: Any) -> str:
+def number_text(value: Any) -> str:
     """Return a number in its usual notation: 1e9, but 4096; a list unchanged."""
     if not isinstance(value, int | float):
         return str(value)
@@ -560,17 +568,17 @@ def written(value: Any) -> str:
 
 
 def _each_at_most(most: float) -> str:
-    return f', each of at most {written(most)}' if most < inf else ''
+    return f', each of at most {number_text(most)}' if most < inf else ''
 
 
-def _bounds(least: float, most: float, above: float = -inf, unit: str = '') -> Schema:
+def _bounds_schema(least: float, most: float, above: float = -inf, unit: str = '') -> Schema:
     # A schema does not know the file's units: the reader alone has the exact bounds.
     scale = most_in_one(unit)
     least, most, above = least * scale, most * scale, above * scale
     bounds = (('minimum', least), ('maximum', most), ('exclusiveMinimum', above))
-    return {word: _plain(bound) for word, bound in bounds if abs(bound) < inf}
+    return {word: _without_decimals(bound) for word, bound in bounds if abs(bound) < inf}
 
 
-def _plain(bound: float) -> float:
+def _without_decimals(bound: float) -> float:
     """Return a whole number without decimals: users see 1, not 1.0."""
     return int(bound) if float(bound).is_integer() and abs(bound) < 1e15 else bound

@@ -72,9 +72,9 @@ class Section:
         path = '.'.join(filter(None, (self._path, key)))
         return FileError(self.file, path, reason, remedy, self._line_of(key))
 
-    def located(self, error: DefinitionError) -> FileError:
+    def locate_error(self, error: DefinitionError) -> FileError:
         """Return an error of this content as one of its file, in the file's units."""
-        told = self.units.told
+        told = self.units.convert_quantities
         return self.error(error.where, told(error.reason), told(error.remedy))
 
     def number(
@@ -88,14 +88,16 @@ class Section:
         unit: str = '',
     ) -> float:
         """Return a finite number within bounds: least ≤ value ≤ most, and value > above."""
-        name = self.units.name(unit)
-        value = self._take(key, default, f'a number{_in(name)}')
+        name = self.units.file_unit(unit)
+        value = self._take_value(key, default, f'a number{_unit_text(name)}')
         if not _is_number(value):
-            raise self.error(key, f'{quoted(value)} is not a number', f'write a number{_in(name)}')
-        found = self._si(key, value, unit)
+            raise self.error(
+                key, f'{quoted(value)} is not a number', f'write a number{_unit_text(name)}'
+            )
+        found = self._to_si(key, value, unit)
         if not isfinite(found) or not least <= found <= most or found <= above:
             bounds = ' and '.join(
-                f'{word} {self.units.shown(bound, unit):g}'
+                f'{word} {self.units.to_file_unit(bound, unit):g}'
                 for word, bound in (('more than', above), ('at least', least), ('at most', most))
                 if isfinite(bound)
             )
@@ -106,7 +108,7 @@ class Section:
             )
         return found
 
-    def whole(
+    def whole_number(
         self,
         key: str,
         default: int | None = None,
@@ -123,14 +125,14 @@ class Section:
 
     def flag(self, key: str, default: bool | None = None) -> bool:
         """Return a boolean."""
-        value = self._take(key, default, 'true or false')
+        value = self._take_value(key, default, 'true or false')
         if not isinstance(value, bool):
             raise self.error(key, f'{quoted(value)} is not a flag', 'write true or false')
         return value
 
     def text(self, key: str, default: str | None = None, *, expected: str = 'a text') -> str:
         """Return a string that is not empty, or the default; ``expected`` tells its meaning."""
-        value = self._take(key, default, expected)
+        value = self._take_value(key, default, expected)
         if value == default and default is not None:
             return default
         if not isinstance(value, str) or not value.isprintable() or not value:
@@ -149,20 +151,20 @@ class Section:
 
     def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
         """Return one of a set of words."""
-        value = self._take(key, default, listed(choices, ' or '))
+        value = self._take_value(key, default, listed(choices, ' or '))
         if value not in choices:
             raise self.error(
                 key, f'{quoted(value)} is not a choice', f'write {listed(choices, " or ")}'
             )
         return cast(str, value)
 
-    def words(self, key: str, groups: Sequence[Sequence[str]]) -> list[str]:
+    def choose_words(self, key: str, groups: Sequence[Sequence[str]]) -> list[str]:
         """
         Return a word of each group: of those that the file names, else the group's first.
 
         The file names one word, or a list of words of different groups.
         """
-        value = self._take(key, [], 'a word')
+        value = self._take_value(key, [], 'a word')
         named = value if isinstance(value, list) else [value]
         found = [[word for word in named if word in group] for group in groups]
         if sum(map(len, found)) != len(named) or any(len(words) > 1 for words in found):
@@ -179,8 +181,8 @@ class Section:
 
     def point(self, key: str, *, most: float = inf, unit: str = '') -> tuple[float, float]:
         """Return two finite numbers, each within ±most."""
-        name = self.units.name(unit)
-        value = self._take(key, None, f'two numbers [x, y]{_in(name)}')
+        name = self.units.file_unit(unit)
+        value = self._take_value(key, None, f'two numbers [x, y]{_unit_text(name)}')
         if not _is_pair(value) or not all(map(isfinite, value)):
             remedy = 'write two finite numbers: [x, y]'
             if isinstance(value, list) and len(value) > 2 and all(map(_is_number, value)):
@@ -188,7 +190,7 @@ class Section:
                 comma = '; a decimal has a point, not a comma: [0.040, 0]'
                 remedy += comma if whole else '; a planar linkage has no z'
             raise self.error(key, f'{quoted(value)} is not a point', remedy)
-        x, y = (self._si(key, part, unit) for part in value)
+        x, y = (self._to_si(key, part, unit) for part in value)
         self._check_most(key, value, (x, y), most, unit)
         return x, y
 
@@ -198,20 +200,20 @@ class Section:
 
         The caller checks their order.
         """
-        value = self._take(key, [-inf, inf], 'two numbers [low, high]')
+        value = self._take_value(key, [-inf, inf], 'two numbers [low, high]')
         if not _is_pair(value) or any(map(isnan, value)):
             raise self.error(
                 key,
                 f'{quoted(value)} is not two numbers',
                 'write [low, high]; -.inf or .inf for none on a side',
             )
-        low, high = (self._si(key, end, unit) for end in value)
+        low, high = (self._to_si(key, end, unit) for end in value)
         self._check_most(key, value, filter(isfinite, (low, high)), most, unit)
         return low, high
 
     def section(self, key: str, *, required: bool = True) -> Section:
         """Return a nested mapping; an empty one if it is absent and not required."""
-        value = self._take(key, None if required else {}, 'a mapping')
+        value = self._take_value(key, None if required else {}, 'a mapping')
         line = self._line_of(key)
         if not isinstance(value, dict):
             remedy = f'write {key}: {_as_mapping(value)}'
@@ -222,7 +224,7 @@ class Section:
 
     def sections(self, key: str) -> list[Section]:
         """Return one mapping, or a list of them."""
-        value = self._take(key, None, 'a mapping')
+        value = self._take_value(key, None, 'a mapping')
         if not isinstance(value, list):
             return [self.section(key)]
         found = []
@@ -237,12 +239,12 @@ class Section:
 
     def numbers(self, key: str, *, most: float = inf, unit: str = '') -> list[float]:
         """Return a list of finite numbers, each within ±most."""
-        value = self._take(key, None, 'a list of numbers')
+        value = self._take_value(key, None, 'a list of numbers')
         if not _is_list_of_finite(value):
             raise self.error(
                 key, f'{quoted(value)} is no list of finite numbers', 'write [0.1, 0.2]'
             )
-        found = [self._si(key, v, unit) for v in value]
+        found = [self._to_si(key, v, unit) for v in value]
         self._check_most(key, value, found, most, unit)
         return found
 
@@ -250,10 +252,10 @@ class Section:
         self, key: str, columns: Sequence[str], *, most: float = inf
     ) -> tuple[tuple[float, ...], ...]:
         """Return a list of rows of finite numbers, each within ±most."""
-        value = self._take(key, None, 'a list of rows of numbers')
+        value = self._take_value(key, None, 'a list of rows of numbers')
         units = list(map(unit_of, columns))
         names = [
-            column.replace(f'[{unit}]', f'[{self.units.name(unit)}]')
+            column.replace(f'[{unit}]', f'[{self.units.file_unit(unit)}]')
             for column, unit in zip(columns, units, strict=True)
         ]
         row = f'[{", ".join(names)}]'
@@ -265,19 +267,19 @@ class Section:
                 raise self.error(
                     key, f'row {number}, {quoted(found)}, is not {row}', 'write finite numbers'
                 )
-            table.append(tuple(map(self._si, repeat(key), found, units)))
+            table.append(tuple(map(self._to_si, repeat(key), found, units)))
             for value, unit in zip(table[-1], units, strict=True):
                 self._check_most(key, found, (value,), most, unit)
         return tuple(table)
 
     def texts(self, key: str) -> list[str]:
         """Return a list of names; empty if the key is absent."""
-        value = self._take(key, [], 'a list of names')
+        value = self._take_value(key, [], 'a list of names')
         if not isinstance(value, list) or any(not isinstance(v, str) or not v for v in value):
             raise self.error(key, f'{quoted(value)} is no list of names', 'write [one, other]')
         return list(value)
 
-    def taken(self, key: str) -> None:
+    def remove_key(self, key: str) -> None:
         """Remove a key that another section uses."""
         self._taken.add(key)
 
@@ -310,30 +312,30 @@ class Section:
             key = key.removeprefix(part).removeprefix('.')
         return line
 
-    def _si(self, key: str, value: float, unit: str) -> float:
+    def _to_si(self, key: str, value: float, unit: str) -> float:
         """Return a number of the file in SI."""
-        if value and self.units.ambiguous(unit):
+        if value and self.units.is_ambiguous(unit):
             raise self.error(
                 key,
                 f'{quoted(value)} is for joints that turn and joints that slide, '
-                f'in {self.units.name(unit)}',
+                f'in {self.units.file_unit(unit)}',
                 'leave units and angles out of this file',
             )
-        return float(self.units.read(value, unit))
+        return float(self.units.to_si(value, unit))
 
     def _check_most(
         self, key: str, value: Any, found: Iterable[float], most: float, unit: str
     ) -> None:
         if any(abs(one) > most for one in found):
-            name = self.units.name(unit)
+            name = self.units.file_unit(unit)
             raise self.error(
                 key,
                 f'{quoted(value)} is out of bounds',
-                f'write numbers of at most {self.units.shown(most, unit):g}'
+                f'write numbers of at most {self.units.to_file_unit(most, unit):g}'
                 f'{name and f" [{name}]"}',
             )
 
-    def _take(self, key: str, default: Any, expected: str) -> Any:
+    def _take_value(self, key: str, default: Any, expected: str) -> Any:
         self._taken.add(key)
         if key not in self._content:
             if default is None:
@@ -362,5 +364,5 @@ def _as_mapping(value: Any) -> str:
     return f'{{{listed(f"{name}: {{}}" for name in names)}}}'
 
 
-def _in(unit: str) -> str:
+def _unit_text(unit: str) -> str:
     return unit and f' in [{unit}]'

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from linkage_ros.errors import FileError, LinkageError, quoted
-from linkage_ros.files.file_access import check_output_name, read_regular, replaced
+from linkage_ros.files.file_access import check_output_name, read_regular, replace_file
 from linkage_ros.names import csv_text
 
 Row = Sequence[float | int | None]
@@ -50,7 +50,7 @@ def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterat
         if target.exists() and not target.is_file():
             raise LinkageError(str(file), 'exists, and is no file', 'name another file')
         kind = KINDS[file.suffix.lower()]
-        with replaced(target) as stream, kind(stream, heads, whole) as write:
+        with replace_file(target) as stream, kind(stream, heads, whole) as write:
             yield write
     except OSError as error:
         raise LinkageError(
@@ -92,7 +92,7 @@ def block_rows(columns: int) -> int:
 
 
 @contextmanager
-def _csv(stream: BinaryIO, heads: Sequence[str], _whole: Sequence[str]) -> Iterator[Write]:
+def _open_csv(stream: BinaryIO, heads: Sequence[str], _whole: Sequence[str]) -> Iterator[Write]:
     text = io.TextIOWrapper(stream, encoding='utf-8', newline='', write_through=True)
     writer = csv.writer(text, lineterminator='\n')  # writes floats with repr
     try:
@@ -103,13 +103,13 @@ def _csv(stream: BinaryIO, heads: Sequence[str], _whole: Sequence[str]) -> Itera
 
 
 @contextmanager
-def _parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) -> Iterator[Write]:
+def _open_parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) -> Iterator[Write]:
     import pyarrow as pa  # local import: an extra, and slow to load
     from pyarrow import parquet
 
     schema = pa.schema([(head, pa.int64() if head in whole else pa.float64()) for head in heads])
 
-    def write(rows: Sequence[Row]) -> None:
+    def write_rows(rows: Sequence[Row]) -> None:
         try:
             columns: list[Any] = [
                 pa.array(column, field.type)
@@ -123,12 +123,12 @@ def _parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) -> It
 
     # Numbers hardly ever repeat exactly: a dictionary of them would be useless.
     with parquet.ParquetWriter(stream, schema, compression='zstd', use_dictionary=False) as writer:
-        yield write
+        yield write_rows
 
 
 KINDS: dict[
     str, Callable[[BinaryIO, Sequence[str], Sequence[str]], AbstractContextManager[Write]]
-] = {'.csv': _csv, '.parquet': _parquet}
+] = {'.csv': _open_csv, '.parquet': _open_parquet}
 """Writer for each suffix of a file."""
 
 _MOST = 1000
@@ -162,10 +162,10 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
         raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'thin it out')
     delimiter = ';' if ';' in text else ','
     rows: list[tuple[float, ...]] = []
-    for number, cells in _lines(file, text, delimiter):
+    for number, cells in _split_lines(file, text, delimiter):
         if not ''.join(cells).strip() or cells[0].lstrip().startswith('#'):
             continue
-        row = _row(cells)
+        row = _parse_row(cells)
         if row is None and not rows:
             continue  # the heading
         allowed = (len(rows[0]),) if rows else columns
@@ -185,7 +185,7 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
     return rows
 
 
-def _lines(file: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
+def _split_lines(file: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
     reader = csv.reader(text.splitlines(), delimiter=delimiter)
     try:
         yield from enumerate(reader, 1)
@@ -195,7 +195,7 @@ def _lines(file: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[st
         ) from None
 
 
-def _row(cells: Sequence[str]) -> tuple[float, ...] | None:
+def _parse_row(cells: Sequence[str]) -> tuple[float, ...] | None:
     try:
         row = tuple(float(cell) for cell in cells)
     except ValueError:

@@ -67,58 +67,60 @@ class Units:
     slides: bool | None = None
 
     @property
-    def si(self) -> bool:
+    def is_si(self) -> bool:
         """Whether nothing is converted."""
         return (self.length, self.angle) == ('m', 'radians')
 
-    def name(self, unit: str) -> str:
+    def file_unit(self, unit: str) -> str:
         """Return the file's unit for a unit in SI: 'mm/s' for 'm/s'."""
-        if self.si:
+        if self.is_si:
             return unit
-        return ' or '.join(map(self._converted, self._chosen(unit)))
+        return ' or '.join(map(self._converted_unit, self._unit_alternatives(unit)))
 
-    def ambiguous(self, unit: str) -> bool:
+    def is_ambiguous(self, unit: str) -> bool:
         """Return whether the same number would be two quantities, of an angle and of a slide."""
-        return len({self._factor(one) for one in self._chosen(unit)}) > 1
+        return len({self._si_factor(one) for one in self._unit_alternatives(unit)}) > 1
 
-    def read(self, value: float, unit: str) -> float:
+    def to_si(self, value: float, unit: str) -> float:
         """Return a value of the file in SI, correctly rounded."""
-        factor = self._factor(self._chosen(unit)[0])
+        factor = self._si_factor(self._unit_alternatives(unit)[0])
         if factor == 1 or not isfinite(value):
             return value
         return float(_EXACT.multiply(Decimal(repr(value)), factor))
 
-    def shown(self, value: float, unit: str) -> float:
+    def to_file_unit(self, value: float, unit: str) -> float:
         """Return a value in SI in the file's unit, for messages."""
-        factor = self._factor(self._chosen(unit)[0])
+        factor = self._si_factor(self._unit_alternatives(unit)[0])
         return value if factor == 1 or not isfinite(value) else value / float(factor)
 
-    def bracketed(self, text: str) -> str:
+    def convert_brackets(self, text: str) -> str:
         """Return a text whose units in brackets, ``[m]``, are those of the file."""
-        return re.sub(r'\[([^][]*)\]', lambda unit: f'[{self.name(unit[1])}]', text)
+        return re.sub(r'\[([^][]*)\]', lambda unit: f'[{self.file_unit(unit[1])}]', text)
 
-    def told(self, text: str) -> str:
+    def convert_quantities(self, text: str) -> str:
         """
         Return a text whose quantities in SI have these units.
 
         Quantities are ``1.5 rad``, ``0 to 2 m`` and ``[0, 2] m``; a unit in brackets stays.
         """
-        return text if self.si else _QUANTITY.sub(self._converted_quantity, text)
+        return text if self.is_si else _QUANTITY.sub(self._converted_quantity, text)
 
     def _converted_quantity(self, found: re.Match[str]) -> str:
         numbers, unit = found.groups()
         # One digit less than the text has: 1.5708 rad are 90 deg.
-        values = re.sub(_NUMBER, lambda one: f'{self.shown(float(one[0]), unit):.5g}', numbers)
-        return f'{values} {self.name(unit)}'
+        values = re.sub(
+            _NUMBER, lambda one: f'{self.to_file_unit(float(one[0]), unit):.5g}', numbers
+        )
+        return f'{values} {self.file_unit(unit)}'
 
-    def _chosen(self, unit: str) -> Sequence[str]:
+    def _unit_alternatives(self, unit: str) -> Sequence[str]:
         """Return the alternatives of a unit that a value can have: of an angle, and of a slide."""
         both = unit.split(' or ')
         if self.slides is None or not all(map(_CONVERTED.fullmatch, both)):
             return both
         return both[-1:] if self.slides else both[:1]
 
-    def _factor(self, unit: str) -> Decimal:
+    def _si_factor(self, unit: str) -> Decimal:
         found = _CONVERTED.fullmatch(unit)
         if found is None:
             return Decimal(1)
@@ -126,7 +128,7 @@ class Units:
             return LENGTHS[self.length]
         return _DEGREE if self.angle == 'degrees' else Decimal(1)
 
-    def _converted(self, unit: str) -> str:
+    def _converted_unit(self, unit: str) -> str:
         found = _CONVERTED.fullmatch(unit)
         if found is None:
             return unit
@@ -139,4 +141,4 @@ _SMALLEST = Units('mm', 'degrees')
 
 def most_in_one(unit: str) -> float:
     """Return how many of the smallest units that a file can name make one unit in SI."""
-    return max(_SMALLEST.shown(1.0, one) for one in unit.split(' or '))
+    return max(_SMALLEST.to_file_unit(1.0, one) for one in unit.split(' or '))

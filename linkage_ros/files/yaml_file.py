@@ -91,7 +91,7 @@ def bounded_yaml(text: str, most: int = MOST_VALUES) -> Any:
         raise ValueError('it is nested too deeply') from None
 
 
-def _integer(text: str) -> float:
+def _parse_integer(text: str) -> float:
     # Python limits the length of integers that it converts, from and to text and to float.
     return int(text) if len(text) <= _LONGEST_INTEGER else float(text)
 
@@ -102,7 +102,7 @@ _CONSTRUCTORS: dict[str, Callable[[Any, Any], Any]] = {
     'str': yaml.SafeLoader.construct_yaml_str,
     'null': yaml.SafeLoader.construct_yaml_null,
     'bool': lambda self, node: self.construct_scalar(node).lower() == 'true',
-    'int': lambda self, node: _integer(self.construct_scalar(node)),
+    'int': lambda self, node: _parse_integer(self.construct_scalar(node)),
     'float': lambda self, node: float(
         self.construct_scalar(node).replace('.inf', 'inf').replace('.nan', 'nan')
     ),

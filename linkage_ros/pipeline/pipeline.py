@@ -169,7 +169,7 @@ class LinkagePipeline:
         except DefinitionError as error:
             of_linkage = error.where.startswith('masses')
             content = member.linkage_content if of_linkage else member.content
-            raise content.located(error) from None
+            raise content.locate_error(error) from None
 
     def _build(self, scene: Scene, closure: Closure | None, injection: Injection | None) -> None:
         member = self.member

@@ -26,7 +26,7 @@ from linkage_ros.effects.dispatch import in_order, module_of
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed, quoted
 from linkage_ros.files.linkage_file import looks_like_linkage, read_closure
-from linkage_ros.files.parameters import declared, is_required, Parts, read_parameters
+from linkage_ros.files.parameters import declared_fields, is_required, Parts, read_parameters
 from linkage_ros.files.section import Section
 from linkage_ros.files.units import ANGLES, LENGTHS, Units
 from linkage_ros.files.yaml_file import parse_yaml, read_yaml
@@ -164,7 +164,7 @@ def _stand_in(
         closure = read_closure(content, publish_inputs=True)
         text = scene_text_for(closure, LINKAGE_FILE).encode()
     except DefinitionError as error:
-        raise content.located(error) from None
+        raise content.locate_error(error) from None
 
     def open_linkage(where: Section) -> tuple[Section, bytes]:
         where.text('linkage')
@@ -269,7 +269,7 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
         members=tuple(members),
         rate=_rate(content),
         wrapped=wrapped,
-        seed=content.whole('seed', seed, least=0, most=2**53),
+        seed=content.whole_number('seed', seed, least=0, most=2**53),
         faults=_read_faults(content, members),
         record=_record(content.section('record')) if 'record' in content else None,
         files={SCENE_FILE: data, **linkage_files},
@@ -278,7 +278,7 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
     )
     for key in _OF_A_MEMBER:
         if key in content:
-            content.taken(key)
+            content.remove_key(key)
     content.finish(('record', 'linkages', *_OF_A_MEMBER))
     for member in members:
         drive, _ = member.drive
@@ -437,7 +437,7 @@ def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
         named = in_order([name for name in known if name not in left_out])
         return {name: module_of(name).PARAMETERS for name in named}
     except DefinitionError as error:
-        raise effects.located(error) from None
+        raise effects.locate_error(error) from None
 
 
 def _silent(content: Section, linkage: Linkage) -> bool:
@@ -458,7 +458,7 @@ def _silent(content: Section, linkage: Linkage) -> bool:
 
 def _read_units(content: Section) -> bool:
     """Set the units of a scene; return whether it publishes wrapped angles."""
-    words = content.words('angles', (PUBLISHED_ANGLES, ANGLES))
+    words = content.choose_words('angles', (PUBLISHED_ANGLES, ANGLES))
     content.units = Units(content.choice('units', tuple(LENGTHS), 'm'), words[1])
     return words[0] == 'wrapped'
 
@@ -478,7 +478,7 @@ def _record(content: Section) -> RecordParameters:
     record = RecordParameters(
         directory=content.text('directory', 'runs'),
         name=content.text('name', ''),
-        queue=content.whole('queue', 20_000, least=100, most=10_000_000),
+        queue=content.whole_number('queue', 20_000, least=100, most=10_000_000),
         storage=_read_storage(content),
     )
     if record.name != Path(record.name).name or record.name == '..':
@@ -524,7 +524,7 @@ def _named(where: Section) -> tuple[str, Any]:
             'solver', f'there is no {quoted(name)}', did_you_mean(name, SOLVERS, known)
         )
     parameters = import_module(SOLVERS[name]).PARAMETERS
-    for entry, _ in declared(parameters):
+    for entry, _ in declared_fields(parameters):
         if entry.default is MISSING:
             raise where.error(
                 'solver',
@@ -547,7 +547,7 @@ def _read_loads(content: Section, parts: Parts) -> Loads:
         ),
     )
     # Only here: what is read below refuses the keys that it does not know.
-    content.taken('gravity')
+    content.remove_key('gravity')
     return replace(loads, applied=read_parameters(content, AppliedLoads, parts))
 
 
@@ -589,7 +589,7 @@ def kinds_of_fault(name: str, kinds: Sequence[str]) -> tuple[str, str]:
     if kinds:
         return f'names {len(kinds)} kinds of fault', f'leave all but one of {listed(kinds)} out'
     kind = name if name in FAULTS else 'freeze'
-    needed = declared(FAULTS[kind])
+    needed = declared_fields(FAULTS[kind])
     parameters = ', '.join(f'{entry.name}: …' for entry, _ in needed if is_required(entry))
     shape = f'{name}: {{{kind}: {{{parameters}}}, at: [1], seconds: 2}}'
     return 'names no kind of fault', f'write {shape}; kinds: {listed(FAULTS)}'

@@ -41,8 +41,8 @@ def scene_notes(scene: Scene) -> Iterator[FileError]:
     for member in scene.members:
         content = member.linkage_content
         notes = linkage_notes(member.linkage, content.units, scene.rate)
-        yield from map(content.located, notes)
-        yield from map(member.content.located, _of_member(member))
+        yield from map(content.locate_error, notes)
+        yield from map(member.content.locate_error, _of_member(member))
 
 
 def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator[DefinitionError]:

@@ -54,4 +54,4 @@ def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> byte
     except PartError as error:
         member = scene.members[error.number]
         content = member.linkage_content if error.of_linkage else member.content
-        raise content.located(error) from None
+        raise content.locate_error(error) from None

@@ -16,7 +16,7 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.bag.storage import COMPRESSIONS, Storage
 from linkage_ros.dynamics.loads import Loads
-from linkage_ros.files.parameters import choice, number, Parts, whole
+from linkage_ros.files.parameters import choice, number, Parts, whole_number
 from linkage_ros.files.section import Section
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Linkage, SlideJoint
@@ -54,7 +54,7 @@ class StorageParameters(Storage):
         least=LEAST_FLUSH_PERIOD,
         most=60.0,
     )
-    split_bytes: int = whole(
+    split_bytes: int = whole_number(
         'size at which the next file begins; 0: never',
         _DEFAULT.split_bytes,
         unit='bytes',
@@ -68,13 +68,13 @@ class StorageParameters(Storage):
         least=0.0,
         most=1e9,
     )
-    keep_files: int = whole(
+    keep_files: int = whole_number(
         'how many files are kept: the oldest goes when one more begins; 0: all',
         _DEFAULT.keep_files,
         least=0,
         most=1_000_000,
     )
-    min_free_bytes: int = whole(
+    min_free_bytes: int = whole_number(
         'what stays free on the disk: where less is, the recording ends; 0: no matter',
         _DEFAULT.min_free_bytes,
         unit='bytes',
@@ -90,7 +90,7 @@ class StorageParameters(Storage):
         least=0.0,
         most=86_400.0,
     )
-    snapshot_bytes: int = whole(
+    snapshot_bytes: int = whole_number(
         'how much memory that may take: where it is too little, less than snapshot_seconds is '
         'kept; twice as much while a snapshot is written',
         _DEFAULT.snapshot_bytes,

@@ -29,15 +29,15 @@ from linkage_ros.faults import FAULTS
 from linkage_ros.files.linkage_file import FARTHEST, HEAVIEST, STRONGEST
 from linkage_ros.files.parameters import (
     CHARACTER,
-    declared,
+    declared_fields,
     is_required,
-    mapping,
-    named,
+    mapping_schema,
+    named_mapping,
     Number,
     parameters_schema,
     Point,
     Schema,
-    Text,
+    TextOf,
 )
 from linkage_ros.files.units import ANGLES, LENGTHS
 from linkage_ros.scene.load import (
@@ -87,7 +87,7 @@ def as_text(schema: Schema) -> str:
 
 
 def _text(description: str, pattern: str = f'^{CHARACTER}+$') -> Schema:
-    return Text(description, pattern).schema()
+    return TextOf(description, pattern).json_schema()
 
 
 def _number(
@@ -98,11 +98,11 @@ def _number(
     most: float = inf,
     above: float = -inf,
 ) -> Schema:
-    return Number(description, unit, least, most, above).schema()
+    return Number(description, unit, least, most, above).json_schema()
 
 
 def _point(description: str, unit: str, most: float) -> Schema:
-    return Point(description, unit, most).schema()
+    return Point(description, unit, most).json_schema()
 
 
 def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
@@ -113,7 +113,7 @@ def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
 def scene_schema() -> Schema:
     """Return the schema of a scene file; it imports all drives, effects and faults."""
     own = {key: {'$ref': f'#/$defs/{key}'} for key in _of_a_linkage()}
-    whole = mapping(
+    whole = mapping_schema(
         'A linkage or several, what drives them, what is called for, and a recording.',
         {
             'linkage': _text(_NAMED),
@@ -135,7 +135,7 @@ def scene_schema() -> Schema:
             },
             **own,
             'faults': {
-                **named('What can go wrong on demand, by a name for each.', _fault()),
+                **named_mapping('What can go wrong on demand, by a name for each.', _fault()),
                 'propertyNames': _text('a name: letters, digits and _, a letter first', ROS_NAME),
             },
             'record': _record(),
@@ -182,7 +182,7 @@ def _angles() -> Schema:
 
 
 def _linkages(own: Mapping[str, Schema]) -> Schema:
-    one = mapping(
+    one = mapping_schema(
         'A linkage; what it does not say for itself is as the scene says.',
         {
             'name': _text(
@@ -228,12 +228,12 @@ def _of_a_linkage() -> dict[str, Schema]:
             'default': 'publish',
         },
         'drive': {
-            **mapping('Where the crank comes from: one drive.', drives),
+            **mapping_schema('Where the crank comes from: one drive.', drives),
             'maxProperties': 1,
             'default': {'topic': {}},
         },
         'effects': {
-            **mapping('What is called for beyond positions.', effects),
+            **mapping_schema('What is called for beyond positions.', effects),
             'patternProperties': {DOTTED: _OWN_EFFECT},
             'default': {},
         },
@@ -244,11 +244,11 @@ def _of_a_linkage() -> dict[str, Schema]:
             least=FINEST_ACCURACY,
             most=COARSEST_ACCURACY,
         ),
-        'loads': mapping(
+        'loads': mapping_schema(
             'The forces that act on the links, where effects or the drive ask for them.',
             {
                 'gravity': {**_point('gravity: [x, y]', 'm/s²', 1e3), 'default': [0, 0]},
-                'springs': named('springs between points of links, by name', _spring()),
+                'springs': named_mapping('springs between points of links, by name', _spring()),
                 'drive_inertia': {
                     **_number(
                         'of the motor, at the input',
@@ -269,9 +269,9 @@ def _solver() -> Schema:
     alone = [
         name
         for name, of in solvers.items()
-        if not any(is_required(entry) for entry, _ in declared(of))
+        if not any(is_required(entry) for entry, _ in declared_fields(of))
     ]
-    one = mapping(
+    one = mapping_schema(
         'How the loops are closed: one solver.',
         {name: parameters_schema(of) for name, of in solvers.items()},
     )
@@ -289,7 +289,7 @@ def _spring() -> Schema:
     end = _text('where it ends: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
     free = _number('length without a force', 'm', least=0.0, most=GREATEST_LOAD)
     damping = _number('damping along it', 'N·s/m', least=0.0, most=STIFFEST)
-    return mapping(
+    return mapping_schema(
         'A spring, with a damper beside it.',
         {
             'from': end,
@@ -305,7 +305,7 @@ def _spring() -> Schema:
 def _fault() -> Schema:
     kinds = {name: parameters_schema(of) for name, of in FAULTS.items()}
     return {
-        **mapping(
+        **mapping_schema(
             'A fault of one kind, injected by service, or at the times that are said.',
             {
                 **kinds,
@@ -329,7 +329,7 @@ def _record() -> Schema:
     for key, least in LEASTS.items():
         above = {'if': {'exclusiveMinimum': 0}, 'then': {'minimum': least}}
         storage[key] = {**storage[key], **above}
-    whole = mapping(
+    whole = mapping_schema(
         'How the run is recorded; without it, it is not.',
         {
             'directory': {
@@ -384,7 +384,7 @@ def _wanted(key: str) -> Schema:
 def linkage_schema() -> Schema:
     """Return the schema of a linkage file."""
     units = {'units': _units(), 'angles': _choice('Unit of the angles.', ANGLES, ANGLES[0])}
-    whole = mapping('A planar linkage.', {**units, **_keys(), **_shorthands()})
+    whole = mapping_schema('A planar linkage.', {**units, **_keys(), **_shorthands()})
     return {
         '$schema': DIALECT,
         'title': 'Linkage',
@@ -401,29 +401,31 @@ def linkage_schema() -> Schema:
 def _keys() -> dict[str, Schema]:
     place = _point('where the point lies in the frame of its link: [x, y]', 'm', FARTHEST)
     return {
-        'links': named(
+        'links': named_mapping(
             'Links, each with its points; a point on two links is a pin; one link is the ground.',
-            named('points of the link, by name', place),
+            named_mapping('points of the link, by name', place),
         ),
         'input': _input(),
-        'assembly': named(
+        'assembly': named_mapping(
             'Of each pin or slider that closes a dyad, the side on which it lies, unless `pose` '
             'tells it.',
             _choice('the side', ('left', 'right', 'ahead', 'behind')),
         ),
-        'sliders': named('Points that stay on lines of other links, by name.', _slider()),
+        'sliders': named_mapping('Points that stay on lines of other links, by name.', _slider()),
         'joints': {
-            **named('What is published, in this order, by name.', _joint()),
+            **named_mapping('What is published, in this order, by name.', _joint()),
             'minProperties': 1,
         },
-        'ratios': named('Joints that follow others: gears, belts, racks, mimic.', _ratio()),
+        'ratios': named_mapping(
+            'Joints that follow others: gears, belts, racks, mimic.', _ratio()
+        ),
         'traced': {
             'description': 'Points whose paths are drawn.',
             'type': 'array',
             'items': _text('a point'),
         },
         'pose': _pose(),
-        'masses': named('What the links weigh, by their names.', _mass()),
+        'masses': named_mapping('What the links weigh, by their names.', _mass()),
     }
 
 
@@ -434,7 +436,7 @@ def _shorthands() -> dict[str, Schema]:
     }
     left, ahead = ('left', 'right'), ('ahead', 'behind')
     return {
-        'four_bar': mapping(
+        'four_bar': mapping_schema(
             'A four-bar by the lengths of its links; stands for a file written out.',
             {
                 **lengths,
@@ -444,7 +446,7 @@ def _shorthands() -> dict[str, Schema]:
             },
             required=tuple(lengths),
         ),
-        'inverted_slider_crank': mapping(
+        'inverted_slider_crank': mapping_schema(
             'A crank whose rod slides through a swivel; stands for a file written out.',
             {
                 'a': _number('crank', 'm', above=0.0, most=FARTHEST),
@@ -461,7 +463,7 @@ def _shorthands() -> dict[str, Schema]:
 def _input() -> Schema:
     """Return the schema of one input, or a list of them."""
     one = {
-        **mapping(
+        **mapping_schema(
             'The driven joint; several in a list.',
             {
                 'joint': _text('its name in crank messages'),
@@ -483,7 +485,7 @@ def _input() -> Schema:
 
 
 def _ratio() -> Schema:
-    return mapping(
+    return mapping_schema(
         'A published joint, as ratio · other joint + offset.',
         {
             'of': _text('the joint that it follows: an input, or a published joint'),
@@ -504,7 +506,7 @@ def _ratio() -> Schema:
 
 def _joint() -> Schema:
     return {
-        **mapping(
+        **mapping_schema(
             "The child's angle less the parent's [rad], or the slide of a slider [m].",
             {
                 'parent': _text('the link from which the angle is measured'),
@@ -537,10 +539,10 @@ def _limits() -> dict[str, Schema]:
 def _limits_of(*joints: str) -> dict[str, Schema]:
     """Return the schemas of the limits that a shorthand gives to its joints."""
     return {
-        'input': mapping('What the driven joint can do.', _limits()),
-        'joints': mapping(
+        'input': mapping_schema('What the driven joint can do.', _limits()),
+        'joints': mapping_schema(
             'What the published joints can do, by their names.',
-            {name: mapping('What the joint can do.', _limits()) for name in joints},
+            {name: mapping_schema('What the joint can do.', _limits()) for name in joints},
         ),
     }
 
@@ -554,7 +556,7 @@ _either_slider: Schema = {
 
 def _slider() -> Schema:
     return {
-        **mapping(
+        **mapping_schema(
             'A point that stays on a line of the link `along`.',
             {
                 'point': _text('the point; no point of `along`'),
@@ -583,7 +585,7 @@ def _slider() -> Schema:
 
 
 def _pose() -> Schema:
-    return mapping(
+    return mapping_schema(
         'The linkage as drawn, where it starts. Points and angles tell the assembly, as few as '
         'tell it; of links that no dyad covers they start the iteration.',
         {
@@ -592,11 +594,11 @@ def _pose() -> Schema:
                 'type': 'array',
                 'items': _number('a value', 'rad or m', least=-FARTHEST, most=FARTHEST),
             },
-            'points': named(
+            'points': named_mapping(
                 'points in the frame of the ground, roughly',
                 _point('[x, y]', 'm', FARTHEST),
             ),
-            'angles': named(
+            'angles': named_mapping(
                 'angles of links to the ground, roughly',
                 _number('the angle', 'rad', least=-FARTHEST, most=FARTHEST),
             ),
@@ -606,7 +608,7 @@ def _pose() -> Schema:
 
 
 def _mass() -> Schema:
-    return mapping(
+    return mapping_schema(
         'What a link weighs.',
         {
             'mass': _number('mass; 0: the link is massless', 'kg', least=0.0, most=HEAVIEST),

@@ -79,7 +79,9 @@ def violations(content: Section, schema: Schema) -> list[FileError]:
     mistyped = {tuple(error.absolute_path) for error in broken if error.validator == 'type'}
     units = _units(whole)
     errors = [
-        FileError(content.file, _dotted(path), reason, units.bracketed(remedy), _line(whole, path))
+        FileError(
+            content.file, _dotted(path), reason, units.convert_brackets(remedy), _line(whole, path)
+        )
         for error in broken
         if error.validator == 'type' or tuple(error.absolute_path) not in mistyped
         for path, reason, remedy in _problems(error, schema)

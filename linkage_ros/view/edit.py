@@ -33,7 +33,7 @@ from linkage_ros.errors import (
     quoted,
 )
 from linkage_ros.files.linkage_file import FARTHEST, written_linkage
-from linkage_ros.files.linkage_rewriting import rewritten
+from linkage_ros.files.linkage_rewriting import rewrite_linkage
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Linkage, links_by_point, RevoluteJoint
@@ -109,7 +109,7 @@ def edited(text: str, edit: Mapping[str, Any], name: str = _NAME) -> Edited:
     linkage = change.linkage
     if kind in ('pin', 'input'):
         linkage = _in_pose(linkage, inputs, pins, closure.scale)
-    return Edited(rewritten(text, name, linkage), inputs)
+    return Edited(rewrite_linkage(text, name, linkage), inputs)
 
 
 def pin_of(error: LinkageError, text: str) -> str | None:

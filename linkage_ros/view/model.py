@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from linkage_ros.drawing.drawing_data import drawn_in_frames, pose_in_frames
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.files.linkage_file import closable, closures, written_linkage
+from linkage_ros.files.linkage_file import checked_closure, find_closures, written_linkage
 from linkage_ros.files.section import Section
 from linkage_ros.files.units import Units
 from linkage_ros.files.yaml_file import parse_yaml
@@ -91,7 +91,7 @@ def model(
         quick = None
     if quick:
         return quick
-    closure = closable(content, written, name, shorthand)
+    closure = checked_closure(content, written, name, shorthand)
     try:
         inputs = usual_inputs(closure)
         drawn = drawn_in_frames(view(closure, inputs))
@@ -100,7 +100,7 @@ def model(
             found['others'] = _others(closure, content)
             found |= _analysis(closure, content.units)
     except DefinitionError as error:
-        raise content.located(error) from None
+        raise content.locate_error(error) from None
     return found
 
 
@@ -179,7 +179,7 @@ def _model(
             for slider, its in linkage.sliders.items()
         ],
         'lengths': list(_lengths(closure)),
-        'unit': {'length': units.length, 'factor': units.read(1.0, 'm')},
+        'unit': {'length': units.length, 'factor': units.to_si(1.0, 'm')},
         'choices': {key: {'now': now.get(key), 'sides': list(of)} for key, of in sides.items()},
         'inputs_possible': [
             link
@@ -228,7 +228,7 @@ def _lengths(closure: Closure) -> Iterator[dict[str, Any]]:
 def _others(closure: Closure, content: Section) -> list[dict[str, Any]]:
     """Return the other assemblies in which the linkage closes."""
     try:
-        found = closures(content, closure.name)
+        found = find_closures(content, closure.name)
     except FileError:  # it has none, or too many to choose from
         return []
     own = written_sides(closure)

@@ -19,7 +19,7 @@ from linkage_ros.drawing import figure as drawing
 from linkage_ros.drawing.figure import picture
 from linkage_ros.drawing.painting import degree_step
 from linkage_ros.errors import FileError
-from linkage_ros.files.linkage_file import assemblies, load
+from linkage_ros.files.linkage_file import find_assemblies, load
 from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.resources import linkage_names, named_file
@@ -138,25 +138,25 @@ def test_sides_that_a_file_leaves_out_are_chosen(tmp_path):
     file = tmp_path / 'x.yaml'
     file.write_text(WITHOUT_SIDES)
     sides = 'left', 'right'
-    assert [*assemblies(file)] == [
+    assert [*find_assemblies(file)] == [
         f'assembly: {{B: {one}, D: {other}}}' for one in sides for other in sides
     ]
     file.write_text(f'{WITHOUT_SIDES}assembly: {{B: right}}\n')
-    assert [*assemblies(file)] == [f'assembly: {{B: right, D: {other}}}' for other in sides]
+    assert [*find_assemblies(file)] == [f'assembly: {{B: right, D: {other}}}' for other in sides]
     file.write_text(f'{WITHOUT_SIDES}assembly: {{B: right, D: left}}\n')
-    assert len(assemblies(file)) == 4
+    assert len(find_assemblies(file)) == 4
 
 
 def test_a_shorthand_gets_its_own_text(tmp_path):
     file = tmp_path / 'x.yaml'
     file.write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
-    found = assemblies(file)
+    found = find_assemblies(file)
     assert [*found] == ['assembly: left', 'assembly: right']
     assert found['assembly: right'].linkage.assembly == {'B': 'right'}
 
 
 def test_each_assembly_closes_on_its_sides():
-    for closure in assemblies('jansen_leg').values():
+    for closure in find_assemblies('jansen_leg').values():
         position = closure.position(*usual_inputs(closure))
         points = closure.points(position)
         a, b, c = points['crank', 'A'], points['ground', 'B'], points['upper_rod', 'C']
@@ -167,20 +167,20 @@ def test_each_assembly_closes_on_its_sides():
 def test_choices_that_close_nowhere_are_left_out():
     sides = 'left', 'right'
     found = [f'assembly: {{B: left, D: {other}}}' for other in sides]
-    assert [*assemblies('stephenson_3')] == found
+    assert [*find_assemblies('stephenson_3')] == found
 
 
 @pytest.mark.parametrize('name', ['class_3', 'scotch_yoke'])
 def test_a_linkage_without_sides_is_told(name):
     with pytest.raises(FileError, match='no dyad of this linkage has two assemblies'):
-        assemblies(name)
+        find_assemblies(name)
 
 
 def test_a_file_that_closes_in_no_assembly_is_told_as_always(tmp_path):
     file = tmp_path / 'x.yaml'
     file.write_text(WITHOUT_SIDES.replace('0.080', '0.380'))
     with pytest.raises(FileError, match='close at no value of the input'):
-        assemblies(file)
+        find_assemblies(file)
 
 
 UNITS = 'units: mm\nangles: degrees\n'
@@ -197,7 +197,7 @@ def test_the_picture_of_assemblies_has_the_pose_for_the_file(text, tmp_path, mon
     titles = re.findall('<!-- (.*?) -->', Path('x.svg').read_text('utf-8'), re.DOTALL)
     folded = [title for title in titles if title.startswith('pose')]
     assert len(lines) == len(folded) == 4
-    for line, title, drawn in zip(lines, folded, assemblies('x.yaml').values(), strict=True):
+    for line, title, drawn in zip(lines, folded, find_assemblies('x.yaml').values(), strict=True):
         assert line.startswith(title)
         Path('y.yaml').write_text(f'{text}{line}\n')
         found = load('y.yaml')
@@ -211,7 +211,7 @@ def test_the_pose_of_each_assembly_of_the_gallery_leads_back(name, tmp_path, cap
     lines = capsys.readouterr().out.splitlines()[:-1]
     text = named_file(name, 'linkages').read_text('utf-8')
     own = re.sub(r'(?m)^(assembly|pose):.*\n(  .*\n)*', '', text)
-    for line, drawn in zip(lines, assemblies(name).values(), strict=True):
+    for line, drawn in zip(lines, find_assemblies(name).values(), strict=True):
         file = tmp_path / 'y.yaml'
         file.write_text(f'{own}{line}\n')
         found = load(file)

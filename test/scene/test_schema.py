@@ -26,35 +26,35 @@ from linkage_ros.errors import FileError
 from linkage_ros.faults import FAULTS
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.parameters import (
-    Choice,
     choice,
-    declared,
+    ChoiceOf,
+    declared_fields,
     Each,
-    each,
+    each_part,
     File,
     file,
     Flag,
     flag,
-    Group,
-    group,
     KINDS,
     Name,
-    name,
-    Names,
-    names,
+    NamesOf,
     Number,
     number,
-    Numbers,
-    numbers,
+    number_list,
+    number_rows,
+    NumberList,
+    parameter_section,
+    ParameterGroup,
     parameters_schema,
+    part_name,
+    part_names,
     Point,
     point,
     read_parameters,
-    Rows,
-    rows,
-    Text,
+    RowsOf,
     text,
-    whole,
+    TextOf,
+    whole_number,
 )
 from linkage_ros.files.section import Section
 from linkage_ros.files.units import Units
@@ -120,7 +120,9 @@ def test_all_that_scenes_can_name_is_in_the_schema():
     assert list(fault) == [*FAULTS, 'at', 'seconds']
     for types in (parameter_types(DRIVES), parameter_types(EFFECTS), FAULTS):
         for of in types.values():
-            assert list(parameters_schema(of)['properties']) == [f.name for f, _ in declared(of)]
+            assert list(parameters_schema(of)['properties']) == [
+                f.name for f, _ in declared_fields(of)
+            ]
 
 
 def test_no_mapping_lets_strangers_in():
@@ -366,7 +368,7 @@ class One:
 class Within:
     """Within others."""
 
-    depth: int = whole('how deep', 3, least=1, most=9)
+    depth: int = whole_number('how deep', 3, least=1, most=9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,20 +376,22 @@ class AllKinds:
     """Parameters of every kind."""
 
     must: float = number('that must be there', unit='s', least=-1.0, most=1.0)
-    table: tuple[tuple[float, ...], ...] = rows('a table', ('time [s]', 'load [N]'), most=5.0)
+    table: tuple[tuple[float, ...], ...] = number_rows(
+        'a table', ('time [s]', 'load [N]'), most=5.0
+    )
     path: str = file('where')
-    ones: Mapping[str, One] = each('of each', 'pin', One, required=True)
-    count: int = whole('that is whole', 1, least=0, most=100)
-    some: tuple[float, ...] = numbers('some', (), most=10.0)
+    ones: Mapping[str, One] = each_part('of each', 'pin', One, required=True)
+    count: int = whole_number('that is whole', 1, least=0, most=100)
+    some: tuple[float, ...] = number_list('some', (), most=10.0)
     on: bool = flag('whether', True)
     word: str = choice('which', ('one', 'other'), 'one')
     title: str = text('what it is called', 'none')
     place: tuple[float, float] = point('where', (0.0, 0.0), unit='N', most=3.0)
-    joint: str = name('which', 'joint', 'rocker')
-    joints: tuple[str, ...] = names('which', 'joint')
-    gains: Mapping[str, float] = each('of each', 'joint', Number('gain', '', least=0.0))
-    shifts: Mapping[str, Any] = each('of each', 'link', Point('[x, y]', 'N', 1.0))
-    within: Within = group('further', Within)  # noqa: RUF009 (a field, as the others are)
+    joint: str = part_name('which', 'joint', 'rocker')
+    joints: tuple[str, ...] = part_names('which', 'joint')
+    gains: Mapping[str, float] = each_part('of each', 'joint', Number('gain', '', least=0.0))
+    shifts: Mapping[str, Any] = each_part('of each', 'link', Point('[x, y]', 'N', 1.0))
+    within: Within = parameter_section('further', Within)  # noqa: RUF009 (a field, as the others are)
 
 
 PARTS = dict.fromkeys(KINDS, ('rocker', 'crank'))
@@ -404,24 +408,24 @@ def values_of(kind: Any) -> st.SearchStrategy[Any]:
     match kind:
         case Number():
             good = FINITE
-        case Numbers():
+        case NumberList():
             good = st.lists(FINITE, max_size=3)
-        case Rows():
+        case RowsOf():
             width = len(kind.columns)
             good = st.lists(st.lists(FINITE, min_size=width, max_size=width), max_size=3)
         case Flag():
             good = st.booleans()
-        case Choice():
+        case ChoiceOf():
             good = st.sampled_from([*kind.words, 'neither'])
-        case Text() | File():
+        case TextOf() | File():
             good = st.sampled_from(['a b', 'ü', 'a\nb', '\u2028', '\xa0', '0'])
         case Point():
             good = pair
         case Name():
             good = part
-        case Names():
+        case NamesOf():
             good = st.lists(part | st.just(''), max_size=2)
-        case Group():
+        case ParameterGroup():
             good = contents_of(kind.of)
         case Each():
             inner = contents_of(kind.of) if isinstance(kind.of, type) else values_of(kind.of)
@@ -431,7 +435,7 @@ def values_of(kind: Any) -> st.SearchStrategy[Any]:
 
 def contents_of(of: Any) -> st.SearchStrategy[dict[str, Any]]:
     """Return contents of a section of such parameters, most of them near what it takes."""
-    required = {entry.name: values_of(kind) for entry, kind in declared(of)}
+    required = {entry.name: values_of(kind) for entry, kind in declared_fields(of)}
     whole_section = st.fixed_dictionaries({}, optional=required)
     stranger = st.sampled_from([{}, {}, {}, {'stranger': 1}])
     return st.builds(lambda content, more: content | more, whole_section, stranger)
@@ -546,9 +550,9 @@ def test_an_editor_is_told_meaning_unit_bounds_and_default():
 
 
 def test_a_schema_takes_a_bounded_length_in_every_unit_of_a_file():
-    one = Number('where', 'rad/s or m/s', least=-0.5, most=2.0).schema()
+    one = Number('where', 'rad/s or m/s', least=-0.5, most=2.0).json_schema()
     assert (one['minimum'], one['maximum']) == (-500, 2000)  # [mm/s]
-    one = Number('where', 'rad', least=0.0, most=0.5 * pi).schema()
+    one = Number('where', 'rad', least=0.0, most=0.5 * pi).json_schema()
     assert (one['minimum'], one['maximum']) == (0, 90)  # [deg]
 
 

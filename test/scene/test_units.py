@@ -76,13 +76,13 @@ def test_a_linkage_in_millimetres_and_degrees_is_that_in_si_to_the_last_bit(writ
 @given(digits=st.integers(-(10**12), 10**12), places=st.integers(0, 9))
 def test_a_length_is_the_nearest_double_to_the_decimal_in_the_file(unit, digits, places):
     exact = Fraction(digits, 10**places)
-    metres = Units(unit).read(float(exact), 'm')
+    metres = Units(unit).to_si(float(exact), 'm')
     assert metres == float(exact * Fraction(LENGTHS[unit]))
 
 
 def test_right_angles_are_those_of_the_library():
     turns = {90: 0.5 * pi, 180: pi, 360: 2.0 * pi, -180: -pi}
-    read = Units(angle='degrees').read
+    read = Units(angle='degrees').to_si
     assert {degrees: read(degrees, 'rad') for degrees in turns} == turns
 
 
