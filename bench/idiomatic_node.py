@@ -34,7 +34,7 @@ class IdiomaticNode(Node):
 
     def __init__(self, scene: Path, rate: float) -> None:
         super().__init__('idiomatic_node')
-        linkage = load_scene(scene).members[0].linkage
+        linkage = load_scene(scene).linkages[0].linkage
         self.closure = Closure(linkage)
         self.crank_name = linkage.inputs[0].joint
         self.names = list(linkage.joints)

@@ -205,7 +205,7 @@ def effect_lines(*, quick: bool) -> Iterator[str]:
     """Yield a table of each effect alone, on a scene without any."""
     files = {SCENE_FILE: EVERY_EFFECT.encode(), LINKAGE_FILE: FOUR_BAR.read_bytes()}
     scene = parse_scene('effects', 'effects', files)
-    (member,) = scene.members
+    (member,) = scene.linkages
     names = [*member.effects]
     # Friction acts on nothing without a force effect.
     beside = {'friction': ('effort',)}
@@ -234,7 +234,7 @@ def effect_lines(*, quick: bool) -> Iterator[str]:
 
 def _only(scene: Scene, *names: str) -> Scene:
     """Return the scene with these of its effects only."""
-    (member,) = scene.members
+    (member,) = scene.linkages
     return leave_out(scene, frozenset(member.effects).difference(names))
 
 

@@ -16,8 +16,8 @@ bag = lr.read_bag(sys.argv[1])
 for topic in bag.topics:
     print(topic.name, topic.type)
 scene = lr.recorded_scene(bag)
-reader = lr.JointStateReader(scene.joints)
-print('stamp [ns]', *scene.joints)
+reader = lr.JointStateReader(scene.joint_names)
+print('stamp [ns]', *scene.joint_names)
 for message in bag.messages():
     if message.topic == '/joint_states':
         state = reader.read(message.data)

@@ -347,7 +347,7 @@ def test_an_effect_gets_what_the_scene_says_and_the_defaults(effect, linkage, te
         f'effects: {{effort: {{}}, {effect}: {text}}}',
         (LINKAGES / f'{linkage}.yaml').read_bytes(),
     )
-    assert scene.members[0].effects[effect] == parameters
+    assert scene.linkages[0].effects[effect] == parameters
 
 
 @pytest.mark.parametrize(('text', 'said'), REFUSED)
@@ -361,7 +361,7 @@ def test_what_a_scene_cannot_say_is_refused_in_one_line(text, said):
 @pytest.mark.parametrize('effect', [name for name in EFFECTS if name not in REFUSED_EFFECTS])
 def test_an_effect_without_rows_needs_no_key(effect):
     scene = scene_of(f'effects: {{{effect}: {{}}}}', (LINKAGES / 'four_bar.yaml').read_bytes())
-    assert effect in scene.members[0].effects
+    assert effect in scene.linkages[0].effects
 
 
 @pytest.mark.parametrize('names', [EFFECTS, DRIVES], ids=['effects', 'drives'])

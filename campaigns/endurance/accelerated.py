@@ -107,7 +107,7 @@ def _run(plan: Plan, folder: Path) -> Run:
     attached = {name: ('application/yaml', data) for name, data in scene.files.items()}
     writer = BagWriter(folder / 'bag', _topics(pipeline), attached, storage)
     loop.recorder = recorder = Recorder(writer, flush_period=_FLUSH_PERIOD)
-    crank = JointStateWriter(scene.members[0].inputs).write
+    crank = JointStateWriter(scene.linkages[0].input_names).write
     period, ticks = round(NANOSECONDS / plan.rate), round(plan.hours * 3600.0 * plan.rate)
     between = max(ticks // 144, 1)  # ten minutes of 24 h
     progress = progress_lines(ticks, f'ticks of {plan.name}')

@@ -103,7 +103,7 @@ class Run(NamedTuple):
         )
 
     def _read(self, joint: str, values: Callable[[SensorReading], Sequence[float]]) -> Values:
-        place = self.pipeline.lines[0].member.joints.index(joint)
+        place = self.pipeline.lines[0].member.joint_names.index(joint)
         read = [look.reading and values(look.reading) for look in self.looks]
         return np.array([each[place] if each else nan for each in read])
 

@@ -262,7 +262,7 @@ def scene_account(scene: Scene) -> dict[str, Any]:
         'rate_hz': scene.rate,
         'seed': scene.seed,
         'faults': list(scene.faults),
-        'linkages': [_linkage(member) for member in scene.members],
+        'linkages': [_linkage(member) for member in scene.linkages],
     }
 
 
@@ -317,9 +317,9 @@ def _linkage(member: SceneLinkage) -> dict[str, Any]:
         'links': len(linkage.links),
         'inputs': [
             {'joint': name, 'unit': given.unit}
-            for name, given in zip(member.inputs, linkage.inputs, strict=True)
+            for name, given in zip(member.input_names, linkage.inputs, strict=True)
         ],
-        'joints': list(member.joints),
+        'joints': list(member.joint_names),
         'drive': member.drive[0],
         'effects': list(member.effects),
         'effects_not_imported': list(member.not_imported),

@@ -120,7 +120,7 @@ def _beside(scene: Scene, seconds: float) -> Iterator[None]:
             command,
             start_new_session=True,  # Ctrl-C goes to this process only, which ends the others
         )
-        for member in scene.members
+        for member in scene.linkages
         if (command := _command(member, seconds))
     ]
     try:
@@ -140,7 +140,7 @@ def _command(member: SceneLinkage, seconds: float) -> list[str]:
     module, *parameters = _BESIDE[drive]
     # A time limit, so that it ends by itself even if this process is killed.
     limit = seconds + _PATIENCE + 10.0
-    parameters += [f'joint:={member.sampled[0]}', f'seconds:={limit:.1f}']
+    parameters += [f'joint:={member.sampled_joints[0]}', f'seconds:={limit:.1f}']
     pairs = [part for parameter in parameters for part in ('-p', parameter)]
     return [sys.executable, '-m', module, '--ros-args', *pairs]
 
@@ -155,5 +155,5 @@ def _fault(name: str, fault: Fault) -> str:
 def _row(file: Path) -> tuple[str, ...]:
     """Return the list's text on a scene: its drives, and its own description."""
     scene = load_scene(file)
-    drives = ' and '.join(dict.fromkeys(member.drive[0] for member in scene.members))
+    drives = ' and '.join(dict.fromkeys(member.drive[0] for member in scene.linkages))
     return scene.name, drives, 'yes' if scene.record else 'no', first_sentence(file)

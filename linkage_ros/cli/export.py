@@ -282,7 +282,7 @@ def export(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Found:
 
     size = sum(layout_of(path).content for path in bag.files) // _MIB
     with progress('columns looked for [MiB]') as advance:
-        found = survey(source, [] if scene is None else scene.joints, bounded(advance, size))
+        found = survey(source, [] if scene is None else scene.joint_names, bounded(advance, size))
     if not found.rows:
         raise _nothing(source, found)
     heads = [TIME, STAMP, PUBLISHED, LOGGED, *(_head(key, turning) for key in found.keys)]

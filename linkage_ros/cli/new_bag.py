@@ -80,8 +80,8 @@ def names_for(source: Source, scene: Scene, counterfactual: Counterfactual) -> N
     node = nodes[0] if nodes else f'{joint_states.rpartition("/")[0]}/linkage_node'
     if joint_states == source.crank_topic:
         # On a shared topic, joints distinguish samples from states: they must be the run's joints.
-        own = source.recorded.joints if source.recorded is not None else ()
-        if run.crank_topic != joint_states or scene.joints != own:
+        own = source.recorded.joint_names if source.recorded is not None else ()
+        if run.crank_topic != joint_states or scene.joint_names != own:
             joint_states = f'{node}/joint_states'
 
     def resolved(key: str) -> str:

@@ -99,8 +99,8 @@ def draw(
     bag = opened(bag_path, stop)
     scene = scene_of(bag, trust_effects=trust_effects)
     # The x axis is the crank of the first linkage; its joints are drawn.
-    member = scene.members[0]
-    reader = JointStateReader(member.joints)
+    member = scene.linkages[0]
+    reader = JointStateReader(member.joint_names)
     times: list[int] = []
     cranks: list[Values] = []
     positions: list[Values] = []

@@ -300,7 +300,7 @@ def _replayed_with(
     force: bool,
 ) -> dict[str, Any]:
     """Run another scene over a bag's samples; return the comparison with the recorded run."""
-    check_drives(scene, scene.members[0].content.file)
+    check_drives(scene, scene.linkages[0].content.file)
     run, recorded = _own_account(bag)
     topic = find_crank_topic(bag, reading.glance(), scene, run, recorded, crank_topic)
     source = Source(bag, run, recorded, topic)
@@ -335,14 +335,16 @@ def _replayed_with(
                         comparison.add(At(comparison.ticks + 1, event.time), then, now)
     comparison.settle()
     turning = turning_joints(scene) | (turning_joints(recorded) if recorded else {})
-    recorded_joints = recorded.joints if recorded is not None else ()
+    recorded_joints = recorded.joint_names if recorded is not None else ()
     return bag_account(bag, scene, reading, begin) | {
         'crank_topic': topic,
         'joint_states': published,
         'topics': [topic_account(each) for each in comparison.topics],
         'joints': joints_account(comparison, turning),
-        'joints_only_recorded': [name for name in recorded_joints if name not in scene.joints],
-        'joints_only_now': [name for name in scene.joints if name not in recorded_joints],
+        'joints_only_recorded': [
+            name for name in recorded_joints if name not in scene.joint_names
+        ],
+        'joints_only_now': [name for name in scene.joint_names if name not in recorded_joints],
         'new_bag': str(output) if new_bag is not None else None,
         'written': new_bag.counts if new_bag is not None else {},
     }
@@ -362,11 +364,15 @@ def _own_account(bag: Bag) -> tuple[RunMetadata, Scene | None]:
 
 def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path | None) -> None:
     """Raise if the replay could neither compare joints nor write a bag."""
-    if output is not None or recorded is None or set(recorded.joints) & set(scene.joints):
+    if (
+        output is not None
+        or recorded is None
+        or set(recorded.joint_names) & set(scene.joint_names)
+    ):
         return
     raise LinkageError(
-        scene.members[0].content.file,
-        f'publishes {listed(scene.joints)}, and {bag.path} holds {listed(recorded.joints)}: '
+        scene.linkages[0].content.file,
+        f'publishes {listed(scene.joint_names)}, and {bag.path} holds {listed(recorded.joint_names)}: '
         'nothing to compare',
         'write a new bag with -o',
     )
@@ -421,7 +427,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         code = {IDENTICAL: 0, DIFFERENT: EXIT_DIFFERENT}.get(account['verdict'], EXIT_INCOMPLETE)
     else:
         scene = _other_scene(bag, arguments)
-        if RUN_FILE in bag.attachments and 'seed' not in scene.members[0].content:
+        if RUN_FILE in bag.attachments and 'seed' not in scene.linkages[0].content:
             # The same seeds: the scene makes the difference, not the noise.
             scene = replace(scene, seed=read_run_metadata(bag).seed)
         account = _replayed_with(

@@ -140,11 +140,11 @@ def _state(
             continue
         member = line.member
         age = f'{crank.age * 1e-6:.2f} ms'
-        if not set(member.inputs) <= set(member.joints):
-            values += zip(member.inputs, crank.angles, crank.rates, strict=True)
+        if not set(member.input_names) <= set(member.joint_names):
+            values += zip(member.input_names, crank.angles, crank.rates, strict=True)
         if reading is not None:
             rates = reading.rates or [None] * len(reading.joints)
-            values += zip(member.joints, reading.joints, rates, strict=True)
+            values += zip(member.joint_names, reading.joints, rates, strict=True)
     return age, [_shown(*each, turning[each[0]], angles) for each in values[:_MOST_SHOWN]]
 
 

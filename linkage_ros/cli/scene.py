@@ -80,9 +80,9 @@ def tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
 
 
 def _facts(scene: Scene) -> Iterator[tuple[str, str]]:
-    if scene.members[0].name:
-        yield 'linkages', _some([member.name for member in scene.members])
-    joints = list(scene.joints)
+    if scene.linkages[0].name:
+        yield 'linkages', _some([member.name for member in scene.linkages])
+    joints = list(scene.joint_names)
     yield 'joints', _some(joints)
     rate = f'{scene.rate:g} a second' if scene.rate else 'one for every crank sample'
     yield 'ticks', rate
@@ -164,7 +164,7 @@ def _topics(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
         yield 'listens to', pipeline.topic, JOINT_STATE, ''
     for wrench in pipeline.wrenches:
         yield 'listens to', wrench.topic, 'geometry_msgs/msg/WrenchStamped', wrench.key
-    yield 'publishes', 'joint_states', JOINT_STATE, f'{len(scene.joints)} joints'
+    yield 'publishes', 'joint_states', JOINT_STATE, f'{len(scene.joint_names)} joints'
     for extra in pipeline.extras:
         yield 'publishes', extra.topic, extra.message, ''
     if scene.faults:
@@ -216,7 +216,7 @@ def account_of(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
         ]
     record = scene.record
     return account | {
-        'joints': list(scene.joints),
+        'joints': list(scene.joint_names),
         'wrapped': scene.wrapped,
         'record': record and {'directory': record.directory, 'name': record.name or None},
         'fault_parameters': [
@@ -369,19 +369,19 @@ def _violations(file: Path) -> list[FileError]:
     """Return all violations of the schemas in a scene and the linkages that it names."""
     if find_spec('jsonschema') is None:
         return []
-    from linkage_ros.scene.violations import violations
+    from linkage_ros.scene.violations import find_violations
 
     content, _ = read_yaml(file)
     if kind_of(content) == 'linkage':
-        return violations(content, linkage_schema())
-    wrong = violations(content, scene_schema())
+        return find_violations(content, linkage_schema())
+    wrong = find_violations(content, scene_schema())
     if wrong:
         return wrong
     for linkage in dict.fromkeys(_linkages(content)):
         # The reader reports a missing file, with the line that names it.
         path = linkage_of_scene(linkage, file.parent)
         if isfile(path):  # noqa: PTH113 (Path's raises where a name is too long)
-            wrong += violations(read_yaml(path)[0], linkage_schema())
+            wrong += find_violations(read_yaml(path)[0], linkage_schema())
     return wrong
 
 

@@ -198,7 +198,7 @@ def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) 
     scene = _loaded(arguments)
     ticks = check_simulated(scene, arguments.seconds)
     runs = runs_of(sweeps, arguments.seeds, scene.seed)
-    instants = instants_of(len(runs), len(scene.joints), ticks)
+    instants = instants_of(len(runs), len(scene.joint_names), ticks)
     study = Study(scene.name, scene.files, scene.folder, arguments.seconds, instants)
     with closing(FinishedRuns(output, study, runs)) as finished:
         found = finished.outcomes
@@ -263,8 +263,8 @@ def _turning(scene: Scene) -> dict[str, bool]:
     """Return whether each joint turns, by its name in messages."""
     return {
         joint: turns
-        for member in scene.members
-        for joint, turns in zip(member.joints, member.closure.turning, strict=True)
+        for member in scene.linkages
+        for joint, turns in zip(member.joint_names, member.closure.turning, strict=True)
     }
 
 
@@ -312,7 +312,7 @@ def _draw(scene: Scene, seconds: float, found: Mapping[int, Outcome], picture: P
             'rad' if turning[joint] else 'm',
             np.array([outcome.positions[number] for outcome in good]),
         )
-        for number, joint in enumerate(scene.joints)
+        for number, joint in enumerate(scene.joint_names)
     ]
     title = f'{scene.name}: {len(good)} runs of {seconds:g} s'
     spread.draw_spread(title, seconds, joints, picture)

@@ -102,7 +102,7 @@ def _linkage(named: str) -> _Linkage:
         read_closure(content, file.stem)
         return _Linkage(file.stem, file, data, None)
     scene = load_scene(file)
-    path = Path(scene.members[0].linkage_content.file)
+    path = Path(scene.linkages[0].linkage_content.file)
     first = next(text for name, text in scene.files.items() if name != SCENE_FILE)
     texts = {name: text.decode() for name, text in scene.files.items()}
     folder = str(Path(scene.folder).absolute())

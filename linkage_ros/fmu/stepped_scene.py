@@ -89,11 +89,11 @@ class _Sender:
         # A motor may be commanded by another quantity, which the message calls an effort too.
         command = getattr(getattr(parameters, 'motor', None), 'command', 'effort')
         quantities = {field: command if field == 'effort' else field for field in self._fields}
-        self._count = len(member.sampled)
-        self._write = JointStateWriter(member.sampled).write
+        self._count = len(member.sampled_joints)
+        self._write = JointStateWriter(member.sampled_joints).write
         parts = (
-            [member.linkage.joints[member.dependent]]
-            if member.dependent
+            [member.linkage.joints[member.dependent_joint]]
+            if member.dependent_joint
             else (member.linkage.inputs)
         )
         self.variables = [
@@ -105,7 +105,7 @@ class _Sender:
                 else f'{quantity} that is commanded to the motor of {joint}',
             )
             for field, quantity in quantities.items()
-            for joint, given in zip(member.sampled, parts, strict=True)
+            for joint, given in zip(member.sampled_joints, parts, strict=True)
         ]
 
     def message(self, stamp: int, values: Sequence[float]) -> bytes:
@@ -136,7 +136,7 @@ class LinkageOutputs:
                     _UNITS[field][not turns],
                     f'{field} of {joint}, as its sensor reads it',
                 )
-                for joint, turns in zip(member.joints, turning, strict=True)
+                for joint, turns in zip(member.joint_names, turning, strict=True)
             ]
             for field in _published(member)
         }
@@ -192,7 +192,7 @@ class MotorOutputs:
 
     def __init__(self, line: LinkagePipeline, writer: int) -> None:
         member = line.member
-        (joint,), (given,) = member.inputs, member.linkage.inputs
+        (joint,), (given,) = member.input_names, member.linkage.inputs
         _, parameters = member.drive
         # Without a motor at the input, the reading is of what is commanded: the input itself.
         slides = bool(given.slider) and parameters.motor is None
@@ -343,7 +343,7 @@ class SteppedScene:
 
 def _refuse(scene: Scene) -> None:
     """Refuse a scene that needs more than its files and a clock from outside."""
-    content = scene.members[0].content
+    content = scene.linkages[0].content
     if scene.rate == 0.0:
         raise content.error(
             'rate', '0 is one tick for every message, and there are none', 'name a rate'
@@ -353,7 +353,7 @@ def _refuse(scene: Scene) -> None:
             raise content.error(
                 f'faults.{name}', 'sets the clock, which is that of the importer', 'leave it out'
             )
-    for member in scene.members:
+    for member in scene.linkages:
         drive, _ = member.drive
         if drive == 'bag':
             raise member.content.error(

@@ -77,11 +77,11 @@ class FollowedRun(NamedTuple):
             The time, in [ns].
 
         """
-        names = self.scene.joints
+        names = self.scene.joint_names
         inputs = self._inputs_at(joints.stamp, crank)
-        known = dict.fromkeys(self.shown.joints, nan)
+        known = dict.fromkeys(self.shown.joint_names, nan)
         known |= dict(zip(names, joints.angles, strict=True))
-        known |= dict(zip(self.shown.inputs, inputs, strict=True))
+        known |= dict(zip(self.shown.input_names, inputs, strict=True))
         rates = joints.rates or (nan,) * len(names)
         return {
             't': joints.stamp * 1e-9,
@@ -97,7 +97,7 @@ class FollowedRun(NamedTuple):
     def _inputs_at(self, stamp: int, crank: CrankSample | None) -> list[float]:
         """Return the inputs at the time of the joints; NaN where they are unknown."""
         if crank is None:
-            return [nan] * len(self.shown.inputs)
+            return [nan] * len(self.shown.input_names)
         lead = (stamp - crank.stamp) * 1e-9
         if crank.rates is None or abs(lead) > _LONGEST_LEAD:
             return list(crank.angles)
@@ -106,7 +106,7 @@ class FollowedRun(NamedTuple):
     def _frames(self, known: Mapping[str, float]) -> list[float] | None:
         """Return place and angle of the frame of each link; None if they are unknown."""
         values = {name: np.array([value]) for name, value in known.items()}
-        found = poses(self.closure, self.shown.prefix, values, self.shown.inputs)
+        found = poses(self.closure, self.shown.prefix, values, self.shown.input_names)
         if not set(self.model['links']) <= set(found.links):
             return None
         order = [found.links.index(link) for link in self.model['links']]
@@ -127,12 +127,12 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
     try:
         announced = read_announced(message, topic)
         scene, account = recorded_scene(announced), read_run_metadata(announced)
-        shown = scene.members[0]
+        shown = scene.linkages[0]
         closure = Closure(shown.linkage)
         model = model_of(closure, scene.name)
     except (ValueError, ArithmeticError, MalformedError) as error:
         raise LinkageError(topic, f'is not valid: {quoted(str(error))}', 'name another') from None
-    turned = next((each for each in scene.members if each.drive[0] in _BY_TOPIC), None)
+    turned = next((each for each in scene.linkages if each.drive[0] in _BY_TOPIC), None)
     if not account.crank_topic:
         turned = None
     model |= {'live': _beside_model(scene, closure, turned)}
@@ -141,7 +141,7 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
 
 def _beside_model(scene: Scene, closure: Closure, turned: SceneLinkage | None) -> dict[str, Any]:
     """Return what a page shows of a scene beside the model of its first linkage."""
-    shown = scene.members[0]
+    shown = scene.linkages[0]
     cranks: list[list[float] | None] = []
     for given in closure.linkage.inputs:
         # A crank on the ground is turned by the mouse about its pin.
@@ -156,15 +156,15 @@ def _beside_model(scene: Scene, closure: Closure, turned: SceneLinkage | None) -
     return {
         'joints': [
             [name, 'rad' if turning else 'm']
-            for member in scene.members
-            for name, turning in zip(member.joints, member.closure.turning, strict=True)
+            for member in scene.linkages
+            for name, turning in zip(member.joint_names, member.closure.turning, strict=True)
         ],
-        'inputs': list(shown.inputs),
+        'inputs': list(shown.input_names),
         'cranks': cranks,
         'turned': turned is shown,
         'drive': (turned or shown).drive[0],
         'effort': _range_of_effort(closure),
-        'linkages': len(scene.members),
+        'linkages': len(scene.linkages),
     }
 
 

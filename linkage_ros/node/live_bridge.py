@@ -314,7 +314,7 @@ class LiveBridge:
         self._followed = []
         # Taken by a timer, so that a fast node costs this process nothing.
         self._joint_states = self._subscribe(JointState, run.account.joint_states_topic)
-        self._read_joints = JointStateReader(run.scene.joints)
+        self._read_joints = JointStateReader(run.scene.joint_names)
         self._read_inputs = _crank_reader(run.shown)
         self._crank_states = None
         if run.crank_topic not in ('', run.account.joint_states_topic):
@@ -493,17 +493,17 @@ class LiveBridge:
         run, target = self._turnable('topic', 'crank'), _number(content, 'angle')
         assert run.turned is not None
         number = content.get('input', 0)
-        if type(number) is not int or not 0 <= number < len(run.turned.inputs):
-            count = len(run.turned.inputs)
+        if type(number) is not int or not 0 <= number < len(run.turned.input_names):
+            count = len(run.turned.input_names)
             raise LinkageError('input', f'{quoted(number)} is none', f'name one of {count}')
-        at = [0.0] * len(run.turned.inputs)
+        at = [0.0] * len(run.turned.input_names)
         if self._cranks is not None and run.turned is run.shown:
             at = list(self._cranks.angles)
         else:
             at[number] = target
         self._hand.turn(number, target, at, monotonic())
         self._hold(run)
-        return f'{listed(run.turned.sampled)} on {run.crank_topic}, by hand'
+        return f'{listed(run.turned.sampled_joints)} on {run.crank_topic}, by hand'
 
     def _push(self, content: Mapping[str, Any]) -> str:
         run = self._turnable('torque', 'effort')
@@ -541,7 +541,7 @@ class LiveBridge:
             message = self._write_crank(stamp, *followed)
             self._hand_publisher.handle.publish_raw(message)
         elif now - self._effort[1] <= HELD:
-            command = JointState(name=list(self._run.turned.inputs[:1]))
+            command = JointState(name=list(self._run.turned.input_names[:1]))
             command.effort = [self._effort[0]]
             command.header.stamp.sec, command.header.stamp.nanosec = divmod(stamp, NANOSECONDS)
             self._hand_publisher.publish(command)
@@ -584,20 +584,20 @@ def _flag(content: Mapping[str, Any]) -> bool:
 
 def _branch_of(member: SceneLinkage) -> CrankBranch:
     """Return the branch on which a dependent joint moves a crank."""
-    return sampled_inverse(member.closure, member.dependent, member.drive[1].branch).branch
+    return sampled_inverse(member.closure, member.dependent_joint, member.drive[1].branch).branch
 
 
 def _crank_reader(member: SceneLinkage) -> JointStateReader | DependentSampleReader:
     """Return the reader of its inputs, as samples or published joints name them."""
-    if not member.dependent:
-        return JointStateReader(member.inputs)
-    return DependentSampleReader(_branch_of(member), member.sampled[0])
+    if not member.dependent_joint:
+        return JointStateReader(member.input_names)
+    return DependentSampleReader(_branch_of(member), member.sampled_joints[0])
 
 
 def _crank_writer(member: SceneLinkage) -> Callable[[int, Floats, Floats], bytes]:
     """Return the writer of samples as its drive takes them: of inputs, or of a dependent joint."""
-    write = JointStateWriter(member.sampled).write
-    if not member.dependent:
+    write = JointStateWriter(member.sampled_joints).write
+    if not member.dependent_joint:
         return write
     branch = _branch_of(member)
 

@@ -238,15 +238,17 @@ class LinkageNode(LifecycleNode):
         if self._middleware:
             self.get_logger().info(STANDSTILL)
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
-        cranks = ', '.join(joint for member in self.scene.members for joint in member.sampled)
-        drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
+        cranks = ', '.join(
+            joint for member in self.scene.linkages for joint in member.sampled_joints
+        )
+        drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.linkages))
         source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
         wrenches = [each.topic_name for each in self._scene_topics.wrenches]
         source += f'; wrenches from {" and ".join(wrenches)}' if wrenches else ''
         to = [each.topic_name for each in (self._joint_states, *self._scene_topics.extras)]
         self.get_logger().info(
             f'{self.scene.name}: ticking {rate}; crank {cranks} {source}; '
-            f'{", ".join(self.scene.joints)} to {" and ".join(to)}'
+            f'{", ".join(self.scene.joint_names)} to {" and ".join(to)}'
         )
         return TransitionCallbackReturn.SUCCESS
 
@@ -435,7 +437,7 @@ class LinkageNode(LifecycleNode):
         # Without /clock messages no tick has taken crank messages yet.
         assert self.scene is not None
         if listening and (loop.counts.ticks or not self.scene.rate):
-            inputs = [name for member in listening for name in member.sampled]
+            inputs = [name for member in listening for name in member.sampled_joints]
             simulated = self.scene.rate and self.get_parameter('use_sim_time').value
             self._warnings.check_silence(
                 loop.counts,

@@ -68,11 +68,11 @@ class CommandRelay:
 
     def __init__(self, scene: Scene) -> None:
         self._inverses: dict[str, tuple[InverseClosure, str]] = {}
-        for member in scene.members:
-            if member.dependent:
+        for member in scene.linkages:
+            if member.dependent_joint:
                 number = member.drive[1].branch
-                inverse = sampled_inverse(member.closure, member.dependent, number)
-                self._inverses[member.sampled[0]] = inverse, member.inputs[0]
+                inverse = sampled_inverse(member.closure, member.dependent_joint, number)
+                self._inverses[member.sampled_joints[0]] = inverse, member.input_names[0]
         if not self._inverses:
             raise DefinitionError(
                 'drive.topic.joint', 'names no dependent joint', 'name the one that is commanded'

@@ -236,7 +236,7 @@ class LinkagePipeline:
         sensors = wanted.build('sensor', self.context)
         if {'encoder', 'rate_limit'} <= set(sensors):
             sensors['rate_limit'].read_by(sensors['encoder'])
-        joints = self.member.joints
+        joints = self.member.joint_names
         broken = injection.build('sensor', joints) if injection is not None else []
         angles = Continuous(self.closure.turning, beginnings(self.closure))
         behind = [*sensors.values(), *broken]
@@ -536,13 +536,13 @@ class Pipeline:
         """The faults; None if the scene has none."""
         self.lines = [
             LinkagePipeline(scene, member, closures[number] if closures else None, injection)
-            for number, member in enumerate(scene.members)
+            for number, member in enumerate(scene.linkages)
         ]
         self.extras = [extra for line in self.lines for extra in line.extras]
         """The topics beside the joint states."""
         topics = sorted({line.topic for line in self.lines} - {''})
         if len(topics) > 1:
-            raise scene.members[0].content.error(
+            raise scene.linkages[0].content.error(
                 'drive', f'{" and ".join(topics)} are listened to', 'drive all by one of them'
             )
         _refuse_stamps(scene)
@@ -566,7 +566,7 @@ class Pipeline:
             or any(not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines)
         )
         """Whether ticks without a message may matter to a replay."""
-        self._routes = SampleRouter({line: line.member.sampled for line in self.lines})
+        self._routes = SampleRouter({line: line.member.sampled_joints for line in self.lines})
         self.addressed: tuple[LinkagePipeline, ...] = ()
         """Of several linkages, those whose inputs the last message named."""
         self._offered = 0
@@ -678,7 +678,7 @@ class Pipeline:
             joint
             for line, there in zip(self.lines, present, strict=True)
             if there
-            for joint in line.member.joints
+            for joint in line.member.joint_names
         ]
         self._writers[present] = writer = JointStateWriter(joints)
         return writer
@@ -701,8 +701,8 @@ class Pipeline:
 
 def _refuse_stamps(scene: Scene) -> None:
     """Refuse measurement stamps that cannot share one message of several linkages."""
-    delays = [member.effects.get('delay') for member in scene.members]
-    for member, delay in zip(scene.members, delays, strict=True):
+    delays = [member.effects.get('delay') for member in scene.linkages]
+    for member, delay in zip(scene.linkages, delays, strict=True):
         if delay is not None and delay.stamp == 'measured' and delays.count(delay) < len(delays):
             raise member.content.error(
                 'effects.delay.stamp',

@@ -78,8 +78,8 @@ ReplayEvent = SampleEvent | FaultEvent | ResetEvent | Remade
 
 def check_drives(scene: Scene, where: str) -> None:
     """Raise LinkageError if a scene does not take crank angles, or efforts, from one topic."""
-    drives = [member.drive[0] for member in scene.members]
-    for member, drive in zip(scene.members, drives, strict=True):
+    drives = [member.drive[0] for member in scene.linkages]
+    for member, drive in zip(scene.linkages, drives, strict=True):
         if drive not in _TOPICS or drive != drives[0]:
             beside = f' beside {drives[0]}' if drive in _TOPICS else ''
             raise LinkageError(
@@ -113,7 +113,7 @@ class Counterfactual:
         self._scene = scene
         self._followed: set[str] = set()
         # Under torque the linkage moves without commands, too.
-        self._goes_on = scene.members[0].drive[0] == 'torque'
+        self._goes_on = scene.linkages[0].drive[0] == 'torque'
         if recorded is not None:
             self._followed = {
                 name for name, fault in scene.faults.items() if recorded.faults.get(name) == fault
@@ -344,14 +344,14 @@ def find_crank_topic(
         There is no such topic, or more than one.
 
     """
-    drive = scene.members[0].drive[0]
+    drive = scene.linkages[0].drive[0]
     readers = {
-        topic: [_reader(member, scene.dependent_joints) for member in scene.members]
+        topic: [_reader(member, scene.dependent_joints) for member in scene.linkages]
         for topic in _candidates(bag, drive, run, recorded, typed)
     }
     if drive == 'torque' and len(readers) == 1:
         return next(iter(readers))  # also where no command came: the linkage moved without
-    wanting = {topic: set(range(len(scene.members))) for topic in readers}
+    wanting = {topic: set(range(len(scene.linkages))) for topic in readers}
     names: dict[str, None] = {}
     for topic, _, _, data in messages if readers else ():
         if not wanting.get(topic):
@@ -372,7 +372,9 @@ def find_crank_topic(
     good = [topic for topic, left in wanting.items() if not left]
     if len(good) == 1:
         return good[0]
-    inputs = list(dict.fromkeys(name for member in scene.members for name in member.sampled))
+    inputs = list(
+        dict.fromkeys(name for member in scene.linkages for name in member.sampled_joints)
+    )
     if good:
         raise BagError(
             bag.path,
@@ -390,8 +392,8 @@ def find_crank_topic(
 
 def _reader(member: SceneLinkage, dependent: Collection[str]) -> Callable[[bytes], object]:
     if member.drive[0] == 'torque':
-        return JointEffortReader(member.inputs[0], dependent).read
-    return JointStateReader(member.sampled).read
+        return JointEffortReader(member.input_names[0], dependent).read
+    return JointStateReader(member.sampled_joints).read
 
 
 def _candidates(
@@ -406,7 +408,7 @@ def _candidates(
                 did_you_mean(typed, held, f'it holds {listed(held) or "none"}'),
             )
         return [typed]
-    other = recorded is not None and any(member.drive[0] != drive for member in recorded.members)
+    other = recorded is not None and any(member.drive[0] != drive for member in recorded.linkages)
     if run.crank_topic in held and not other:
         return [run.crank_topic]
     if _TOPICS[drive] in held and not other:

@@ -133,21 +133,21 @@ def beginning_text(proof: ReplayVerification) -> str:
 def turning_joints(scene: Scene) -> dict[str, bool]:
     """Return for each joint of a scene, published or driven, whether it is a revolute joint."""
     revolute: dict[str, bool] = {}
-    for member in scene.members:
+    for member in scene.linkages:
         driven = [not given.slider for given in member.linkage.inputs]
-        revolute |= dict(zip(member.inputs, driven, strict=True))
+        revolute |= dict(zip(member.input_names, driven, strict=True))
         kinds = [isinstance(joint, RevoluteJoint) for joint in member.linkage.joints.values()]
-        revolute |= dict(zip(member.joints, kinds, strict=True))
+        revolute |= dict(zip(member.joint_names, kinds, strict=True))
     return revolute
 
 
 def _lost(scene: Scene) -> tuple[str, ...]:
     named = []
-    for member in scene.members:
+    for member in scene.linkages:
         drive, parameters = member.drive
         if drive != 'topic' or parameters.cutoff:
             named.append(drive)
-    for member in scene.members:
+    for member in scene.linkages:
         if member.loads is not None and member.loads.applied.changes_with_time:
             named.append('loads')
         named += [effect for effect in member.effects if effect in _NEVER_FOUND_AGAIN]

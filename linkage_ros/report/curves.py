@@ -199,19 +199,19 @@ class SceneCurves:
 
     def __init__(self, scene: Scene, topics: tuple[str, str], bodies: int, window: Window) -> None:
         turning = turning_joints(scene)
-        inputs = [name for member in scene.members for name in member.sampled]
+        inputs = [name for member in scene.linkages for name in member.sampled_joints]
         states, crank = topics
         self._window = window
         self._states = BoundedCurves(
-            states, joint_columns(scene.joints, turning), STATE_BYTES, window
+            states, joint_columns(scene.joint_names, turning), STATE_BYTES, window
         )
         self._samples = BoundedCurves(crank, joint_columns(inputs, turning), SAMPLE_BYTES, window)
         self._lates = BoundedCurves('ticks', [LATENESS], DURATION_BYTES, window)
         self._ages = BoundedCurves('ticks', [AGE], DURATION_BYTES, window)
         self._lateness = Lateness(scene.rate) if scene.rate else None
         self.late, self.age = Histogram(), Histogram()
-        moving = scene.members[:MOST_LINKAGES]
-        names = (name for each in moving for name in (*each.inputs, *each.joints))
+        moving = scene.linkages[:MOST_LINKAGES]
+        names = (name for each in moving for name in (*each.input_names, *each.joint_names))
         self._places = {name: place for place, name in enumerate(dict.fromkeys(names))}
         # Beside the joint values, the page holds three numbers for the frame of each link, and the
         # distance by which loops are open.
@@ -219,7 +219,7 @@ class SceneCurves:
         most = min(MOST_FRAMES, FRAME_BYTES // size)
         self._frames = Decimation(len(self._places), max(2, most - most % 2))
         # The joints of a scene are in the order of its linkages.
-        self._joints = [self._places[name] for each in moving for name in each.joints]
+        self._joints = [self._places[name] for each in moving for name in each.joint_names]
 
     def add_states(
         self, times: Times, numbers: Numbers, inputs: Sequence[tuple[Sequence[str], Numbers]]

@@ -244,24 +244,26 @@ class SceneRun:
                 member.name,
                 member.prefix,
                 line.closure,
-                member.inputs,
-                member.joints,
+                member.input_names,
+                member.joint_names,
                 tuple(given.unit for given in member.linkage.inputs),
                 Lane(APART, longest=True, most=_MOST_SILENCES, window=window),
             )
-            for member, line in zip(scene.members, pipeline.lines, strict=True)
+            for member, line in zip(scene.linkages, pipeline.lines, strict=True)
         ]
-        inputs = [name for member in scene.members for name in member.sampled]
-        self._states = JointStates(scene.joints, others=False)
+        inputs = [name for member in scene.linkages for name in member.sampled_joints]
+        self._states = JointStates(scene.joint_names, others=False)
         self._samples = JointStates(inputs, others=False)
         self._cranks = {
-            number: Crank(line, [inputs.index(name) for name in line.member.sampled])
+            number: Crank(line, [inputs.index(name) for name in line.member.sampled_joints])
             for number, line in enumerate(pipeline.lines)
             if line.member.drive[0] == 'topic'
         }
-        self._first_joints = [scene.joints.index(linkage.joints[0]) for linkage in self._linkages]
-        self._has_limits = any(member.linkage.limits for member in scene.members)
-        self._tells_toggles = len(scene.members) == 1 and 'velocity' in scene.members[0].effects
+        self._first_joints = [
+            scene.joint_names.index(linkage.joints[0]) for linkage in self._linkages
+        ]
+        self._has_limits = any(member.linkage.limits for member in scene.linkages)
+        self._tells_toggles = len(scene.linkages) == 1 and 'velocity' in scene.linkages[0].effects
         self._health = DiagnosticsSummary(self._lanes, from_beginning)
         bodies = sum(len(each.closure.structure.links) for each in self._linkages[:MOST_LINKAGES])
         topics = run.joint_states_topic, run.crank_topic

@@ -122,7 +122,7 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
             )
         return read_yaml(linkage)
 
-    return _scene(content, data, _SceneSource(name, folder, open_linkage), settings)
+    return _build_scene(content, data, _SceneSource(name, folder, open_linkage), settings)
 
 
 def kind_of(content: Section) -> Literal['scene', 'linkage']:
@@ -138,14 +138,14 @@ def kind_of(content: Section) -> Literal['scene', 'linkage']:
     if not ('linkage' in content or 'linkages' in content):
         if looks_like_linkage(content):
             for key in content:
-                if key in _OF_A_SCENE:
+                if key in _SCENE_KEYS:
                     raise content.error(
                         key,
                         'is a key of scenes, and this is a linkage',
                         f'write it beside linkage: {Path(content.file).name} into another file',
                     )
             return 'linkage'
-        if not any(key in _OF_A_SCENE for key in content):
+        if not any(key in _SCENE_KEYS for key in content):
             raise content.error(
                 '',
                 'is neither a scene nor a linkage',
@@ -173,7 +173,9 @@ def _stand_in(
     scene = parse_yaml(text, f'{content.file}, as a scene')
     # A drive moves one input, which is then published; several inputs come from a topic.
     closed = closure if len(closure.linkage.inputs) == 1 and not settings else None
-    return _scene(scene, text, _SceneSource(name, folder, open_linkage, closed=closed), settings)
+    return _build_scene(
+        scene, text, _SceneSource(name, folder, open_linkage, closed=closed), settings
+    )
 
 
 def parse_scene(
@@ -226,10 +228,10 @@ def parse_scene(
         return parse_yaml(files[part], f'{where}: {part}'), files[part]
 
     source = _SceneSource(name, folder, open_linkage, seed, trust_effects=trust_effects)
-    scene = _scene(content, files[SCENE_FILE], source, settings)
+    scene = _build_scene(content, files[SCENE_FILE], source, settings)
     if not solvers or any(setting.startswith('accuracy=') for setting in settings):
         return scene
-    return replace(scene, members=tuple(_as_chosen(one, solvers) for one in scene.members))
+    return replace(scene, members=tuple(_as_chosen(one, solvers) for one in scene.linkages))
 
 
 def _as_chosen(member: SceneLinkage, solvers: Mapping[str, Any]) -> SceneLinkage:
@@ -245,7 +247,7 @@ def seed_of(name: str) -> int:
     return crc32(name.encode())
 
 
-def _scene(
+def _build_scene(
     content: Section, data: bytes, source: _SceneSource, settings: Sequence[str] = ()
 ) -> Scene:
     """Read a scene with settings beside its file."""
@@ -257,7 +259,7 @@ def _scene(
     try:
         return _read_scene(content, data, source)
     except FileError as error:
-        raise given.blamed(error, content, settings) from None
+        raise given.blame_setting(error, content, settings) from None
 
 
 def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
@@ -266,20 +268,20 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
     seed = seed_of(source.name) if source.seed is None else source.seed
     scene = Scene(
         name=source.name,
-        members=tuple(members),
-        rate=_rate(content),
+        linkages=tuple(members),
+        rate=_read_rate(content),
         wrapped=wrapped,
         seed=content.whole_number('seed', seed, least=0, most=2**53),
         faults=_read_faults(content, members),
-        record=_record(content.section('record')) if 'record' in content else None,
+        record=_read_record(content.section('record')) if 'record' in content else None,
         files={SCENE_FILE: data, **linkage_files},
         folder=source.folder,
         robot_description=content.flag('robot_description', False),
     )
-    for key in _OF_A_MEMBER:
+    for key in _LINKAGE_KEYS:
         if key in content:
             content.remove_key(key)
-    content.finish(('record', 'linkages', *_OF_A_MEMBER))
+    content.finish(('record', 'linkages', *_LINKAGE_KEYS))
     for member in members:
         drive, _ = member.drive
         if scene.rate == 0.0 and drive != 'topic':
@@ -297,7 +299,7 @@ def _read_linkages(
     """Return the linkages of a scene, and their files."""
     if 'linkages' not in content:
         linkage_content, data = source.open_linkage(content)
-        member = _member('', linkage_content, content, content, source, source.closed)
+        member = _read_scene_linkage('', linkage_content, content, content, source, source.closed)
         return [member], {LINKAGE_FILE: data}
     if 'linkage' in content:
         raise content.error('linkage', 'stands beside linkages', 'write one of the two')
@@ -313,19 +315,19 @@ def _read_linkages(
         name = entry.ros_name(entry.text('name'))
         if name in [member.name for member in members]:
             raise entry.error('name', f'{quoted(name)} is taken', 'give each its own')
-        taken = {joint for member in members for joint in member.joints}
-        members.append(_member(name, linkage_content, entry, content, source))
-        if twice := taken.intersection(members[-1].joints):
+        taken = {joint for member in members for joint in member.joint_names}
+        members.append(_read_scene_linkage(name, linkage_content, entry, content, source))
+        if twice := taken.intersection(members[-1].joint_names):
             raise entry.error(
                 'prefix' if 'prefix' in entry else '',
                 f'a second linkage publishes {listed(sorted(twice))}',
                 'give each linkage its own prefix, or its joints names of their own',
             )
-        entry.finish(_OF_A_MEMBER)
+        entry.finish(_LINKAGE_KEYS)
     return members, files
 
 
-_OF_A_MEMBER = (
+_LINKAGE_KEYS = (
     'prefix',
     'publish_input',
     'drive',
@@ -337,11 +339,11 @@ _OF_A_MEMBER = (
 )
 """Keys of an entry of ``linkages``; the scene has them for the entries without."""
 
-_OF_A_SCENE = ('rate', 'seed', 'faults', 'record', 'robot_description', *_OF_A_MEMBER)
+_SCENE_KEYS = ('rate', 'seed', 'faults', 'record', 'robot_description', *_LINKAGE_KEYS)
 """Keys of a scene beside the linkages."""
 
 
-def _member(
+def _read_scene_linkage(
     name: str,
     linkage_content: Section,
     own: Section,
@@ -349,13 +351,13 @@ def _member(
     source: _SceneSource,
     closure: Closure | None = None,
 ) -> SceneLinkage:
-    def where(key: str) -> Section:
+    def section_with(key: str) -> Section:
         return own if key in own else scene
 
-    drives = where('drive').section('drive', required=False)
+    drives = section_with('drive').section('drive', required=False)
     drive = _drive_name(drives)
-    effects = where('effects').section('effects', required=False)
-    loads = where('loads').section('loads') if 'loads' in where('loads') else None
+    effects = section_with('effects').section('effects', required=False)
+    loads = section_with('loads').section('loads') if 'loads' in section_with('loads') else None
     default = drive != 'topic' or 'effort' in effects
     published = where('publish_input').flag('publish_input', default)
     if closure is None:
@@ -367,7 +369,7 @@ def _member(
     not_imported = () if source.trust_effects else tuple(name for name in effects if '.' in name)
     for effect in not_imported:
         effects.section(effect)
-    types = _effects(effects, not_imported)
+    types = _effect_types(effects, not_imported)
     parameters = import_module(DRIVES[drive]).PARAMETERS
     driven = drives.section(drive, required=False)
     member = SceneLinkage(
@@ -377,10 +379,10 @@ def _member(
         drive=(drive, read_parameters(driven, parameters, parts, source.folder)),
         effects={e: read_parameters(effects.section(e), of, parts) for e, of in types.items()},
         loads=_read_loads(loads, parts) if loads is not None else None,
-        prefix=_prefix(where('prefix'), f'{name}_' if name else ''),
+        prefix=_read_prefix(section_with('prefix'), f'{name}_' if name else ''),
         content=own,
         linkage_content=linkage_content,
-        silent_beyond_limits=_silent(where('beyond_limits'), linkage),
+        silent_beyond_limits=_is_silent_beyond(section_with('beyond_limits'), linkage),
         not_imported=not_imported,
         **_read_solving(own, scene, parts),
     )
@@ -420,7 +422,7 @@ def _set_slide_units(sections: Collection[Section], linkage: Linkage) -> None:
         section.units = replace(section.units, slides=slides)
 
 
-def _prefix(content: Section, default: str) -> str:
+def _read_prefix(content: Section, default: str) -> str:
     """Return the prefix of the names of a linkage; '' is one too."""
     prefix = content.text('prefix', '') if 'prefix' in content else default
     if not fullmatch('[A-Za-z0-9_/.-]*', prefix):
@@ -430,7 +432,7 @@ def _prefix(content: Section, default: str) -> str:
     return prefix
 
 
-def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
+def _effect_types(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
     """Return the parameter types of the named effects, in physical order."""
     known = [name for name in effects if name in EFFECTS or '.' in name]
     try:
@@ -440,7 +442,7 @@ def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
         raise effects.locate_error(error) from None
 
 
-def _silent(content: Section, linkage: Linkage) -> bool:
+def _is_silent_beyond(content: Section, linkage: Linkage) -> bool:
     """Return whether nothing is published while a joint is beyond its limits."""
     policy = content.choice('beyond_limits', ('publish', 'silent'), 'publish')
     if (
@@ -463,7 +465,7 @@ def _read_units(content: Section) -> bool:
     return words[0] == 'wrapped'
 
 
-def _rate(content: Section) -> float:
+def _read_rate(content: Section) -> float:
     rate = content.number('rate', 1000.0, least=0.0, most=HIGHEST_RATE, unit='Hz')
     if 0.0 < rate < LOWEST_RATE:
         raise content.error(
@@ -474,7 +476,7 @@ def _rate(content: Section) -> float:
     return rate
 
 
-def _record(content: Section) -> RecordParameters:
+def _read_record(content: Section) -> RecordParameters:
     record = RecordParameters(
         directory=content.text('directory', 'runs'),
         name=content.text('name', ''),
@@ -503,7 +505,7 @@ def _read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
 def _read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
     """Return a solver's name and parameters; the file may give the name alone."""
     if isinstance(where.mapping['solver'], str):
-        return _named(where)
+        return _name_and_value(where)
     solvers = where.section('solver')
     named = list(solvers)
     if len(named) > 1:
@@ -516,7 +518,7 @@ def _read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
     return name, read_parameters(solvers.section(name), parameters, parts)
 
 
-def _named(where: Section) -> tuple[str, Any]:
+def _name_and_value(where: Section) -> tuple[str, Any]:
     name = where.text('solver')
     if name not in SOLVERS:
         known = f'known: {listed(SOLVERS)}'
@@ -541,7 +543,7 @@ def _read_loads(content: Section, parts: Parts) -> Loads:
         gravity=content.point('gravity', most=1e3, unit='m/s²')
         if 'gravity' in content
         else (0.0, 0.0),
-        springs=tuple(_spring(name, springs.section(name)) for name in springs),
+        springs=tuple(_read_spring(name, springs.section(name)) for name in springs),
         drive_inertia=content.number(
             'drive_inertia', 0.0, least=0.0, most=GREATEST_LOAD, unit='kg·m², or kg of a slide'
         ),
@@ -551,10 +553,10 @@ def _read_loads(content: Section, parts: Parts) -> Loads:
     return replace(loads, applied=read_parameters(content, AppliedLoads, parts))
 
 
-def _spring(name: str, content: Section) -> Spring:
+def _read_spring(name: str, content: Section) -> Spring:
     spring = Spring(
-        *_end(content, 'from'),
-        *_end(content, 'to'),
+        *_read_spring_end(content, 'from'),
+        *_read_spring_end(content, 'to'),
         content.number('stiffness', least=0.0, most=STIFFEST, unit='N/m'),
         content.number('free_length', 0.0, least=0.0, most=GREATEST_LOAD, unit='m'),
         content.number('damping', 0.0, least=0.0, most=STIFFEST, unit='N·s/m'),
@@ -564,7 +566,7 @@ def _spring(name: str, content: Section) -> Spring:
     return spring
 
 
-def _end(content: Section, key: str) -> tuple[str, str]:
+def _read_spring_end(content: Section, key: str) -> tuple[str, str]:
     """Return link and point of a spring's end."""
     link, dot, point = content.text(key).rpartition('.')
     if not dot or not link or not point:
@@ -579,12 +581,14 @@ def _read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str,
     for member in members:
         for kind, names in parts_of(member.linkage).items():
             parts[kind] = (*parts.get(kind, ()), *(member.prefix + name for name in names))
-    return {section.ros_name(name): _fault(name, section.section(name), parts) for name in section}
+    return {
+        section.ros_name(name): _read_fault(name, section.section(name), parts) for name in section
+    }
 
 
 def kinds_of_fault(name: str, kinds: Sequence[str]) -> tuple[str, str]:
     """Return reason and remedy for a fault that names no kind, or several."""
-    from linkage_ros.faults import FAULTS  # local import: only where a scene has faults
+    from linkage_ros.faults import FAULTS  # local import: only section_with a scene has faults
 
     if kinds:
         return f'names {len(kinds)} kinds of fault', f'leave all but one of {listed(kinds)} out'
@@ -595,7 +599,7 @@ def kinds_of_fault(name: str, kinds: Sequence[str]) -> tuple[str, str]:
     return 'names no kind of fault', f'write {shape}; kinds: {listed(FAULTS)}'
 
 
-def _fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
+def _read_fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
     from linkage_ros.faults import Fault, FAULTS  # local import: as above
 
     kinds = [key for key in content if key in FAULTS]

@@ -38,11 +38,11 @@ _WEAK = 0.1
 
 def scene_notes(scene: Scene) -> Iterator[FileError]:
     """Yield the notes on a scene and its linkages."""
-    for member in scene.members:
+    for member in scene.linkages:
         content = member.linkage_content
         notes = linkage_notes(member.linkage, content.units, scene.rate)
         yield from map(content.locate_error, notes)
-        yield from map(member.content.locate_error, _of_member(member))
+        yield from map(member.content.locate_error, _linkage_notes(member))
 
 
 def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator[DefinitionError]:
@@ -59,7 +59,7 @@ def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator
                 f'{max(ends):g} rad is more than a turn',
                 'if it is in degrees, write angles: degrees',
             )
-    lengths = _lengths(linkage)
+    lengths = _link_lengths(linkage)
     if not lengths:
         return
     shortest, longest = (of(lengths, key=lengths.__getitem__) for of in (min, max))
@@ -78,7 +78,7 @@ def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator
         )
 
 
-def _lengths(linkage: Linkage) -> dict[str, float]:
+def _link_lengths(linkage: Linkage) -> dict[str, float]:
     """Return for each link the greatest distance between its pins, in [m]."""
     pins = {name for name, links in links_by_point(linkage.links).items() if len(links) > 1}
     lengths = {}
@@ -89,10 +89,10 @@ def _lengths(linkage: Linkage) -> dict[str, float]:
     return lengths
 
 
-def _of_member(member: SceneLinkage) -> Iterator[DefinitionError]:
-    drive, parameters = member.drive
-    if member.content.units.angle == 'radians' and hasattr(parameters, 'amplitude'):
-        for given in member.linkage.inputs:
+def _linkage_notes(scene_linkage: SceneLinkage) -> Iterator[DefinitionError]:
+    drive, parameters = scene_linkage.drive
+    if scene_linkage.content.units.angle == 'radians' and hasattr(parameters, 'amplitude'):
+        for given in scene_linkage.linkage.inputs:
             own = given.joint in parameters.inputs
             amplitude = (parameters.inputs[given.joint] if own else parameters).amplitude
             if not given.slider and amplitude > tau:
@@ -102,8 +102,8 @@ def _of_member(member: SceneLinkage) -> Iterator[DefinitionError]:
                     f'{amplitude:g} rad is more than a turn',
                     'if it is in degrees, write angles: degrees',
                 )
-    if member.loads is not None and 0.0 < hypot(*member.loads.gravity) < _WEAK:
-        x, y = member.loads.gravity
+    if scene_linkage.loads is not None and 0.0 < hypot(*scene_linkage.loads.gravity) < _WEAK:
+        x, y = scene_linkage.loads.gravity
         yield DefinitionError(
             'loads.gravity',
             f'[{x:g}, {y:g}] m/s² is hardly any',

@@ -47,11 +47,11 @@ def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> byte
     """
     parts = [
         Part(closure, member.prefix, member.loads, scene.wrapped)
-        for member, closure in zip(scene.members, closures, strict=True)
+        for member, closure in zip(scene.linkages, closures, strict=True)
     ]
     try:
         return write(scene.name, parts)
     except PartError as error:
-        member = scene.members[error.number]
+        member = scene.linkages[error.number]
         content = member.linkage_content if error.of_linkage else member.content
         raise content.locate_error(error) from None

@@ -142,22 +142,22 @@ class SceneLinkage:
     not_imported: tuple[str, ...] = ()
 
     @property
-    def joints(self) -> tuple[str, ...]:
+    def joint_names(self) -> tuple[str, ...]:
         """Return the published names of its joints."""
         return tuple(self.prefix + joint for joint in self.linkage.joints)
 
     @property
-    def inputs(self) -> tuple[str, ...]:
+    def input_names(self) -> tuple[str, ...]:
         """Return the names of its driven joints, as in messages."""
         return tuple(self.prefix + given.joint for given in self.linkage.inputs)
 
     @property
-    def sampled(self) -> tuple[str, ...]:
+    def sampled_joints(self) -> tuple[str, ...]:
         """Return the joints that samples for its drive name: the driven ones, or a dependent."""
-        return (self.prefix + self.dependent,) if self.dependent else self.inputs
+        return (self.prefix + self.dependent_joint,) if self.dependent_joint else self.input_names
 
     @property
-    def dependent(self) -> str:
+    def dependent_joint(self) -> str:
         """Return the dependent joint that samples name instead of the input; '' for none."""
         name, parameters = self.drive
         return parameters.joint if name == 'topic' else ''
@@ -194,7 +194,7 @@ class Scene:
     """
 
     name: str
-    members: tuple[SceneLinkage, ...]
+    linkages: tuple[SceneLinkage, ...]
     rate: float
     wrapped: bool
     seed: int
@@ -205,23 +205,25 @@ class Scene:
     robot_description: bool = False
 
     def __repr__(self) -> str:
-        linkages = 'linkage' if len(self.members) == 1 else 'linkages'
-        return f'<Scene {self.name}: {len(self.members)} {linkages}, {self.rate:g} Hz>'
+        linkages = 'linkage' if len(self.linkages) == 1 else 'linkages'
+        return f'<Scene {self.name}: {len(self.linkages)} {linkages}, {self.rate:g} Hz>'
 
     @property
-    def joints(self) -> tuple[str, ...]:
+    def joint_names(self) -> tuple[str, ...]:
         """Return the names of all published joints, in order."""
-        return tuple(joint for member in self.members for joint in member.joints)
+        return tuple(joint for member in self.linkages for joint in member.joint_names)
 
     @property
     def dependent_joints(self) -> frozenset[str]:
         """Return the names of the published joints that depend on others."""
-        return frozenset(self.joints).difference(*(member.inputs for member in self.members))
+        return frozenset(self.joint_names).difference(
+            *(member.input_names for member in self.linkages)
+        )
 
     @property
     def not_imported(self) -> tuple[str, ...]:
         """Return the names of the user-defined effects that were not imported."""
-        named = (effect for member in self.members for effect in member.not_imported)
+        named = (effect for member in self.linkages for effect in member.not_imported)
         return tuple(dict.fromkeys(named))
 
 

@@ -86,11 +86,11 @@ def as_text(schema: Schema) -> str:
     return json.dumps(schema, indent=2, ensure_ascii=False, allow_nan=False) + '\n'
 
 
-def _text(description: str, pattern: str = f'^{CHARACTER}+$') -> Schema:
+def _text_schema(description: str, pattern: str = f'^{CHARACTER}+$') -> Schema:
     return TextOf(description, pattern).json_schema()
 
 
-def _number(
+def _number_schema(
     description: str,
     unit: str = '',
     *,
@@ -101,7 +101,7 @@ def _number(
     return Number(description, unit, least, most, above).json_schema()
 
 
-def _point(description: str, unit: str, most: float) -> Schema:
+def _point_schema(description: str, unit: str, most: float) -> Schema:
     return Point(description, unit, most).json_schema()
 
 
@@ -116,16 +116,16 @@ def scene_schema() -> Schema:
     whole = mapping_schema(
         'A linkage or several, what drives them, what is called for, and a recording.',
         {
-            'linkage': _text(_NAMED),
-            'linkages': _linkages(own),
+            'linkage': _text_schema(_NAMED),
+            'linkages': _linkages_schema(own),
             'rate': {
-                **_number(_RATE, 'Hz', least=0.0, most=HIGHEST_RATE),
+                **_number_schema(_RATE, 'Hz', least=0.0, most=HIGHEST_RATE),
                 'if': {'type': 'number', 'exclusiveMinimum': 0},
-                'then': _number(_RATE, 'Hz', least=LOWEST_RATE),
+                'then': _number_schema(_RATE, 'Hz', least=LOWEST_RATE),
                 'default': 1000,
             },
-            'units': _units(),
-            'angles': _angles(),
+            'units': _units_schema(),
+            'angles': _angles_schema(),
             'seed': {
                 'description': 'From which everything random comes; if not said, a number that '
                 'follows from the name of the scene.',
@@ -135,10 +135,14 @@ def scene_schema() -> Schema:
             },
             **own,
             'faults': {
-                **named_mapping('What can go wrong on demand, by a name for each.', _fault()),
-                'propertyNames': _text('a name: letters, digits and _, a letter first', ROS_NAME),
+                **named_mapping(
+                    'What can go wrong on demand, by a name for each.', _fault_schema()
+                ),
+                'propertyNames': _text_schema(
+                    'a name: letters, digits and _, a letter first', ROS_NAME
+                ),
             },
-            'record': _record(),
+            'record': _record_schema(),
             'robot_description': {
                 'description': 'Whether the node publishes the linkages as URDF on '
                 'robot_description.',
@@ -159,7 +163,7 @@ def scene_schema() -> Schema:
     }
 
 
-def _units() -> Schema:
+def _units_schema() -> Schema:
     return {
         'description': 'Unit of the lengths in this file: of all values whose unit is m, m/s or '
         'm/s². All other units are SI.',
@@ -168,7 +172,7 @@ def _units() -> Schema:
     }
 
 
-def _angles() -> Schema:
+def _angles_schema() -> Schema:
     one = {'enum': [*PUBLISHED_ANGLES, *ANGLES]}
     return {
         'description': 'Whether published angles run on or lie in (−π, π]; and the unit of the '
@@ -181,15 +185,15 @@ def _angles() -> Schema:
     }
 
 
-def _linkages(own: Mapping[str, Schema]) -> Schema:
+def _linkages_schema(own: Mapping[str, Schema]) -> Schema:
     one = mapping_schema(
         'A linkage; what it does not say for itself is as the scene says.',
         {
-            'name': _text(
+            'name': _text_schema(
                 'its name, which its joints have before their own: letters, digits and _',
                 ROS_NAME,
             ),
-            'linkage': _text(_NAMED),
+            'linkage': _text_schema(_NAMED),
             **own,
         },
         required=('name', 'linkage'),
@@ -237,8 +241,8 @@ def _of_a_linkage() -> dict[str, Schema]:
             'patternProperties': {DOTTED: _OWN_EFFECT},
             'default': {},
         },
-        'solver': _solver(),
-        'accuracy': _number(
+        'solver': _solver_schema(),
+        'accuracy': _number_schema(
             'Of the positions: the cheapest solver that proves it is chosen.',
             'rad and m',
             least=FINEST_ACCURACY,
@@ -247,10 +251,12 @@ def _of_a_linkage() -> dict[str, Schema]:
         'loads': mapping_schema(
             'The forces that act on the links, where effects or the drive ask for them.',
             {
-                'gravity': {**_point('gravity: [x, y]', 'm/s²', 1e3), 'default': [0, 0]},
-                'springs': named_mapping('springs between points of links, by name', _spring()),
+                'gravity': {**_point_schema('gravity: [x, y]', 'm/s²', 1e3), 'default': [0, 0]},
+                'springs': named_mapping(
+                    'springs between points of links, by name', _spring_schema()
+                ),
                 'drive_inertia': {
-                    **_number(
+                    **_number_schema(
                         'of the motor, at the input',
                         'kg·m², or kg of a slide',
                         least=0.0,
@@ -264,7 +270,7 @@ def _of_a_linkage() -> dict[str, Schema]:
     }
 
 
-def _solver() -> Schema:
+def _solver_schema() -> Schema:
     solvers = parameter_types(SOLVERS)
     alone = [
         name
@@ -285,16 +291,16 @@ def _solver() -> Schema:
     }
 
 
-def _spring() -> Schema:
-    end = _text('where it ends: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
-    free = _number('length without a force', 'm', least=0.0, most=GREATEST_LOAD)
-    damping = _number('damping along it', 'N·s/m', least=0.0, most=STIFFEST)
+def _spring_schema() -> Schema:
+    end = _text_schema('where it ends: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
+    free = _number_schema('length without a force', 'm', least=0.0, most=GREATEST_LOAD)
+    damping = _number_schema('damping along it', 'N·s/m', least=0.0, most=STIFFEST)
     return mapping_schema(
         'A spring, with a damper beside it.',
         {
             'from': end,
             'to': end,
-            'stiffness': _number('stiffness', 'N/m', least=0.0, most=STIFFEST),
+            'stiffness': _number_schema('stiffness', 'N/m', least=0.0, most=STIFFEST),
             'free_length': {**free, 'default': 0},
             'damping': {**damping, 'default': 0},
         },
@@ -302,7 +308,7 @@ def _spring() -> Schema:
     )
 
 
-def _fault() -> Schema:
+def _fault_schema() -> Schema:
     kinds = {name: parameters_schema(of) for name, of in FAULTS.items()}
     return {
         **mapping_schema(
@@ -312,9 +318,9 @@ def _fault() -> Schema:
                 'at': {
                     'description': 'when it is injected by itself, from the first tick on [s]',
                     'type': 'array',
-                    'items': _number('a time', 's', least=0.0, most=1e9),
+                    'items': _number_schema('a time', 's', least=0.0, most=1e9),
                 },
-                'seconds': _number('how long it lasts then', 's', least=1e-6, most=1e9),
+                'seconds': _number_schema('how long it lasts then', 's', least=1e-6, most=1e9),
             },
         ),
         'oneOf': [{'required': [kind]} for kind in kinds],
@@ -324,7 +330,7 @@ def _fault() -> Schema:
     }
 
 
-def _record() -> Schema:
+def _record_schema() -> Schema:
     storage = parameters_schema(StorageParameters)['properties']
     for key, least in LEASTS.items():
         above = {'if': {'exclusiveMinimum': 0}, 'then': {'minimum': least}}
@@ -333,11 +339,13 @@ def _record() -> Schema:
         'How the run is recorded; without it, it is not.',
         {
             'directory': {
-                **_text("folder of the bags' folders, relative to where the node is started"),
+                **_text_schema(
+                    "folder of the bags' folders, relative to where the node is started"
+                ),
                 'default': 'runs',
             },
             'name': {
-                **_text(
+                **_text_schema(
                     "name of the bag's folder; '': the scene's name and the time; one that exists "
                     'gets a number',
                     rf'^(?!\.\.?$)(?!.*/){CHARACTER}*$',
@@ -356,7 +364,7 @@ def _record() -> Schema:
         },
     )
     one = {'required': ['split_bytes'], 'properties': {'split_bytes': {'maximum': 0}}}
-    split = {'anyOf': [{'not': one}, _wanted('split_seconds')]}
+    split = {'anyOf': [{'not': one}, _wanted_schema('split_seconds')]}
     one_file = f'without {" or ".join(SPLITS)} there is one file'
     alone = {'properties': {'keep_files': {'description': one_file, 'maximum': 0}}}
     in_memory = 'leave it out: with snapshot_seconds the run is kept in memory'
@@ -368,7 +376,7 @@ def _record() -> Schema:
         'allOf': [
             {'if': split, 'else': alone},
             {
-                'if': _wanted('snapshot_seconds'),
+                'if': _wanted_schema('snapshot_seconds'),
                 'then': {'properties': dict.fromkeys(AS_THE_RUN_GOES, for_a_run)},
                 'else': {'properties': {'snapshot_bytes': for_memory}},
             },
@@ -376,15 +384,20 @@ def _record() -> Schema:
     }
 
 
-def _wanted(key: str) -> Schema:
+def _wanted_schema(key: str) -> Schema:
     """Return the schema of a mapping in which a number is given and not 0."""
     return {'required': [key], 'properties': {key: {'exclusiveMinimum': 0}}}
 
 
 def linkage_schema() -> Schema:
     """Return the schema of a linkage file."""
-    units = {'units': _units(), 'angles': _choice('Unit of the angles.', ANGLES, ANGLES[0])}
-    whole = mapping_schema('A planar linkage.', {**units, **_keys(), **_shorthands()})
+    units = {
+        'units': _units_schema(),
+        'angles': _choice_schema('Unit of the angles.', ANGLES, ANGLES[0]),
+    }
+    whole = mapping_schema(
+        'A planar linkage.', {**units, **_linkage_keys(), **_shorthand_schemas()}
+    )
     return {
         '$schema': DIALECT,
         'title': 'Linkage',
@@ -398,40 +411,42 @@ def linkage_schema() -> Schema:
     }
 
 
-def _keys() -> dict[str, Schema]:
-    place = _point('where the point lies in the frame of its link: [x, y]', 'm', FARTHEST)
+def _linkage_keys() -> dict[str, Schema]:
+    place = _point_schema('where the point lies in the frame of its link: [x, y]', 'm', FARTHEST)
     return {
         'links': named_mapping(
             'Links, each with its points; a point on two links is a pin; one link is the ground.',
             named_mapping('points of the link, by name', place),
         ),
-        'input': _input(),
+        'input': _input_schema(),
         'assembly': named_mapping(
             'Of each pin or slider that closes a dyad, the side on which it lies, unless `pose` '
             'tells it.',
-            _choice('the side', ('left', 'right', 'ahead', 'behind')),
+            _choice_schema('the side', ('left', 'right', 'ahead', 'behind')),
         ),
-        'sliders': named_mapping('Points that stay on lines of other links, by name.', _slider()),
+        'sliders': named_mapping(
+            'Points that stay on lines of other links, by name.', _slider_schema()
+        ),
         'joints': {
-            **named_mapping('What is published, in this order, by name.', _joint()),
+            **named_mapping('What is published, in this order, by name.', _joint_schema()),
             'minProperties': 1,
         },
         'ratios': named_mapping(
-            'Joints that follow others: gears, belts, racks, mimic.', _ratio()
+            'Joints that follow others: gears, belts, racks, mimic.', _ratio_schema()
         ),
         'traced': {
             'description': 'Points whose paths are drawn.',
             'type': 'array',
-            'items': _text('a point'),
+            'items': _text_schema('a point'),
         },
-        'pose': _pose(),
-        'masses': named_mapping('What the links weigh, by their names.', _mass()),
+        'pose': _pose_schema(),
+        'masses': named_mapping('What the links weigh, by their names.', _mass_schema()),
     }
 
 
-def _shorthands() -> dict[str, Schema]:
+def _shorthand_schemas() -> dict[str, Schema]:
     lengths = {
-        key: _number(link, 'm', above=0.0, most=FARTHEST)
+        key: _number_schema(link, 'm', above=0.0, most=FARTHEST)
         for key, link in zip('abcd', ('crank', 'coupler', 'rocker', 'ground'), strict=True)
     }
     left, ahead = ('left', 'right'), ('ahead', 'behind')
@@ -440,8 +455,8 @@ def _shorthands() -> dict[str, Schema]:
             'A four-bar by the lengths of its links; stands for a file written out.',
             {
                 **lengths,
-                'assembly': _choice('side of A→O4 on which B lies', left, left[0]),
-                'pose': _pose(),
+                'assembly': _choice_schema('side of A→O4 on which B lies', left, left[0]),
+                'pose': _pose_schema(),
                 **_limits_of('coupler_joint', 'rocker_joint'),
             },
             required=tuple(lengths),
@@ -449,10 +464,12 @@ def _shorthands() -> dict[str, Schema]:
         'inverted_slider_crank': mapping_schema(
             'A crank whose rod slides through a swivel; stands for a file written out.',
             {
-                'a': _number('crank', 'm', above=0.0, most=FARTHEST),
-                'swivel': _point("the swivel from the crank's pivot: [x, y]", 'm', FARTHEST),
-                'assembly': _choice('side of B on which the swivel lies', ahead, ahead[0]),
-                'pose': _pose(),
+                'a': _number_schema('crank', 'm', above=0.0, most=FARTHEST),
+                'swivel': _point_schema(
+                    "the swivel from the crank's pivot: [x, y]", 'm', FARTHEST
+                ),
+                'assembly': _choice_schema('side of B on which the swivel lies', ahead, ahead[0]),
+                'pose': _pose_schema(),
                 **_limits_of('rod_joint', 'rod_slide'),
             },
             required=('a', 'swivel'),
@@ -460,17 +477,19 @@ def _shorthands() -> dict[str, Schema]:
     }
 
 
-def _input() -> Schema:
+def _input_schema() -> Schema:
     """Return the schema of one input, or a list of them."""
     one = {
         **mapping_schema(
             'The driven joint; several in a list.',
             {
-                'joint': _text('its name in crank messages'),
-                'parent': _text('the link that carries the motor'),
-                'child': _text('the link that is turned'),
-                'slider': _text('the slider that is driven, in the place of parent and child'),
-                **_limits(),
+                'joint': _text_schema('its name in crank messages'),
+                'parent': _text_schema('the link that carries the motor'),
+                'child': _text_schema('the link that is turned'),
+                'slider': _text_schema(
+                    'the slider that is driven, in the place of parent and child'
+                ),
+                **_limits_schemas(),
             },
             required=('joint',),
         ),
@@ -484,18 +503,18 @@ def _input() -> Schema:
     }
 
 
-def _ratio() -> Schema:
+def _ratio_schema() -> Schema:
     return mapping_schema(
         'A published joint, as ratio · other joint + offset.',
         {
-            'of': _text('the joint that it follows: an input, or a published joint'),
-            'ratio': _number(
+            'of': _text_schema('the joint that it follows: an input, or a published joint'),
+            'ratio': _number_schema(
                 'how far it moves, in rad or units of length, where the other one moves by 1',
                 least=-FARTHEST,
                 most=FARTHEST,
             )
             | {'default': 1},
-            'offset': _number(
+            'offset': _number_schema(
                 'its value where the other one is at 0', 'rad or m', least=-FARTHEST, most=FARTHEST
             )
             | {'default': 0},
@@ -504,22 +523,22 @@ def _ratio() -> Schema:
     )
 
 
-def _joint() -> Schema:
+def _joint_schema() -> Schema:
     return {
         **mapping_schema(
             "The child's angle less the parent's [rad], or the slide of a slider [m].",
             {
-                'parent': _text('the link from which the angle is measured'),
-                'child': _text('the link whose angle it is'),
-                'slider': _text('the slider, in the place of parent and child'),
-                **_limits(),
+                'parent': _text_schema('the link from which the angle is measured'),
+                'child': _text_schema('the link whose angle it is'),
+                'slider': _text_schema('the slider, in the place of parent and child'),
+                **_limits_schemas(),
             },
         ),
         **_either_slider,
     }
 
 
-def _limits() -> dict[str, Schema]:
+def _limits_schemas() -> dict[str, Schema]:
     """Return the schemas of a joint's limits."""
     return {
         'limits': {
@@ -531,18 +550,20 @@ def _limits() -> dict[str, Schema]:
             # The bounds may be -.inf and .inf: JSON Schema accepts these as numbers.
             'items': {'type': 'number'},
         },
-        'velocity': _number('its greatest rate', 'rad/s or m/s', above=0.0, most=FARTHEST),
-        'effort': _number('its greatest torque or force', 'N·m or N', above=0.0, most=STRONGEST),
+        'velocity': _number_schema('its greatest rate', 'rad/s or m/s', above=0.0, most=FARTHEST),
+        'effort': _number_schema(
+            'its greatest torque or force', 'N·m or N', above=0.0, most=STRONGEST
+        ),
     }
 
 
 def _limits_of(*joints: str) -> dict[str, Schema]:
     """Return the schemas of the limits that a shorthand gives to its joints."""
     return {
-        'input': mapping_schema('What the driven joint can do.', _limits()),
+        'input': mapping_schema('What the driven joint can do.', _limits_schemas()),
         'joints': mapping_schema(
             'What the published joints can do, by their names.',
-            {name: mapping_schema('What the joint can do.', _limits()) for name in joints},
+            {name: mapping_schema('What the joint can do.', _limits_schemas()) for name in joints},
         ),
     }
 
@@ -554,21 +575,25 @@ _either_slider: Schema = {
 }
 
 
-def _slider() -> Schema:
+def _slider_schema() -> Schema:
     return {
         **mapping_schema(
             'A point that stays on a line of the link `along`.',
             {
-                'point': _text('the point; no point of `along`'),
-                'along': _text('the link that carries the line'),
-                'through': _text('point of `along` on the line; the slide is measured from it'),
-                'direction': _point('of the line, in the frame of `along`: [x, y]', '', FARTHEST),
+                'point': _text_schema('the point; no point of `along`'),
+                'along': _text_schema('the link that carries the line'),
+                'through': _text_schema(
+                    'point of `along` on the line; the slide is measured from it'
+                ),
+                'direction': _point_schema(
+                    'of the line, in the frame of `along`: [x, y]', '', FARTHEST
+                ),
                 'block': {
-                    **_text('the link that slides without turning', f'^{CHARACTER}*$'),
+                    **_text_schema('the link that slides without turning', f'^{CHARACTER}*$'),
                     'default': '',
                 },
                 'angle': {
-                    **_number(
+                    **_number_schema(
                         'angle of the block less that of `along`',
                         'rad',
                         least=-FARTHEST,
@@ -584,7 +609,7 @@ def _slider() -> Schema:
     }
 
 
-def _pose() -> Schema:
+def _pose_schema() -> Schema:
     return mapping_schema(
         'The linkage as drawn, where it starts. Points and angles tell the assembly, as few as '
         'tell it; of links that no dyad covers they start the iteration.',
@@ -592,28 +617,30 @@ def _pose() -> Schema:
             'inputs': {
                 'description': 'a value for each input [rad or m]',
                 'type': 'array',
-                'items': _number('a value', 'rad or m', least=-FARTHEST, most=FARTHEST),
+                'items': _number_schema('a value', 'rad or m', least=-FARTHEST, most=FARTHEST),
             },
             'points': named_mapping(
                 'points in the frame of the ground, roughly',
-                _point('[x, y]', 'm', FARTHEST),
+                _point_schema('[x, y]', 'm', FARTHEST),
             ),
             'angles': named_mapping(
                 'angles of links to the ground, roughly',
-                _number('the angle', 'rad', least=-FARTHEST, most=FARTHEST),
+                _number_schema('the angle', 'rad', least=-FARTHEST, most=FARTHEST),
             ),
         },
         required=('inputs',),
     )
 
 
-def _mass() -> Schema:
+def _mass_schema() -> Schema:
     return mapping_schema(
         'What a link weighs.',
         {
-            'mass': _number('mass; 0: the link is massless', 'kg', least=0.0, most=HEAVIEST),
-            'center': _point("centre of mass in the link's frame: [x, y]", 'm', FARTHEST),
-            'inertia': _number(
+            'mass': _number_schema(
+                'mass; 0: the link is massless', 'kg', least=0.0, most=HEAVIEST
+            ),
+            'center': _point_schema("centre of mass in the link's frame: [x, y]", 'm', FARTHEST),
+            'inertia': _number_schema(
                 'moment of inertia about the centre of mass', 'kg·m²', least=0.0, most=HEAVIEST
             ),
         },
@@ -621,6 +648,6 @@ def _mass() -> Schema:
     )
 
 
-def _choice(description: str, words: tuple[str, ...], default: str = '') -> Schema:
+def _choice_schema(description: str, words: tuple[str, ...], default: str = '') -> Schema:
     schema: Schema = {'description': description, 'enum': list(words)}
     return {**schema, 'default': default} if default else schema

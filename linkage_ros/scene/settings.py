@@ -54,14 +54,16 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
         parts = _PART.findall(key)
         # On one line no value can add further keys.
         if not (equal and parts) or '.'.join(parts) != key or not setting.isprintable():
-            raise _error(setting, f'{quoted(setting)} is no setting', 'write KEY=VALUE: rate=500')
+            raise _setting_error(
+                setting, f'{quoted(setting)} is no setting', 'write KEY=VALUE: rate=500'
+            )
         within: Any = content.mapping
         outer = ''
         while (part := _next_part(within, parts)) and parts:
-            within, outer = _inner(setting, within, part), part
-        within, last = _mapping(setting, outer, within), part
+            within, outer = _inner_value(setting, within, part), part
+        within, last = _require_mapping(setting, outer, within), part
         within.lines.setdefault(last, 0)
-        within[last] = _value(setting, text)
+        within[last] = _parse_value(setting, text)
     head = ''.join(f'# --set {setting}\n' for setting in settings)
     return (head + yaml.dump(content.mapping, Dumper=_Dumper, sort_keys=False)).encode()
 
@@ -81,12 +83,12 @@ def _next_part(within: Any, parts: list[str]) -> str:
     return part.strip('"')
 
 
-def _inner(setting: str, within: Any, part: str) -> Any:
+def _inner_value(setting: str, within: Any, part: str) -> Any:
     """Return what a key of a mapping holds, or the linkage of a name in a list of them."""
     if isinstance(within, list):
-        names = _names(within)
+        names = _linkage_names(within)
         if part not in names:
-            raise _error(
+            raise _setting_error(
                 setting,
                 f'there is no linkage {quoted(part)}',
                 did_you_mean(part, names, f'there are: {listed(names)}'),
@@ -94,46 +96,50 @@ def _inner(setting: str, within: Any, part: str) -> Any:
         return within[names.index(part)]
     within.lines.setdefault(part, 0)
     inner = within.setdefault(part, LinedDict())
-    return inner if part == 'linkages' and _names(inner) else _mapping(setting, part, inner)
+    return (
+        inner
+        if part == 'linkages' and _linkage_names(inner)
+        else _require_mapping(setting, part, inner)
+    )
 
 
-def _mapping(setting: str, part: str, inner: Any) -> LinedDict:
+def _require_mapping(setting: str, part: str, inner: Any) -> LinedDict:
     if not isinstance(inner, LinedDict):
-        raise _error(setting, f'{part} is {quoted(inner)}', 'name a key in a mapping')
+        raise _setting_error(setting, f'{part} is {quoted(inner)}', 'name a key in a mapping')
     return inner
 
 
-def _names(entries: Any) -> list[str]:
+def _linkage_names(entries: Any) -> list[str]:
     """Return the names of the linkages in a list; [] for anything else."""
     if not isinstance(entries, list):
         return []
     return [str(one.get('name')) if isinstance(one, LinedDict) else '' for one in entries]
 
 
-def _value(setting: str, text: str) -> Any:
+def _parse_value(setting: str, text: str) -> Any:
     try:
         return parse_yaml(f'value: {text}'.encode(), setting).mapping['value']
     except FileError as error:
-        raise _error(setting, error.reason, 'write its value as YAML') from None
+        raise _setting_error(setting, error.reason, 'write its value as YAML') from None
 
 
-def blamed(error: FileError, content: Section, settings: Sequence[str]) -> FileError:
+def blame_setting(error: FileError, content: Section, settings: Sequence[str]) -> FileError:
     """Return an error of a scene; it names the setting that it is about instead of the file."""
     for setting in reversed(settings):
         key = setting.partition('=')[0].replace('"', '')
-        if error.file == content.file and _is_within(error.key, _counted(content, key)):
+        if error.file == content.file and _is_within(error.key, _counted_key(content, key)):
             remedy = error.remedy
             mapping = remedy.removeprefix(f'write {key.rpartition(".")[2]}: ')
             if mapping != remedy:  # as in a file
                 remedy = f"write --set '{key}={mapping}'"
-            return _error(setting, f'{error.key}: {error.reason}', remedy)
+            return _setting_error(setting, f'{error.key}: {error.reason}', remedy)
     return error
 
 
-def _counted(content: Section, key: str) -> str:
+def _counted_key(content: Section, key: str) -> str:
     """Return a key as errors have it, which count the linkages: ``linkages[1].drive``."""
     first, _, rest = key.partition('.')
-    names = _names(content.mapping.get(first)) if first == 'linkages' else []
+    names = _linkage_names(content.mapping.get(first)) if first == 'linkages' else []
     name, dot, last = rest.partition('.')
     return f'{first}[{names.index(name) + 1}]{dot}{last}' if name in names else key
 
@@ -144,5 +150,5 @@ def _is_within(key: str, other: str) -> bool:
     return bool(key) and f'{long}.'.startswith(f'{short}.')
 
 
-def _error(setting: str, reason: str, remedy: str) -> FileError:
+def _setting_error(setting: str, reason: str, remedy: str) -> FileError:
     return FileError(f'--set {setting}', '', reason, remedy)

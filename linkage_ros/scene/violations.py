@@ -60,7 +60,7 @@ def import_jsonschema() -> ModuleType:
     return jsonschema
 
 
-def violations(content: Section, schema: Schema) -> list[FileError]:
+def find_violations(content: Section, schema: Schema) -> list[FileError]:
     """
     Return the violations in a file, in the order of its lines.
 
@@ -77,19 +77,23 @@ def violations(content: Section, schema: Schema) -> list[FileError]:
     broken: list[ValidationError] = list(validator.iter_errors(whole))
     # A value of the wrong type breaks further rules, which are not worth reporting.
     mistyped = {tuple(error.absolute_path) for error in broken if error.validator == 'type'}
-    units = _units(whole)
+    units = _file_units(whole)
     errors = [
         FileError(
-            content.file, _dotted(path), reason, units.convert_brackets(remedy), _line(whole, path)
+            content.file,
+            _dotted_path(path),
+            reason,
+            units.convert_brackets(remedy),
+            _line_number(whole, path),
         )
         for error in broken
         if error.validator == 'type' or tuple(error.absolute_path) not in mistyped
-        for path, reason, remedy in _problems(error, schema)
+        for path, reason, remedy in _describe_error(error, schema)
     ]
     return sorted(errors, key=lambda error: (error.line, error.key))
 
 
-def _units(whole: Mapping[str, Any]) -> Units:
+def _file_units(whole: Mapping[str, Any]) -> Units:
     """Return the units of a file; where they are wrong themselves, SI."""
     length, angle = whole.get('units'), whole.get('angles')
     degrees = angle == ANGLES[1] or (isinstance(angle, list) and ANGLES[1] in angle)
@@ -98,7 +102,7 @@ def _units(whole: Mapping[str, Any]) -> Units:
     return Units(length, ANGLES[1] if degrees else ANGLES[0])
 
 
-def _problems(error: ValidationError, whole: Schema) -> Iterator[_Problem]:
+def _describe_error(error: ValidationError, whole: Schema) -> Iterator[_Problem]:
     """Yield path, reason and remedy for one broken rule."""
     path = tuple(error.absolute_path)
     value: Any = error.instance
@@ -111,11 +115,15 @@ def _problems(error: ValidationError, whole: Schema) -> Iterator[_Problem]:
             others = '|'.join(schema.get('patternProperties', ())) or '$^'
             for key in value:
                 if key not in known and not search(others, key):
-                    yield (*path, key), 'unknown key', _below(key, schema) or _near(key, known)
+                    yield (
+                        (*path, key),
+                        'unknown key',
+                        _misplaced_remedy(key, schema) or _near_key(key, known),
+                    )
         case 'required':
             # Each missing key is a separate error, which names the key in its message only.
             missing = next(key for key in wanted if error.message.startswith(repr(key)))
-            meaning = _meaning(schema.get('properties', {}).get(missing, {}), whole)
+            meaning = _description_text(schema.get('properties', {}).get(missing, {}), whole)
             yield path, f'the key {missing!r} is missing', f'add {missing}: {meaning or "…"}'
         case 'maxProperties':
             others = f'leave all but {wanted} out'
@@ -133,11 +141,11 @@ def _problems(error: ValidationError, whole: Schema) -> Iterator[_Problem]:
             yield path, 'does not go with the keys beside it', 'leave it out'
         case _:
             meaning = schema.get('description', '')
-            expected = f'write {_expected(error)}{meaning and f" ({meaning})"}'
-            yield path, f'{quoted(value)} {_fault(error)}', expected
+            expected = f'write {_expected_text(error)}{meaning and f" ({meaning})"}'
+            yield path, f'{quoted(value)} {_reason_text(error)}', expected
 
 
-def _fault(error: ValidationError) -> str:
+def _reason_text(error: ValidationError) -> str:
     rule: Any = error.validator
     wanted: Any = error.validator_value
     match rule:
@@ -152,7 +160,7 @@ def _fault(error: ValidationError) -> str:
     return 'does not fit'
 
 
-def _expected(error: ValidationError) -> str:
+def _expected_text(error: ValidationError) -> str:
     """Return the values that the broken rule, and those beside it, allow."""
     rule: Any = error.validator
     wanted: Any = error.validator_value
@@ -160,18 +168,18 @@ def _expected(error: ValidationError) -> str:
     match rule:
         case 'type':
             quote = '; quote what looks like a number' if wanted == 'string' else ''
-            return f'{_TYPES[wanted]}{_bounds(schema)}{quote}'
+            return f'{_TYPES[wanted]}{_bounds_text(schema)}{quote}'
         case 'enum':
             return ' or '.join(wanted)
         case 'minItems' | 'maxItems':
             least, most = schema.get('minItems', 0), schema.get('maxItems')
             return f'{least} of them{"" if least == most else " at least"}'
         case _ if rule in _BOUNDS:
-            return f'a number{_bounds(schema)}'
+            return f'a number{_bounds_text(schema)}'
     return 'a text on one line'
 
 
-def _bounds(schema: Mapping[str, Any]) -> str:
+def _bounds_text(schema: Mapping[str, Any]) -> str:
     # Of a length or an angle the schema has the bound in the smallest unit, not in the file's.
     unit = unit_of(schema.get('description', ''))
     bounds = ' and '.join(
@@ -182,13 +190,13 @@ def _bounds(schema: Mapping[str, Any]) -> str:
     return f', {bounds}' if bounds else ''
 
 
-def _meaning(schema: Schema, whole: Schema) -> str:
+def _description_text(schema: Schema, whole: Schema) -> str:
     if '$ref' in schema:
         schema = whole['$defs'][schema['$ref'].rpartition('/')[2]]
     return str(schema.get('description', ''))
 
 
-def _below(key: str, schema: Schema) -> str:
+def _misplaced_remedy(key: str, schema: Schema) -> str:
     """Return the remedy for a key of the parts in a section beside it; '' for another key."""
     for section, of in schema['properties'].items():
         part = of.get('additionalProperties') if isinstance(of, dict) else None
@@ -197,19 +205,19 @@ def _below(key: str, schema: Schema) -> str:
     return ''
 
 
-def _near(key: str, known: Sequence[str]) -> str:
+def _near_key(key: str, known: Sequence[str]) -> str:
     otherwise = f'known: {listed(sorted(known))}' if known else 'leave it out'
     return did_you_mean(key, known, otherwise)
 
 
-def _dotted(path: _Path) -> str:
+def _dotted_path(path: _Path) -> str:
     """Return a path as in messages; list items count from 1."""
     return ''.join(
         f'[{part + 1}]' if isinstance(part, int) else f'.{part}' for part in path
     ).removeprefix('.')
 
 
-def _line(content: Any, path: _Path) -> int:
+def _line_number(content: Any, path: _Path) -> int:
     """Return the line of a key, or that of the last existing key on its path."""
     line = 0
     for part in path:

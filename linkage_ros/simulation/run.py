@@ -65,7 +65,7 @@ def check_simulated(scene: Scene, seconds: float) -> int:
         There would be too many ticks.
 
     """
-    for member in scene.members:
+    for member in scene.linkages:
         if member.drive[0] == 'topic':
             raise member.content.error(
                 'drive',

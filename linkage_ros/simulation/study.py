@@ -184,7 +184,7 @@ def run_one(study: Study, settings: Settings) -> Outcome:
 def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
     """Tick a pipeline, and keep of it what a study needs."""
     lines, injection = pipeline.lines, pipeline.injection
-    joints = [line.member.joints for line in lines]
+    joints = [line.member.joint_names for line in lines]
     firsts = [sum(map(len, joints[:number])) for number in range(len(joints))]
     reduced = {
         (number, quantity): _Reduction(len(joints[number]))

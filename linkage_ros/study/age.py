@@ -219,11 +219,11 @@ def measure_age_of_command(
 
 def _offer_time(motion: MemberMotion, seconds: float) -> Spread:
     """Return how long the node takes to read and accept a sample, in [µs]."""
-    names = motion.member.sampled
+    names = motion.member.sampled_joints
     zeros = (0.0,) * len(names)
     message = JointStateWriter(names).write(BEGIN, zeros, zeros, zeros)
     name, use = motion.member.drive
-    if name != 'topic' or motion.member.dependent:
+    if name != 'topic' or motion.member.dependent_joint:
         return Spread(0.0, 0.0, 0.0)
     read, drive = topic_drive.reader(use, motion.context), TopicDrive(use, True)
 
@@ -316,7 +316,7 @@ def _rates_missing(scene: Scene) -> list[str]:
     """Return the keys of the effects that publish rates, where they are missing."""
     missing = {
         scene_key(member, 'effects')
-        for member in scene.members
+        for member in scene.linkages
         if not {'velocity', 'acceleration'} & set(member.effects)
     }
     return [f'{key}.velocity' for key in sorted(missing)]

@@ -86,7 +86,9 @@ def compare_runs(
 ) -> list[Difference]:
     """Return how far the published joints of a scene are from those of each of the others."""
     turning = turning_joints(scene)
-    sizes = {joint: member.closure.scale for member in scene.members for joint in member.joints}
+    sizes = {
+        joint: member.closure.scale for member in scene.linkages for joint in member.joint_names
+    }
     compared = [_Compared() for _ in others]
     own, *runs = (published_states(each, feed, ticks) for each in (scene, *others))
     for tick, ((is_new, state), *found) in enumerate(zip(own, *runs, strict=True)):
@@ -125,7 +127,7 @@ class _Compared:
 def leave_out(scene: Scene, names: frozenset[str]) -> Scene:
     """Return a scene without these effects, and without loads where no force is left."""
     return replace(
-        scene, members=tuple(_without(member, names) for member in scene.members), record=None
+        scene, members=tuple(_without(member, names) for member in scene.linkages), record=None
     )
 
 
@@ -148,7 +150,7 @@ class _Variant(NamedTuple):
 
 def _variants(scene: Scene) -> Iterator[_Variant]:
     """Yield the scene without each effect, without each fault, and without all."""
-    named = {name for member in scene.members for name in member.effects}
+    named = {name for member in scene.linkages for name in member.effects}
     for name in in_order(named):
         needed_by = bringing(name, named)
         note = f'computed for {listed(needed_by)} without it, too' if needed_by else ''
@@ -205,7 +207,7 @@ def measure_deliberate(
         feed,
         lambda share: progress(0.5 + 0.5 * share),
     )
-    drifts = any(member.drive[0] == 'torque' for member in scene.members)
+    drifts = any(member.drive[0] == 'torque' for member in scene.linkages)
     after = ticks / (scene.rate or USUAL_RATE) if drifts else None
     knobs = [
         Knob(

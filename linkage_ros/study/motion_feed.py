@@ -40,12 +40,14 @@ def _samples_and_ticks(
 ) -> Iterator[tuple[int, bytes]]:
     """Yield ticks, each with a sample; the last one again and again after the end of a bag."""
     driven = [each for each in motions if each.member.drive[0] == 'topic']
-    if any(each.member.dependent for each in driven):
+    if any(each.member.dependent_joint for each in driven):
         yield from turn_crank(scene, Pipeline(scene))
         return
-    write = JointStateWriter([name for each in driven for name in each.member.sampled]).write
+    write = JointStateWriter(
+        [name for each in driven for name in each.member.sampled_joints]
+    ).write
     period = 1e9 / (scene.rate or USUAL_RATE)
-    known: list[Crank] = [((0.0,) * len(e.member.sampled),) * 2 for e in driven]
+    known: list[Crank] = [((0.0,) * len(e.member.sampled_joints),) * 2 for e in driven]
     number = 0
     while True:
         now = BEGIN + round(number * period)

@@ -86,7 +86,7 @@ def change_scene(scene: Scene, changes: Sequence[Change]) -> Scene:
 def turn_crank(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
     """Yield times and messages: each input turns, or oscillates within the range it closes in."""
     period = 1e9 / (scene.rate or USUAL_RATE)
-    names = [name for member in scene.members for name in member.sampled]
+    names = [name for member in scene.linkages for name in member.sampled_joints]
     write = JointStateWriter(names).write
     paths = [path for line in pipeline.lines for path in _paths(line)] if pipeline.topic else []
     count = 0
@@ -106,7 +106,7 @@ Path = Callable[[float], tuple[float, float]]
 
 def _paths(line: LinkagePipeline) -> list[Path]:
     """Return for each input its value and rate at a time in [s]: a rotation or an oscillation."""
-    closure, joint = line.closure, line.member.dependent
+    closure, joint = line.closure, line.member.dependent_joint
     speed = tau * _CRANK_RATE
     if joint:
         branch = sampled_inverse(closure, joint, line.member.drive[1].branch).branch

@@ -85,7 +85,7 @@ def motions_of(scene: Scene, like: str | None, horizon: float) -> list[MemberMot
 def without_deliberate(scene: Scene) -> Scene:
     """Return a scene without recording, faults and what its sensors and wear change."""
     members = []
-    for member in scene.members:
+    for member in scene.linkages:
         forced = member.drive[0] == 'torque'
         kept = {'velocity', 'tolerance', *(('friction',) if forced else ())}
         effects = {name: use for name, use in member.effects.items() if name in kept}

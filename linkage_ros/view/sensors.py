@@ -60,7 +60,7 @@ class Sensors:
         # The user names this scene to be shown: its own effects are imported, as in a run of it.
         scene = parse_scene(files.name, files.name, data, files.folder, trust_effects=True)
         self.text = text
-        self._member = _by_hand(scene.members[0])
+        self._member = _by_hand(scene.linkages[0])
         self._scene = replace(scene, members=(self._member,), faults={})
         self._rate = min(scene.rate, _FASTEST)
         self.count = len(self._member.linkage.inputs)
@@ -120,10 +120,10 @@ class Sensors:
         if self._reading is None:
             return {'read': {}, 'frames': []}
         member = self._member
-        read = dict(zip(member.joints, self._reading.joints, strict=True))
-        values = dict(zip(member.inputs, inputs, strict=True)) | read
+        read = dict(zip(member.joint_names, self._reading.joints, strict=True))
+        values = dict(zip(member.input_names, inputs, strict=True)) | read
         arrays = {name: np.array([value]) for name, value in values.items()}
-        frames = poses(member.closure, member.prefix, arrays, member.inputs).frames[0]
+        frames = poses(member.closure, member.prefix, arrays, member.input_names).frames[0]
         finite = bool(np.isfinite(frames).all())
         # A fault of a sensor may publish NaN, which JSON does not hold.
         read = {name: value for name, value in read.items() if np.isfinite(value)}

@@ -65,7 +65,7 @@ def test_effects_alone_are_what_linkage_cost_was(capsys: Any) -> None:
     assert run('worn_press', '--quick', '--only', 'effects', '--horizon', '0.2') == 0
     said = capsys.readouterr().out
     assert said.startswith('on purpose: ')
-    for effect in load_scene('worn_press').members[0].effects:
+    for effect in load_scene('worn_press').linkages[0].effects:
         assert f'on purpose: {effect}' in said
     assert 'the whole tick' in said
 
@@ -92,13 +92,13 @@ def test_the_tuned_scene_has_the_lines_of_the_answer(
     said = json.loads(capsys.readouterr().out)
     assert said['need']['is_met']
     tuned, own = load_scene(file), load_scene('torque_crank')
-    assert tuned.members[0].linkage == own.members[0].linkage
+    assert tuned.linkages[0].linkage == own.linkages[0].linkage
     write = said['need']['write']
-    drive = tuned.members[0].drive[1]
-    assert drive.step == write['drive.torque.step'] != own.members[0].drive[1].step
+    drive = tuned.linkages[0].drive[1]
+    assert drive.step == write['drive.torque.step'] != own.linkages[0].drive[1].step
     assert drive.method == write['drive.torque.method']
     assert tuned.rate == write.get('rate', own.rate)
-    assert tuned.members[0].effects == own.members[0].effects
+    assert tuned.linkages[0].effects == own.linkages[0].effects
 
 
 def test_a_page_and_a_picture_are_written(by_hand: Any, tmp_path: Path) -> None:

@@ -272,7 +272,7 @@ def scene(tmp_path: Path) -> Path:
 
 def test_keys_are_set_and_the_rest_stays(scene: Path, tmp_path: Path) -> None:
     loaded = load_scene(scene, ['rate=500', 'drive.sine.amplitude=0.3', 'effects.markers={}'])
-    (member,) = loaded.members
+    (member,) = loaded.linkages
     name, sine = member.drive
     assert (loaded.rate, name, sine.amplitude, sine.frequency) == (500.0, 'sine', 0.3, 1.0)
     assert list(member.effects) == ['velocity', 'noise', 'markers']
@@ -286,7 +286,7 @@ def test_the_files_of_a_scene_hold_what_was_set(scene: Path) -> None:
     loaded = load_scene(scene, settings)
     scene.write_bytes(loaded.files[SCENE_FILE])
     again = load_scene(scene)
-    assert again.members[0].effects == loaded.members[0].effects
+    assert again.linkages[0].effects == loaded.linkages[0].effects
     assert (again.rate, again.seed, again.record) == (500.0, loaded.seed, loaded.record)
     assert again.files[SCENE_FILE].startswith(b'# --set rate=500\n# --set effects.noise.')
 
@@ -313,12 +313,12 @@ def test_keys_of_one_of_several_linkages_are_set_by_its_name(tmp_path: Path) -> 
         'linkages.right.effects={velocity: {}}',
     ]
     loaded = load_scene(scene, settings)
-    left, right = loaded.members
+    left, right = loaded.linkages
     assert (left.drive[1].amplitude, right.drive[1].amplitude) == (0.3, 0.4)
     assert (left.accuracy, right.accuracy) == (None, 1e-6)
     assert (list(left.effects), list(right.effects)) == ([], ['velocity'])
     scene.write_bytes(loaded.files[SCENE_FILE])
-    assert load_scene(scene).members == loaded.members
+    assert load_scene(scene).linkages == loaded.linkages
 
 
 OF_SEVERAL = {
@@ -424,7 +424,7 @@ def test_a_file_of_the_gallery_is_printed(tmp_path: Path) -> None:
 def test_a_copied_scene_is_whole(tmp_path: Path, name: str) -> None:
     answer = linkage(tmp_path, 'gallery', name, '--scene', '-o', 'mine.yaml')
     copied, shipped = load_scene(tmp_path / 'mine.yaml'), load_scene(name)
-    assert [one.linkage for one in copied.members] == [one.linkage for one in shipped.members]
+    assert [one.linkage for one in copied.linkages] == [one.linkage for one in shipped.linkages]
     assert copied.rate == shipped.rate
     assert answer.stdout.split() == [
         'mine.yaml',

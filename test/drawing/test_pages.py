@@ -129,7 +129,7 @@ def test_the_equations_of_a_module_stand_in_its_section(name, equation):
 @pytest.mark.parametrize('section', DRAWN, ids=lambda section: section.name)
 def test_a_scene_is_a_scene_and_has_what_its_section_is_about(section):
     scene = scene_of(section.scene)
-    (member,) = scene.members
+    (member,) = scene.linkages
     if section.name == 'Faults':
         assert {fault.kind for fault in scene.faults.values()} == set(FAULTS)
     elif section.name == 'loads':

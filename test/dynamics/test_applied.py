@@ -332,5 +332,5 @@ def test_the_squeezer_ends_where_the_test_set_says(method, step):
     (line,) = pipeline_of(text, linkage).lines
     for tick in range(31):
         seen = line.see(BEGIN + tick * MS)
-    found = dict(zip(line.member.joints, seen.reading.joints, strict=True))
+    found = dict(zip(line.member.joint_names, seen.reading.joints, strict=True))
     assert found == pytest.approx(SQUEEZED, abs=1e-8)

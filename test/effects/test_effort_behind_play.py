@@ -258,6 +258,6 @@ def test_of_several_linkages_that_with_torque_may_have_none():
         return parse_scene('scene', 'here', files)
 
     turning = 'drive: {constant_rate: {rate: 1}}'
-    assert len(scene(turning, 'drive: {torque: {}}, effects: {}').members) == 2
+    assert len(scene(turning, 'drive: {torque: {}}, effects: {}').linkages) == 2
     with pytest.raises(FileError, match=r'effects\.backlash: is a play without'):
         scene(turning, 'drive: {torque: {}}')

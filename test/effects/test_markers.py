@@ -54,7 +54,7 @@ class Held:
         self.pipeline = built(linkage, f'drive: {{topic: {{}}}}\neffects: {{{effects}}}')
         (line,) = self.pipeline.lines
         self.closure = line.closure
-        self._write = JointStateWriter(line.member.inputs).write
+        self._write = JointStateWriter(line.member.input_names).write
         self._now = BEGIN
 
     def at(self, *inputs):

@@ -28,7 +28,7 @@ from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import user_effects_here
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.schema import scene_schema
-from linkage_ros.scene.violations import violations
+from linkage_ros.scene.violations import find_violations
 import pytest
 
 from ..support.commands import linkage
@@ -315,7 +315,7 @@ def test_a_scene_that_names_it_wrongly_is_refused_in_a_line(tmp_path, package, l
 def test_the_schema_takes_it_and_still_refuses_what_is_misspelt(tmp_path, package):
     mine = package(add=HEAD + ADD)
     file = scene_file(tmp_path, [f'{mine}.add: {{by: 0.25}}', 'biass: {}', f'{mine}.other: 3'])
-    wrong = violations(read_yaml(file)[0], scene_schema())
+    wrong = find_violations(read_yaml(file)[0], scene_schema())
     assert [error.key for error in wrong] == ['effects.biass', f'effects.{mine}.other']
 
 

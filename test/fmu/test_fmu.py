@@ -179,8 +179,8 @@ def test_every_output_has_the_bits_of_the_message(name, settings, bench):
     pipeline = Pipeline(scene)
     instance = bench(scene)
     names = [name for name, v in instance.variables.items() if v.causality == 'input']
-    sampled = [member for member in scene.members if member.drive[0] in ('topic', 'torque')]
-    driven = [joint for member in sampled for joint in member.inputs]
+    sampled = [member for member in scene.linkages if member.drive[0] in ('topic', 'torque')]
+    driven = [joint for member in sampled for joint in member.input_names]
     assert list(dict.fromkeys(name.split('.')[1] for name in names)) == driven
     newest: dict[str, float] = {}
     published = 0

@@ -92,7 +92,7 @@ def test_without_its_wrenches_it_would_not(recorded, name):
 def test_a_bag_whose_account_names_more_wrenches_than_its_scene_can_be_read(recorded):
     done = recorded('held')
     scene = recorded_scene(done.bag)
-    (member,) = scene.members
+    (member,) = scene.linkages
     loads = replace(member.loads, applied=type(member.loads.applied)())
     bare = replace(scene, members=(replace(member, loads=loads),))
     assert len(list(replay(done.bag, bare))) == len(done.published)

@@ -235,7 +235,7 @@ def test_parts_that_deviate_are_in_the_model():
     file = SCENES / 'worn_press.yaml'
     scene = load_scene(file)
     model, made = model_of(str(file), urdf), Pipeline(scene).closures[0].linkage
-    assert made.links != scene.members[0].linkage.links
+    assert made.links != scene.linkages[0].linkage.links
     (place,) = (
         joint.find('origin')
         for joint in ET.fromstring(model).iter('joint')

@@ -262,9 +262,9 @@ LIMITED = SHORT.replace('SAID', 'input: {limits: [0, 1]}').encode()
 
 
 def test_what_is_published_beyond_them_is_a_choice():
-    assert not scene_of('', LIMITED).members[0].silent_beyond_limits
-    assert not scene_of('beyond_limits: publish', LIMITED).members[0].silent_beyond_limits
-    assert scene_of('beyond_limits: silent', LIMITED).members[0].silent_beyond_limits
+    assert not scene_of('', LIMITED).linkages[0].silent_beyond_limits
+    assert not scene_of('beyond_limits: publish', LIMITED).linkages[0].silent_beyond_limits
+    assert scene_of('beyond_limits: silent', LIMITED).linkages[0].silent_beyond_limits
 
 
 SCENES = {

@@ -14,7 +14,7 @@ from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.schema import scene_schema
-from linkage_ros.scene.violations import violations
+from linkage_ros.scene.violations import find_violations
 import pytest
 
 LINKAGE = """
@@ -218,5 +218,5 @@ VIOLATIONS = {
 def test_a_violation_of_the_schema_is_told_once(tmp_path, kind):
     text, lines = VIOLATIONS[kind]
     file = scene_of(tmp_path, text)
-    found = violations(read_yaml(file)[0], scene_schema())
+    found = find_violations(read_yaml(file)[0], scene_schema())
     assert [str(error) for error in found] == [f'{file}{line}' for line in lines]

@@ -293,22 +293,22 @@ def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(fil
     for number in range(5001):
         now = BEGIN + number * MS
         if file.stem == 'five_bar':  # it has two inputs, which come from a topic
-            inputs = JointStateWriter(scene.members[0].inputs)
+            inputs = JointStateWriter(scene.linkages[0].input_names)
             assert pipeline.offer(inputs.write(now, [SIXTY, SIXTY], [0.0, 0.0]), now) is None
         ((crank, position, _, reading),) = pipeline.tick(now).looks
         assert crank is not None
         assert position is not None
         assert position.status is Status.CLOSED, crank
         assert reading is not None
-        assert len(reading[2]) == len(scene.joints)  # rates
+        assert len(reading[2]) == len(scene.joint_names)  # rates
         cranks.append(crank.angles[0])
     if file.stem == 'five_bar':
-        assert scene.members[0].drive == ('topic', TopicParameters())
+        assert scene.linkages[0].drive == ('topic', TopicParameters())
     elif file.stem == 'gripper':  # its motor has limits, and starts at the pose
         assert cranks[0] == 0.25
         assert [min(cranks), max(cranks)] == pytest.approx([0.0, 0.74], abs=1e-6)
     elif ends is None:
-        assert scene.members[0].drive == ('constant_rate', ConstantRateParameters(1.0, SIXTY))
+        assert scene.linkages[0].drive == ('constant_rate', ConstantRateParameters(1.0, SIXTY))
         assert cranks[0] == SIXTY
         assert cranks[-1] == pytest.approx(SIXTY + 5.0, rel=1e-15)
     else:
@@ -404,7 +404,7 @@ def test_a_pose_with_points_is_where_an_iteration_starts_and_no_run(tmp_path):
     text = (CONFIG / 'linkages/class_3.yaml').read_text('utf-8')
     assert 'inputs: [0.0], points:' in text
     (tmp_path / 'posed.yaml').write_text(text)
-    assert load_scene(tmp_path / 'posed.yaml').members[0].drive[1].start == SIXTY
+    assert load_scene(tmp_path / 'posed.yaml').linkages[0].drive[1].start == SIXTY
 
 
 def test_what_is_iterated_needs_the_points_of_its_pose(tmp_path):
@@ -439,7 +439,7 @@ def test_what_stands_for_it_is_a_scene_of_the_user_s_own(tmp_path):
     (tmp_path / 'scene.yaml').write_bytes(alone.files['scene.yaml'])
     beside = load_scene(tmp_path / 'scene.yaml')
     assert beside.files == alone.files
-    assert (beside.members, beside.rate) == (alone.members, alone.rate)
+    assert (beside.linkages, beside.rate) == (alone.linkages, alone.rate)
 
 
 NEITHER = 'is neither a scene nor a linkage; write linkage: FILE for a scene, links: {…} for a'
@@ -481,10 +481,10 @@ def test_a_scene_names_a_linkage_that_comes_with_the_package(tmp_path):
     file = tmp_path / 'scene.yaml'
     for name in ('hoeken', 'four_bar'):
         file.write_text(f'linkage: {name}')
-        (member,) = load_scene(file).members
-        assert member.linkage.links == load_scene(name).members[0].linkage.links
+        (member,) = load_scene(file).linkages
+        assert member.linkage.links == load_scene(name).linkages[0].linkage.links
     # A file with a suffix, or in a folder, is the user's.
     (tmp_path / 'four_bar.yaml').write_text(load_scene('hoeken').files['linkage.yaml'].decode())
     file.write_text('linkage: four_bar.yaml')
-    hoeken = load_scene('hoeken').members[0].linkage
-    assert load_scene(file).members[0].linkage.links == hoeken.links
+    hoeken = load_scene('hoeken').linkages[0].linkage
+    assert load_scene(file).linkages[0].linkage.links == hoeken.links

@@ -559,7 +559,7 @@ def test_a_schema_takes_a_bounded_length_in_every_unit_of_a_file():
 def test_every_shipped_scene_is_read_after_all():
     # That a file is valid says nothing if nobody reads it.
     for path in SCENES:
-        assert load_scene(path).members
+        assert load_scene(path).linkages
     assert json.loads(as_text(scene_schema()))['title'] == 'Scene'
 
 

@@ -150,13 +150,13 @@ def test_a_scene_has_its_own_units_and_other_quantities_stay_in_si(write):
     write(IN_SI, 'linkage.yaml')
     scene, in_si = load_scene(write(SCENE)), load_scene(write(SCENE_IN_SI, 'si.yaml'))
     assert scene.wrapped
-    assert scene.members == in_si.members
+    assert scene.linkages == in_si.linkages
 
 
 def test_a_bag_holds_the_file_as_written_and_is_read_the_same(write):
     write(IN_MM, 'linkage.yaml')
     scene = load_scene(write(SCENE))
-    assert parse_scene('file', 'bag', scene.files).members == scene.members
+    assert parse_scene('file', 'bag', scene.files).linkages == scene.linkages
 
 
 def test_a_scene_in_units_runs_as_that_in_si(write):
@@ -198,7 +198,7 @@ def test_a_driven_slide_is_given_as_a_length(write):
     write(SLIDE, 'linkage.yaml')
     drive = 'drive: {sine: {amplitude: 40, frequency: 1, mean: 500, phase: 90}}'
     scene = load_scene(write(f'linkage: linkage.yaml\nunits: mm\nangles: degrees\n{drive}'))
-    (_, sine) = scene.members[0].drive
+    (_, sine) = scene.linkages[0].drive
     assert (sine.amplitude, sine.mean, sine.phase) == (0.04, 0.5, 0.5 * pi)
 
 
@@ -288,11 +288,11 @@ def test_an_error_in_a_scene_is_told_in_its_units(write, kind):
 def test_what_is_set_has_the_units_of_the_scene(write):
     write(IN_SI, 'linkage.yaml')
     settings = ['drive.sine.amplitude=30', 'effects.tolerance.given={crank.A: [0.2, 0]}']
-    (member,) = load_scene(write(SCENE), settings).members
+    (member,) = load_scene(write(SCENE), settings).linkages
     assert member.drive[1].amplitude == 0.5235987755982989
     assert member.effects['tolerance'].given == {'crank.A': (0.0002, 0.0)}
     in_metres = [*settings, 'units=m', 'loads.gravity=[0, -9.81]']
-    (metres,) = load_scene(write(SCENE), in_metres).members
+    (metres,) = load_scene(write(SCENE), in_metres).linkages
     assert metres.drive[1].amplitude == 0.5235987755982989
     assert metres.effects['tolerance'].given == {'crank.A': (0.2, 0.0)}
 
@@ -445,7 +445,7 @@ def test_tables_over_an_input_and_rates_of_pins_have_the_unit_of_what_moves(writ
         write(FORCES.format(start=0.5, rate=0.045, stribeck=0.005, turn=0.5 * pi), 'si.yaml')
     )
     in_mm = FORCES.format(start=500, rate=45, stribeck=5, turn=90)
-    assert load_scene(write(f'{in_mm}units: mm\nangles: degrees\n')).members == in_si.members
+    assert load_scene(write(f'{in_mm}units: mm\nangles: degrees\n')).linkages == in_si.linkages
 
 
 WORDS = {
@@ -460,7 +460,7 @@ WORDS = {
 def test_angles_of_a_scene_name_how_they_are_published_and_their_unit(write, words):
     write(IN_SI, 'linkage.yaml')
     scene = load_scene(write(f'linkage: linkage.yaml\nangles: {words}'))
-    assert (scene.wrapped, scene.members[0].content.units.angle) == WORDS[words]
+    assert (scene.wrapped, scene.linkages[0].content.units.angle) == WORDS[words]
 
 
 def test_two_words_for_one_thing_are_refused(write):

@@ -85,10 +85,10 @@ def test_a_study_is_bounded():
 def test_a_run_is_reduced_to_what_its_messages_say(noisy):
     outcome = run_one(study_of(noisy, 1.0), (('seed', 3), ('drive.constant_rate.rate', 5.0)))
     scene = load_scene('noisy.yaml', ['seed=3', 'drive.constant_rate.rate=5.0'])
-    pipeline, reader = Pipeline(scene), JointStateReader(scene.joints)
+    pipeline, reader = Pipeline(scene), JointStateReader(scene.joint_names)
     samples = [reader.read(pipeline.tick(BEGIN + n * 10_000_000).message) for n in range(101)]
     assert (outcome.failure, outcome.ticks, outcome.messages) == ('', 101, 101)
-    for number, joint in enumerate(scene.joints):
+    for number, joint in enumerate(scene.joint_names):
         for head, column in (
             (joint, np.array([sample.angles[number] for sample in samples])),
             (f'{joint} rate', np.array([sample.rates[number] for sample in samples])),

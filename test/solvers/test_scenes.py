@@ -21,7 +21,7 @@ from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import replay
 from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.schema import scene_schema
-from linkage_ros.scene.violations import violations
+from linkage_ros.scene.violations import find_violations
 from linkage_ros.solvers import choose as choosing
 from linkage_ros.solvers.choose import choose_solver, only_closed_form
 from linkage_ros.solvers.newton import NewtonClosure
@@ -208,7 +208,7 @@ def test_a_solver_that_cannot_be_is_refused_by_reader_and_schema(text):
     with pytest.raises(FileError) as caught:
         scene_of(text)
     assert REFUSED[text] in str(caught.value)
-    assert violations(parse_yaml(f'linkage: l.yaml\n{text}'.encode(), 'f'), scene_schema())
+    assert find_violations(parse_yaml(f'linkage: l.yaml\n{text}'.encode(), 'f'), scene_schema())
 
 
 BUILT = {
@@ -235,7 +235,7 @@ def test_the_closed_form_that_the_refusal_recommends_is_taken(forces):
 def test_what_is_read_the_schema_takes():
     for text, _ in SOLVERS.values():
         content = parse_yaml(f'linkage: l.yaml\n{text}'.encode(), 'f')
-        assert not violations(content, scene_schema())
+        assert not find_violations(content, scene_schema())
 
 
 # The cheapest solver that guarantees an accuracy: candidates, choice, and output.

@@ -173,7 +173,7 @@ def test_a_change_is_what_set_does() -> None:
     typed = ['rate=250', 'effects={noise: {joints: {rocker_joint: {white: 0.001}}}}']
     expected = load_scene('demo', typed)
     assert (changed.rate, changed.seed) == (expected.rate, expected.seed)
-    assert changed.members[0].effects == expected.members[0].effects
+    assert changed.linkages[0].effects == expected.linkages[0].effects
     with pytest.raises(FileError, match='rate: -1 is out of bounds'):
         change_scene(DEMO, [('rate', -1)])
 

@@ -45,7 +45,7 @@ def test_it_loads_from_another_folder(
     )
     tuned = load_scene(other / 'tuned.yaml')
     assert (tuned.rate, tuned.seed) == (250.0, 7)
-    for one, before in zip(tuned.members, scene.members, strict=True):
+    for one, before in zip(tuned.linkages, scene.linkages, strict=True):
         assert one.linkage == before.linkage
         assert one.drive == before.drive
         assert one.effects == before.effects
@@ -61,5 +61,5 @@ def test_the_bag_of_a_drive_is_found_from_there(tmp_path: Path) -> None:
     (deep / 'x.yaml').write_bytes(
         tuned_scene(scene, tmp_path / 'play.yaml', [('rate', 25.0)], deep)
     )
-    file = Path(load_scene(deep / 'x.yaml').members[0].drive[1].file)
+    file = Path(load_scene(deep / 'x.yaml').linkages[0].drive[1].file)
     assert file.resolve() == (tmp_path / 'bag').resolve()

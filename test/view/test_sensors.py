@@ -116,13 +116,13 @@ def test_every_shipped_scene_is_read(name: str) -> None:
     scene = load_scene(name)
     files = {part: data.decode() for part, data in scene.files.items()}
     of = Sensors(SceneFiles(name, files, scene.folder))
-    closure = scene.members[0].closure
+    closure = scene.linkages[0].closure
     low = closure.closing_ranges[0].lowest if closure.closing_ranges[0].turns == 0 else pi / 3
     read: Mapping[str, float] = {}
     for frame in range(60):
         found = of.read(frame / 60, [low + 0.1 + 1e-3 * frame] * of.count, [0.06] * of.count)
         read = found['read'] or read
-    assert tuple(read) == scene.members[0].joints
+    assert tuple(read) == scene.linkages[0].joint_names
 
 
 def test_a_torque_drive_gives_its_crank_to_the_page(tmp_path: Path) -> None:
