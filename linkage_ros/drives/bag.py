@@ -41,7 +41,7 @@ from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Reje
 _TYPE = 'sensor_msgs/msg/JointState'
 
 
-class Samples:
+class BagSamples:
     """
     Good samples, in the order of their log times and stamps.
 
@@ -93,7 +93,7 @@ class Samples:
         self._values.extend(sample.angles)
         self._values.extend(sample.rates or (nan,) * self._inputs)
 
-    def settle(self) -> None:
+    def sort_and_check(self) -> None:
         """Put the added samples in the order of their log times, and reject what is not good."""
         times = self._log_times
         order: Sequence[int] = range(len(times))
@@ -126,7 +126,7 @@ class Samples:
         return tuple(self._values[first:middle]), tuple(self._values[middle:end])
 
 
-def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -> Samples:
+def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -> BagSamples:
     """
     Return the samples of a bag's crank topic.
 
@@ -152,14 +152,14 @@ def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -
         raise BagError(bag.path, f'holds no topic {topic!r} of {_TYPE}', f'it holds {known}')
     crank_topic = topic or _crank_topic_of_run(bag)
     samples_of = {
-        name: Samples(use, context)
+        name: BagSamples(use, context)
         for name in ([crank_topic] if crank_topic in of_type else of_type)
     }
     for name, log_time, _, data in bag.messages():
         if name in samples_of:
             samples_of[name].add(log_time, data)
     for samples in samples_of.values():
-        samples.settle()
+        samples.sort_and_check()
     good = {name: samples for name, samples in samples_of.items() if len(samples)}
     if len(good) == 1:
         (samples,) = good.values()
@@ -172,12 +172,12 @@ def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -
         )
     raise BagError(
         bag.path,
-        f'holds no crank sample of {listed(context.inputs_in_messages)}{_why(samples_of)}',
+        f'holds no crank sample of {listed(context.inputs_in_messages)}{_rejection_text(samples_of)}',
         'name another bag, or its topic as drive.bag.topic',
     )
 
 
-def _why(samples_of: Mapping[str, Samples]) -> str:
+def _rejection_text(samples_of: Mapping[str, BagSamples]) -> str:
     """Return the most frequent reason for rejected messages, for each topic."""
     reasons = (
         f'{name}: {samples.rejected.most_common(1)[0][0].value}'
@@ -278,7 +278,7 @@ class RecordedPace(Drive):
     max_age: int
     """Age of the newest sample above which there is no crank state, in [ns]."""
 
-    def __init__(self, samples: Samples, use: TopicParameters, *, repeat: bool) -> None:
+    def __init__(self, samples: BagSamples, use: TopicParameters, *, repeat: bool) -> None:
         self.samples = samples
         self._topic = TopicDrive(replace(use, stamp='measured'), needs_rate=False)
         self.max_age = self._topic.max_age
@@ -331,7 +331,7 @@ class FastPace(Drive):
     stamp = 0
     max_age = 0
 
-    def __init__(self, samples: Samples, *, repeat: bool) -> None:
+    def __init__(self, samples: BagSamples, *, repeat: bool) -> None:
         self.samples = samples
         self._repeat = repeat
         self._next = 0

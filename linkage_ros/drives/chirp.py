@@ -59,11 +59,11 @@ class ChirpParameters(Chirp):
 PARAMETERS = ChirpParameters
 
 
-def extent(parameters: Chirp) -> tuple[float, float]:
+def value_range(parameters: Chirp) -> tuple[float, float]:
     """Return the least and the greatest value of an input, in [rad] or [m]."""
     mean, A = parameters.mean, parameters.amplitude
     length = round(parameters.seconds * NANOSECONDS)
-    sweep = _linear if parameters.sweep == 'linear' else _logarithmic
+    sweep = _linear_sweep if parameters.sweep == 'linear' else _logarithmic_sweep
     periods, below, _ = sweep(parameters.start_frequency, parameters.end_frequency, length)
     passed = inf if parameters.repeat else periods(length) / below
     # The sine begins at 0; its maximum is a quarter of a period later, its minimum three quarters.
@@ -73,11 +73,11 @@ def extent(parameters: Chirp) -> tuple[float, float]:
     )
 
 
-def curve(parameters: Chirp, _where: str = '') -> Curve:
+def motion_curve(parameters: Chirp, _where: str = '') -> Curve:
     """Return value, rate and acceleration as a function of time, in [ns]."""
     mean, A = parameters.mean, parameters.amplitude
     length = round(parameters.seconds * NANOSECONDS)
-    sweep = _linear if parameters.sweep == 'linear' else _logarithmic
+    sweep = _linear_sweep if parameters.sweep == 'linear' else _logarithmic_sweep
     periods, below, frequency = sweep(parameters.start_frequency, parameters.end_frequency, length)
     there = periods(length)
     rest = None if parameters.repeat else (mean + A * sin(tau * (there % below / below)), 0.0, 0.0)
@@ -105,7 +105,7 @@ def curve(parameters: Chirp, _where: str = '') -> Curve:
     return chirp
 
 
-class _Sweep(NamedTuple):
+class _FrequencySweep(NamedTuple):
     """A sweep as functions of the time since its start, in [ns]."""
 
     periods: Callable[[int], int]
@@ -115,7 +115,7 @@ class _Sweep(NamedTuple):
     """Frequency, in [Hz], and its slope, in [Hz/s]."""
 
 
-def _linear(start: float, end: float, length: int) -> _Sweep:
+def _linear_sweep(start: float, end: float, length: int) -> _FrequencySweep:
     (first, last), below = as_integers(start, end)
     at_start, growth = 2 * length * first, last - first
     slope = (end - start) / (length / NANOSECONDS)
@@ -126,16 +126,16 @@ def _linear(start: float, end: float, length: int) -> _Sweep:
     def frequency(time: int) -> tuple[float, float]:
         return start + (end - start) * (time / length), slope
 
-    return _Sweep(periods, 2 * length * below * NANOSECONDS, frequency)
+    return _FrequencySweep(periods, 2 * length * below * NANOSECONDS, frequency)
 
 
 _FINEST = 2**60
 
 
-def _logarithmic(start: float, end: float, length: int) -> _Sweep:
+def _logarithmic_sweep(start: float, end: float, length: int) -> _FrequencySweep:
     growth = log(end / start)
     if growth == 0.0:
-        return _linear(start, end, length)
+        return _linear_sweep(start, end, length)
     seconds = length / NANOSECONDS
     scale = start * seconds / growth
 
@@ -146,7 +146,7 @@ def _logarithmic(start: float, end: float, length: int) -> _Sweep:
         f = start * exp(growth * (time / length))
         return f, f * growth / seconds
 
-    return _Sweep(periods, _FINEST, frequency)
+    return _FrequencySweep(periods, _FINEST, frequency)
 
 
-build = partial(build_clocked, 'drive.chirp', curve, extent)
+build = partial(build_clocked, 'drive.chirp', motion_curve, value_range)

@@ -134,10 +134,10 @@ class ClockedDrive(Drive):
         values, rates, accelerations = zip(*[c(elapsed) for c in self._curves], strict=True)
         return CrankState(values, rates, accelerations, 0)
 
-    def straight(self, inputs: int, leave: str) -> Lines:
+    def compile_state(self, inputs: int, bail_out: str) -> Lines:
         """Return `state` as generated lines; a single input needs no function call."""
         if self._curve is None:
-            return super().straight(inputs, leave)
+            return super().compile_state(inputs, bail_out)
         lines = [
             'if drive.start is None:',
             '    drive.start = now',

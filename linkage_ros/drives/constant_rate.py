@@ -48,13 +48,13 @@ class ConstantRateParameters(ConstantRate):
 PARAMETERS = ConstantRateParameters
 
 
-def extent(parameters: ConstantRate) -> tuple[float, float]:
+def value_range(parameters: ConstantRate) -> tuple[float, float]:
     """Return the least and the greatest value of an input, in [rad] or [m]."""
     start, rate = parameters.start, parameters.rate
     return (-inf if rate < 0.0 else start), (inf if rate > 0.0 else start)
 
 
-def curve(parameters: ConstantRate, _where: str = '') -> Curve:
+def motion_curve(parameters: ConstantRate, _where: str = '') -> Curve:
     """Return value, rate and acceleration as a function of time, in [ns]."""
     (start, per_second), below = as_integers(parameters.start, parameters.rate)
     start *= NANOSECONDS
@@ -67,4 +67,4 @@ def curve(parameters: ConstantRate, _where: str = '') -> Curve:
     return constant_rate
 
 
-build = partial(build_clocked, 'drive.constant_rate', curve, extent)
+build = partial(build_clocked, 'drive.constant_rate', motion_curve, value_range)

@@ -112,11 +112,11 @@ class Drive(Protocol):
         """Return the crank state at a time, in [ns]; None if there is none."""
 
     @property
-    def chattered(self) -> int:
+    def chatter_count(self) -> int:
         """Return the number of steps in which motor and crank met and parted too often."""
         return 0
 
-    def straight(self, _inputs: int, leave: str) -> Lines:
+    def compile_state(self, _inputs: int, bail_out: str) -> Lines:
         """
         Return `state` as generated lines that compute the fields of `CrankState` from ``now``.
 
@@ -128,7 +128,7 @@ class Drive(Protocol):
             Statement that leaves the lines where there is no crank state.
 
         """
-        lines = ['crank = state(now)', 'if crank is None:', f'    {leave}', f'{_CRANK} = crank']
+        lines = ['crank = state(now)', 'if crank is None:', f'    {bail_out}', f'{_CRANK} = crank']
         return Lines(lines, {'state': self.state})
 
 

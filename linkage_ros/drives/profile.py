@@ -63,7 +63,7 @@ class ProfileParameters(Profile):
 PARAMETERS = ProfileParameters
 
 
-def extent(parameters: Profile) -> tuple[float, float]:
+def value_range(parameters: Profile) -> tuple[float, float]:
     """Return the least and the greatest value of an input, in [rad] or [m]."""
     values = [value for _, value in parameters.table]
     gain = values[-1] - values[0] if parameters.repeat else 0.0
@@ -72,7 +72,7 @@ def extent(parameters: Profile) -> tuple[float, float]:
         times = [time for time, _ in parameters.table]
         seconds = [after - before for before, after in pairwise(times)]
         for value, (c1, c2, c3, _, _) in zip(
-            values, _polynomials(parameters, seconds), strict=False
+            values, _row_polynomials(parameters, seconds), strict=False
         ):
             extremes += [value + x * (c1 + x * (c2 + x * c3)) for x in _turns_at(c1, c2, c3)]
     return (-inf if gain < 0.0 else min(extremes)), (inf if gain > 0.0 else max(extremes))
@@ -90,7 +90,7 @@ def _turns_at(c1: float, c2: float, c3: float) -> list[float]:
     return [x for x in roots if 0.0 < x < 1.0]
 
 
-def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
+def motion_curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
     """
     Return value, rate and acceleration as a function of time, in [ns].
 
@@ -100,12 +100,12 @@ def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
         The table has less than two rows, or times that do not increase.
 
     """
-    times = _times(parameters.table, f'{where}.table')
+    times = _table_times(parameters.table, f'{where}.table')
     values = [value for _, value in parameters.table]
     begin, length = times[0], times[-1] - times[0]
     starts = [time - begin for time in times[:-1]]
     seconds = [(after - before) / NANOSECONDS for before, after in pairwise(times)]
-    polynomials = _polynomials(parameters, seconds)
+    polynomials = _row_polynomials(parameters, seconds)
     durations = [after - before for before, after in pairwise(times)]
     pieces = list(zip(starts, durations, values, seconds, polynomials, strict=False))
     before, after = (values[0], 0.0, 0.0), (values[-1], 0.0, 0.0)
@@ -132,17 +132,17 @@ def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
     return profile
 
 
-def _polynomials(parameters: Profile, seconds: Sequence[float]) -> list[_Polynomial]:
+def _row_polynomials(parameters: Profile, seconds: Sequence[float]) -> list[_Polynomial]:
     """Return the polynomial from each row to the next, without its constant term."""
     steps = [after - before for (_, before), (_, after) in pairwise(parameters.table)]
     if parameters.interpolation == 'linear':
         return [(step, 0.0, 0.0, 0.0, 0.0) for step in steps]
     if parameters.interpolation == 'cubic':
-        return _cubic(seconds, steps, periodic=parameters.repeat)
+        return _cubic_spline(seconds, steps, periodic=parameters.repeat)
     return [(0.0, 0.0, 10 * step, -15 * step, 6 * step) for step in steps]
 
 
-def _times(table: Sequence[tuple[float, float]], where: str) -> list[int]:
+def _table_times(table: Sequence[tuple[float, float]], where: str) -> list[int]:
     """Return the times of a table, in [ns]."""
     if len(table) < 2:
         raise DefinitionError(where, 'has one row', 'write two or more rows [time, value]')
@@ -166,15 +166,15 @@ def _times(table: Sequence[tuple[float, float]], where: str) -> list[int]:
 _Polynomial = tuple[float, float, float, float, float]
 
 
-def _cubic(
+def _cubic_spline(
     seconds: Sequence[float], steps: Sequence[float], *, periodic: bool
 ) -> list[_Polynomial]:
     """Return the coefficients of the spline from its slopes at the rows."""
     chords = [step / h for step, h in zip(steps, seconds, strict=True)]
-    slopes = _slopes(seconds, chords, 0.0)
+    slopes = _spline_slopes(seconds, chords, 0.0)
     if periodic:
         # Linear in the slope at the seam, chosen to make the acceleration continuous there.
-        unit = _slopes(seconds, [0.0] * len(chords), 1.0)
+        unit = _spline_slopes(seconds, [0.0] * len(chords), 1.0)
         h0, h1 = seconds[0], seconds[-1]
         seam = (3.0 * (h0 * chords[-1] + h1 * chords[0]) - h0 * slopes[-2] - h1 * slopes[1]) / (
             2.0 * (h0 + h1) + h0 * unit[-2] + h1 * unit[1]
@@ -186,7 +186,7 @@ def _cubic(
     ]
 
 
-def _slopes(seconds: Sequence[float], chords: Sequence[float], ends: float) -> list[float]:
+def _spline_slopes(seconds: Sequence[float], chords: Sequence[float], ends: float) -> list[float]:
     """
     Return the slopes at the rows from those at both ends, in [rad/s] or [m/s].
 
@@ -205,4 +205,4 @@ def _slopes(seconds: Sequence[float], chords: Sequence[float], ends: float) -> l
     return slopes
 
 
-build = partial(build_clocked, 'drive.profile', curve, extent)
+build = partial(build_clocked, 'drive.profile', motion_curve, value_range)

@@ -45,12 +45,12 @@ class SineParameters(Sine):
 PARAMETERS = SineParameters
 
 
-def extent(parameters: Sine) -> tuple[float, float]:
+def value_range(parameters: Sine) -> tuple[float, float]:
     """Return the least and the greatest value of an input, in [rad] or [m]."""
     return parameters.mean - parameters.amplitude, parameters.mean + parameters.amplitude
 
 
-def curve(parameters: Sine, _where: str = '') -> Curve:
+def motion_curve(parameters: Sine, _where: str = '') -> Curve:
     """Return value, rate and acceleration as a function of time, in [ns]."""
     (frequency,), below = as_integers(parameters.frequency)
     below *= NANOSECONDS
@@ -67,4 +67,4 @@ def curve(parameters: Sine, _where: str = '') -> Curve:
     return sine
 
 
-build = partial(build_clocked, 'drive.sine', curve, extent)
+build = partial(build_clocked, 'drive.sine', motion_curve, value_range)

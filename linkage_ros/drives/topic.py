@@ -216,7 +216,7 @@ class TopicDrive(Drive):
         for value in angles + rates:
             if not -LARGEST <= value <= LARGEST:
                 complete = False
-        if not complete and (why := _refusal(angles, rates)) is not None:
+        if not complete and (why := _find_rejection(angles, rates)) is not None:
             return why
         if self._at_arrival:
             stamp = now
@@ -232,18 +232,23 @@ class TopicDrive(Drive):
             if jump > self.jump:
                 self.jump = jump
         if not complete:
-            known = self._differences(stamp, angles) if self._needs_rate else zeros
+            known = self._mean_rates(stamp, angles) if self._needs_rate else zeros
             if known is None:
                 self._last = stamp, angles
                 return None
             rates = tuple(
                 [old if isnan(rate) else rate for rate, old in zip(rates, known, strict=True)]
             )
-        self.sample = (stamp, angles, rates, self._bent(stamp, rates) if self._estimate else zeros)
+        self.sample = (
+            stamp,
+            angles,
+            rates,
+            self._estimate_accelerations(stamp, rates) if self._estimate else zeros,
+        )
         self._last = stamp, angles
         return None
 
-    def _differences(self, stamp: int, angles: _Values) -> _Values | None:
+    def _mean_rates(self, stamp: int, angles: _Values) -> _Values | None:
         """Return the mean rates since the last sample; None without one of another stamp."""
         if self._last is None or stamp == self._last[0]:
             return self.sample and self.sample[2]
@@ -257,7 +262,7 @@ class TopicDrive(Drive):
             ]
         )
 
-    def _bent(self, stamp: int, rates: _Values) -> _Values:
+    def _estimate_accelerations(self, stamp: int, rates: _Values) -> _Values:
         """Return the accelerations at a new sample; 0 at the first one, and after a gap."""
         if self.sample is None or stamp - self.sample[0] > self.max_age:
             return (0.0,) * len(rates)
@@ -297,15 +302,15 @@ class TopicDrive(Drive):
                 angles = tuple([angle + rate * seconds for angle, rate in pairs])
         return CrankState(angles, rates, accelerations, age)
 
-    def straight(self, inputs: int, leave: str) -> Lines:
+    def compile_state(self, inputs: int, bail_out: str) -> Lines:
         """Return `state` as generated lines, without a function call."""
         lines = [
             'if drive.sample is None:',
-            f'    {leave}',
+            f'    {bail_out}',
             'stamp, angles, rates, accelerations = drive.sample',
             'age = now - stamp',
             f'if age > {self.max_age}:',
-            f'    {leave}',
+            f'    {bail_out}',
         ]
         if self._carry_forward and self._estimate:
             carried = [
@@ -325,7 +330,7 @@ class TopicDrive(Drive):
         return Lines(lines, {'drive': self})
 
 
-def _refusal(angles: _Values, rates: _Values) -> Rejection | None:
+def _find_rejection(angles: _Values, rates: _Values) -> Rejection | None:
     """Return why a sample is rejected for its numbers; a rate that is NaN is absent."""
     bad = [value for value in angles if not -LARGEST <= value <= LARGEST]
     bad += [rate for rate in rates if abs(rate) > LARGEST]

@@ -214,7 +214,7 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     most = given.limits.effort
     motor = None
     if parameters.motor is not None:
-        motor = _motor(parameters.motor, most)
+        motor = _build_motor(parameters.motor, most)
         motion = motor.mount_on(motion)
         if parameters.motor.command != 'effort':
             most = LARGEST
@@ -265,7 +265,7 @@ def _build_motion(parameters: TorqueParameters, context: Context) -> Any:
     motion = SingleDofMechanism(
         mechanics.motion_equation,
         METHODS[parameters.method].step,
-        _stops(context.hard_limited, parameters.start, parameters.stop_margin),
+        _find_stops(context.hard_limited, parameters.start, parameters.stop_margin),
         parameters.restitution,
         mechanics.laws,
         context.reactions.friction_effort if mechanics.friction.load_dependent_joint else None,
@@ -316,7 +316,7 @@ def writer(parameters: TorqueParameters, context: Context, drive: TorqueDrive) -
     return MotorEncoder(name, parameters.motor_encoder.counts, lambda: drive.motor)
 
 
-def _motor(given: MotorParameters, most: float) -> Motor | Winding:
+def _build_motor(given: MotorParameters, most: float) -> Motor | Winding:
     """Return the motor of an input that bears an effort of at most ``most``."""
     from linkage_ros.dynamics.motor import Motor  # local import: only with a motor
 
@@ -355,7 +355,7 @@ def _motor(given: MotorParameters, most: float) -> Motor | Winding:
     return Winding(by_current, given.inductance, given.voltage, given.command)
 
 
-def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]:
+def _find_stops(closure: Closure, start: float, margin: float) -> tuple[float, float]:
     """Return the stops of the input, in [rad] or [m]: at limits, or before a toggle."""
     # If the input has limits, its angle is not reduced by whole turns.
     counted = closure.linkage.inputs[0].limits.is_bounded
@@ -505,7 +505,7 @@ class TorqueDrive(Drive):
                 return Rejection.EFFORT_TOO_LARGE
             return Rejection.EFFORT_NOT_FINITE
         self.saturated += not -self._most <= effort <= self._most
-        acting = self.acting(effort)
+        acting = self.actuation_for(effort)
         self.stamp = now
         if self._delay:
             self._waiting.append((now + self._delay, acting))
@@ -519,7 +519,7 @@ class TorqueDrive(Drive):
         self._until = now + self.max_age
         return None
 
-    def acting(self, effort: float | None) -> tuple[Any, float, float]:
+    def actuation_for(self, effort: float | None) -> tuple[Any, float, float]:
         """Return mechanism, force on its input and brake under a command; None: without one."""
         if effort is None:
             return self._idle
@@ -572,12 +572,12 @@ class TorqueDrive(Drive):
         if motion.rate or not self.exerts_effort:
             return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
         standing = CrankAtRest((motion.value,), (motion.rate,), (acceleration,), 0)
-        standing.bearing = self._bearing(motion, acceleration)
+        standing.bearing = self._resting_efforts(motion, acceleration)
         return standing
 
     def _watch_chatter(self, play: PlayParameters) -> None:
         """Let a late tick integrate less while motor and crank meet too often, or end the run."""
-        if self.chattered and play.on_chatter == 'end':
+        if self.chatter_count and play.on_chatter == 'end':
             raise LinkageError(
                 'drive.torque.play',
                 f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
@@ -587,7 +587,7 @@ class TorqueDrive(Drive):
         hurries = _without_winding(self._motion).trials < _FEW_TRIALS
         self._made_up = self._least_made_up if hurries else self._most_made_up
 
-    def _bearing(self, motion: Any, acceleration: float) -> tuple[float, float]:
+    def _resting_efforts(self, motion: Any, acceleration: float) -> tuple[float, float]:
         """Return the least and the greatest effort that acts on the input at rest."""
         mechanism, force, holding = self._acting
         if self._motor:
@@ -603,7 +603,7 @@ class TorqueDrive(Drive):
         return least, most
 
     @property
-    def chattered(self) -> int:
+    def chatter_count(self) -> int:
         """Return the number of steps in which motor and crank met and parted too often."""
         coarse: int = getattr(_without_winding(self._motion), 'coarse', 0)
         return coarse

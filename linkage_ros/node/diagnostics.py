@@ -412,7 +412,7 @@ class DiagnosticsSummary:
 
 def chattered(lines: Sequence[LinkagePipeline]) -> int:
     """Return the number of steps in which motor and crank met and parted too often."""
-    return sum(line.drive.chattered for line in lines)
+    return sum(line.drive.chatter_count for line in lines)
 
 
 def is_interleaved(before: int, now: int) -> bool:
@@ -679,7 +679,7 @@ class Warnings:
     def check_chatter(self, lines: Sequence[LinkagePipeline], period: float) -> None:
         """Warn of steps in which motor and crank met and parted too often, once a period [s]."""
         for line in lines:
-            kind, count = f'chatter {line.member.name}', line.drive.chattered
+            kind, count = f'chatter {line.member.name}', line.drive.chatter_count
             before = min(self._chattered.get(kind, 0), count)  # a reset counts anew
             if count > before:
                 told = f'{describe_chatter(count - before)}{_of(line)}'

@@ -94,7 +94,7 @@ def straight(
     The compiled linkage closes for at least one input; it returns the values of a `Straight`, as
     far as the scene asks for them. ``angles`` unwraps the published angles; None if not needed.
     """
-    crank = drive.straight(compiled.driven, 'return plain(now, None)')
+    crank = drive.compile_state(compiled.driven, 'return plain(now, None)')
     lines, bound = [*crank.lines], {**crank.bound}
     # The state of a drive that exerts an effort holds more than its fields.
     exerts = getattr(drive, 'exerts_effort', False)

@@ -161,8 +161,8 @@ def simulate(
             counts = dict(zip((topic.name for _, topic in topics), recording.written, strict=True))
             writer.close({'linkage_ros.dropped': json.dumps(dict.fromkeys(counts, 0))})
     for line in loop.pipeline.lines:
-        if line.drive.chattered:
-            warn(describe_chatter(line.drive.chattered))
+        if line.drive.chatter_count:
+            warn(describe_chatter(line.drive.chatter_count))
     return counts
 
 

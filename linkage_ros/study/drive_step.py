@@ -196,7 +196,7 @@ def _integrated(motion: MemberMotion, times: Sequence[int], factor: float) -> li
         changes.append((at, command.effort))
     if motion.commands:
         changes.append((changes[-1][0] + use.timeout, None))
-    acting = [exact_drive.Acting(at, *drive.acting(effort)) for at, effort in changes]
+    acting = [exact_drive.Acting(at, *drive.actuation_for(effort)) for at, effort in changes]
     seconds = [time * 1e-9 for time in times]
     try:
         found = exact_drive.exact_motion(

@@ -200,7 +200,9 @@ def _usual_effort(motion: MemberMotion) -> float:
     equation = motion.context.mechanics.motion_equation
     drive = build_drive(motion)
     start = motion.member.drive[1].start
-    low, high = (min(max(end, start - tau), start + tau) for end in drive.acting(None)[0].stops)
+    low, high = (
+        min(max(end, start - tau), start + tau) for end in drive.actuation_for(None)[0].stops
+    )
     found = [terms for k in range(90) if (terms := equation(low + (high - low) * k / 90.0))]
     least = min(terms.inertia for terms in found)
     rubbing = max(terms.coulomb + terms.breakaway for terms in found)

@@ -15,7 +15,7 @@ The integral is mpmath's, by quadrature; so are the derivatives of the position.
 from dataclasses import replace
 from math import hypot, log2, tau
 
-from linkage_ros.drives.chirp import build, Chirp, ChirpParameters, curve
+from linkage_ros.drives.chirp import build, Chirp, ChirpParameters, motion_curve
 from linkage_ros.drives.drive import CrankState
 from mpmath import mp
 import pytest
@@ -85,7 +85,7 @@ def check(parameters, time):
         # A double's roundings of what the sine is taken of; the linear sweep's is below a period.
         rounding = 16e-16 * (1 if parameters.sweep == 'linear' else 1 + passed) * 2 * mp.pi
         w = 2 * mp.pi * max(parameters.start_frequency, parameters.end_frequency)
-        found = curve(parameters)(time)
+        found = motion_curve(parameters)(time)
         assert abs(found[0] - position(t)) <= A * rounding + 1e-16
         if time:
             # One step of each is exact to 1e-12 and better, as mpmath chooses it.
@@ -109,7 +109,7 @@ def test_repeated_it_sweeps_back_and_there_again(name, part):
 
 @pytest.mark.parametrize('name', ALL)
 def test_at_the_end_it_rests_where_it_is(name):
-    chirp = curve(ALL[name])
+    chirp = motion_curve(ALL[name])
     end = round(ALL[name].seconds * SECOND)
     before, rate, _ = chirp(end - 1)
     rest, *still = chirp(end)
@@ -122,7 +122,7 @@ def test_at_the_end_it_rests_where_it_is(name):
 @pytest.mark.parametrize('name', ALL)
 def test_where_it_turns_neither_position_nor_rate_jumps(name, turn):
     parameters = repeated(ALL[name])
-    chirp = curve(parameters)
+    chirp = motion_curve(parameters)
     end = turn * round(parameters.seconds * SECOND)
     w = 6.3 * max(parameters.start_frequency, parameters.end_frequency)
     before, at, after = (chirp(end + step) for step in (-1, 0, 1))
@@ -139,7 +139,7 @@ def test_it_sweeps_from_the_first_frequency_to_the_last(name):
     parameters = repeated(ALL[name])
     end = round(parameters.seconds * SECOND)
     for time, f in ((0, parameters.start_frequency), (end, parameters.end_frequency)):
-        value, rate, _ = curve(parameters)(time)
+        value, rate, _ = motion_curve(parameters)(time)
         swing = hypot(value - parameters.mean, rate / (tau * f))
         assert swing == pytest.approx(parameters.amplitude, rel=1e-12)
 

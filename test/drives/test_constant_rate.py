@@ -12,7 +12,12 @@ from math import ulp
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.constant_rate import build, ConstantRate, ConstantRateParameters, curve
+from linkage_ros.drives.constant_rate import (
+    build,
+    ConstantRate,
+    ConstantRateParameters,
+    motion_curve,
+)
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.errors import DefinitionError
 from mpmath import mp
@@ -44,12 +49,12 @@ def exact(start, rate, time):
     ],
 )
 def test_angles_are_those_worked_out_by_hand(start, rate, time, angle):
-    assert curve(ConstantRate(rate, start))(time) == (angle, rate, 0.0)
+    assert motion_curve(ConstantRate(rate, start))(time) == (angle, rate, 0.0)
 
 
 @given(st.floats(-1e3, 1e3), st.floats(-1e4, 1e4), st.integers(0, 1000 * DAY))
 def test_after_any_time_the_angle_is_rounded_once(start, rate, time):
-    angle, same_rate, acceleration = curve(ConstantRate(rate, start))(time)
+    angle, same_rate, acceleration = motion_curve(ConstantRate(rate, start))(time)
     assert abs(angle - exact(start, rate, time)) <= 0.500001 * mp.mpf(ulp(angle))
     assert (same_rate, acceleration) == (rate, 0.0)
 

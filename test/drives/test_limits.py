@@ -10,7 +10,7 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.drives.profile import curve, extent, ProfileParameters
+from linkage_ros.drives.profile import motion_curve, ProfileParameters, value_range
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import EffortCommand
@@ -120,8 +120,10 @@ def test_what_is_refused_when_the_scene_is_built(name):
 def test_between_which_values_a_table_stays(values, interpolation, repeat):
     table = tuple((float(2 * i), value) for i, value in enumerate(values))
     parameters = ProfileParameters(table, interpolation, repeat)
-    low, high = extent(parameters)
-    seen = [curve(parameters)(time * 5 * MS)[0] for time in range(400 * (len(values) - 1) + 1)]
+    low, high = value_range(parameters)
+    seen = [
+        motion_curve(parameters)(time * 5 * MS)[0] for time in range(400 * (len(values) - 1) + 1)
+    ]
     if not repeat or values[0] == values[-1]:
         assert low == pytest.approx(min(seen), abs=1e-4)
         assert high == pytest.approx(max(seen), abs=1e-4)

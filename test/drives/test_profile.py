@@ -13,7 +13,7 @@ from math import sqrt, tau
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import CrankState
-from linkage_ros.drives.profile import build, curve, Profile, ProfileParameters
+from linkage_ros.drives.profile import build, motion_curve, Profile, ProfileParameters
 from linkage_ros.errors import DefinitionError
 from mpmath import mp
 import numpy as np
@@ -90,7 +90,7 @@ TIMELINES = {
 @pytest.mark.parametrize('name', TIMELINES)
 def test_a_profile_passes_as_the_timeline_says(name):
     parameters, steps = TIMELINES[name]
-    profile = curve(parameters)
+    profile = motion_curve(parameters)
     for time, expected in steps:
         assert profile(time * MS) == pytest.approx(expected, abs=1e-12), f'at {time} ms'
 
@@ -106,7 +106,7 @@ def tables(draw):
 
 @given(tables(), st.sampled_from(['linear', 'cubic', 'minimum_jerk']), st.booleans())
 def test_it_passes_through_every_row(table, interpolation, repeat):
-    profile = curve(Profile(table, interpolation, repeat=repeat))
+    profile = motion_curve(Profile(table, interpolation, repeat=repeat))
     for time, value in table:
         assert profile(round(time * SECOND))[0] == pytest.approx(value, abs=1e-13)
 
@@ -116,7 +116,7 @@ def test_a_cubic_is_the_clamped_spline(table, part):
     times, values = np.array(table).T
     spline = CubicSpline(times, values, bc_type='clamped')
     time = round((times[0] + part * (times[-1] - times[0])) * SECOND) - 1
-    check_spline(curve(Profile(table, 'cubic')), spline, time, 0.0)
+    check_spline(motion_curve(Profile(table, 'cubic')), spline, time, 0.0)
 
 
 @given(tables(), st.floats(0.0, 1.0), st.integers(0, 5))
@@ -129,7 +129,7 @@ def test_a_cubic_that_repeats_is_the_periodic_spline(table, part, rounds):
     spline = CubicSpline(times, level, bc_type='periodic')
     within = round((times[0] + part * length) * SECOND) - 1
     time = within + rounds * round(length * SECOND)
-    check_spline(curve(Profile(table, 'cubic', repeat=True)), spline, time, trend)
+    check_spline(motion_curve(Profile(table, 'cubic', repeat=True)), spline, time, trend)
 
 
 def check_spline(profile, spline, time, trend):
@@ -150,7 +150,7 @@ def check_spline(profile, spline, time, trend):
 
 @pytest.mark.parametrize('x', ['0.0', '0.001', '0.2', '0.5', '0.7', '0.999', '0.999999999'])
 def test_minimum_jerk_is_that_of_flash_and_hogan(x):
-    profile = curve(Profile(((1.0, 0.3), (3.5, -1.4)), 'minimum_jerk'))
+    profile = motion_curve(Profile(((1.0, 0.3), (3.5, -1.4)), 'minimum_jerk'))
     with mp.workdps(40):
         h, step = mp.mpf('2.5'), mp.mpf(-1.4) - mp.mpf(0.3)
 
@@ -165,7 +165,7 @@ def test_minimum_jerk_is_that_of_flash_and_hogan(x):
 
 def test_the_largest_acceleration_of_minimum_jerk():
     """It is 10/√3·Δ/T², where the time is (3 − √3)/6 of the whole."""
-    profile = curve(Profile(((0.0, 0.0), (2.0, 3.0)), 'minimum_jerk'))
+    profile = motion_curve(Profile(((0.0, 0.0), (2.0, 3.0)), 'minimum_jerk'))
     largest = max(profile(time)[2] for time in range(0, 2 * SECOND, MS))
     assert largest == pytest.approx(10 / sqrt(3) * 3.0 / 4.0, rel=1e-5)
     at = round((3 - sqrt(3)) / 6 * 2 * SECOND)
@@ -174,7 +174,7 @@ def test_the_largest_acceleration_of_minimum_jerk():
 
 @pytest.mark.parametrize('interpolation', ['cubic', 'minimum_jerk'])
 def test_where_the_rows_meet_nothing_jumps(interpolation):
-    profile = curve(Profile(ONCE_AROUND, interpolation, repeat=True))
+    profile = motion_curve(Profile(ONCE_AROUND, interpolation, repeat=True))
     for row in range(1, 9):
         before, after = profile(row * SECOND - 1), profile(row * SECOND)
         # In a nanosecond nothing changes by more than the next derivative, here below 320.
@@ -182,7 +182,7 @@ def test_where_the_rows_meet_nothing_jumps(interpolation):
 
 
 def test_after_a_million_rounds_it_is_as_exact_as_the_angle_allows():
-    profile = curve(Profile(ONCE_AROUND, 'minimum_jerk', repeat=True))
+    profile = motion_curve(Profile(ONCE_AROUND, 'minimum_jerk', repeat=True))
     angle, rate, acceleration = profile(2_000_000 * SECOND + SECOND // 2)
     with mp.workdps(40):
         expected = 1_000_000 * mp.mpf(tau) + mp.mpf('0.5')

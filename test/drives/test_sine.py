@@ -13,7 +13,7 @@ from math import pi
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import CrankState
-from linkage_ros.drives.sine import build, curve, Sine, SineParameters
+from linkage_ros.drives.sine import build, motion_curve, Sine, SineParameters
 from mpmath import mp
 import pytest
 
@@ -38,7 +38,7 @@ def check(parameters, time):
 
         expected = [mp.diff(position, mp.mpf(time) / SECOND, n) for n in range(3)]
         w = 2 * mp.pi * f
-        found = curve(parameters)(time)
+        found = motion_curve(parameters)(time)
         limits = (ROUNDING * A + abs(mean) * 2e-16, ROUNDING * A * w, ROUNDING * A * w * w)
         for value, wanted, limit in zip(found, expected, limits, strict=True):
             assert abs(value - wanted) <= limit
@@ -69,7 +69,9 @@ def test_however_late_it_is(amplitude, frequency, phase, time):
 
 @pytest.mark.parametrize('periods', [1, 10**6, 10**12 + 1])
 def test_whole_periods_repeat_to_the_last_bit(periods):
-    sine = curve(Sine(amplitude=0.5, frequency=125.0, mean=0.1, phase=0.3))  # a period is 8 ms
+    sine = motion_curve(
+        Sine(amplitude=0.5, frequency=125.0, mean=0.1, phase=0.3)
+    )  # a period is 8 ms
     for time in range(0, 8_000_000, 999_983):
         assert sine(time + periods * 8_000_000) == sine(time)
 

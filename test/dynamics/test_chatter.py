@@ -154,7 +154,7 @@ def test_a_late_tick_integrates_little_while_it_chatters():
         assert drive.offer(EffortCommand(0, 5.0), now) is None
         drive.state(now)
         lost.append(drive.lost)
-    assert drive.chattered > 0
+    assert drive.chatter_count > 0
     skipped = [(after - before) // MS for before, after in pairwise(lost)]
     assert skipped[0] == 0
     assert skipped[-1] in {79, 80, 81}
@@ -166,4 +166,4 @@ def test_bounces_that_end_are_no_chatter():
         if not number % 10:
             drive.offer(EffortCommand(0, 0.02 * (-1) ** (number // 10)), BEGIN + number * 10 * MS)
         drive.state(BEGIN + number * 10 * MS)
-    assert drive.chattered == 0
+    assert drive.chatter_count == 0
