@@ -193,13 +193,13 @@ class FrozenSensor:
         if not self._switch.on:
             self._last = reading
             return reading
-        return None if self._last is None else restamped(self._last, reading.stamp)
+        return None if self._last is None else restamp(self._last, reading.stamp)
 
     def gap(self, now: int) -> SensorReading | None:
         """Return the last reading before the freeze, stamped now, in [ns]; None otherwise."""
         if not self._switch.on or self._last is None:
             return None
-        return restamped(self._last, now)
+        return restamp(self._last, now)
 
 
 @dataclass(frozen=True, slots=True)

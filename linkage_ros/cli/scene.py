@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 from linkage_ros.cli.arguments import add_set, check_no_settings, finite, SCENE_HELP
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.dispatch import bringing, module_of
+from linkage_ros.effects.dispatch import effects_requiring, module_of
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, listed
 from linkage_ros.faults import FAULTS
@@ -137,7 +137,7 @@ def _stages(line: LinkagePipeline) -> Iterator[Stage]:
         if stage in given:
             yield Stage(stage, where, given[stage], ())
         else:
-            yield Stage(stage, where, module.PARAMETERS(), bringing(stage, given))
+            yield Stage(stage, where, module.PARAMETERS(), effects_requiring(stage, given))
 
 
 def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:

@@ -56,7 +56,7 @@ class Continuous:
 
     def __init__(self, turning: Sequence[bool], begins: Mapping[int, Begin] | None = None) -> None:
         self.places = tuple(i for i, turns in enumerate(turning) if turns)
-        self._begin = dict.fromkeys(self.places, wrapped) | dict(begins or {})
+        self._begin = dict.fromkeys(self.places, wrap_angle) | dict(begins or {})
         self._turns = [0] * len(turning)
         self.raw: tuple[float, ...] = ()
         self.added = (_NO_TURN,) * len(turning)
@@ -67,15 +67,15 @@ class Continuous:
         self.raw = joints
         if raw:
             if not all(-pi < raw[i] - joints[i] < pi for i in self.places):
-                self._turn({i: raw[i] for i in self.places}, joints)
+                self._add_turns({i: raw[i] for i in self.places}, joints)
             return reading._replace(joints=tuple(map(add, joints, self.added)))
         first = {i: begin(joints[i]) for i, begin in self._begin.items()}
-        self._turn(first, joints)
+        self._add_turns(first, joints)
         # Keep the first values exactly: adding turns may round.
         began = tuple(first.get(i, value) for i, value in enumerate(joints))
         return reading._replace(joints=began)
 
-    def _turn(self, last: Mapping[int, float], joints: Sequence[float]) -> None:
+    def _add_turns(self, last: Mapping[int, float], joints: Sequence[float]) -> None:
         """Add the turns that bring the joints nearest to their last values."""
         for i, value in last.items():
             if not -pi < value - joints[i] < pi:
@@ -83,7 +83,7 @@ class Continuous:
         self.added = tuple(n * tau if n else _NO_TURN for n in self._turns)
 
 
-def beginnings(closure: Closure) -> dict[int, Begin]:
+def first_values(closure: Closure) -> dict[int, Begin]:
     """
     Return the first values of published angles with limits, by joint index.
 
@@ -100,7 +100,7 @@ def beginnings(closure: Closure) -> dict[int, Begin]:
     return found
 
 
-def all_wrapped(turning: Sequence[bool]) -> Sensor:
+def wrap_all(turning: Sequence[bool]) -> Sensor:
     """
     Build a stage that wraps angles to (−π, π].
 
@@ -113,13 +113,13 @@ def all_wrapped(turning: Sequence[bool]) -> Sensor:
     turns = tuple(turning)
 
     def wrap(_now: int, reading: SensorReading) -> SensorReading:
-        now = [wrapped(v) if turn else v for v, turn in zip(reading.joints, turns, strict=True)]
+        now = [wrap_angle(v) if turn else v for v, turn in zip(reading.joints, turns, strict=True)]
         return reading._replace(joints=tuple(now))
 
     return wrap
 
 
-def wrapped(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """Return an angle without its whole turns, in (−π, π] rad."""
     rest = remainder(angle, tau)
     return pi if rest <= -pi else rest

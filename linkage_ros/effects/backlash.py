@@ -73,7 +73,7 @@ def drive_stage(parameters: BacklashParameters, context: Context) -> DriveStage:
     def backlash(motor: CrankState) -> CrankState:
         angles, rates, accelerations, free_motors = zip(
             *[
-                play.follow(*of_one)
+                play.follow_motor(*of_one)
                 for play, *of_one in zip(
                     plays, motor.angles, motor.rates, motor.accelerations, strict=True
                 )
@@ -108,7 +108,7 @@ class Play:
         self._crank: float | None = None
         self._motor = 0.0
 
-    def follow(
+    def follow_motor(
         self, motor: float, rate: float, acceleration: float
     ) -> tuple[float, float, float, float | None]:
         """

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 from math import hypot
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import MechanismState, Stage, yielding
+from linkage_ros.effects.stage import MechanismState, Stage, with_deflection
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.files.parameters import each_part, Number
 from linkage_ros.kinematics.arithmetic import call, make_vector
@@ -99,6 +99,6 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
                 fx, fy, _ = reactions[joint]
                 offsets[joint] = make_vector(-play * (fx / size), -play * (fy / size))
         moved = shift_of(motion.position, offsets)
-        return motion if moved is None else yielding(motion, moved)
+        return motion if moved is None else with_deflection(motion, moved)
 
     return clearance

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import MechanismState, Stage, yielding
+from linkage_ros.effects.stage import MechanismState, Stage, with_deflection
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.files.parameters import each_part, Number
 from linkage_ros.kinematics.arithmetic import unit_vector
@@ -76,7 +76,7 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
         A link has not exactly two pins.
 
     """
-    bars = tuple(_bar(context, link, k) for link, k in parameters.links.items())
+    bars = tuple(_make_bar(context, link, k) for link, k in parameters.links.items())
     rigid = (0j,) * len(context.closure.structure.joints)
     shift_of = context.reactions.joint_deflections
 
@@ -97,20 +97,20 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
             for joint, sign in far:
                 offsets[joint] -= sign * stretch
         moved = shift_of(position, offsets)
-        return motion if moved is None else yielding(motion, moved)
+        return motion if moved is None else with_deflection(motion, moved)
 
     return compliance
 
 
-def _bar(context: Context, link: str, stiffness: float) -> _Bar:
+def _make_bar(context: Context, link: str, stiffness: float) -> _Bar:
     closure = context.closure
     ends: dict[str, list[tuple[int, float]]] = {}
     for number, joint in enumerate(closure.structure.joints):
         if link in (joint.link, joint.to):
-            _check(link, joint)
+            _check_joint(link, joint)
             ends.setdefault(joint.name, []).append((number, 1.0 if joint.link == link else -1.0))
     if len(ends) != 2:
-        raise _error(link, f'has the pins {listed(ends)}')
+        raise _bar_error(link, f'has the pins {listed(ends)}')
     near, far = ends
     points = closure.linkage.links[link]
     between = complex(*points[far]) - complex(*points[near])
@@ -125,12 +125,12 @@ def _bar(context: Context, link: str, stiffness: float) -> _Bar:
     )
 
 
-def _check(link: str, joint: Joint) -> None:
+def _check_joint(link: str, joint: Joint) -> None:
     if joint.kind != 'R':
-        raise _error(link, f'has the slider {joint.name!r}')
+        raise _bar_error(link, f'has the slider {joint.name!r}')
 
 
-def _error(link: str, reason: str) -> DefinitionError:
+def _bar_error(link: str, reason: str) -> DefinitionError:
     return DefinitionError(
         f'effects.compliance.links.{link}',
         f'{link!r} {reason}, so it is not a bar between two pins',

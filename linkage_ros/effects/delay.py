@@ -55,7 +55,7 @@ from random import Random
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
-from linkage_ros.effects.stage import restamped, Sensor, SensorReading
+from linkage_ros.effects.stage import restamp, Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import choice, flag, number, own_parameters
 
@@ -85,7 +85,7 @@ class JointDelay:
     )
 
     @property
-    def random(self) -> bool:
+    def is_random(self) -> bool:
         """Whether the line carries messages with random latencies."""
         return bool(self.spread or self.duplicates)
 
@@ -102,7 +102,7 @@ class DelayParameters(JointDelay):
     joints: Mapping[str, JointDelay] | None = own_parameters('own line of a joint', JointDelay)
 
     @property
-    def lines(self) -> tuple[JointDelay, ...]:
+    def delay_lines(self) -> tuple[JointDelay, ...]:
         """Return the line of the joints without their own one, and these."""
         return self, *(self.joints or {}).values()
 
@@ -110,9 +110,9 @@ class DelayParameters(JointDelay):
 PARAMETERS = DelayParameters
 
 
-def interpolates(parameters: DelayParameters, named: Collection[str]) -> bool:
+def interpolates_readings(parameters: DelayParameters, named: Collection[str]) -> bool:
     """Return whether a line interpolates readings, given the effects of the scene."""
-    between = {line.between for line in parameters.lines if not line.random}
+    between = {line.between for line in parameters.delay_lines if not line.is_random}
     return 'interpolated' in between or (_AUTOMATIC in between and 'encoder' not in named)
 
 
@@ -137,7 +137,7 @@ def sensor(parameters: DelayParameters, context: Context) -> Sensor:
                 'write arrival, or leave joints out',
             )
         return own_sensors('delay', sensor, parameters, context)
-    if parameters.random and parameters.between == 'interpolated':
+    if parameters.is_random and parameters.between == 'interpolated':
         raise DefinitionError(
             'effects.delay.between',
             'interpolated takes one latency for all readings',
@@ -147,9 +147,11 @@ def sensor(parameters: DelayParameters, context: Context) -> Sensor:
         raise DefinitionError(
             'effects.delay.reorder', 'nothing overtakes without a spread', 'write spread too'
         )
-    if parameters.random:
+    if parameters.is_random:
         return RandomDelay(parameters, context.random('delay'))
-    return Delay(parameters, interpolates(parameters, context.effects), context.moves_by_rates)
+    return Delay(
+        parameters, interpolates_readings(parameters, context.effects), context.moves_by_rates
+    )
 
 
 class Delay:
@@ -180,7 +182,7 @@ class Delay:
     def __init__(self, use: DelayParameters, mixes: bool, with_rates: bool = True) -> None:
         self._delay = round(use.seconds * 1e9)
         self._history = History(self._delay, with_rates)
-        self._look = self._history.arriving if mixes else self._history.newest
+        self._look = self._history.arriving_reading if mixes else self._history.newest_reading
         self._measured = use.stamp == 'measured'
         self._arrived = -1
         """Time up to which readings have arrived, in [ns]."""
@@ -199,12 +201,12 @@ class Delay:
             self._begin_messages()
         else:
             self._history.add(now, reading)
-        return self._arriving(now)
+        return self._arriving_reading(now)
 
     def gap(self, now: int) -> SensorReading | None:
         """Return the arriving reading at a time, in [ns], at which the linkage has no pose."""
         self.gap_begins = self._messages is None and self._history.add_gap(now)
-        return self._arriving(now)
+        return self._arriving_reading(now)
 
     def silence(self, now: int, gap: bool) -> SensorReading | None:
         """Return the arriving reading where a sensor before is silent, or in a gap."""
@@ -213,20 +215,20 @@ class Delay:
     def _begin_messages(self) -> None:
         """Make the line carry messages from the newest reading on."""
         self._messages = -1
-        for newest in self._history.after(self._arrived)[-1:]:
+        for newest in self._history.readings_after(self._arrived)[-1:]:
             self._messages = newest[0]
             self._on_the_way.append(newest)
 
-    def _arriving(self, now: int) -> SensorReading | None:
+    def _arriving_reading(self, now: int) -> SensorReading | None:
         due = now - self._delay
         if self._messages is not None and due >= self._messages:
-            found = self._next(due)
+            found = self._next_due(due)
         else:
             found = self._look(due, self._arrived)
         self._arrived = due
-        return found if found is None or self._measured else restamped(found, now)
+        return found if found is None or self._measured else restamp(found, now)
 
-    def _next(self, due: int) -> SensorReading | None:
+    def _next_due(self, due: int) -> SensorReading | None:
         """Return the first waiting reading, if it is due."""
         if self._on_the_way and self._on_the_way[0][0] <= due:
             return self._on_the_way.popleft()[1]
@@ -271,13 +273,13 @@ class RandomDelay:
     def __call__(self, now: int, reading: SensorReading | None) -> SensorReading | None:
         """Return the arriving message; None as `reading` means that the sensor is silent."""
         if reading is not None:
-            self._send(now, reading)
+            self._send_reading(now, reading)
             if self._duplicates and self._random() < self._duplicates:
-                self._send(now, reading)
+                self._send_reading(now, reading)
         found: SensorReading | None = None
         while self._way and self._way[0][0] <= now:
             _, _, found = heappop(self._way)
-        return found if found is None or self._measured else restamped(found, now)
+        return found if found is None or self._measured else restamp(found, now)
 
     def gap(self, now: int) -> SensorReading | None:
         """Return the arriving message at a time, in [ns], at which the linkage has no pose."""
@@ -287,7 +289,7 @@ class RandomDelay:
         """Return the arriving message where a sensor before is silent, or in a gap."""
         return self.gap(now) if gap else self(now, None)
 
-    def _send(self, now: int, reading: SensorReading) -> None:
+    def _send_reading(self, now: int, reading: SensorReading) -> None:
         arrives = now + self._delay + self._draw()
         if not self._reorder:
             arrives = self._latest = max(arrives, self._latest)

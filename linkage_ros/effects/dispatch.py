@@ -50,7 +50,7 @@ def in_order(named: Collection[str]) -> tuple[str, ...]:
     return with_user_effects(named)
 
 
-def needs(effect: str) -> tuple[str, ...]:
+def needed_effects(effect: str) -> tuple[str, ...]:
     """Return the effects that an effect starts from."""
     if '.' not in effect:
         return NEEDS.get(effect, ())
@@ -59,15 +59,15 @@ def needs(effect: str) -> tuple[str, ...]:
     return user_needs(effect)
 
 
-def dependencies(effect: str) -> tuple[str, ...]:
+def effect_dependencies(effect: str) -> tuple[str, ...]:
     """Return the effects that an effect adds to a scene."""
-    return *needs(effect), *PUBLISHED_WITH.get(effect, ())
+    return *needed_effects(effect), *PUBLISHED_WITH.get(effect, ())
 
 
-def bringing(name: str, named: Collection[str]) -> tuple[str, ...]:
+def effects_requiring(name: str, named: Collection[str]) -> tuple[str, ...]:
     """Return those of the named effects that add another one to the scene."""
     own = [other for other in named if '.' in other or other in EFFECTS]
-    return tuple(other for other in in_order(own) if name in dependencies(other))
+    return tuple(other for other in in_order(own) if name in effect_dependencies(other))
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,7 +41,7 @@ from decimal import Context as Rounding
 from random import Random
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import restamped, Sensor, SensorReading
+from linkage_ros.effects.stage import restamp, Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import choice, number, own_parameters
 
@@ -92,7 +92,7 @@ def sensor(parameters: DropoutParameters, context: Context) -> Sensor:
     return own_sensors('dropout', sensor, parameters, context)
 
 
-def _chances(loss: float, burst: float) -> tuple[float, float]:
+def _loss_probabilities(loss: float, burst: float) -> tuple[float, float]:
     """Return the loss probability after a sample that arrived, and after a lost one."""
     if burst == 0.0:
         return loss, loss
@@ -145,7 +145,7 @@ class Dropout:
     __slots__ = ('_begins', '_chance', '_goes_on', '_last', '_random', '_repeat')
 
     def __init__(self, use: DropoutParameters, random: Random) -> None:
-        self._begins, self._goes_on = _chances(use.probability, use.burst)
+        self._begins, self._goes_on = _loss_probabilities(use.probability, use.burst)
         self._chance = use.probability
         self._repeat = use.hold == 'repeat'
         self._random = random.random
@@ -161,4 +161,4 @@ class Dropout:
         last = self._last
         if last is None or not self._repeat:
             return None
-        return restamped(last, reading.stamp)
+        return restamp(last, reading.stamp)

@@ -171,13 +171,13 @@ class Counter:
         self._read: int | None = None
         self.rate = 0.0
 
-    def count(self, value: float) -> float:
+    def count_value(self, value: float) -> float:
         """Return the reading for a value, in [rad] or [m]."""
         encoder, counts, span, last = self._encoder, self._counts, self._span, self._last
         count = floor((value - encoder.offset) * counts / span)
         if last is None:
             self._begin = count if encoder.incremental else None
-        elif self._begin is not None and encoder.index and self._passes(last, count):
+        elif self._begin is not None and encoder.index and self._passes_index(last, count):
             self._begin = None
         self._last = count
         if self._begin is not None:
@@ -186,7 +186,7 @@ class Counter:
             count = (count + counts // 2) % counts - counts // 2
         return encoder.offset + count * span / counts
 
-    def read(self, elapsed: int) -> float:
+    def read_rate(self, elapsed: int) -> float:
         """Return the rate that a driver computes, so many [ns] after its last reading."""
         if self._read is not None and self._last is not None and elapsed > 0:
             moved = self._last - self._read
@@ -197,7 +197,7 @@ class Counter:
         self._read = self._last
         return self.rate
 
-    def _passes(self, last: int, count: int) -> bool:
+    def _passes_index(self, last: int, count: int) -> bool:
         """Return whether an index mark lies between two counts."""
         if self._turns:
             return last // self._counts != count // self._counts
@@ -230,7 +230,7 @@ class Encoder:
         self._last = 0
         self.read_at_ticks = True
 
-    def part(self, places: Sequence[int]) -> Encoder:
+    def select_joints(self, places: Sequence[int]) -> Encoder:
         """Return a driver that reads the counts of these joints alone, at its own times."""
         counters = dict(self._counters)
         found = [(at, counters[place]) for at, place in enumerate(places) if place in counters]
@@ -240,11 +240,11 @@ class Encoder:
         """Return the reading of the encoders."""
         values = list(reading.joints)
         for place, counter in self._counters:
-            values[place] = counter.count(values[place])
+            values[place] = counter.count_value(values[place])
         found = reading._replace(joints=tuple(values))
-        return self.differenced(now, found) if self.read_at_ticks else found
+        return self.difference_rates(now, found) if self.read_at_ticks else found
 
-    def differenced(self, now: int, reading: SensorReading) -> SensorReading:
+    def difference_rates(self, now: int, reading: SensorReading) -> SensorReading:
         """Return a reading with the rates that the driver computes, at a time in [ns]."""
         if not self._differenced:
             return reading
@@ -252,7 +252,7 @@ class Encoder:
         self._last = now
         speeds = list(reading.rates)
         for place, counter in self._counters:
-            rate = counter.read(elapsed)
+            rate = counter.read_rate(elapsed)
             if speeds:
                 speeds[place] = rate
         return reading._replace(rates=tuple(speeds))

@@ -66,7 +66,7 @@ class History:
         return len(self._times)
 
     @property
-    def begin(self) -> int:
+    def earliest_time(self) -> int:
         """Earliest time in memory, in [ns]."""
         return self._times[0]
 
@@ -115,7 +115,7 @@ class History:
         times.append(now)
         readings.append(reading)
 
-    def newest(self, time: int, since: int) -> SensorReading | None:
+    def newest_reading(self, time: int, since: int) -> SensorReading | None:
         """
         Return the newest reading at a time, in [ns]; in a gap the last one before it, once.
 
@@ -132,7 +132,7 @@ class History:
             return self._readings[at - 1]
         return self._before_gap(time, since)
 
-    def between(self, time: int) -> SensorReading | None:
+    def interpolate(self, time: int) -> SensorReading | None:
         """
         Return the interpolated reading at a time, in [ns], which becomes its stamp.
 
@@ -149,11 +149,11 @@ class History:
         after = self._readings[at]
         if before is None or after is None:
             return None
-        return _mixed(time, begin, before, self._times[at], after, self._with_rates)
+        return _mix_readings(time, begin, before, self._times[at], after, self._with_rates)
 
-    def arriving(self, time: int, since: int) -> SensorReading | None:
+    def arriving_reading(self, time: int, since: int) -> SensorReading | None:
         """Return as `between`, and also the last reading before a gap, unchanged and once."""
-        return self.between(time) or self._before_gap(time, since)
+        return self.interpolate(time) or self._before_gap(time, since)
 
     def _before_gap(self, time: int, since: int) -> SensorReading | None:
         """Return the newest reading at a time, if it came after another time."""
@@ -164,13 +164,13 @@ class History:
                 return self._readings[at]
         return None
 
-    def after(self, time: int) -> list[tuple[int, SensorReading]]:
+    def readings_after(self, time: int) -> list[tuple[int, SensorReading]]:
         """Return the readings after a time, in [ns], each with its time."""
         pairs = zip(self._times, self._readings, strict=True)
         return [(at, reading) for at, reading in pairs if at > time and reading is not None]
 
 
-def _mixed(
+def _mix_readings(
     time: int, begin: int, before: SensorReading, end: int, after: SensorReading, with_rates: bool
 ) -> SensorReading:
     """Return the reading at a time between two readings, all times in [ns]."""
@@ -180,25 +180,34 @@ def _mixed(
     if with_rates and v0 and v1:
         h = (end - begin) * 1e-9
         joints = tuple(
-            [_cubic(s, p, q, h * v, h * w) for p, q, v, w in zip(x0, x1, v0, v1, strict=True)]
+            [
+                _interpolate_cubic(s, p, q, h * v, h * w)
+                for p, q, v, w in zip(x0, x1, v0, v1, strict=True)
+            ]
         )
     else:
-        joints = _line(s, x0, x1)
-    return SensorReading(time, joints, _line(s, v0, v1), _line(s, a0, a1), _line(s, e0, e1))
+        joints = _interpolate_linear(s, x0, x1)
+    return SensorReading(
+        time,
+        joints,
+        _interpolate_linear(s, v0, v1),
+        _interpolate_linear(s, a0, a1),
+        _interpolate_linear(s, e0, e1),
+    )
 
 
-def _cubic(s: float, x0: float, x1: float, way0: float, way1: float) -> float:
+def _interpolate_cubic(s: float, x0: float, x1: float, tangent0: float, tangent1: float) -> float:
     """Return the value at s; `way0` and `way1` are the rates at the ends times the interval."""
     step = x1 - x0
-    more0, more1 = way0 - step, way1 - step
+    more0, more1 = tangent0 - step, tangent1 - step
     line = x0 + s * step
-    if 2.0 * abs(more0 + more1) > abs(way1 - way0) + abs(step):
+    if 2.0 * abs(more0 + more1) > abs(tangent1 - tangent0) + abs(step):
         return line
     r = 1.0 - s
     return line + s * r * (r * more0 - s * more1)
 
 
-def _line(s: float, first: _Values, last: _Values) -> _Values:
+def _interpolate_linear(s: float, first: _Values, last: _Values) -> _Values:
     if not first or not last:
         return ()
     return tuple([a + s * (b - a) for a, b in zip(first, last, strict=True)])

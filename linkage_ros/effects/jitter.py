@@ -33,7 +33,7 @@ from random import Random
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
-from linkage_ros.effects.stage import restamped, SensorReading
+from linkage_ros.effects.stage import restamp, SensorReading
 from linkage_ros.files.parameters import choice, number
 
 
@@ -84,22 +84,22 @@ class Jitter:
         if use.distribution == 'uniform':
             uniform = random.random
 
-            def earlier() -> int:
+            def draw_lead_time() -> int:
                 return int((most + 1) * uniform())
         else:
             normal, deviation = random.gauss, most / 3.0
 
-            def earlier() -> int:
+            def draw_lead_time() -> int:
                 return min(round(abs(normal(0.0, deviation))), most)
 
-        self._earlier = earlier
+        self._earlier = draw_lead_time
 
     def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
         """Return the reading at a time, in [ns]."""
         history = self._history
         history.add(now, reading)
-        found = history.between(max(now - self._earlier(), history.begin))
-        return None if found is None else restamped(found, reading.stamp)
+        found = history.interpolate(max(now - self._earlier(), history.earliest_time))
+        return None if found is None else restamp(found, reading.stamp)
 
     def gap(self, now: int) -> None:
         """Record that the linkage has no pose at a time, in [ns]; nothing is read."""

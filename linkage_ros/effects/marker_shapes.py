@@ -63,11 +63,11 @@ class Key(NamedTuple):
     point: str
 
 
-class Body(NamedTuple):
+class MarkerBody(NamedTuple):
     """A marker that moves with a link."""
 
     number: int  # Index of the marker
-    at: Key  # Origin of its frame
+    origin: Key  # Origin of its frame
     colour: Colour  # Colour when not near a toggle
     filled: bool  # Whether it is a filled area; else a line
 
@@ -77,7 +77,7 @@ class MarkerShapes(NamedTuple):
 
     moving: tuple[Marker, ...]  # Markers that change from message to message
     still: tuple[Marker, ...]  # The ground, and the curves of traced points
-    bodies: tuple[Body, ...]  # Moving markers that belong to a link
+    bodies: tuple[MarkerBody, ...]  # Moving markers that belong to a link
     # Moving markers for pins: each has a sphere for every place in `pin_places`.
     pins: tuple[int, ...]
     pin_places: tuple[Key, ...]  # Positions of the pins
@@ -139,12 +139,12 @@ def marker_shapes(
     size = 0.5 * width * extent if width else symbol_size(shown)
     moves, stays = lifetimes
     drawn = carried_shapes(closure, shown.position, size, shown.sweep.travels)
-    still = _still([shape for link, shape in drawn if link == GROUND], size, stays)
+    still = _ground_markers([shape for link, shape in drawn if link == GROUND], size, stays)
     pile = _Pile(size, moves)
-    bodies = _bodies(pile, closure, shown.position, drawn)
+    bodies = _body_markers(pile, closure, shown.position, drawn)
     pin_places = tuple(Key(link, s.name) for link, s in drawn if isinstance(s, Circle))
-    pins = _pins(pile, len(pin_places))
-    traced = _traced(closure)
+    pins = _pin_markers(pile, len(pin_places))
+    traced = _traced_points(closure)
     trails = []
     for number, name in enumerate(traced):
         colour, scale = rgba(COLOURS[number % len(COLOURS)]), (0.35 * size, 0.0, 0.0)
@@ -152,7 +152,7 @@ def marker_shapes(
             marker = Marker('traces', number, LINE_STRIP, scale, colour, _NOWHERE * trail)
             trails.append(pile.add(marker._replace(z=pile.z)))
         elif len(closure.linkage.inputs) == 1:
-            curve = [_flat(place) for place in shown.sweep.paths[name]]
+            curve = [_flat_point(place) for place in shown.sweep.paths[name]]
             marker = Marker('traces', number, LINE_STRIP, scale, colour, curve)
             still.append(marker._replace(lifetime=stays))
     top = pile.z + size
@@ -200,9 +200,9 @@ class _Pile:
         return len(self.markers) - 1
 
 
-def _bodies(
+def _body_markers(
     pile: _Pile, closure: Closure, position: Position, drawn: Sequence[tuple[str, Shape]]
-) -> tuple[Body, ...]:
+) -> tuple[MarkerBody, ...]:
     """Return the markers that move with a link, each in the frame of its link."""
     points, angles = closure.points(position), closure.link_angles(position)
     anchors = {link: Key(link, next(iter(p))) for link, p in closure.structure.links.items()}
@@ -210,31 +210,31 @@ def _bodies(
     whole, edge_line = (1.0, 1.0, 1.0), (0.16 * pile.size, 0.0, 0.0)
     found = []
 
-    def add(link: str, marker: Marker) -> None:
+    def add_body(link: str, marker: Marker) -> None:
         marker = marker._replace(number=ids[marker.ns])
         ids[marker.ns] += 1
         filled = marker.kind == TRIANGLE_LIST
-        found.append(Body(pile.add(marker), anchors[link], marker.colour, filled))
+        found.append(MarkerBody(pile.add(marker), anchors[link], marker.colour, filled))
 
     for link, shape in drawn:
         if link == GROUND or isinstance(shape, Circle):
             continue
         origin, back = points[anchors[link]], rect(1.0, -angles[link])
-        edge = [_flat((place - origin) * back) for place in outline(shape)]
+        edge = [_flat_point((place - origin) * back) for place in outline(shape)]
         if isinstance(shape, Segment):
             slot_line, z = (0.5 * pile.size, 0.0, 0.0), pile.z - 0.6 * pile.layer
-            add(link, Marker('slots', 0, LINE_LIST, slot_line, _SLOT, edge, z=z))
+            add_body(link, Marker('slots', 0, LINE_LIST, slot_line, _SLOT, edge, z=z))
             continue
-        area, colour = _triangles(edge[:-1]), rgba(FACES[shape.role])
+        area, colour = _fan_triangles(edge[:-1]), rgba(FACES[shape.role])
         ns = 'links' if shape.name == link else 'sliders'
-        add(link, Marker(ns, 0, TRIANGLE_LIST, whole, colour, area, z=pile.z))
+        add_body(link, Marker(ns, 0, TRIANGLE_LIST, whole, colour, area, z=pile.z))
         z = pile.z + 0.2 * pile.layer
-        add(link, Marker('edges', 0, LINE_STRIP, edge_line, _EDGE, edge, z=z))
+        add_body(link, Marker('edges', 0, LINE_STRIP, edge_line, _EDGE, edge, z=z))
         pile.z += pile.layer
     return tuple(found)
 
 
-def _pins(pile: _Pile, count: int) -> tuple[int, int]:
+def _pin_markers(pile: _Pile, count: int) -> tuple[int, int]:
     """Return the indices of two spheres per pin: the smaller one stands out above the larger."""
     wide, narrow = 1.1 * pile.size, 0.68 * pile.size
     places = _NOWHERE * count
@@ -244,11 +244,11 @@ def _pins(pile: _Pile, count: int) -> tuple[int, int]:
     return rim, face
 
 
-def _still(drawn: Sequence[Shape], size: float, lifetime: int) -> list[Marker]:
+def _ground_markers(drawn: Sequence[Shape], size: float, lifetime: int) -> list[Marker]:
     """Return the markers of the ground: areas and lines."""
     filled = [shape for shape in drawn if isinstance(shape, Polygon)]
-    area = [p for shape in filled for p in _triangles([_flat(q) for q in shape.corners])]
-    lines = [_flat(q) for shape in drawn for ends in pairwise(outline(shape)) for q in ends]
+    area = [p for shape in filled for p in _fan_triangles([_flat_point(q) for q in shape.corners])]
+    lines = [_flat_point(q) for shape in drawn for ends in pairwise(outline(shape)) for q in ends]
     whole, thin = (1.0, 1.0, 1.0), (0.16 * size, 0.0, 0.0)
     found = [
         Marker('ground', 0, TRIANGLE_LIST, whole, rgba(FACES['ground']), area, lifetime=lifetime),
@@ -257,13 +257,13 @@ def _still(drawn: Sequence[Shape], size: float, lifetime: int) -> list[Marker]:
     return [marker for marker in found if marker.points]
 
 
-def _traced(closure: Closure) -> dict[str, Key]:
+def _traced_points(closure: Closure) -> dict[str, Key]:
     """Return the key of each traced point."""
     links = links_by_point(closure.linkage.links)
     return {point: Key(links[point][0], point) for point in closure.linkage.traced}
 
 
-def _triangles(corners: Sequence[Place]) -> list[Place]:
+def _fan_triangles(corners: Sequence[Place]) -> list[Place]:
     """Return the corners of triangles that fill a convex area, seen from above."""
     found = []
     for i in range(1, len(corners) - 1):
@@ -271,7 +271,7 @@ def _triangles(corners: Sequence[Place]) -> list[Place]:
     return found
 
 
-def _flat(place: complex) -> Place:
+def _flat_point(place: complex) -> Place:
     return place.real, place.imag, 0.0
 
 
@@ -322,12 +322,12 @@ class Arrows:
         self._head = 2.0 * shapes.size
         self._joints = joints
 
-    def _length(self, force: float) -> float:
+    def _arrow_length(self, force: float) -> float:
         if self._scale:
             return self._scale * force
         return self._eighth * log1p(force / self._weight)
 
-    def forces(
+    def force_arrows(
         self, points: Points, reactions: Sequence[tuple[float, float, float]]
     ) -> list[list[complex]]:
         """Return the arrow of each joint."""
@@ -336,13 +336,13 @@ class Arrows:
         drawn = []
         for at, (fx, fy, _) in zip(self._joints, reactions, strict=True):
             force = complex(fx, fy)
-            length = self._length(abs(force))
+            length = self._arrow_length(abs(force))
             start = points[at]
             end = start + rect(length, phase(force))
             drawn.append([start, end] if length >= self._shortest else [])
         return drawn
 
-    def efforts(
+    def effort_arrows(
         self,
         inputs: Sequence[Input],
         points: Points,
@@ -353,13 +353,13 @@ class Arrows:
         if not efforts:
             return [[] for _ in inputs]
         return [
-            self._straight(given, points, angles, effort)
+            self._straight_arrow(given, points, angles, effort)
             if given.slider
-            else self._arc(given, points, angles, effort)
+            else self._arc_arrow(given, points, angles, effort)
             for given, effort in zip(inputs, efforts, strict=True)
         ]
 
-    def _straight(
+    def _straight_arrow(
         self, given: Input, points: Points, angles: Mapping[str, float], effort: float
     ) -> list[complex]:
         slider = self._closure.linkage.sliders[given.slider]
@@ -367,24 +367,24 @@ class Arrows:
         way = rect(1.0 if effort > 0.0 else -1.0, angles[slider.along])
         way *= slider.unit
         start = points[block, slider.point]
-        length = self._length(abs(effort))
-        return self._headed([start, start + length * way], way, length)
+        length = self._arrow_length(abs(effort))
+        return self._add_head([start, start + length * way], way, length)
 
-    def _arc(
+    def _arc_arrow(
         self, given: Input, points: Points, angles: Mapping[str, float], effort: float
     ) -> list[complex]:
         links = self._closure.linkage.links
         pin = next(point for point in links[given.parent] if point in links[given.child])
         centre, start = points[given.child, pin], angles[given.child]
-        length = self._length(abs(effort) / self._radius)
+        length = self._arrow_length(abs(effort) / self._radius)
         turn = min(length / self._radius, _WIDEST) * (1.0 if effort > 0.0 else -1.0)
         steps = ARROW_POINTS - 4
         arc = [centre + rect(self._radius, start + turn * i / steps) for i in range(steps)]
         arc.append(centre + rect(self._radius, start + turn))
         way = rect(1.0, start + turn) * (1j if effort > 0.0 else -1j)
-        return self._headed(arc, way, length)
+        return self._add_head(arc, way, length)
 
-    def _headed(self, line: list[complex], way: complex, length: float) -> list[complex]:
+    def _add_head(self, line: list[complex], way: complex, length: float) -> list[complex]:
         """Return a line with a head; all arrows have the same number of points."""
         if length < self._shortest:
             return []

@@ -124,7 +124,12 @@ class Markers:
         ]
         trail = min(round(use.trace * use.rate) + 1, _LONGEST_TRAIL) if use.trace else 0
         self._shapes = shapes = marker_shapes(
-            closure, use.thickness, trail, len(joints), len(self._inputs), _lifetimes(use, context)
+            closure,
+            use.thickness,
+            trail,
+            len(joints),
+            len(self._inputs),
+            _marker_lifetimes(use, context),
         )
         self._arrows = Arrows(use.force_scale, closure, shapes, joints)
         self._moving = MarkerArrayWriter(self._frame, shapes.moving)
@@ -145,7 +150,7 @@ class Markers:
         write, shapes = self._full if full else self._moving, self._shapes
         closure = self._closure
         points, angles = closure.points(position), closure.link_angles(position)
-        red = self._red(position)
+        red = self._links_near_toggle(position)
         for marker, at, colour, filled in shapes.bodies:
             write.place_marker(marker, points[at], angles[at.link])
             write.colour_marker(marker, ALARM if filled and at.link in red else colour)
@@ -160,15 +165,15 @@ class Markers:
             # A line has its full number of points from the start.
             write.move_points(marker, [*trail, *(place,) * (trail.maxlen or 0)][: trail.maxlen])
         for marker, drawn in zip(
-            shapes.forces, self._arrows.forces(points, motion.reactions), strict=True
+            shapes.forces, self._arrows.force_arrows(points, motion.reactions), strict=True
         ):
-            _show(write, marker, drawn)
+            _show_arrow(write, marker, drawn)
         for marker, drawn in zip(
             shapes.efforts,
-            self._arrows.efforts(self._inputs, points, angles, motion.efforts),
+            self._arrows.effort_arrows(self._inputs, points, angles, motion.efforts),
             strict=True,
         ):
-            _show(write, marker, drawn)
+            _show_arrow(write, marker, drawn)
         write.show_marker(shapes.status, False)
         return write.message_at(now)
 
@@ -204,19 +209,19 @@ class Markers:
         before, self._second = self._second, now // NANOSECONDS
         return before != self._second
 
-    def _red(self, position: Position) -> frozenset[str]:
+    def _links_near_toggle(self, position: Position) -> frozenset[str]:
         """Return the links near a toggle."""
         nearness = self._closure.singularity_margin(position)
         near = nearness.conditioning < self._near and nearness.group >= 0
         return self._groups[nearness.group] if near else frozenset()
 
 
-def _show(write: MarkerArrayWriter, marker: int, drawn: list[complex]) -> None:
+def _show_arrow(write: MarkerArrayWriter, marker: int, drawn: list[complex]) -> None:
     write.show_marker(marker, bool(drawn))
     write.move_points(marker, drawn)
 
 
-def _lifetimes(use: MarkersParameters, context: Context) -> tuple[int, int]:
+def _marker_lifetimes(use: MarkersParameters, context: Context) -> tuple[int, int]:
     """
     Return the lifetimes of moving and of still markers, in [ns].
 

@@ -93,15 +93,15 @@ def sensor(parameters: MeasuringRangeParameters, context: Context) -> Sensor:
 
     def measuring_range(_now: int, reading: SensorReading) -> SensorReading:
         return reading._replace(
-            joints=_ended(reading.joints, positions),
-            rates=_ended(reading.rates, rates),
-            efforts=_ended(reading.efforts, efforts),
+            joints=_clip_values(reading.joints, positions),
+            rates=_clip_values(reading.rates, rates),
+            efforts=_clip_values(reading.efforts, efforts),
         )
 
     return measuring_range
 
 
-def _ended(
+def _clip_values(
     values: tuple[float, ...], limits: tuple[tuple[float, float], ...]
 ) -> tuple[float, ...]:
     """Return values within their limits; none of none."""

@@ -110,9 +110,9 @@ def sensor(parameters: NoiseParameters, context: Context) -> Sensor:
 
     """
     for joint, noise in parameters.joints.items():
-        _check(f'effects.noise.joints.{joint}', noise, context.rate)
+        _check_noise(f'effects.noise.joints.{joint}', noise, context.rate)
 
-    def sources(kind: str, factor: float = 1.0) -> tuple[_Source, ...]:
+    def make_sources(kind: str, factor: float = 1.0) -> tuple[_Source, ...]:
         return tuple(
             (i, factor * strength, context.random(f'noise/{joint}/{kind}').gauss)
             for i, joint in enumerate(context.joints)
@@ -126,15 +126,15 @@ def sensor(parameters: NoiseParameters, context: Context) -> Sensor:
         if joint in parameters.joints and parameters.joints[joint].drift
     ]
     return Noise(
-        (*sources('white'), *sources('density', sqrt(context.rate))),
-        sources('walk'),
-        sources('rate_white'),
-        sources('effort_white'),
-        tuple(map(_Drift, sources('drift'), times)),
+        (*make_sources('white'), *make_sources('density', sqrt(context.rate))),
+        make_sources('walk'),
+        make_sources('rate_white'),
+        make_sources('effort_white'),
+        tuple(map(_Drift, make_sources('drift'), times)),
     )
 
 
-def _check(key: str, noise: JointNoise, rate: float) -> None:
+def _check_noise(key: str, noise: JointNoise, rate: float) -> None:
     if noise.density and noise.white:
         raise DefinitionError(f'{key}.density', 'is white noise too', 'leave white or density out')
     if noise.density and not rate:
@@ -169,7 +169,7 @@ class _Drift:
         self._last: int | None = None
         self._value = 0.0
 
-    def at(self, now: int) -> float:
+    def drift_at(self, now: int) -> float:
         """Return the drift at a time, in [ns], in [rad] or [m]."""
         kept = 0.0
         if self._last is not None:
@@ -228,7 +228,7 @@ class Noise:
                 noisy[i] += wandered[n]
             self._last = now
         for drift in self._drifts:
-            noisy[drift.joint] += drift.at(now)
+            noisy[drift.joint] += drift.drift_at(now)
         if self._effort_white:
             efforts = list(reading.efforts)
             for i, deviation, normal in self._effort_white:

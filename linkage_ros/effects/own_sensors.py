@@ -120,14 +120,14 @@ class OwnSensors:
         self._order = [together.index(place) for place in sorted(together)]
         """Where each joint is among the joints of all sensors, one after the other."""
         hears = all(hasattr(sensor, 'gap') for _, sensor in groups)
-        self.gap, self.silence = (self._gap, self._silence) if hears else (None, None)
+        self.gap, self.silence = (self._read_gap, self._read_silence) if hears else (None, None)
         self.gap_begins = False
 
     def read_by(self, encoder: Encoder) -> None:
         """Make the counts of an encoder before them be read with each sample of their joints."""
         encoder.read_at_ticks = False
         for places, sensor in self._groups:
-            sensor.read_by(encoder.part(places))
+            sensor.read_by(encoder.select_joints(places))
 
     def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
         """Return the newest readings of all; None if none is new."""
@@ -135,24 +135,24 @@ class OwnSensors:
         found = []
         for places, sensor in self._groups:
             if new is None or not new.isdisjoint(places):
-                found.append(sensor(now, _part(reading, places)))
+                found.append(sensor(now, _select_joints(reading, places)))
             else:
                 found.append(sensor.silence(now, False) if self.silence is not None else None)
-        return self._newest(found)
+        return self._newest_reading(found)
 
-    def _gap(self, now: int) -> SensorReading | None:
+    def _read_gap(self, now: int) -> SensorReading | None:
         found = [sensor.gap(now) for _, sensor in self._groups]
-        newest = self._newest(found)
+        newest = self._newest_reading(found)
         unseen = newest is None and any(part is not None for part in found)
         self.gap_begins = unseen or any(sensor.gap_begins for _, sensor in self._groups)
         return newest
 
-    def _silence(self, now: int, gap: bool) -> SensorReading | None:
+    def _read_silence(self, now: int, gap: bool) -> SensorReading | None:
         if gap:
-            return self._gap(now)
-        return self._newest([sensor.silence(now, False) for _, sensor in self._groups])
+            return self._read_gap(now)
+        return self._newest_reading([sensor.silence(now, False) for _, sensor in self._groups])
 
-    def _newest(self, found: Sequence[SensorReading | None]) -> SensorReading | None:
+    def _newest_reading(self, found: Sequence[SensorReading | None]) -> SensorReading | None:
         """Return what is held of all joints; None if no reading is new, or one is missing."""
         stamp = None
         for number, part in enumerate(found):
@@ -162,7 +162,7 @@ class OwnSensors:
         if stamp is None or len(held) < len(found):
             return None
         _, *values = zip(*held, strict=True)
-        reading = PartlyNew(stamp, *map(self._joined, values))
+        reading = PartlyNew(stamp, *map(self._join_values, values))
         if None in found:
             reading.new = frozenset(
                 place
@@ -172,13 +172,13 @@ class OwnSensors:
             )
         return reading
 
-    def _joined(self, parts: Sequence[_Values]) -> _Values:
+    def _join_values(self, parts: Sequence[_Values]) -> _Values:
         """Return the values of all joints in their order; none if a sensor has none."""
         values, order = [value for part in parts for value in part], self._order
         return tuple([values[at] for at in order]) if len(values) == len(order) else ()
 
 
-def _part(reading: SensorReading, places: Sequence[int]) -> SensorReading:
+def _select_joints(reading: SensorReading, places: Sequence[int]) -> SensorReading:
     """Return a reading of some joints."""
     stamp, *values = reading
     return SensorReading(

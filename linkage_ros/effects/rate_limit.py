@@ -39,7 +39,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import restamped, Sensor, SensorReading
+from linkage_ros.effects.stage import restamp, Sensor, SensorReading
 from linkage_ros.files.parameters import choice, number, own_parameters
 
 if TYPE_CHECKING:
@@ -122,12 +122,12 @@ class RateLimit:
         if now < self._due:
             if held is None or not self._repeat:
                 return None
-            return restamped(held, reading.stamp)
+            return restamp(held, reading.stamp)
         unit, per = self._unit, self._per
         elapsed = now - self._begin
         following = ((2 * elapsed + 1) * unit - 1) // per + 1
         self._due = self._begin + (following * per + unit) // (2 * unit)
         if self._encoder is not None:
-            reading = self._encoder.differenced(now, reading)
+            reading = self._encoder.difference_rates(now, reading)
         self._held = reading
         return reading

@@ -141,7 +141,7 @@ class MechanismState(NamedTuple):
     acceleration: Acceleration | None
     efforts: tuple[float, ...]
     reactions: tuple[Reaction, ...]
-    shift: tuple[float, ...]
+    deflection: tuple[float, ...]
     seconds: float = 0.0
 
 
@@ -193,7 +193,7 @@ class SensorStage(NamedTuple):
     silence: Callable[[int, bool], SensorReading | None] | None
 
     @classmethod
-    def of(cls, sensor: Sensor) -> SensorStage:
+    def from_sensor(cls, sensor: Sensor) -> SensorStage:
         """Put a sensor in its place."""
         return cls(sensor, getattr(sensor, 'gap', None), getattr(sensor, 'silence', None))
 
@@ -226,21 +226,23 @@ class WriterStage(NamedTuple):
     of_reading: bool
 
     @classmethod
-    def of(cls, writer: Writer, *, of_reading: bool) -> WriterStage:
+    def from_writer(cls, writer: Writer, *, of_reading: bool) -> WriterStage:
         """Put a writer in its place."""
         return cls(
             writer, getattr(writer, 'no_pose', None), getattr(writer, 'due', None), of_reading
         )
 
 
-def restamped(reading: SensorReading, stamp: int) -> SensorReading:
+def restamp(reading: SensorReading, stamp: int) -> SensorReading:
     """Return a reading under another stamp, in [ns]."""
     return reading._replace(stamp=stamp)
 
 
-def yielding(motion: MechanismState, moved: tuple[float, ...]) -> MechanismState:
+def with_deflection(motion: MechanismState, deflection: tuple[float, ...]) -> MechanismState:
     """Return a motion whose published joints have moved further, in [rad] or [m]."""
-    return motion._replace(shift=tuple(map(add, motion.shift, moved)) if motion.shift else moved)
+    return motion._replace(
+        shift=tuple(map(add, motion.deflection, deflection)) if motion.deflection else deflection
+    )
 
 
 DriveStage = Callable[[CrankState], CrankState]

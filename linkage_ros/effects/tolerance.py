@@ -95,16 +95,16 @@ def alter(parameters: ToleranceParameters, linkage: Linkage, random: Random) -> 
         scale = parameters.standard_deviation if link in deviating else 0.0
         made = {}
         for point, (x, y) in points.items():
-            drawn = scale * _normal(random), scale * _normal(random)
+            drawn = scale * _draw_deviation(random), scale * _draw_deviation(random)
             dx, dy = parameters.given.get(f'{link}.{point}', drawn)
             made[point] = (x + dx, y + dy)
         links[link] = made
     altered = replace(linkage, links=links, nominal=linkage.nominal or linkage)
-    _check(altered)
+    _check_closes(altered)
     return altered
 
 
-def _normal(random: Random) -> float:
+def _draw_deviation(random: Random) -> float:
     """Draw a deviation from the truncated normal distribution of standard deviation 1."""
     while True:
         value = random.gauss(0.0, BEFORE)
@@ -112,7 +112,7 @@ def _normal(random: Random) -> float:
             return value
 
 
-def _check(linkage: Linkage) -> None:
+def _check_closes(linkage: Linkage) -> None:
     reason = 'at no value of the input'
     try:
         closure = Closure(linkage)

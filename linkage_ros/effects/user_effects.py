@@ -69,15 +69,15 @@ def user_module(name: str) -> ModuleType:
         module = import_module(name)
     except ModuleNotFoundError as error:
         if not f'{name}.'.startswith(f'{error.name}.'):
-            raise _failed(name, error) from None
+            raise _failure(name, error) from None
         raise DefinitionError(
             name,
             f'there is no module {error.name}',
             'put the folder that it lies in on PYTHONPATH, or source its workspace',
         ) from None
     except (Exception, SystemExit) as error:  # noqa: BLE001 (a module of others may do anything)
-        raise _failed(name, error) from None
-    _check(name, module)
+        raise _failure(name, error) from None
+    _check_module(name, module)
     return module
 
 
@@ -104,10 +104,10 @@ def user_needs(name: str) -> tuple[str, ...]:
 
 def with_user_effects(named: Iterable[str]) -> tuple[str, ...]:
     """Return effects in the order in which they act."""
-    return tuple(sorted(named, key=_place))
+    return tuple(sorted(named, key=_order_key))
 
 
-def identity(name: str) -> str:
+def effect_version(name: str) -> str:
     """
     Return which version of a user-defined effect a run uses.
 
@@ -123,13 +123,13 @@ def identity(name: str) -> str:
     return ', '.join(filter(None, said)) or 'unknown'
 
 
-def _place(name: str) -> tuple[int, str]:
+def _order_key(name: str) -> tuple[int, str]:
     if name in EFFECTS:
         return _ORDER.index(name), ''
     return _ORDER.index(user_module(name).AFTER), name
 
 
-def _failed(name: str, error: BaseException) -> DefinitionError:
+def _failure(name: str, error: BaseException) -> DefinitionError:
     return DefinitionError(
         name,
         f'cannot be imported: {type(error).__name__}: {quoted(str(error))}',
@@ -137,7 +137,7 @@ def _failed(name: str, error: BaseException) -> DefinitionError:
     )
 
 
-def _check(name: str, module: ModuleType) -> None:
+def _check_module(name: str, module: ModuleType) -> None:
     """Refuse a module that is no effect."""
     parameters: Any = getattr(module, 'PARAMETERS', None)
     try:

@@ -23,7 +23,7 @@ from operator import add
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, DRIVES
-from linkage_ros.effects.angle_unwrap import all_wrapped, beginnings, Continuous
+from linkage_ros.effects.angle_unwrap import Continuous, first_values, wrap_all
 from linkage_ros.effects.stage import (
     FORCE_EFFECTS,
     MechanismState,
@@ -238,7 +238,7 @@ class LinkagePipeline:
             sensors['rate_limit'].read_by(sensors['encoder'])
         joints = self.member.joint_names
         broken = injection.build('sensor', joints) if injection is not None else []
-        angles = Continuous(self.closure.turning, beginnings(self.closure))
+        angles = Continuous(self.closure.turning, first_values(self.closure))
         behind = [*sensors.values(), *broken]
         self._running = angles if behind or not wrapped else None
         self._read_off = wanted.named
@@ -247,9 +247,9 @@ class LinkagePipeline:
             self._read_off |= {'velocity'}
             behind.append(_without_rates)
         if wrapped:
-            behind.append(all_wrapped(self.closure.turning))
+            behind.append(wrap_all(self.closure.turning))
         running = [] if self._running is None else [self._running]
-        self._sensors = [SensorStage.of(sensor) for sensor in (*running, *behind)]
+        self._sensors = [SensorStage.from_sensor(sensor) for sensor in (*running, *behind)]
         self._read_behind = partial(self._read, first=len(running)) if behind else None
 
     def _build_outputs(self, wanted: WantedEffects) -> None:
@@ -369,7 +369,9 @@ class LinkagePipeline:
             efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
         return SensorReading(
             now,
-            tuple(map(add, position.joints, motion.shift)) if motion.shift else position.joints,
+            tuple(map(add, position.joints, motion.deflection))
+            if motion.deflection
+            else position.joints,
             velocity.joints if velocity and 'velocity' in self._read_off else (),
             acceleration.joints if acceleration and 'acceleration' in self._read_off else (),
             efforts,
@@ -458,7 +460,9 @@ def _output(
     name: str, topic: str, message: str, writer: Any, member: str, *, of_reading: bool
 ) -> AuxiliaryOutput:
     within = f'~/{member}/{topic[2:]}' if member else topic
-    return AuxiliaryOutput(name, within, message, WriterStage.of(writer, of_reading=of_reading))
+    return AuxiliaryOutput(
+        name, within, message, WriterStage.from_writer(writer, of_reading=of_reading)
+    )
 
 
 def _without_rates(_now: int, reading: SensorReading) -> SensorReading:

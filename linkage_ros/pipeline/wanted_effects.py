@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.dispatch import Effect, effect_of, in_order, module_of, needs
+from linkage_ros.effects.dispatch import Effect, effect_of, in_order, module_of, needed_effects
 from linkage_ros.effects.stage import FORCE_EFFECTS, PUBLISHED_WITH
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.scene.scene import SceneLinkage
@@ -51,7 +51,7 @@ def choose_effects(member: SceneLinkage) -> WantedEffects:
     named |= {also for effect in named for also in PUBLISHED_WITH.get(effect, ())}
     moves_by_rates = getattr(drive_parameters, 'carry_forward', True)
     starting = named - _between_readings(member, named, moves_by_rates)
-    computed = named | {need for effect in starting for need in needs(effect)}
+    computed = named | {need for effect in starting for need in needed_effects(effect)}
     effects = [effect_of(name) for name in in_order(computed)]
     computes_forces = drive == 'torque' or not computed.isdisjoint(FORCE_EFFECTS)
     _refuse_idle(member, computes_forces)

@@ -265,7 +265,7 @@ def user_effects_here(scene: Scene) -> dict[str, str]:
     if not names:
         return {}
     from linkage_ros.effects.user_effects import (
-        identity,  # local import: only where a scene names one
+        effect_version,  # local import: only where a scene names one
     )
 
-    return {name: identity(name) for name in sorted(names)}
+    return {name: effect_version(name) for name in sorted(names)}

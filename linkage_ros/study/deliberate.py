@@ -23,7 +23,7 @@ from itertools import islice
 from math import remainder, sqrt, tau
 from typing import NamedTuple
 
-from linkage_ros.effects.dispatch import bringing, in_order
+from linkage_ros.effects.dispatch import effects_requiring, in_order
 from linkage_ros.effects.stage import FORCE_EFFECTS
 from linkage_ros.errors import FileError, listed
 from linkage_ros.measuring import Progress
@@ -152,7 +152,7 @@ def _variants(scene: Scene) -> Iterator[_Variant]:
     """Yield the scene without each effect, without each fault, and without all."""
     named = {name for member in scene.linkages for name in member.effects}
     for name in in_order(named):
-        needed_by = bringing(name, named)
+        needed_by = effects_requiring(name, named)
         note = f'computed for {listed(needed_by)} without it, too' if needed_by else ''
         # Friction without a force effect acts on nothing, and is refused.
         for others in ((), ('friction',)):

@@ -27,7 +27,7 @@ MOTIONS = [(1.0, 0.0, 0.0), (0.4, 0.0, 20.0), (2.5, -6.0, 30.0), (-1.2, 12.0, -8
 
 
 def shift(within, motion, pins):
-    return moved(within, motion, {'pin_forces': (), 'clearance': (pins,)}).shift
+    return moved(within, motion, {'pin_forces': (), 'clearance': (pins,)}).deflection
 
 
 @pytest.mark.parametrize(
@@ -140,8 +140,8 @@ def test_a_force_that_is_rounding_leans_nothing():
     stage = clearance.stage(ClearanceParameters({'A': 1e-5, 'B': 1e-5, 'O4': 1e-5}), within)
     names = within.reactions.names
     assert names[0] == 'O2'
-    assert stage(before._replace(reactions=tiny)).shift == (0.0, 0.0)
-    assert stage(before).shift != (0.0, 0.0)
+    assert stage(before._replace(reactions=tiny)).deflection == (0.0, 0.0)
+    assert stage(before).deflection != (0.0, 0.0)
 
 
 def test_at_a_toggle_nothing_leans():
@@ -154,9 +154,9 @@ def test_it_is_added_to_what_the_links_yield_and_the_rest_is_passed_on():
     before = moved(within, MOTIONS[2], {'pin_forces': ()})
     stage = clearance.stage(ClearanceParameters({'A': 1e-5}), within)
     alone = stage(before)
-    assert alone == before._replace(shift=alone.shift)
+    assert alone == before._replace(shift=alone.deflection)
     further = stage(before._replace(shift=(0.5, -0.25)))
-    expected = (0.5 + alone.shift[0], -0.25 + alone.shift[1])
+    expected = (0.5 + alone.deflection[0], -0.25 + alone.deflection[1])
     assert further == before._replace(shift=expected)
 
 

@@ -48,7 +48,7 @@ MOTIONS = [(1.0, 0.0, 0.0), (0.4, 0.0, 20.0), (2.5, -6.0, 30.0), (-1.2, 12.0, -8
 
 
 def shift(within, motion, links):
-    return moved(within, motion, {'pin_forces': (), 'compliance': (links,)}).shift
+    return moved(within, motion, {'pin_forces': (), 'compliance': (links,)}).deflection
 
 
 def tensions_by_hand(motion):
@@ -145,9 +145,9 @@ def test_it_is_added_to_a_shift_and_the_rest_is_passed_on():
     before = moved(within, MOTIONS[2], {'pin_forces': ()})
     stage = compliance.stage(ComplianceParameters({'coupler': 1e4}), within)
     alone = stage(before)
-    assert alone == before._replace(shift=alone.shift)
+    assert alone == before._replace(shift=alone.deflection)
     further = stage(before._replace(shift=(0.5, -0.25)))
-    expected = (0.5 + alone.shift[0], -0.25 + alone.shift[1])
+    expected = (0.5 + alone.deflection[0], -0.25 + alone.deflection[1])
     assert further == before._replace(shift=expected)
 
 

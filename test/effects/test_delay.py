@@ -256,7 +256,7 @@ def test_between_readings_with_rates_is_the_cubic_itself(coefficients):
     # At 10 ms the way is more than the cubic part, as it is of a motion that ticks resolve.
     history = remembered(signal, range(BEGIN, BEGIN + 100 * MS, 10 * MS))
     for ns in (1, 999_999, 12_345_678, 33_333_333, 45_000_000, 89_999_999):
-        found, true = history.between(BEGIN + ns), signal(BEGIN + ns)
+        found, true = history.interpolate(BEGIN + ns), signal(BEGIN + ns)
         assert found.stamp == BEGIN + ns
         assert found.joints == pytest.approx(true.joints, abs=1e-15)
         assert found.accelerations == pytest.approx(true.accelerations, abs=1e-12)
@@ -279,7 +279,7 @@ def test_the_error_is_what_it_says_and_no_less(rates, law):
     for h in (100 * MS, 50 * MS, 25 * MS):
         history = remembered(signal, range(BEGIN, BEGIN + 7000 * MS, h))
         worst = max(
-            abs(history.between(time).joints[0] - signal(time).joints[0])
+            abs(history.interpolate(time).joints[0] - signal(time).joints[0])
             for time in range(BEGIN, BEGIN + 6900 * MS, h // 8)
         )
         assert 0.95 * law(h * 1e-9) < worst < 1.001 * law(h * 1e-9)
@@ -296,7 +296,7 @@ def test_a_rate_that_does_not_fit_the_values_is_not_believed(first, last, absurd
     history.add(BEGIN, reading(BEGIN, first, rates=(absurd * 1000.0,)))
     history.add(BEGIN + MS, reading(BEGIN + MS, last, rates=(rate,)))
     for ns in (1, MS // 3, MS - 1):
-        (value,) = history.between(BEGIN + ns).joints
+        (value,) = history.interpolate(BEGIN + ns).joints
         assert min(first, last) - 1e-12 <= value <= max(first, last) + 1e-12
 
 
@@ -314,26 +314,26 @@ def test_where_belief_ends(way, expected):
     history = History(10**10)
     history.add(BEGIN, reading(BEGIN, 0.0, rates=(way,)))
     history.add(BEGIN + 1000 * MS, reading(BEGIN, 1.0, rates=(1.0,)))
-    assert history.between(BEGIN + 500 * MS).joints == pytest.approx((expected,))
+    assert history.interpolate(BEGIN + 500 * MS).joints == pytest.approx((expected,))
 
 
 def test_what_one_of_the_two_does_not_have_is_left_out():
     history = History(10**9)
     history.add(BEGIN, reading(BEGIN, 1.0, rates=(9.0,), efforts=(2.0,)))
     history.add(BEGIN + 4 * MS, reading(BEGIN + 4 * MS, 3.0, efforts=(4.0,)))
-    middle = history.between(BEGIN + MS)
+    middle = history.interpolate(BEGIN + MS)
     assert middle == reading(BEGIN + MS, 1.5, efforts=(2.5,))
-    assert history.between(BEGIN) == reading(BEGIN, 1.0, rates=(9.0,), efforts=(2.0,))
+    assert history.interpolate(BEGIN) == reading(BEGIN, 1.0, rates=(9.0,), efforts=(2.0,))
 
 
 def test_outside_of_what_was_read_nothing_is_invented():
     history = remembered(cubic((1.0, 2.0, 3.0, 4.0)), (BEGIN, BEGIN + MS))
     first, last = (cubic((1.0, 2.0, 3.0, 4.0))(time) for time in (BEGIN, BEGIN + MS))
-    for look in (history.between, partial(history.newest, since=-1)):
+    for look in (history.interpolate, partial(history.newest_reading, since=-1)):
         assert look(BEGIN - 1) is None
         assert look(BEGIN) == first
         assert look(BEGIN + MS) == look(BEGIN + 100 * MS) == last
-    assert history.newest(BEGIN + MS - 1, -1) == first
+    assert history.newest_reading(BEGIN + MS - 1, -1) == first
 
 
 def test_what_came_after_a_time_is_known_with_its_own():
@@ -341,8 +341,8 @@ def test_what_came_after_a_time_is_known_with_its_own():
     read = [(BEGIN + ms * MS, reading(BEGIN + ms * MS, float(ms))) for ms in range(4)]
     for now, one in read:
         history.add(now, one)
-    assert history.after(BEGIN + MS) == read[2:]
-    assert history.after(-1) == read
+    assert history.readings_after(BEGIN + MS) == read[2:]
+    assert history.readings_after(-1) == read
 
 
 @given(st.lists(st.integers(0, 20), min_size=1, max_size=50), st.integers(0, 40))
@@ -354,7 +354,9 @@ def test_it_reaches_back_over_its_span_and_forgets_the_rest(gaps, span):
         all_of_them[now] = reading(now, float(number))
         for time in range(now - span, now + 1):
             before = [known for known in all_of_them if known <= time]
-            assert history.newest(time, -1) == (all_of_them[max(before)] if before else None)
+            assert history.newest_reading(time, -1) == (
+                all_of_them[max(before)] if before else None
+            )
         # Of what is older than the last time it was asked, one is left.
         times = sorted(all_of_them)
         within = [known for known in times if known > (times[-2:][0] - span)]
@@ -367,8 +369,8 @@ def test_while_time_stands_the_last_reading_counts_and_none_pile_up():
     for number in range(1000):
         history.add(BEGIN + MS, reading(BEGIN + MS, float(number)))
     assert len(history) == 2
-    assert history.newest(BEGIN + MS, -1).joints == (999.0,)
-    assert history.between(BEGIN + MS // 2).joints == (499.5,)
+    assert history.newest_reading(BEGIN + MS, -1).joints == (999.0,)
+    assert history.interpolate(BEGIN + MS // 2).joints == (499.5,)
 
 
 # Random latencies. Of the messages that arrive between two ticks the last one is published.

@@ -13,7 +13,7 @@ from math import nextafter, pi, tau
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.effects.angle_unwrap import all_wrapped, Continuous, wrapped
+from linkage_ros.effects.angle_unwrap import Continuous, wrap_all, wrap_angle
 from linkage_ros.effects.stage import SensorReading
 import pytest
 
@@ -29,18 +29,18 @@ def reading(*joints):
 def test_continuous_follows_from_any_turns(moves, start):
     # What the loop knows of an angle is the angle up to turns.
     stage = Continuous([True])
-    angle = wrapped(start)
+    angle = wrap_angle(start)
     assert stage(0, reading(angle)).joints == (angle,)
     for move in moves:
         angle += move
-        assert stage(0, reading(wrapped(angle))).joints[0] == pytest.approx(angle, abs=1e-12)
+        assert stage(0, reading(wrap_angle(angle))).joints[0] == pytest.approx(angle, abs=1e-12)
 
 
 @given(st.floats(-1e6, 1e6))
 def test_the_first_angle_is_wrapped(angle):
     (first,) = Continuous([True])(0, reading(angle)).joints
     assert -pi < first <= pi
-    assert first == wrapped(angle)
+    assert first == wrap_angle(angle)
 
 
 @given(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=20))
@@ -56,14 +56,14 @@ def test_a_step_is_never_more_than_half_a_turn(angles):
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=20))
 def test_slides_are_left_alone(lengths):
-    for stage in (Continuous([False, True]), all_wrapped([False, True])):
+    for stage in (Continuous([False, True]), wrap_all([False, True])):
         for length in lengths:
             assert stage(0, reading(length, length)).joints[0] == length
 
 
 @given(st.floats(-1e9, 1e9))
 def test_wrapped_is_exact(angle):
-    rest = wrapped(angle)
+    rest = wrap_angle(angle)
     assert -pi < rest <= pi
     turns = round((Fraction(angle) - Fraction(rest)) / Fraction(tau))
     assert Fraction(angle) - turns * Fraction(tau) == Fraction(rest) or rest == pi
@@ -84,21 +84,21 @@ def test_wrapped_is_exact(angle):
     ],
 )
 def test_wrapped_at_the_edge(angle, rest):
-    assert wrapped(angle) == pytest.approx(rest, abs=1e-15)
-    assert -pi < wrapped(angle) <= pi
-    (now,) = all_wrapped([True])(0, reading(angle)).joints
-    assert now == wrapped(angle)
+    assert wrap_angle(angle) == pytest.approx(rest, abs=1e-15)
+    assert -pi < wrap_angle(angle) <= pi
+    (now,) = wrap_all([True])(0, reading(angle)).joints
+    assert now == wrap_angle(angle)
 
 
 def test_many_turns_add_up_without_drift():
     stage = Continuous([True])
     for step in range(100_001):
-        (now,) = stage(0, reading(wrapped(step * 1.0))).joints
+        (now,) = stage(0, reading(wrap_angle(step * 1.0))).joints
     # The last is exact up to the rounding of tau, 2.4e-16, for each of 15915 turns.
     assert abs(now - 100_000.0) < 1e-11
 
 
 def test_the_rest_of_the_motion_is_passed_on():
     rest = (1.0, 2.0), (3.0, 4.0), (5.0, 0.0)
-    for stage in (Continuous([True, False]), all_wrapped([True, False])):
+    for stage in (Continuous([True, False]), wrap_all([True, False])):
         assert stage(9, SensorReading(7, (0.5, 0.5), *rest)) == (7, (0.5, 0.5), *rest)
