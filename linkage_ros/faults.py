@@ -76,11 +76,11 @@ class TimeJump:
         """Build the clock."""
         step = round(self.by * 1e9)
 
-        def jumping(now: int) -> int:
+        def jump_clock(now: int) -> int:
             # Stamps of messages are limited to the years 1970 to 2038.
             return max(0, min(now + step, TIME_END - 1)) if switch.on else now
 
-        return jumping
+        return jump_clock
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +95,10 @@ class NotANumber:
     def message(self, switch: Switch) -> Callable[[bytes], bytes]:
         """Build a function that corrupts the messages."""
 
-        def spoilt(data: bytes) -> bytes:
+        def corrupt(data: bytes) -> bytes:
             return with_every_number(data, nan) if switch.on else data
 
-        return spoilt
+        return corrupt
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,12 +117,12 @@ class BrokenLink:
         if self.link not in [context.prefix + link for link in context.closure.linkage.links]:
             return None
 
-        def broken(position: Position) -> Position:
+        def break_link(position: Position) -> Position:
             if not switch.on:
                 return position
             return replace(position, status=Status.INDETERMINATE, gap=0.0, joints=())
 
-        return broken
+        return break_link
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +230,7 @@ FAULTS: Mapping[str, type[Any]] = {
 """The kinds of faults, by name."""
 
 
-class Change(NamedTuple):
+class FaultChange(NamedTuple):
     """Begin or end of a fault, by its name in the scene."""
 
     name: str
@@ -250,11 +250,11 @@ class Injection:
         self.injected = dict.fromkeys(faults, 0)
         """Number of times that each fault has begun."""
         self._begun: int | None = None
-        self._asked: list[Change] = []
+        self._asked: list[FaultChange] = []
         changes = [
             (time, name, on)
             for name, fault in faults.items()
-            for begin, end in _windows(fault)
+            for begin, end in _fault_windows(fault)
             for time, on in ((begin, True), (end, False))
         ]
         # At the same instant an end comes before a begin: windows that touch stay two.
@@ -262,11 +262,11 @@ class Injection:
         self._next = 0
         self._clocks = self.build('clock')
 
-    def ask(self, name: str, on: bool) -> None:
+    def request_change(self, name: str, on: bool) -> None:
         """Let a fault begin or end at the next tick; callable from any thread."""
-        self._asked.append(Change(name, on))
+        self._asked.append(FaultChange(name, on))
 
-    def advance(self, now: int) -> list[Change]:
+    def advance(self, now: int) -> list[FaultChange]:
         """Set the switches for a time, in [ns]; return the changes."""
         if self._begun is None:
             self._begun = now
@@ -274,13 +274,13 @@ class Injection:
         timeline, since = self._timeline, now - self._begun
         while self._next < len(timeline) and timeline[self._next][0] <= since:
             _, name, on = timeline[self._next]
-            due.append(Change(name, on))
+            due.append(FaultChange(name, on))
             self._next += 1
         while self._asked:
             due.append(self._asked.pop(0))
-        return [change for change in due if self.turn(*change)]
+        return [change for change in due if self.switch_fault(*change)]
 
-    def turn(self, name: str, on: bool) -> bool:
+    def switch_fault(self, name: str, on: bool) -> bool:
         """Turn a fault on or off; return whether that changed it."""
         switch = self.switches[name]
         if switch.on == on:
@@ -289,13 +289,13 @@ class Injection:
         self.injected[name] += on
         return True
 
-    def clock(self, now: int) -> int:
+    def tick_time(self, now: int) -> int:
         """Return the time of the tick for the true time, in [ns]."""
         for clock in self._clocks:
             now = clock(now)
         return now
 
-    def build(self, function: str, *arguments: Any) -> list[Any]:
+    def build_functions(self, function: str, *arguments: Any) -> list[Any]:
         """Build the functions of all faults for one place of the pipeline, named by `function`."""
         built = []
         for fault, switch in zip(self.faults.values(), self.switches.values(), strict=True):
@@ -304,7 +304,7 @@ class Injection:
         return [each for each in built if each is not None]
 
 
-def _windows(fault: Fault) -> list[tuple[int, int]]:
+def _fault_windows(fault: Fault) -> list[tuple[int, int]]:
     """Return the windows of a fault, in [ns]; overlapping windows are merged."""
     windows: list[tuple[int, int]] = []
     for at in sorted(fault.at):

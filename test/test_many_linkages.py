@@ -183,7 +183,7 @@ def test_a_fault_concerns_whom_it_names(load, fault, held):
         load(f'{TWO}\ndrive: {{constant_rate: {{rate: 1.0}}}}\nfaults: {{f: {{{fault}}}}}')
     )
     before = read(both.tick(BEGIN).message)
-    both.injection.turn('f', True)
+    both.injection.switch_fault('f', True)
     after = read(both.tick(BEGIN + 100 * MS).message)
     for side, is_held in zip(LR, held, strict=True):
         place = before.name.index(f'{side}_rocker_joint')
@@ -193,7 +193,7 @@ def test_a_fault_concerns_whom_it_names(load, fault, held):
 def test_a_broken_link_is_one_of_one_linkage(load):
     text = f'{TWO}\ndrive: {{constant_rate: {{rate: 1.0}}}}\n'
     both = Pipeline(load(f'{text}faults: {{f: {{broken_link: {{link: right_coupler}}}}}}'))
-    both.injection.turn('f', True)
+    both.injection.switch_fault('f', True)
     assert read(both.tick(BEGIN).message).name == ['left_crank_joint', *LEFT]
 
 

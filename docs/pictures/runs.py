@@ -131,7 +131,7 @@ def run(
             now = START + time
             if pipeline.injection is not None:
                 pipeline.injection.advance(now)
-                now = pipeline.injection.clock(now)
+                now = pipeline.injection.tick_time(now)
             if now < last:
                 pipeline = reset(pipeline)
             last = now

@@ -361,7 +361,7 @@ class LinkageNode(LifecycleNode):
     ) -> SetBool.Response:
         if self.loop is None or not self.loop.running or self.loop.injection is None:
             return _answer(response, False, 'not active: nothing to inject into')
-        self.loop.injection.ask(name, bool(request.data))
+        self.loop.injection.request_change(name, bool(request.data))
         what = 'begins' if request.data else 'ends'
         return _answer(response, True, f'{name} {what} at the next tick')
 

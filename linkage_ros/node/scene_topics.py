@@ -38,7 +38,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
 
 if TYPE_CHECKING:
-    from linkage_ros.faults import Change
+    from linkage_ros.faults import FaultChange
 
 SCENE_TOPIC = '~/scene'
 
@@ -242,7 +242,7 @@ class SceneTopics:
         """Return functions that take the next message of each topic with a wrench."""
         return [partial(one.handle.take_message, one.msg_type, True) for one in self.wrenches]
 
-    def publish_change(self, change: Change) -> bytes:
+    def publish_change(self, change: FaultChange) -> bytes:
         """Publish the begin or end of a fault; return the serialized message."""
         assert self._changes is not None
         message = text_message(change_text(change, self._kinds[change.name]))

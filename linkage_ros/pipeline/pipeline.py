@@ -205,7 +205,7 @@ class LinkagePipeline:
         """Topic of the drive; '' for none."""
         self.drive: Drive = module.build(parameters, self.context)
         self._read_message = module.reader(parameters, self.context) if self.topic else None
-        self._spoil = injection.build('message') if injection is not None else []
+        self._spoil = injection.build_functions('message') if injection is not None else []
         if self._spoil and not self.topic:
             raise DefinitionError(
                 'faults', f'not_a_number spoils messages, and {drive} has none', 'leave it out'

@@ -32,7 +32,7 @@ from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline, Tick
 
 if TYPE_CHECKING:
-    from linkage_ros.faults import Change, Injection
+    from linkage_ros.faults import FaultChange, Injection
 
 
 _STEPS = 5
@@ -220,7 +220,7 @@ class TickLoop:
         publish: Callable[[bytes], None],
         own: Callable[[bytes], bool] | None = None,
         publish_extras: Sequence[Callable[[bytes], None]] = (),
-        publish_change: Callable[[Change], bytes] | None = None,
+        publish_change: Callable[[FaultChange], bytes] | None = None,
         depth: int = 100,
         take_wrenches: Sequence[Take] = (),
     ) -> None:
@@ -404,7 +404,7 @@ class TickLoop:
     def _move_on(self, time: int) -> None:
         """Move `_last_time` on: a message may be newer than the tick that takes it."""
         if self.injection is not None:
-            time = self.injection.clock(time)
+            time = self.injection.tick_time(time)
         if time > self._last_time:
             self._last_time = time
 
@@ -458,7 +458,7 @@ class TickLoop:
     def _inject(self, injection: Injection, now: int) -> int:
         """Let faults begin and end; return the time of the tick, in [ns]."""
         changes = injection.advance(now)
-        now = injection.clock(now)
+        now = injection.tick_time(now)
         for change in changes:
             if self._publish_change is not None:
                 message = self._publish_change(change)

@@ -287,7 +287,7 @@ class Counterfactual:
             return
         # The times of the bag already contain the effect of a time jump.
         if self._scene.faults[name].kind != 'time_jump':
-            self._injection.turn(name, on)
+            self._injection.switch_fault(name, on)
         now = self._clock(event.log_time)
         self._write_at(now)
         yield FaultEvent(now, now, event.data)
@@ -303,7 +303,7 @@ class Counterfactual:
             yield FaultEvent(shifted, shifted, text_message(text))
 
     def _clock(self, time: int) -> int:
-        return time if self._injection is None else self._injection.clock(time)
+        return time if self._injection is None else self._injection.tick_time(time)
 
     def _write_at(self, now: int) -> None:
         """Reset where the written time jumps back; a replay resets there too."""

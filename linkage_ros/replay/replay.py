@@ -44,7 +44,7 @@ from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from linkage_ros.faults import Change, Injection
+    from linkage_ros.faults import FaultChange, Injection
 
 
 _LONGEST_ANNOUNCED = 16 * 2**20
@@ -216,7 +216,7 @@ def own_joint_states(scene: Scene) -> OwnJointStates:
     return OwnJointStates(member.joint_names for member in scene.linkages)
 
 
-def change_text(change: Change, kind: str) -> str:
+def change_text(change: FaultChange, kind: str) -> str:
     """Return the begin or end of a fault as the text that is published and recorded."""
     return json.dumps({'fault': change.name, 'kind': kind, 'injected': change.on})
 
@@ -246,7 +246,7 @@ def read_change(message: bytes) -> tuple[str, bool]:
 def turn(bag: Bag, injection: Injection, message: bytes) -> None:
     """Turn a fault on or off by a message of a bag; raise `BagError` if that is impossible."""
     try:
-        injection.turn(*read_change(message))
+        injection.switch_fault(*read_change(message))
     except (ValueError, KeyError):
         raise BagError(
             bag.path, 'a message on its faults topic names no fault of its scene', 'name another'

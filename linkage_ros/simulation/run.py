@@ -39,7 +39,7 @@ from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import heeded
 
 if TYPE_CHECKING:
-    from linkage_ros.faults import Change
+    from linkage_ros.faults import FaultChange
 
 BEGIN = 1_000_000_000
 """Time of the first tick, in [ns]: a stamp of 0 means none in ROS."""
@@ -129,7 +129,7 @@ def simulate(
     first = Pipeline(scene)
     kinds = {name: fault.kind for name, fault in scene.faults.items()}
 
-    def change_message(change: Change) -> bytes:
+    def change_message(change: FaultChange) -> bytes:
         return text_message(change_text(change, kinds[change.name]))
 
     def published(_message: bytes) -> None:

@@ -199,7 +199,7 @@ def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
         now = time
         if injection is not None:
             injection.advance(time)
-            now = injection.clock(time)
+            now = injection.tick_time(time)
         tick = pipeline.tick(now)
         messages += bool(tick.message)
         place = wanted.get(number)

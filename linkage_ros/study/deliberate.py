@@ -59,7 +59,7 @@ def published_states(
     for now, sample in islice(feed(scene, pipeline), ticks):
         if injection is not None:
             injection.advance(now)
-            now = injection.clock(now)  # noqa: PLW2901 (a clock fault changes the tick's time)
+            now = injection.tick_time(now)  # noqa: PLW2901 (a clock fault changes the tick's time)
             if now < last:  # As in the tick loop, where a clock jumps back
                 pipeline = Pipeline(scene, pipeline.closures, injection)
             last = now

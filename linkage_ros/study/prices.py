@@ -157,7 +157,7 @@ class TimedScene:
         for now, message in block:
             if injection is not None:
                 injection.advance(now)
-                now = injection.clock(now)  # noqa: PLW2901 (a clock fault changes the tick's time)
+                now = injection.tick_time(now)  # noqa: PLW2901 (a clock fault changes the tick's time)
             if message:
                 offer(message, now)
             if tick(now).message:

@@ -143,7 +143,7 @@ def test_freeze_over_an_open_loop_publishes_the_last_state():
     found = []
     for i in range(3000):
         if i == 100:
-            work.injection.turn('hang', on=True)
+            work.injection.switch_fault('hang', on=True)
         found.append(work.tick(BEGIN + i * MS).looks[0].reading)
     posed = [closes(crank_at(BEGIN + i * MS)) for i in range(len(found))]
     assert all(posed[:100])

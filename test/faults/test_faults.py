@@ -10,7 +10,7 @@
 
 from math import isnan
 
-from linkage_ros.faults import Change, Fault, Freeze, Injection
+from linkage_ros.faults import Fault, FaultChange, Freeze, Injection
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -39,9 +39,9 @@ def run(text, times, ask=None):
     messages = []
     for time in times:
         for change in (ask or {}).get(time, ()):
-            injection.ask(*change)
+            injection.request_change(*change)
         injection.advance(BEGIN + time * MS)
-        now = injection.clock(BEGIN + time * MS)
+        now = injection.tick_time(BEGIN + time * MS)
         messages.append(pipeline.tick(now).message)
     return messages
 
@@ -128,7 +128,7 @@ def test_the_clock_jumps_and_jumps_back():
 def test_faults_begin_and_end_at_the_first_tick_that_is_not_before_their_time():
     injection = Injection(scene_of(window('silence: {}', '[0.0151, 0.04]', 0.01)).faults)
     changes = {t: injection.advance(BEGIN + t * MS) for t in (0, 15, 16, 25, 26, 39, 40, 49, 50)}
-    on, off = [Change('mine', True)], [Change('mine', False)]
+    on, off = [FaultChange('mine', True)], [FaultChange('mine', False)]
     assert changes == {0: [], 15: [], 16: on, 25: [], 26: off, 39: [], 40: on, 49: [], 50: off}
     assert injection.injected == {'mine': 2}
 
@@ -136,8 +136,8 @@ def test_faults_begin_and_end_at_the_first_tick_that_is_not_before_their_time():
 def test_windows_that_touch_are_two():
     injection = Injection(scene_of(window('silence: {}', '[0.01, 0.02]', 0.01)).faults)
     assert injection.advance(BEGIN) == []
-    assert injection.advance(BEGIN + 10 * MS) == [Change('mine', True)]
-    both = [Change('mine', False), Change('mine', True)]
+    assert injection.advance(BEGIN + 10 * MS) == [FaultChange('mine', True)]
+    both = [FaultChange('mine', False), FaultChange('mine', True)]
     assert injection.advance(BEGIN + 20 * MS) == both
     assert injection.injected == {'mine': 2}
 

@@ -100,7 +100,7 @@ def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
         waiting += [(message, {'source_timestamp': time}) for message in messages]
         loop.reset_requested |= reset
         for name, on in asked:
-            injection.ask(name, on)
+            injection.request_change(name, on)
         tick(time)
     recorder.stop()
     return Run(read_bag(folder), published, extras, loop)
