@@ -38,8 +38,8 @@ def measure_empty_scene(rounds: int, ticks: int) -> Table:
     """Measure ticks of the empty scene and of hand-written code in turn, and return the table."""
     empty, moving = _pipeline(''), _pipeline('effects: {velocity: {}}')
     by_hand = _by_hand(0.04, 0.12, 0.08, 0.1)
-    (look,) = empty.tick(BEGIN).looks
-    joints = JointStateReader(empty.lines[0].member.joint_names).read(by_hand(BEGIN))
+    (look,) = empty.tick(BEGIN).full_states
+    joints = JointStateReader(empty.linkages[0].scene_linkage.joint_names).read(by_hand(BEGIN))
     if isinstance(joints, Rejection) or look.reading is None:
         raise MeasurementError('empty scene: publishes nothing')
     if not all(map(isclose, joints.angles, look.reading.joints)):
@@ -100,7 +100,9 @@ def _pipeline(text: str) -> Pipeline:
     files = {'scene.yaml': f'linkage: here\n{text}'.encode(), 'linkage.yaml': linkage}
     pipeline = Pipeline(parse_scene('measured', 'bench', files))
     angle, rate = _CRANK
-    sample = JointStateWriter(pipeline.lines[0].member.input_names).write(BEGIN, [angle], [rate])
+    sample = JointStateWriter(pipeline.linkages[0].scene_linkage.input_names).write(
+        BEGIN, [angle], [rate]
+    )
     if pipeline.offer(sample, BEGIN) is not None:
         raise MeasurementError('empty scene: refuses its crank')
     return pipeline

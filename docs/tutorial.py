@@ -156,7 +156,7 @@ effects:
 """)
 
 pipeline = lr.Pipeline(lr.load_scene('scene.yaml'))
-pipeline.lines[0].stages
+pipeline.linkages[0].effect_names
 
 # %%
 ticks = [pipeline.tick(number * 10_000_000) for number in range(101)]
@@ -167,7 +167,7 @@ ticks[0].message[:12].hex(' ')  # the bytes that the node would publish, header 
 # sensors.
 
 # %%
-looks = [tick.looks[0] for tick in ticks]
+looks = [tick.full_states[0] for tick in ticks]
 column = pipeline.closures[0].joint_names.index('rocker_joint')
 true = np.array([look.position['rocker_joint'] for look in looks])
 read = np.array([look.reading.joints[column] for look in looks])

@@ -84,9 +84,11 @@ linkages:
     usual = 0
     for number in range(400):
         one, other = (work.tick(BEGIN + number * MS) for work in (whole, apart))
-        usual += isinstance(one.seen, list) and not any(hasattr(s, 'reading') for s in one.seen)
+        usual += isinstance(one.states, list) and not any(
+            hasattr(s, 'reading') for s in one.states
+        )
         assert one.message == other.message
-        for look, beside in zip(one.looks, other.looks, strict=True):
+        for look, beside in zip(one.full_states, other.full_states, strict=True):
             assert (look.crank, look.reading) == (beside.crank, beside.reading)
     assert 0 < usual < 400
 
@@ -110,7 +112,7 @@ def test_who_does_not_close_is_left_out(load):
     both.offer(crank(BEGIN, left_crank_joint=0.1, right_crank_joint=3.0), BEGIN)
     tick = both.tick(BEGIN)
     assert read(tick.message).name == LEFT
-    assert [look.reading is None for look in tick.looks] == [False, True]
+    assert [look.reading is None for look in tick.full_states] == [False, True]
 
 
 def test_a_message_for_nobody_is_refused(load):
@@ -125,7 +127,7 @@ def test_ever_new_names_do_not_fill_the_memory(load):
     both = Pipeline(load(TWO))
     for number in range(3000):
         both.offer(crank(BEGIN, **{f'joint_{number}': 0.1}), BEGIN)
-    assert len(both._routes._found) <= 1000
+    assert len(both._router._found) <= 1000
     assert both.offer(crank(BEGIN, left_crank_joint=0.1), BEGIN) is None
 
 
@@ -150,7 +152,7 @@ drive: {constant_rate: {rate: 2.0}}
     assert [extra.topic for extra in both.extras] == ['~/left/motion']
     motion = STORE.deserialize_cdr(tick.extras[0], 'trajectory_msgs/msg/JointTrajectory')
     assert motion.joint_names == ['left_crank_joint', *LEFT]
-    assert tick.looks[1].crank.angles == (pytest.approx(0.2, rel=1e-15),)
+    assert tick.full_states[1].crank.angles == (pytest.approx(0.2, rel=1e-15),)
 
 
 def test_random_effects_differ_from_linkage_to_linkage(load):

@@ -18,7 +18,7 @@ from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.linkage import GROUND, Mass
 from linkage_ros.kinematics.topology import assur_groups
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline
+from linkage_ros.pipeline.pipeline import LinkageState, Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
 
@@ -110,9 +110,9 @@ def check(linkage, scene, looked=1):
         assert (one.message, one.extras) == (other.message, other.extras)
         if number % looked:
             continue
-        for look, beside in zip(one.looks, other.looks, strict=True):
+        for look, beside in zip(one.full_states, other.full_states, strict=True):
             assert (look.crank, look.reading) == (beside.crank, beside.reading)
-        assert all(isinstance(seen, LinkageTick) for seen in other.seen)
+        assert all(isinstance(seen, LinkageState) for seen in other.states)
 
 
 @pytest.mark.parametrize('drive', DRIVES)
@@ -177,7 +177,9 @@ def test_the_usual_tick_is_straight(effects):
         f'{DRIVES["turning"]}\neffects: {effects}',
     )
     plain = [
-        number for number, tick in enumerate(ticks(work)) if isinstance(tick.seen[0], LinkageTick)
+        number
+        for number, tick in enumerate(ticks(work))
+        if isinstance(tick.states[0], LinkageState)
     ]
     # The first, and those at which an angle passes half a turn.
     assert plain[0] == 0
@@ -202,8 +204,8 @@ def test_a_reset_compiles_nothing(effects, monkeypatch):
 def test_a_pose_is_worked_out_for_a_message_that_is_due_and_no_other(monkeypatch):
     file = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
     work = pipeline(file.read_bytes(), f'{DRIVES["turning"]}\neffects: {{markers: {{rate: 50}}}}')
-    (line,) = work.lines
-    looked, worked_out = line.looked, []
+    (line,) = work.linkages
+    looked, worked_out = line.complete_state, []
     monkeypatch.setattr(line, 'looked', lambda seen: worked_out.append(seen) or looked(seen))
     drawn = sum(any(tick.extras) for tick in ticks(work))
     assert drawn == len(worked_out) == TICKS * 50 // 1000

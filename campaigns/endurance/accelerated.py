@@ -175,7 +175,7 @@ def _topics(pipeline: Pipeline) -> list[Topic]:
     }
     if pipeline.topic:
         kinds['/crank_states'] = _JOINT_STATE
-    if pipeline.withholds:
+    if pipeline.suppresses_ticks:
         kinds['/linkage_node/withheld'] = 'builtin_interfaces/msg/Time'
     kinds |= {
         extra.topic.replace('~', '/linkage_node'): extra.message for extra in pipeline.extras

@@ -162,7 +162,7 @@ def _span_of_potential(scene: Scene) -> float:
     """Return the span of the potential energy of a linkage, in [J]."""
     creeping = {**scene, 'drive': {'constant_rate': {'rate': tau}}, 'effects': {'effort': {}}}
     moving = run(creeping, 1.0)
-    potential = moving.pipeline.lines[0].context.mechanics.potential_energy
+    potential = moving.pipeline.linkages[0].context.mechanics.potential_energy
     values = [potential(look.position) for look in moving.looks if look.position is not None]
     return max(values) - min(values)
 

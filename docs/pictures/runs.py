@@ -22,7 +22,7 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.effects.stage import SensorReading
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline
+from linkage_ros.pipeline.pipeline import LinkageState, Pipeline
 from linkage_ros.scene.load import load_scene
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class Run(NamedTuple):
 
     pipeline: Pipeline
     times: Values
-    looks: list[LinkageTick]
+    looks: list[LinkageState]
 
     def position(self, joint: str) -> Values:
         """Return the published positions of a joint, in [rad] or [m]; nan without a message."""
@@ -86,14 +86,14 @@ class Run(NamedTuple):
 
     def force(self, pin: str) -> Values:
         """Return the force in a pin, in [N]: a row of x and a row of y."""
-        names = self.pipeline.lines[0].context.reactions.names
+        names = self.pipeline.linkages[0].context.reactions.names
         place = names.index(pin)
         motions = [look.motion for look in self.looks]
         return np.array([m.reactions[place][:2] for m in motions if m is not None]).T
 
     def energy(self) -> Values:
         """Return the energy of the linkage, in [J]."""
-        energy = self.pipeline.lines[0].context.mechanics.total_energy
+        energy = self.pipeline.linkages[0].context.mechanics.total_energy
         return np.array(
             [
                 energy(position, *crank.rates)
@@ -103,7 +103,7 @@ class Run(NamedTuple):
         )
 
     def _read(self, joint: str, values: Callable[[SensorReading], Sequence[float]]) -> Values:
-        place = self.pipeline.lines[0].member.joint_names.index(joint)
+        place = self.pipeline.linkages[0].scene_linkage.joint_names.index(joint)
         read = [look.reading and values(look.reading) for look in self.looks]
         return np.array([each[place] if each else nan for each in read])
 
@@ -137,7 +137,7 @@ def run(
             last = now
             while due and due[0][0] <= START + time:
                 pipeline.offer(due.pop(0)[1], now)
-            looks.append(pipeline.tick(now).looks[0])
+            looks.append(pipeline.tick(now).full_states[0])
     return Run(pipeline, np.array(times) * 1e-9, looks)
 
 

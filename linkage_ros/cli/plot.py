@@ -108,7 +108,7 @@ def draw(
     for at, recorded, _, tick in replay(bag, scene):
         if stop.is_set():
             raise StoppedError
-        crank_state = tick.looks[0].crank
+        crank_state = tick.full_states[0].crank
         if crank_state is None or not recorded:
             continue
         sample = reader.read(recorded)

@@ -125,11 +125,11 @@ def _state(
     loop: TickLoop, turning: Mapping[str, bool], angles: AngleUnit
 ) -> tuple[str, list[Shown]]:
     """Return the input's age as text, and the inputs and joints to show."""
-    tick = loop.counts.last
+    tick = loop.counts.last_tick
     age = 'no crank'
     values: list[tuple[str, float, float | None]] = []
     for line, (crank, position, _, reading) in zip(
-        loop.pipeline.lines, tick.looks if tick else (), strict=False
+        loop.pipeline.linkages, tick.full_states if tick else (), strict=False
     ):
         if crank is None or position is None:
             continue
@@ -138,7 +138,7 @@ def _state(
             if position.status is Status.OPEN:
                 age += f', gap {position.gap:.3g} m'
             continue
-        member = line.member
+        member = line.scene_linkage
         age = f'{crank.age * 1e-6:.2f} ms'
         if not set(member.input_names) <= set(member.joint_names):
             values += zip(member.input_names, crank.angles, crank.rates, strict=True)
@@ -187,8 +187,8 @@ def summary(node: LinkageNode, longest: float) -> Table:
     if loop is None:
         return Table('', ('',), [('nothing ran',)])
     counts = loop.counts
-    per_second = counts.ticks / loop.seconds
-    rows = [('ticks', f'{counts.ticks} in {loop.seconds:.2f} s, {per_second:.1f} a second')]
+    per_second = counts.ticks / loop.run_seconds
+    rows = [('ticks', f'{counts.ticks} in {loop.run_seconds:.2f} s, {per_second:.1f} a second')]
     if counts.lateness.count:
         p50, p99 = (counts.lateness.percentile(p) / 1e3 for p in (50, 99))
         longest = counts.lateness.longest / 1e3
@@ -197,12 +197,17 @@ def summary(node: LinkageNode, longest: float) -> Table:
             ('lateness', f'p50 {p50:.0f} µs, p99 {p99:.0f} µs, max {longest:.0f} µs'),
         ]
     rows += [
-        ('published', f'{counts.published} joint states; {counts.silent} ticks without a crank'),
+        (
+            'published',
+            f'{counts.published} joint states; {counts.without_crank} ticks without a crank',
+        ),
     ]
-    if counts.withheld:
-        rows.append(('withheld', f'{counts.withheld} readings, by what the scene does to sensors'))
+    if counts.suppressed:
+        rows.append(
+            ('withheld', f'{counts.suppressed} readings, by what the scene does to sensors')
+        )
     if node.crank_topic:
-        rows.append(('samples', loop.samples))
+        rows.append(('samples', loop.sample_counts_text))
     rows += [
         (status.value, f'{counts.unclosed[status]} ticks')
         for status in Status

@@ -67,9 +67,9 @@ _LONGEST = 60
 
 def tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
     """Yield the tables of a scene that has been built."""
-    yield Table(title, ('', ''), [*_facts(scene), *_solvers(pipeline.lines)])
-    for lines in _alike(pipeline.lines):
-        names = _some([line.member.name for line in lines if line.member.name])
+    yield Table(title, ('', ''), [*_facts(scene), *_solvers(pipeline.linkages)])
+    for lines in _alike(pipeline.linkages):
+        names = _some([line.scene_linkage.name for line in lines if line.scene_linkage.name])
         heads = ('>', 'stage', 'where', 'what it does', 'as said here', '')
         yield Table(
             f'Stages of {names}' if names else 'Stages', heads, list(_stage_rows(lines[0]))
@@ -98,11 +98,14 @@ def _facts(scene: Scene) -> Iterator[tuple[str, str]]:
 def _solvers(lines: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
     """Yield the solvers that close the loops, if the scene names any."""
     for line in lines:
-        name = f'{line.member.name}: ' if line.member.name else ''
-        if line.choice is not None:
-            yield 'solver', f'{name}for an accuracy of {line.member.accuracy:g}: {line.choice.why}'
-        elif line.member.solver is not None:
-            solver, parameters = line.member.solver
+        name = f'{line.scene_linkage.name}: ' if line.scene_linkage.name else ''
+        if line.solver_choice is not None:
+            yield (
+                'solver',
+                f'{name}for an accuracy of {line.scene_linkage.accuracy:g}: {line.solver_choice.why}',
+            )
+        elif line.scene_linkage.solver is not None:
+            solver, parameters = line.scene_linkage.solver
             text = _parameters_text(parameters)
             yield 'solver', f'{name}{solver}{text and ", "}{text}'
 
@@ -111,7 +114,9 @@ def _alike(lines: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:
     """Return the linkages; those with the same drive and effects share a row."""
     groups: dict[str, list[LinkagePipeline]] = {}
     for line in lines:
-        groups.setdefault(repr((line.member.drive, line.member.effects)), []).append(line)
+        groups.setdefault(repr((line.scene_linkage.drive, line.scene_linkage.effects)), []).append(
+            line
+        )
     return list(groups.values())
 
 
@@ -126,10 +131,10 @@ class Stage(NamedTuple):
 
 def _stages(line: LinkagePipeline) -> Iterator[Stage]:
     """Yield the drive of a linkage and its effects, in the order of a tick."""
-    name, parameters = line.member.drive
+    name, parameters = line.scene_linkage.drive
     yield Stage(name, 'drive', parameters, ())
-    given = line.member.effects
-    for stage in line.stages:
+    given = line.scene_linkage.effects
+    for stage in line.effect_names:
         module = module_of(stage)
         where = next(
             (where for has, where in _WHERE.items() if hasattr(module, has)), 'in the forces'
@@ -202,10 +207,10 @@ def account_of(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
     from linkage_ros.cli.bag_reading import scene_account
 
     account = scene_account(scene)
-    for linkage, line in zip(account['linkages'], pipeline.lines, strict=True):
-        solver = line.member.solver
+    for linkage, line in zip(account['linkages'], pipeline.linkages, strict=True):
+        solver = line.scene_linkage.solver
         linkage['solver'] = None if solver is None else _named_parameters(*solver)
-        linkage['accuracy'] = line.member.accuracy
+        linkage['accuracy'] = line.scene_linkage.accuracy
         linkage['stages'] = [
             {
                 **_named_parameters(stage.name, stage.parameters),

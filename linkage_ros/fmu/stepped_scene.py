@@ -29,7 +29,7 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageTick, Pipeline
+from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageState, Pipeline
 from linkage_ros.scene.scene import Scene, SceneLinkage
 
 FIRST_TICK = NANOSECONDS
@@ -83,7 +83,7 @@ class _Sender:
     """
 
     def __init__(self, line: LinkagePipeline) -> None:
-        member = line.member
+        member = line.scene_linkage
         drive, parameters = member.drive
         self._fields = _INPUT_FIELDS[drive]
         # A motor may be commanded by another quantity, which the message calls an effort too.
@@ -125,7 +125,7 @@ class LinkageOutputs:
     """The newest reading of a linkage, and whether it is of the last tick."""
 
     def __init__(self, line: LinkagePipeline) -> None:
-        member = line.member
+        member = line.scene_linkage
         self.prefix = f'{member.name}.' if member.name else ''
         """What its variables that belong to no joint begin with."""
         turning = line.closure.turning
@@ -148,7 +148,7 @@ class LinkageOutputs:
         self.status = NO_CRANK
         """Status of the linkage at the last tick, as a number."""
 
-    def take(self, look: LinkageTick) -> None:
+    def take(self, look: LinkageState) -> None:
         """Take the state of the linkage at a tick."""
         position, reading = look.position, look.reading
         self.status = NO_CRANK if position is None else STATUS_NUMBERS[position.status]
@@ -191,7 +191,7 @@ class MotorOutputs:
     """
 
     def __init__(self, line: LinkagePipeline, writer: int) -> None:
-        member = line.member
+        member = line.scene_linkage
         (joint,), (given,) = member.input_names, member.linkage.inputs
         _, parameters = member.drive
         # Without a motor at the input, the reading is of what is commanded: the input itself.
@@ -238,12 +238,12 @@ class SteppedScene:
         self._scene = scene
         self._pipeline = Pipeline(scene)
         self._ticks = 0
-        self._senders = [_Sender(line) for line in self._pipeline.lines if line.topic]
+        self._senders = [_Sender(line) for line in self._pipeline.linkages if line.topic]
         self.inputs = [variable for sender in self._senders for variable in sender.variables]
         """What goes in, in order."""
-        self.outputs = [LinkageOutputs(line) for line in self._pipeline.lines]
+        self.outputs = [LinkageOutputs(line) for line in self._pipeline.linkages]
         """What comes out of each linkage."""
-        extras = [(line, extra) for line in self._pipeline.lines for extra in line.extras]
+        extras = [(line, extra) for line in self._pipeline.linkages for extra in line.extras]
         self.motors = [
             MotorOutputs(line, number)
             for number, (line, extra) in enumerate(extras)
@@ -335,7 +335,7 @@ class SteppedScene:
 
     def _tick(self) -> None:
         tick = self._pipeline.tick(self._now())
-        for outputs, look in zip(self.outputs, tick.looks, strict=True):
+        for outputs, look in zip(self.outputs, tick.full_states, strict=True):
             outputs.take(look)
         for motor in self.motors:
             motor.take(tick.extras)

@@ -32,7 +32,7 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import head_of, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.run_recording import RunSnapshots
-from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageTick
+from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageState
 from linkage_ros.pipeline.tick_loop import Counts, TickLoop, WrenchCounts
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
@@ -184,14 +184,16 @@ class DiagnosticsSummary:
 
     def _lost_time(self) -> dict[str, object]:
         """Return the time that integrating drives skipped because they could not keep up."""
-        lines = self.loop.pipeline.lines
+        lines = self.loop.pipeline.linkages
         drives = [line.drive for line in lines]
         lost = [drive.lost for drive in drives if hasattr(drive, 'lost')]
         if not lost:
             return {}
         values: dict[str, object] = {'Time not integrated (s)': f'{sum(lost) / NANOSECONDS:.3f}'}
         if any(
-            limits.effort < inf for line in lines for limits in line.member.linkage.limits.values()
+            limits.effort < inf
+            for line in lines
+            for limits in line.scene_linkage.linkage.limits.values()
         ):
             cut = sum(drive.saturated for drive in drives if hasattr(drive, 'saturated'))
             values['Commands cut to the effort limit'] = cut
@@ -219,7 +221,7 @@ class DiagnosticsSummary:
             level, message = WARN, self.cranks_doubled
         elif rejected > 0:
             level, message = WARN, f'{rejected} samples rejected'
-        missed = self.loop.missed
+        missed = self.loop.missed_messages
         values: dict[str, object] = {
             'Topic': self.crank_topic,
             'Publishers': ', '.join(self.publishers),
@@ -238,7 +240,7 @@ class DiagnosticsSummary:
     def _closure(self) -> DiagnosticStatus:
         counts = self.loop.counts
         level, message = OK, 'Closed'
-        lines = self.loop.pipeline.lines
+        lines = self.loop.pipeline.linkages
         number, last = counts.last_unclosed.get(Status.OPEN, (0, None))
         reachable = describe_ranges(lines[number].closure.input_ranges)
         if self.now.unclosed > self.before.unclosed:
@@ -263,7 +265,11 @@ class DiagnosticsSummary:
             'Ticks indeterminate': counts.unclosed[Status.INDETERMINATE],
             'Gap when last open (m)': f'{last.gap:.6g}' if last is not None else '0',
         }
-        looks = [*zip(counts.last.lines, counts.last.looks, strict=True)] if counts.last else []
+        looks = (
+            [*zip(counts.last_tick.linkages, counts.last_tick.full_states, strict=True)]
+            if counts.last_tick
+            else []
+        )
         posed = [
             (line, look.position)
             for line, look in looks
@@ -292,7 +298,7 @@ class DiagnosticsSummary:
     ) -> tuple[dict[str, str], str]:
         """Return the singularity measures of the worst linkage, and the warning text."""
         nearness = [(line, line.closure.singularity_margin(position)) for line, position in posed]
-        inputs = [driven for line, _ in posed for driven in line.member.linkage.inputs]
+        inputs = [driven for line, _ in posed for driven in line.scene_linkage.linkage.inputs]
         unit = ' or '.join(sorted({driven.unit for driven in inputs}))
         values, warnings = {}, []
         for name, text in _NEARNESS.items():
@@ -322,7 +328,7 @@ class DiagnosticsSummary:
         for topic, counts in zip(
             self.loop.pipeline.wrenches, self.loop.counts.wrenches, strict=True
         ):
-            held, name = topic.held, topic.topic
+            held, name = topic.wrench, topic.topic
             age = self.clock - held.stamp if held.stamp else inf
             if age > held.max_age:
                 silent.append(name)
@@ -429,39 +435,39 @@ def no_clock(silence: float) -> str:
     return 'No /clock yet' if silence == inf else f'No /clock for {silence:.1f} s'
 
 
-def _shares(looks: Sequence[tuple[LinkagePipeline, LinkageTick]]) -> tuple[dict[str, str], str]:
+def _shares(looks: Sequence[tuple[LinkagePipeline, LinkageState]]) -> tuple[dict[str, str], str]:
     """Return the share of its limits that each joint used at the last tick, and the excess."""
     values, warnings = {}, []
     for line, look in looks:
         for name, (rate, effort) in _exertions(line, look).items():
-            limits = line.member.linkage.limits[name]
+            limits = line.scene_linkage.linkage.limits[name]
             for what, value, most in (
                 ('Velocity', rate, limits.velocity),
                 ('Effort', effort, limits.effort),
             ):
                 if value is None or most == inf:
                     continue
-                joint = f'{line.member.prefix}{name}'
+                joint = f'{line.scene_linkage.prefix}{name}'
                 values[f'{what} of {joint}, of its limit'] = f'{abs(value) / most:.4g}'
                 if abs(value) > most:
                     warnings.append(f'{what} of {joint} is {abs(value):.6g}, its limit {most:.6g}')
     return values, '; '.join(warnings)
 
 
-def _inputs(line: LinkagePipeline, look: LinkageTick) -> dict[str, str]:
+def _inputs(line: LinkagePipeline, look: LinkageState) -> dict[str, str]:
     """Return the inputs of a linkage, as diagnostic values."""
     angles = look.crank.angles if look.crank is not None else ()
     return {
         f'Input {driven.joint} ({driven.unit})': f'{angle:.6f}'
-        for driven, angle in zip(line.member.linkage.inputs, angles, strict=False)
+        for driven, angle in zip(line.scene_linkage.linkage.inputs, angles, strict=False)
     }
 
 
 def _exertions(
-    line: LinkagePipeline, look: LinkageTick
+    line: LinkagePipeline, look: LinkageState
 ) -> dict[str, tuple[float | None, float | None]]:
     """Return rate and effort of the joints that have limits, as far as they are known."""
-    linkage, reading = line.member.linkage, look.reading
+    linkage, reading = line.scene_linkage.linkage, look.reading
     exertions: dict[str, tuple[float | None, float | None]] = {}
     if reading is not None:
         for number, name in enumerate(linkage.joints):
@@ -476,7 +482,7 @@ def _exertions(
 
 def _of(line: LinkagePipeline) -> str:
     """Return the name of the linkage for a message, if there are several."""
-    return f' ({line.member.name})' if line.member.name else ''
+    return f' ({line.scene_linkage.name})' if line.scene_linkage.name else ''
 
 
 _REMEDIES = {
@@ -679,7 +685,7 @@ class Warnings:
     def check_chatter(self, lines: Sequence[LinkagePipeline], period: float) -> None:
         """Warn of steps in which motor and crank met and parted too often, once a period [s]."""
         for line in lines:
-            kind, count = f'chatter {line.member.name}', line.drive.chatter_count
+            kind, count = f'chatter {line.scene_linkage.name}', line.drive.chatter_count
             before = min(self._chattered.get(kind, 0), count)  # a reset counts anew
             if count > before:
                 told = f'{describe_chatter(count - before)}{_of(line)}'
@@ -723,11 +729,11 @@ class Warnings:
         lost, stalls = counts.lost - self._lost, counts.stalls - self._stalls
         ticks = counts.ticks - self._ticks
         often = stalls > 1 and lost > _RATE_TOLERANCE * (lost + ticks)
-        assert counts.stall is not None, 'a lost tick is counted with its stall'
-        seconds = counts.stall.duration / NANOSECONDS
+        assert counts.last_stall is not None, 'a lost tick is counted with its stall'
+        seconds = counts.last_stall.duration / NANOSECONDS
         what = (
             f'a tick took {seconds:.3f} s'
-            if counts.stall.in_tick
+            if counts.last_stall.in_tick
             else f'the operating system woke the node {seconds:.3f} s late'
         )
         where = 'at once' if stalls == 1 else f'in {stalls} stalls, the last'

@@ -211,11 +211,11 @@ class LinkageNode(LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         for note in scene_notes(scene):
             self.get_logger().warning(str(note))
-        for line in pipeline.lines:
-            if line.choice is not None:
-                name = f'{line.member.name}: ' if line.member.name else ''
-                accuracy = f'accuracy {line.member.accuracy:g}'
-                self.get_logger().info(f'{name}{accuracy}: {line.choice.why}')
+        for line in pipeline.linkages:
+            if line.solver_choice is not None:
+                name = f'{line.scene_linkage.name}: ' if line.scene_linkage.name else ''
+                accuracy = f'accuracy {line.scene_linkage.accuracy:g}'
+                self.get_logger().info(f'{name}{accuracy}: {line.solver_choice.why}')
         self.failure, self.scene, self._closures = None, scene, pipeline.closures
         return TransitionCallbackReturn.SUCCESS
 
@@ -308,12 +308,12 @@ class LinkageNode(LifecycleNode):
 
     def end(self) -> None:
         """Stop ticking and close the bag; do nothing if nothing runs."""
-        if self.loop is not None and self.loop.running:
+        if self.loop is not None and self.loop.is_running:
             self.loop.stop()
             self._watch_failure(self.loop)
             self._diagnose()
             if self.crank_topic:
-                self.get_logger().info(f'{self.crank_topic}: {self.loop.samples}')
+                self.get_logger().info(f'{self.crank_topic}: {self.loop.sample_counts_text}')
             self.recording.stop(self.loop)
 
     def _start_recording(self) -> str:
@@ -351,7 +351,7 @@ class LinkageNode(LifecycleNode):
             return response
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self.loop is None or not self.loop.running:
+        if self.loop is None or not self.loop.is_running:
             return _answer(response, False, 'not active: nothing to reset')
         self.loop.reset_requested = True
         return _answer(response, True, 'crank and turns are forgotten before the next tick')
@@ -359,7 +359,7 @@ class LinkageNode(LifecycleNode):
     def _on_inject(
         self, name: str, request: SetBool.Request, response: SetBool.Response
     ) -> SetBool.Response:
-        if self.loop is None or not self.loop.running or self.loop.injection is None:
+        if self.loop is None or not self.loop.is_running or self.loop.injection is None:
             return _answer(response, False, 'not active: nothing to inject into')
         self.loop.injection.request_change(name, bool(request.data))
         what = 'begins' if request.data else 'ends'
@@ -368,7 +368,7 @@ class LinkageNode(LifecycleNode):
     def _on_start_recording(
         self, _: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        if self.loop is None or not self.loop.running:
+        if self.loop is None or not self.loop.is_running:
             return _answer(response, False, 'not active: nothing to record')
         if self.recording.has_ended(self.loop):
             self.recording.stop(self.loop)
@@ -385,7 +385,7 @@ class LinkageNode(LifecycleNode):
         return _answer(response, *self.recording.stop(self.loop))
 
     def _on_snapshot(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self.loop is None or not self.loop.running:
+        if self.loop is None or not self.loop.is_running:
             return _answer(response, False, 'not active: nothing is kept in memory')
         refusal = self.recording.snapshot(self._snapshot_answers.answer, self._wake)
         if refusal:
@@ -399,7 +399,7 @@ class LinkageNode(LifecycleNode):
 
     def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         simulated = self.get_parameter('use_sim_time').value
-        running = self.loop is not None and self.loop.running
+        running = self.loop is not None and self.loop.is_running
         for parameter in parameters:
             if parameter.name == 'use_sim_time' and parameter.value != simulated and running:
                 return SetParametersResult(
@@ -418,14 +418,14 @@ class LinkageNode(LifecycleNode):
     def _watch(self) -> None:
         """Log the counts of the tick, and publish the diagnostics when they are due."""
         loop = self.loop
-        if loop is None or not loop.running:
+        if loop is None or not loop.is_running:
             return
         period = self.get_parameter('warning_period').value
         self._warnings.check(loop.counts, loop.pipeline.closures, self.crank_topic, period)
         self._warnings.check_age(loop.counts, self.crank_topic, loop.pipeline.max_age, period)
-        self._warnings.check_jumps(loop.pipeline.lines, self.crank_topic)
+        self._warnings.check_jumps(loop.pipeline.linkages, self.crank_topic)
         wrenches = [each.topic_name for each in self._scene_topics.wrenches]
-        self._warnings.check_chatter(loop.pipeline.lines, period)
+        self._warnings.check_chatter(loop.pipeline.linkages, period)
         self._warnings.check_wrenches([*zip(wrenches, loop.counts.wrenches, strict=True)], period)
         silence = self._clock_silence()
         if min(silence, (time.monotonic_ns() - self._activated) / NANOSECONDS) > CLOCK_PATIENCE:
@@ -433,7 +433,7 @@ class LinkageNode(LifecycleNode):
             self._warnings.warn('clock', f'{no_clock(silence)}: {remedy}', period)
         while self._real_time.refused:
             self.get_logger().warning(self._real_time.refused.pop(0))
-        listening = [line.member for line in loop.pipeline.lines if line.topic]
+        listening = [line.scene_linkage for line in loop.pipeline.linkages if line.topic]
         # Without /clock messages no tick has taken crank messages yet.
         assert self.scene is not None
         if listening and (loop.counts.ticks or not self.scene.rate):
@@ -463,9 +463,9 @@ class LinkageNode(LifecycleNode):
         assert self.scene is not None
         assert self.loop is not None
         publishers = self._crank_publishers()
-        self.loop.several_publishers |= len(publishers) > 1
+        self.loop.had_several_publishers |= len(publishers) > 1
         now = Snapshot.of(
-            self.loop.counts, time.monotonic_ns(), chattered(self.loop.pipeline.lines)
+            self.loop.counts, time.monotonic_ns(), chattered(self.loop.pipeline.linkages)
         )
         cranks_doubled = self._doubled_cranks(publishers, now)
         node_doubled = self._doubled_node(now)
@@ -513,7 +513,7 @@ class LinkageNode(LifecycleNode):
         # Where others share the topic, or each linkage has a publisher, only the numbers tell.
         if is_interleaved(self._before_last.interleaved, now.interleaved):
             return f'{topic}: several publishers send the crank, among {among}; stop all but one'
-        if len(publishers) > 1 and not shared and len(self.loop.pipeline.lines) == 1:
+        if len(publishers) > 1 and not shared and len(self.loop.pipeline.linkages) == 1:
             return f'{topic}: several publishers, {among}; stop all but one'
         return ''
 

@@ -47,7 +47,7 @@ def steady(rate: float) -> Pace:
 
     def pace(loop: TickLoop, stopping: Event) -> None:
         counts = loop.counts
-        add, tick_at = counts.lateness.add, loop.tick_at
+        add, tick_at = counts.lateness.add_duration, loop.tick_at
         begin = monotonic_ns()
         number = 0
         while not stopping.is_set():
@@ -66,7 +66,7 @@ def steady(rate: float) -> Pace:
                 if lateness > CATCH_UP:
                     lost = int(lateness // period)
                     # Another thread reads the stall where it finds ticks lost.
-                    counts.stall = Stall(lateness, in_tick=early <= 0)
+                    counts.last_stall = Stall(lateness, in_tick=early <= 0)
                     counts.stalls += 1
                     counts.lost += lost
                     number += lost

@@ -92,12 +92,12 @@ class RunRecording:
         record = scene.record or _DEFAULT
         storage = record.storage
         # The bag lacks what a running tick remembers: a replay has to know that.
-        with_the_run = not loop.running
+        with_the_run = not loop.is_running
 
         def new_bag(whole: bool) -> BagWriter:
             begun = WITH_THE_RUN if whole and with_the_run else MID_RUN
             folder = _folder(runs, record.name, scene.name)
-            files = _attachments(scene, described, begun, loop.pipeline.lines, folder)
+            files = _attachments(scene, described, begun, loop.pipeline.linkages, folder)
             opening = [
                 (number, description)
                 for number, (key, _) in enumerate(described)

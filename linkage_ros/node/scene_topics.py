@@ -21,7 +21,7 @@ from linkage_ros.messages.single_values import text_message
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.run_recording import DESCRIPTION
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.pipeline.tick_loop import RecordedTopics, Take
+from linkage_ros.pipeline.tick_loop import RecordedTopics, TakeMessage
 from linkage_ros.replay.replay import announced_text, change_text
 from linkage_ros.replay.run_files import EXTRA, scene_files
 from linkage_ros.replay.topic_description import message_type
@@ -199,7 +199,7 @@ class SceneTopics:
             topics['faults_topic'] = self._changes.topic_name
         text_type = message_type('std_msgs/msg/String', '~/scene')
         self._announced = self._node.create_publisher(text_type, SCENE_TOPIC, SCENE_QOS)
-        files = scene_files(scene, topics, '', pipeline.lines)
+        files = scene_files(scene, topics, '', pipeline.linkages)
         self._announced.publish(text_message(announced_text(files)))
 
     def disconnect(self) -> None:
@@ -231,14 +231,14 @@ class SceneTopics:
         return self._node.get_publishers_info_by_topic(self._crank_name)
 
     @property
-    def take(self) -> Take | None:
+    def take(self) -> TakeMessage | None:
         """Return a function that takes the next message for the drives; None without a topic."""
         if self.crank is None:
             return None
         return partial(self.crank.handle.take_message, JointState, True)
 
     @property
-    def take_wrenches(self) -> list[Take]:
+    def take_wrenches(self) -> list[TakeMessage]:
         """Return functions that take the next message of each topic with a wrench."""
         return [partial(one.handle.take_message, one.msg_type, True) for one in self.wrenches]
 
@@ -268,8 +268,8 @@ class SceneTopics:
             bag_topic(f'{node.get_fully_qualified_name()}/{name}', time_type, OUTPUT_QOS)
             for name in ('withheld', 'resets')
         )
-        if handles.withheld is not None:
-            topics[handles.withheld] = 'withheld_topic', withheld
+        if handles.suppressed is not None:
+            topics[handles.suppressed] = 'withheld_topic', withheld
         for handle, extra in zip(handles.extras, self.extras, strict=True):
             described = bag_topic(extra.topic_name, extra.msg_type, extra.qos_profile)
             topics[handle] = EXTRA, described

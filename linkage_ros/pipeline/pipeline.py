@@ -39,13 +39,13 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.pipeline.sample_router import SampleRouter
 from linkage_ros.pipeline.straight_tick import (
-    Numbers,
-    Seen,
-    Straight,
-    straight,
-    straight_look,
-    straight_share,
-    straight_tick,
+    compile_contribution,
+    compile_linkage_state,
+    compile_scene_tick,
+    compile_tick,
+    CompiledState,
+    CompiledTick,
+    StateTuple,
 )
 from linkage_ros.pipeline.wanted_effects import choose_effects, WantedEffects
 from linkage_ros.scene.scene import Scene, SceneLinkage
@@ -58,20 +58,20 @@ if TYPE_CHECKING:
     from linkage_ros.pipeline.wrench_topics import WrenchTopic
     from linkage_ros.solvers.solver import SolverChoice
 
-_WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
+_SUPPRESSING = {'rate_limit', 'dropout', 'delay', 'jitter'}
 """Effects that may suppress the message of a tick."""
 
-_GOING_ON = {'backlash'}
+_RUNNING_IN_GAPS = {'backlash'}
 """Effects that keep running while a loop is open."""
 
 _KINEMATIC = ('velocity', 'acceleration')
 """Stages of the mechanism that a compiled linkage computes itself, by its derivatives."""
 
-_OF_FORCES = {'pin_forces'}
+_FORCES_ONLY = {'pin_forces'}
 """Effects whose messages contain joint forces only."""
 
 
-class LinkageTick(NamedTuple):
+class LinkageState(NamedTuple):
     """The state of one linkage at a tick, step by step."""
 
     crank: CrankState | None  # State of the crank; None without a crank state
@@ -102,13 +102,16 @@ class Tick(NamedTuple):
 
     message: bytes
     extras: tuple[bytes, ...]
-    seen: Sequence[LinkageTick | Seen | Numbers]
-    lines: Sequence[LinkagePipeline]
+    states: Sequence[LinkageState | CompiledState | StateTuple]
+    linkages: Sequence[LinkagePipeline]
 
     @property
-    def looks(self) -> tuple[LinkageTick, ...]:
+    def full_states(self) -> tuple[LinkageState, ...]:
         """State of each linkage in full; computes here what the message did not need."""
-        return tuple(line.looked(seen) for line, seen in zip(self.lines, self.seen, strict=True))
+        return tuple(
+            line.complete_state(seen)
+            for line, seen in zip(self.linkages, self.states, strict=True)
+        )
 
 
 class AuxiliaryOutput(NamedTuple):
@@ -122,16 +125,16 @@ class AuxiliaryOutput(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _OutputSelection:
     """Picks the values that the scene publishes from the motion of a compiled linkage."""
 
     # Two objects with equal keys pick the same values.
-    of: list[Any]
-    pick: Callable[[CompiledMotion], Sequence[Sequence[float]]] = field(compare=False)
+    key: list[Any]
+    select_values: Callable[[CompiledMotion], Sequence[Sequence[float]]] = field(compare=False)
 
     def __call__(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
         """Return the values, in groups."""
-        return self.pick(motion)
+        return self.select_values(motion)
 
 
 class LinkagePipeline:
@@ -163,26 +166,28 @@ class LinkagePipeline:
         closure: Closure | None,
         injection: Injection | None,
     ) -> None:
-        self.member = member
+        self.scene_linkage = member
         try:
-            self._build(scene, closure, injection)
+            self._build_stages(scene, closure, injection)
         except DefinitionError as error:
             of_linkage = error.where.startswith('masses')
             content = member.linkage_content if of_linkage else member.content
             raise content.locate_error(error) from None
 
-    def _build(self, scene: Scene, closure: Closure | None, injection: Injection | None) -> None:
-        member = self.member
+    def _build_stages(
+        self, scene: Scene, closure: Closure | None, injection: Injection | None
+    ) -> None:
+        member = self.scene_linkage
         wanted = choose_effects(member)
-        self.stages = tuple(effect.name for effect in wanted.effects)
+        self.effect_names = tuple(effect.name for effect in wanted.effects)
         """Names of the computed effects, in physical order."""
         seed = f'{scene.seed}/{member.name}'
-        self.closure = closure or _closure(member, wanted, seed)
+        self.closure = closure or _make_closure(member, wanted, seed)
         friction = wanted.parameters.get('friction')
         self.context = Context(
             closure=self.closure,
             rate=scene.rate,
-            needs_rate='velocity' in self.stages,
+            needs_rate='velocity' in self.effect_names,
             seed=seed,
             loads=member.loads,
             friction=friction.friction if friction is not None else None,
@@ -195,7 +200,7 @@ class LinkagePipeline:
         self._build_mechanism(wanted, injection)
         self._build_sensors(wanted, injection, wrapped=scene.wrapped)
         self._build_outputs(wanted)
-        self._straight = self._compile_tick(wanted)
+        self._compiled_tick = self._compile_tick(wanted)
 
     def _build_drive(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the crank state: the drive, its messages and the effects on it."""
@@ -204,9 +209,11 @@ class LinkagePipeline:
         self.topic: str = getattr(module, 'TOPIC', '')
         """Topic of the drive; '' for none."""
         self.drive: Drive = module.build(parameters, self.context)
-        self._read_message = module.reader(parameters, self.context) if self.topic else None
-        self._spoil = injection.build_functions('message') if injection is not None else []
-        if self._spoil and not self.topic:
+        self._parse_sample = module.reader(parameters, self.context) if self.topic else None
+        self._message_faults = (
+            injection.build_functions('message') if injection is not None else []
+        )
+        if self._message_faults and not self.topic:
             raise DefinitionError(
                 'faults', f'not_a_number spoils messages, and {drive} has none', 'leave it out'
             )
@@ -215,19 +222,21 @@ class LinkagePipeline:
     def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
         loads = self.member.loads if wanted.computes_forces else None
-        self._timed = loads is not None and loads.applied.changes_with_time
-        self._first = -1
+        self._has_timed_loads = loads is not None and loads.applied.changes_with_time
+        self._first_time = -1
         self.wrenches: dict[str, HeldWrench] = {}
         """The wrenches that messages give, by the name of the link."""
         if loads is not None and loads.applied.wrenches:
             applied = self.context.mechanics.applied
             assert applied is not None
             self.wrenches = applied.wrenches
-        self._close = self.closure.position
+        self._solve_loops = self.closure.position
         if self.member.silent_beyond_limits and self.closure.bounds:
-            self._close = _silent_beyond(self._close, self.closure)
-        self._faults = injection.build('mechanism', self.context) if injection is not None else []
-        self._stages = [*wanted.build('stage', self.context).values()]
+            self._solve_loops = _suppress_beyond_limits(self._solve_loops, self.closure)
+        self._mechanism_faults = (
+            injection.build('mechanism', self.context) if injection is not None else []
+        )
+        self._mechanism_stages = [*wanted.build('stage', self.context).values()]
 
     def _build_sensors(
         self, wanted: WantedEffects, injection: Injection | None, *, wrapped: bool
@@ -241,23 +250,25 @@ class LinkagePipeline:
         angles = Continuous(self.closure.turning, first_values(self.closure))
         behind = [*sensors.values(), *broken]
         self._running = angles if behind or not wrapped else None
-        self._read_off = wanted.named
-        if behind and 'velocity' in self.stages and 'velocity' not in wanted.named:
+        self._observed_effects = wanted.named
+        if behind and 'velocity' in self.effect_names and 'velocity' not in wanted.named:
             # Only used between readings; not published.
-            self._read_off |= {'velocity'}
-            behind.append(_without_rates)
+            self._observed_effects |= {'velocity'}
+            behind.append(_remove_rates)
         if wrapped:
             behind.append(wrap_all(self.closure.turning))
         running = [] if self._running is None else [self._running]
-        self._sensors = [SensorStage.from_sensor(sensor) for sensor in (*running, *behind)]
-        self._read_behind = partial(self._read, first=len(running)) if behind else None
+        self._sensor_stages = [SensorStage.from_sensor(sensor) for sensor in (*running, *behind)]
+        self._apply_later_sensors = (
+            partial(self._apply_sensors, first=len(running)) if behind else None
+        )
 
     def _build_outputs(self, wanted: WantedEffects) -> None:
         """Build the messages beside the joint states: of the effects, and of the drive."""
         member = self.member
         writers = wanted.build('writer', self.context, wanted.named)
         self.extras = [
-            _output(
+            _make_output(
                 effect.name,
                 effect.topic,
                 effect.message,
@@ -276,13 +287,13 @@ class LinkagePipeline:
             if written is not None:
                 topic, message = module.EXTRA_TOPIC, module.EXTRA_MESSAGE
                 self.extras.append(
-                    _output(drive, topic, message, written, member.name, of_reading=True)
+                    _make_output(drive, topic, message, written, member.name, of_reading=True)
                 )
 
-    def _compile_tick(self, wanted: WantedEffects) -> Straight | None:
+    def _compile_tick(self, wanted: WantedEffects) -> CompiledTick | None:
         """Generate the tick up to the reading; None where a part of it has no generated form."""
         moved = {effect.name for effect in wanted.effects if effect.stage is not None}
-        if not self.closure.by_steps or self._faults or self._timed:
+        if not self.closure.by_steps or self._mechanism_faults or self._has_timed_loads:
             return None
         if not moved <= {*_KINEMATIC, *FORCE_EFFECTS}:
             return None
@@ -290,81 +301,89 @@ class LinkagePipeline:
             return None  # A compiled tick computes from the crank alone.
         outputs = None
         if 'acceleration' in moved:
-            of = [wanted.parameters[name] for name in self.stages if name in moved]
-            of += [self._read_off, self.context.loads, self.context.friction]
-            outputs = _Wanted(of, self._ideal)
+            of = [wanted.parameters[name] for name in self.effect_names if name in moved]
+            of += [self._observed_effects, self.context.loads, self.context.friction]
+            outputs = _OutputSelection(of, self._symbolic_outputs)
         compiled = self.closure.compile_linkage(len(moved.intersection(_KINEMATIC)), outputs)
         # Where the forces have no solution, a compiled path has fewer values.
         if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
             return None
-        return straight(self.drive, self._drive_stages, compiled, self._running)
+        return compile_tick(self.drive, self._drive_stages, compiled, self._running)
 
     @property
-    def whole(self) -> Straight | None:
+    def whole_tick(self) -> CompiledTick | None:
         """Return the generated tick up to the reading; None if a stage is not generated."""
         of_seen = all(
-            extra.writer.of_reading or extra.effect in _OF_FORCES for extra in self.extras
+            extra.writer.of_reading or extra.effect in _FORCES_ONLY for extra in self.extras
         )
-        return self._straight if self._read_behind is None and of_seen else None
+        return self._compiled_tick if self._apply_later_sensors is None and of_seen else None
 
     @cached_property
-    def see(self) -> Callable[[int], LinkageTick | Seen]:
+    def compute_state(self) -> Callable[[int], LinkageState | CompiledState]:
         """Return a function from the time, in [ns], to the state of the linkage."""
-        if self._straight is None:
-            return self._see
-        return straight_look(self._straight, self._read_behind, self.look)
+        if self._compiled_tick is None:
+            return self._interpret_state
+        return compile_linkage_state(
+            self._compiled_tick, self._apply_later_sensors, self.interpret_from_crank
+        )
 
-    def _see(self, now: int) -> LinkageTick:
+    def _interpret_state(self, now: int) -> LinkageState:
         """Return the state of the linkage at a time, in [ns], step by step."""
         crank = self.drive.state(now)
         if crank is not None:
             for stage in self._drive_stages:
                 crank = stage(crank)
-        return self.look(now, crank)
+        return self.interpret_from_crank(now, crank)
 
-    def look(self, now: int, crank: CrankState | None) -> LinkageTick:
+    def interpret_from_crank(self, now: int, crank: CrankState | None) -> LinkageState:
         """Return the state of the linkage, given the crank state."""
         if crank is None:
-            return LinkageTick(None, None, None, self._read_gap(now))
-        position = self._close(*crank.angles)
-        for fault in self._faults:
+            return LinkageState(None, None, None, self._apply_sensors_in_gap(now))
+        position = self._solve_loops(*crank.angles)
+        for fault in self._mechanism_faults:
             position = fault(position)
         if not position.joints:
-            return LinkageTick(crank, position, None, self._read_gap(now))
-        if self._timed and self._first < 0:
+            return LinkageState(crank, position, None, self._apply_sensors_in_gap(now))
+        if self._has_timed_loads and self._first_time < 0:
             # A bag does not know of ticks before the first pose.
-            self._first = now
+            self._first_time = now
         for held in self.wrenches.values():
             held.expire(now)
-        motion = self._moved(crank, position, (now - self._first) * 1e-9 if self._timed else 0.0)
-        return LinkageTick(crank, position, motion, self._read(now, self._observed(now, motion)))
+        motion = self._mechanism_motion(
+            crank, position, (now - self._first_time) * 1e-9 if self._has_timed_loads else 0.0
+        )
+        return LinkageState(
+            crank, position, motion, self._apply_sensors(now, self._observe(now, motion))
+        )
 
-    def _ideal(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
+    def _symbolic_outputs(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
         """Return the ideal reading of a symbolic motion, and the joint forces."""
         acceleration = motion.acceleration
         if acceleration is None or not all_finite(acceleration.joints):
             return []
         moved = MechanismState(CrankState((), (), (), 0), *motion, (), (), ())
-        _velocity, _acceleration, *stages = self._stages
+        _velocity, _acceleration, *stages = self._mechanism_stages
         for stage in stages:
             moved = stage(moved)
-        reactions = [] if _OF_FORCES.isdisjoint(self._read_off) else [*chain(*moved.reactions)]
-        return [*self._observed(0, moved)[1:], reactions]
+        reactions = (
+            [] if _FORCES_ONLY.isdisjoint(self._observed_effects) else [*chain(*moved.reactions)]
+        )
+        return [*self._observe(0, moved)[1:], reactions]
 
-    def _moved(
+    def _mechanism_motion(
         self, crank: CrankState, position: Position, seconds: float = 0.0
     ) -> MechanismState:
         """Return the motion of the mechanism in a pose."""
         motion = MechanismState(crank, position, None, None, (), (), (), seconds)
-        for stage in self._stages:
+        for stage in self._mechanism_stages:
             motion = stage(motion)
         return motion
 
-    def _observed(self, now: int, motion: MechanismState) -> SensorReading:
+    def _observe(self, now: int, motion: MechanismState) -> SensorReading:
         """Return the ideal reading of a motion, with the values that the scene asks for."""
         position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
         efforts: tuple[float, ...] = ()
-        if 'effort' in self._read_off and motion.efforts:
+        if 'effort' in self._observed_effects and motion.efforts:
             # Efforts of the inputs, which are published first; 0 for the other joints.
             efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
         return SensorReading(
@@ -372,16 +391,20 @@ class LinkagePipeline:
             tuple(map(add, position.joints, motion.deflection))
             if motion.deflection
             else position.joints,
-            velocity.joints if velocity and 'velocity' in self._read_off else (),
-            acceleration.joints if acceleration and 'acceleration' in self._read_off else (),
+            velocity.joints if velocity and 'velocity' in self._observed_effects else (),
+            acceleration.joints
+            if acceleration and 'acceleration' in self._observed_effects
+            else (),
             efforts,
         )
 
-    def _read(self, now: int, ideal: SensorReading, first: int = 0) -> SensorReading | None:
+    def _apply_sensors(
+        self, now: int, ideal: SensorReading, first: int = 0
+    ) -> SensorReading | None:
         """Apply the sensor stages, from index `first` on, to an ideal reading."""
         reading: SensorReading | None = ideal
         gap = False
-        for sensor in self._sensors[first:]:
+        for sensor in self._sensor_stages[first:]:
             if reading is not None:
                 reading = sensor.read(now, reading)
                 gap = sensor.gap is not None
@@ -389,39 +412,41 @@ class LinkagePipeline:
                 reading = sensor.silence(now, gap)
         return reading
 
-    def _read_gap(self, now: int) -> SensorReading | None:
+    def _apply_sensors_in_gap(self, now: int) -> SensorReading | None:
         """Return the sensor reading where the linkage has no pose."""
         reading: SensorReading | None = None
-        for sensor in self._sensors:
+        for sensor in self._sensor_stages:
             if reading is not None:
                 reading = sensor.read(now, reading)
             elif sensor.gap is not None:
                 reading = sensor.gap(now)
         return reading
 
-    def looked(self, seen: LinkageTick | Seen | Numbers) -> LinkageTick:
+    def complete_state(self, seen: LinkageState | CompiledState | StateTuple) -> LinkageState:
         """Return the full state of a linkage; the generated tick leaves part of it out."""
-        if isinstance(seen, LinkageTick):
+        if isinstance(seen, LinkageState):
             return seen
         crank_numbers, numbers, _ = seen
         crank = _crank_state(crank_numbers)
-        position = self._close(*crank.angles)
+        position = self._solve_loops(*crank.angles)
         reading = None if numbers is None else SensorReading(*numbers)
-        return LinkageTick(crank, position, self._moved(crank, position), reading)
+        return LinkageState(crank, position, self._mechanism_motion(crank, position), reading)
 
-    def write_extras(self, now: int, seen: LinkageTick | Seen) -> list[bytes]:
+    def write_extras(self, now: int, state: LinkageState | CompiledState) -> list[bytes]:
         """Return the auxiliary messages at a time, in [ns]; b'' for none."""
-        return [self._written(extra, now, seen) for extra in self.extras]
+        return [self._write_extra(extra, now, state) for extra in self.extras]
 
-    def _written(self, extra: AuxiliaryOutput, now: int, seen: LinkageTick | Seen) -> bytes:
+    def _write_extra(
+        self, extra: AuxiliaryOutput, now: int, seen: LinkageState | CompiledState
+    ) -> bytes:
         writer = extra.writer
         if writer.due is not None and not writer.due(now):
             return b''
         reading = seen.reading
-        forces = seen if extra.effect in _OF_FORCES and isinstance(seen, Seen) else None
+        forces = seen if extra.effect in _FORCES_ONLY and isinstance(seen, CompiledState) else None
         if writer.of_reading or forces is not None:
             return b'' if reading is None else writer.write(now, forces, reading)
-        _, position, motion, _ = self.looked(seen)
+        _, position, motion, _ = self.complete_state(seen)
         if motion is not None:
             return b'' if reading is None else writer.write(now, motion, reading)
         if position is None or writer.no_pose is None:
@@ -431,10 +456,10 @@ class LinkagePipeline:
     @property
     def gap_begins(self) -> bool:
         """Return whether a gap in the readings began at the last tick, if that had no pose."""
-        return any(sensor.gap_begins for sensor in self._sensors)
+        return any(sensor.gap_begins for sensor in self._sensor_stages)
 
     @property
-    def choice(self) -> SolverChoice | None:
+    def solver_choice(self) -> SolverChoice | None:
         """Return the chosen solver and the reason if the scene asks for an accuracy, else None."""
         choice: SolverChoice | None = getattr(self.closure, 'choice', None)
         return choice
@@ -445,61 +470,63 @@ class LinkagePipeline:
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """Take a serialized message of the drive's topic at a time, in [ns]; or return why not."""
-        if self._read_message is None:
+        if self._parse_sample is None:
             return Rejection.MISSING
-        for spoil in self._spoil:
+        for spoil in self._message_faults:
             message = spoil(message)
-        sample = self._read_message(message)
+        sample = self._parse_sample(message)
         if isinstance(sample, Rejection):
             return sample
         rejection: Rejection | None = self.drive.offer(sample, now)  # type: ignore[attr-defined]
         return rejection
 
 
-def _output(
-    name: str, topic: str, message: str, writer: Any, member: str, *, of_reading: bool
+def _make_output(
+    name: str, topic: str, message: str, writer: Any, linkage_name: str, *, of_reading: bool
 ) -> AuxiliaryOutput:
-    within = f'~/{member}/{topic[2:]}' if member else topic
+    within = f'~/{linkage_name}/{topic[2:]}' if linkage_name else topic
     return AuxiliaryOutput(
         name, within, message, WriterStage.from_writer(writer, of_reading=of_reading)
     )
 
 
-def _without_rates(_now: int, reading: SensorReading) -> SensorReading:
+def _remove_rates(_now: int, reading: SensorReading) -> SensorReading:
     """Remove the rates, which were only used between readings."""
     return reading._replace(rates=())
 
 
-def _silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable[..., Position]:
+def _suppress_beyond_limits(
+    close: Callable[..., Position], closure: Closure
+) -> Callable[..., Position]:
     """Wrap a closure function so that a pose beyond the joint limits publishes no joints."""
 
-    def within(*inputs: float) -> Position:
+    def close_within(*inputs: float) -> Position:
         position = close(*inputs)
         if position.joints and closure.bounds.first_exceeded(inputs, position.joints) is not None:
             return replace(position, status=Status.LIMITED, joints=())
         return position
 
-    return within
+    return close_within
 
 
-def _closure(member: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
+def _make_closure(member: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
     """Return the closure of a linkage as its effects alter it, by the solver that it names."""
-    linkage = member.linkage
+    linkage = scene_linkage.linkage
     for effect in wanted.effects:
         if effect.alter is not None:
             random = Context.generator(seed, effect.name)
             linkage = effect.alter(wanted.parameters[effect.name], linkage, random)
-    if member.accuracy is not None:
+    if scene_linkage.accuracy is not None:
         from linkage_ros.solvers import choose  # local import: only where an accuracy is asked for
 
         if wanted.computes_forces:
             return choose.only_closed_form(linkage, 'forces start from it')
-        return choose.choose_solver(linkage, member.accuracy)
-    if member.solver is not None:
-        name, solving = member.solver
+        return choose.choose_solver(linkage, scene_linkage.accuracy)
+    if scene_linkage.solver is not None:
+        name, solving = scene_linkage.solver
         closure: Closure = import_module(SOLVERS[name]).build(solving, linkage)
         return closure
-    return member.closure if linkage is member.closure.linkage else Closure(linkage)
+    return scene_linkage.closure if linkage is scene_linkage.closure.linkage else Closure(linkage)
 
 
 class Pipeline:
@@ -538,13 +565,13 @@ class Pipeline:
             injection = Injection(scene.faults)
         self.injection = injection
         """The faults; None if the scene has none."""
-        self.lines = [
+        self.linkages = [
             LinkagePipeline(scene, member, closures[number] if closures else None, injection)
             for number, member in enumerate(scene.linkages)
         ]
-        self.extras = [extra for line in self.lines for extra in line.extras]
+        self.extras = [extra for line in self.linkages for extra in line.extras]
         """The topics beside the joint states."""
-        topics = sorted({line.topic for line in self.lines} - {''})
+        topics = sorted({line.topic for line in self.linkages} - {''})
         if len(topics) > 1:
             raise scene.linkages[0].content.error(
                 'drive', f'{" and ".join(topics)} are listened to', 'drive all by one of them'
@@ -554,29 +581,32 @@ class Pipeline:
         """The topic of the drives; '' for none."""
         self.wrenches: tuple[WrenchTopic, ...] = ()
         """The topics of wrenches on links."""
-        if any(line.wrenches for line in self.lines):
-            from linkage_ros.pipeline.wrench_topics import wrench_topics
+        if any(line.wrenches for line in self.linkages):
+            from linkage_ros.pipeline.wrench_topics import make_wrench_topics
 
-            linkages = [(line.member, line.drive, line.wrenches) for line in self.lines]
-            self.wrenches = wrench_topics(linkages, self.topic)
+            linkages = [(line.scene_linkage, line.drive, line.wrenches) for line in self.linkages]
+            self.wrenches = make_wrench_topics(linkages, self.topic)
         # Among the drives, only the topic drive keeps no state from earlier ticks.
-        self._goes_on = any(
-            line.member.drive[0] != 'topic' or not _GOING_ON.isdisjoint(line.stages)
-            for line in self.lines
+        self._has_state = any(
+            line.scene_linkage.drive[0] != 'topic'
+            or not _RUNNING_IN_GAPS.isdisjoint(line.effect_names)
+            for line in self.linkages
         )
-        self.withholds = (
-            self._goes_on
+        self.suppresses_ticks = (
+            self._has_state
             or injection is not None
-            or any(not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines)
+            or any(not _SUPPRESSING.isdisjoint(line.effect_names) for line in self.linkages)
         )
         """Whether ticks without a message may matter to a replay."""
-        self._routes = SampleRouter({line: line.member.sampled_joints for line in self.lines})
-        self.addressed: tuple[LinkagePipeline, ...] = ()
+        self._router = SampleRouter(
+            {line: line.scene_linkage.sampled_joints for line in self.linkages}
+        )
+        self.addressed_linkages: tuple[LinkagePipeline, ...] = ()
         """Of several linkages, those whose inputs the last message named."""
-        self._offered = 0
-        self._newest: dict[LinkagePipeline, int] = {}
+        self._offer_count = 0
+        self._newest_offers: dict[LinkagePipeline, int] = {}
         self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
-        self.tick = self._ticking()
+        self.tick = self._build_tick()
         """Computes the tick at a time, in [ns]."""
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
@@ -591,70 +621,73 @@ class Pipeline:
             The time, in [ns].
 
         """
-        if len(self.lines) == 1:
-            return self.lines[0].offer(message, now)
+        if len(self.linkages) == 1:
+            return self.linkages[0].offer(message, now)
         # A message may concern one linkage or several: it is good if one of them accepts it.
-        self._offered += 1
+        self._offer_count += 1
         rejections = []
-        self.addressed = self._routes.find(message)
-        for line in self.addressed:
+        self.addressed_linkages = self._router.find_receivers(message)
+        for line in self.addressed_linkages:
             rejections.append(line.offer(message, now))
             if rejections[-1] is None:
-                self._newest[line] = self._offered
+                self._newest_offers[line] = self._offer_count
         return None if None in rejections else next(iter(rejections), Rejection.MISSING)
 
-    def newly_used(self, now: int) -> tuple[int, int]:
+    def count_fresh_and_stale(self, now: int) -> tuple[int, int]:
         """
         Tell the good messages since the last call that are still the newest for a linkage.
 
         Return how many of them give a crank at a time, in [ns], and how many are too old.
         """
-        if len(self.lines) == 1:
-            return (0, 1) if self.lines[0].is_stale(now) else (1, 0)
-        fresh = {number for line, number in self._newest.items() if not line.is_stale(now)}
-        stale = {*self._newest.values()} - fresh
-        self._newest.clear()
+        if len(self.linkages) == 1:
+            return (0, 1) if self.linkages[0].is_stale(now) else (1, 0)
+        fresh = {number for line, number in self._newest_offers.items() if not line.is_stale(now)}
+        stale = {*self._newest_offers.values()} - fresh
+        self._newest_offers.clear()
         return len(fresh), len(stale)
 
-    def _made(self, now: int, seen: Sequence[LinkageTick | Seen]) -> Tick:
+    def _make_tick(self, now: int, seen: Sequence[LinkageState | CompiledState]) -> Tick:
         """Return the result of a tick; joints without a reading are left out."""
         extras: tuple[bytes, ...] = ()
         if self.extras:
-            pairs = zip(self.lines, seen, strict=True)
+            pairs = zip(self.linkages, seen, strict=True)
             extras = tuple([extra for line, one in pairs for extra in line.write_extras(now, one)])
         readings = [one.reading for one in seen if one.reading is not None]
         if not readings:
-            return Tick(b'', extras if any(extras) else (), seen, self.lines)
+            return Tick(b'', extras if any(extras) else (), seen, self.linkages)
         present = tuple([one.reading is not None for one in seen])
-        writer = self._writers.get(present) or self._writer(present)
+        writer = self._writers.get(present) or self._make_writer(present)
         stamp = max([reading.stamp for reading in readings])
-        return Tick(writer.write(stamp, *_joined(readings)), extras, seen, self.lines)
+        return Tick(writer.write(stamp, *_join_readings(readings)), extras, seen, self.linkages)
 
-    def _ticking(self) -> Callable[[int], Tick]:
+    def _build_tick(self) -> Callable[[int], Tick]:
         """Return the tick as a function of the time, in [ns]; generated text if possible."""
-        wholes = [whole for line in self.lines if (whole := line.whole) is not None]
-        several = len(self.lines) > 1
-        if len(wholes) < len(self.lines) or (several and self.extras):
-            see = [line.see for line in self.lines]
-            return lambda now: self._made(now, [look(now) for look in see])
+        wholes = [whole for line in self.linkages if (whole := line.whole_tick) is not None]
+        several = len(self.linkages) > 1
+        if len(wholes) < len(self.linkages) or (several and self.extras):
+            see = [line.compute_state for line in self.linkages]
+            return lambda now: self._make_tick(now, [look(now) for look in see])
         if several:
-            return self._together(wholes)
-        (line,), (whole,) = self.lines, wholes
-        return straight_tick(
+            return self._combine_ticks(wholes)
+        (line,), (whole,) = self.linkages, wholes
+        return compile_scene_tick(
             whole,
-            self._writer((True,)),
+            self._make_writer((True,)),
             [extra.writer for extra in self.extras],
             Tick,
-            self.lines,
-            lambda now, crank: self._made(now, [line.look(now, crank)]),
+            self.linkages,
+            lambda now, crank: self._make_tick(now, [line.interpret_from_crank(now, crank)]),
         )
 
-    def _together(self, wholes: Sequence[Straight]) -> Callable[[int], Tick]:
+    def _combine_ticks(self, compiled_ticks: Sequence[CompiledTick]) -> Callable[[int], Tick]:
         """Return the tick of several linkages that all have generated ticks."""
-        lines = self.lines
-        shares = [straight_share(one, line.look) for one, line in zip(wholes, lines, strict=True)]
-        write = self._writer((True,) * len(lines)).write
-        count = sum(len(whole.joints) for whole in wholes)
+        lines = self.linkages
+        shares = [
+            compile_contribution(one, line.interpret_from_crank)
+            for one, line in zip(compiled_ticks, lines, strict=True)
+        ]
+        write = self._make_writer((True,) * len(lines)).write
+        count = sum(len(whole.joints) for whole in compiled_ticks)
 
         def tick(now: int) -> Tick:
             positions: list[float] = []
@@ -662,27 +695,29 @@ class Pipeline:
             efforts: list[float] = []
             seen = [share(now, positions, rates, efforts) for share in shares]
             if len(positions) < count:
-                return self._made(now, [_named(one) for one in seen])
-            message = write(now, positions, _of_all(rates, count), _of_all(efforts, count))
+                return self._make_tick(now, [_name_fields(one) for one in seen])
+            message = write(
+                now, positions, _if_complete(rates, count), _if_complete(efforts, count)
+            )
             return Tick(message, (), seen, lines)
 
         return tick
 
-    def remembers(self, tick: Tick) -> bool:
+    def changes_state(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes the state of the pipeline."""
         return any(
-            not isinstance(seen, LinkageTick)
+            not isinstance(seen, LinkageState)
             or line.gap_begins
-            or (seen.position is not None and (bool(seen.position.joints) or self._goes_on))
-            for line, seen in zip(self.lines, tick.seen, strict=True)
+            or (seen.position is not None and (bool(seen.position.joints) or self._has_state))
+            for line, seen in zip(self.linkages, tick.states, strict=True)
         )
 
-    def _writer(self, present: tuple[bool, ...]) -> JointStateWriter:
+    def _make_writer(self, present: tuple[bool, ...]) -> JointStateWriter:
         joints = [
             joint
-            for line, there in zip(self.lines, present, strict=True)
+            for line, there in zip(self.linkages, present, strict=True)
             if there
-            for joint in line.member.joint_names
+            for joint in line.scene_linkage.joint_names
         ]
         self._writers[present] = writer = JointStateWriter(joints)
         return writer
@@ -690,17 +725,17 @@ class Pipeline:
     @property
     def closures(self) -> list[Closure]:
         """Closures of the linkages."""
-        return [line.closure for line in self.lines]
+        return [line.closure for line in self.linkages]
 
     @property
     def newest_stamp(self) -> int:
         """Stamp of the newest good sample, in [ns]; 0 before the first."""
-        return max(line.drive.stamp for line in self.lines)
+        return max(line.drive.stamp for line in self.linkages)
 
     @property
     def max_age(self) -> int:
         """Age of the newest sample beyond which something is amiss, in [ns]; 0 for never."""
-        return max(line.drive.max_age for line in self.lines)
+        return max(line.drive.max_age for line in self.linkages)
 
 
 def _refuse_stamps(scene: Scene) -> None:
@@ -715,7 +750,7 @@ def _refuse_stamps(scene: Scene) -> None:
             )
 
 
-def _joined(
+def _join_readings(
     readings: Sequence[SensorReading],
 ) -> tuple[list[float], list[float], list[float]]:
     """
@@ -728,20 +763,20 @@ def _joined(
     rates = [value for reading in readings for value in reading.rates]
     efforts = [value for reading in readings for value in reading.efforts]
     n = len(positions)
-    return positions, _of_all(rates, n), _of_all(efforts, n)
+    return positions, _if_complete(rates, n), _if_complete(efforts, n)
 
 
-def _of_all(values: list[float], count: int) -> list[float]:
+def _if_complete(values: list[float], count: int) -> list[float]:
     """Return the values if there is one for each joint, else an empty list."""
     return values if len(values) == count else []
 
 
-def _named(seen: LinkageTick | Numbers) -> LinkageTick | Seen:
+def _name_fields(seen: LinkageState | StateTuple) -> LinkageState | CompiledState:
     """Return the state of a linkage as a named tuple."""
-    if isinstance(seen, LinkageTick):
+    if isinstance(seen, LinkageState):
         return seen
     crank, reading, reactions = seen
-    return Seen(_crank_state(crank), SensorReading(*reading), reactions)
+    return CompiledState(_crank_state(crank), SensorReading(*reading), reactions)
 
 
 def _crank_state(crank: tuple[Any, ...]) -> CrankState:

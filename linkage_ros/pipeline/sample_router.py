@@ -38,14 +38,16 @@ class SampleRouter(Generic[Receiver]):
 
     __slots__ = ('_all', '_ends', '_found', '_wanted')
 
-    def __init__(self, wanted: Mapping[Receiver, Sequence[str]]) -> None:
-        self._all = tuple(wanted)
-        self._wanted = {to: {joint.encode() for joint in joints} for to, joints in wanted.items()}
+    def __init__(self, required_joints: Mapping[Receiver, Sequence[str]]) -> None:
+        self._all = tuple(required_joints)
+        self._wanted = {
+            to: {joint.encode() for joint in joints} for to, joints in required_joints.items()
+        }
         self._ends: dict[int, list[int]] = {}
         """Possible ends of the names, by length of the message."""
         self._found: dict[bytes, tuple[Receiver, ...]] = {}
 
-    def find(self, message: bytes) -> tuple[Receiver, ...]:
+    def find_receivers(self, message: bytes) -> tuple[Receiver, ...]:
         """Return the receivers of a serialized JointState; of a malformed one, all receivers."""
         for end in self._ends.get(len(message), ()):
             known = self._found.get(message[STAMP_END:end])

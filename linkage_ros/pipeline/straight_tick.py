@@ -36,13 +36,13 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.compiling.linkage import Compiled
     from linkage_ros.messages.joint_state import JointStateWriter
 
-_CRANK = ', '.join(CrankState._fields)
+_CRANK_FIELDS = ', '.join(CrankState._fields)
 
-Plain = Callable[[int, CrankState | None], Any]
+InterpretedTick = Callable[[int, CrankState | None], Any]
 """Computes a tick at a time, in [ns], step by step from the given crank state on."""
 
 
-class Seen(NamedTuple):
+class CompiledState(NamedTuple):
     """
     The state of a compiled linkage at a tick: the reading, and what the full state derives from.
 
@@ -62,11 +62,11 @@ class Seen(NamedTuple):
     reactions: tuple[tuple[float, float, float], ...]
 
 
-Numbers: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
+StateTuple: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
 """The same as plain tuples."""
 
 
-class Straight(NamedTuple):
+class CompiledTick(NamedTuple):
     """The usual tick up to its reading, as lines of Python."""
 
     # Lines that compute from ``now``, and the objects that they use. They define the fields of
@@ -82,26 +82,26 @@ class Straight(NamedTuple):
     reactions: list[str]  # All reaction values in sequence, as expressions; likewise
 
 
-def straight(
+def compile_tick(
     drive: Drive,
     drive_stages: Sequence[DriveStage],
-    compiled: Compiled,
+    compiled_linkage: Compiled,
     angles: Continuous | None,
-) -> Straight:
+) -> CompiledTick:
     """
     Write the usual tick of a linkage.
 
     The compiled linkage closes for at least one input; it returns the values of a `Straight`, as
     far as the scene asks for them. ``angles`` unwraps the published angles; None if not needed.
     """
-    crank = drive.compile_state(compiled.driven, 'return plain(now, None)')
+    crank = drive.compile_state(compiled_linkage.driven, 'return plain(now, None)')
     lines, bound = [*crank.lines], {**crank.bound}
     # The state of a drive that exerts an effort holds more than its fields.
     exerts = getattr(drive, 'exerts_effort', False)
-    state = 'crank' if exerts else f'CrankState({_CRANK})'
+    state = 'crank' if exerts else f'CrankState({_CRANK_FIELDS})'
     for number, stage in enumerate(drive_stages):
         bound[f'stage{number}'] = stage
-        lines.append(f'crank = {_CRANK}, = stage{number}({state})')
+        lines.append(f'crank = {_CRANK_FIELDS}, = stage{number}({state})')
         state = 'crank'
     leave = f'return plain(now, {state})'
     mechanism, groups = _mechanism_lines(compiled, leave)
@@ -119,18 +119,18 @@ def straight(
     if angles is not None:
         bound['running'] = angles
         lines += _unwrap_lines(angles.places, joints, leave)
-    crank_text = 'crank' if exerts else f'({_CRANK})'
-    return Straight(lines, bound, crank_text, joints, rates, accelerations, efforts, reactions)
+    crank_text = 'crank' if exerts else f'({_CRANK_FIELDS})'
+    return CompiledTick(lines, bound, crank_text, joints, rates, accelerations, efforts, reactions)
 
 
 def _mechanism_lines(compiled: Compiled, leave: str) -> tuple[Lines, list[list[str]]]:
     """Write the motion of a compiled linkage; also return the names of its values, in groups."""
-    path, *more_paths = compiled.paths
+    path, *more_paths = compiled_linkage.paths
     inputs = [one.name for one in path.inputs]
     given = iter(inputs)
     lines = [
-        f'{", ".join(islice(given, compiled.driven))}, = {field}'
-        for field in CrankState._fields[: 1 + compiled.derivatives]
+        f'{", ".join(islice(given, compiled_linkage.driven))}, = {field}'
+        for field in CrankState._fields[: 1 + compiled_linkage.derivatives]
     ]
     groups = [
         [f'{letter}{i}' for i in range(len(group))]
@@ -143,7 +143,7 @@ def _mechanism_lines(compiled: Compiled, leave: str) -> tuple[Lines, list[list[s
         lines += _leave_unless('values is not None', leave)
         lines.append(f'{", ".join(numbers)}, = chain(*values)')
         return Lines(lines, bound), groups
-    body = compiled.first_path_body(leave)
+    body = compiled_linkage.first_path_body(leave)
     outputs = chain(*body.outputs)
     lines += body.lines
     lines += [f'{name} = {output}' for name, output in zip(numbers, outputs, strict=True)]
@@ -160,7 +160,7 @@ def _unwrap_lines(places: Sequence[int], joints: Sequence[str], leave: str) -> l
         *_leave_unless('last', leave),
         f'{", ".join(lasts)}, = last',
         *(_leave_unless(' and '.join(near), leave) if near else ()),
-        f'running.raw = {_tuple(joints)}',
+        f'running.raw = {_tuple_text(joints)}',
         f'{", ".join(turns)}, = running.added',
         *[f'{joint} += {turn}' for joint, turn in zip(joints, turns, strict=True)],
     ]
@@ -170,10 +170,10 @@ def _leave_unless(condition: str, leave: str) -> tuple[str, str]:
     return f'if not ({condition}):', f'    {leave}'
 
 
-def straight_look(
-    usual: Straight,
-    read: Callable[[int, SensorReading], SensorReading | None] | None,
-    plain: Plain,
+def compile_linkage_state(
+    compiled: CompiledTick,
+    apply_sensors: Callable[[int, SensorReading], SensorReading | None] | None,
+    interpret: InterpretedTick,
 ) -> Callable[[int], Any]:
     """
     Return the state of a linkage as a function of the time, in [ns].
@@ -188,15 +188,15 @@ def straight_look(
         Computes all other ticks.
 
     """
-    lines = [f'reading = new(Reading, {_reading(usual)})']
-    if read is not None:
+    lines = [f'reading = new(Reading, {_reading_text(compiled)})']
+    if apply_sensors is not None:
         lines.append('reading = read(now, reading)')
-    crank = usual.crank if usual.crank == 'crank' else f'new(CrankState, {usual.crank})'
-    lines.append(f'return new(Seen, ({crank}, reading, {_reactions(usual)}))')
-    return _function(usual, lines, {'read': read, 'plain': plain})
+    crank = compiled.crank if compiled.crank == 'crank' else f'new(CrankState, {compiled.crank})'
+    lines.append(f'return new(Seen, ({crank}, reading, {_reactions_text(compiled)}))')
+    return _define_function(compiled, lines, {'read': apply_sensors, 'plain': interpret})
 
 
-def straight_share(usual: Straight, plain: Plain) -> Callable[..., Any]:
+def compile_contribution(compiled: CompiledTick, interpret: InterpretedTick) -> Callable[..., Any]:
     """
     Return a function that adds one linkage to a message of several.
 
@@ -215,22 +215,24 @@ def straight_share(usual: Straight, plain: Plain) -> Callable[..., Any]:
         of the lists.
 
     """
-    groups = {'positions': usual.joints, 'rates': usual.rates, 'efforts': usual.efforts}
+    groups = {'positions': compiled.joints, 'rates': compiled.rates, 'efforts': compiled.efforts}
     lines = [
-        f'_, own_positions, own_rates, _, own_efforts = reading = {_reading(usual)}',
+        f'_, own_positions, own_rates, _, own_efforts = reading = {_reading_text(compiled)}',
         *[f'all_{name} += own_{name}' for name, group in groups.items() if group],
-        f'return ({usual.crank}, reading, {_reactions(usual)})',
+        f'return ({compiled.crank}, reading, {_reactions_text(compiled)})',
     ]
-    return _function(usual, lines, {'plain': plain}, ['now', *(f'all_{name}' for name in groups)])
+    return _define_function(
+        compiled, lines, {'plain': interpret}, ['now', *(f'all_{name}' for name in groups)]
+    )
 
 
-def straight_tick(
-    usual: Straight,
+def compile_scene_tick(
+    compiled: CompiledTick,
     writer: JointStateWriter,
     extras: Sequence[WriterStage],
-    tick: type[Any],
+    tick_type: type[Any],
     linkages: Sequence[Any],
-    plain: Plain,
+    interpret: InterpretedTick,
 ) -> Callable[[int], Any]:
     """
     Return the whole tick of a scene with one linkage, as a function of the time, in [ns].
@@ -249,14 +251,14 @@ def straight_tick(
         Computes all other ticks.
 
     """
-    bound: dict[str, Any] = {'Tick': tick, 'linkages': linkages, 'plain': plain}
+    bound: dict[str, Any] = {'Tick': tick_type, 'linkages': linkages, 'plain': interpret}
     bound |= {f'write{number}': extra.write for number, extra in enumerate(extras)}
-    packed = writer.compile_write('now', usual.joints, usual.rates, usual.efforts)
-    lines = [f'reading = {_reading(usual)}', *packed.lines]
+    packed = writer.compile_write('now', compiled.joints, compiled.rates, compiled.efforts)
+    lines = [f'reading = {_reading_text(compiled)}', *packed.lines]
     if extras:
         lines.append('reading = new(Reading, reading)')
-    seen = f'({usual.crank}, reading, {_reactions(usual)})'
-    messages = _tuple(
+    seen = f'({compiled.crank}, reading, {_reactions_text(compiled)})'
+    messages = _tuple_text(
         [
             f'write{number}(now, {"None" if extra.of_reading else "seen"}, reading)'
             for number, extra in enumerate(extras)
@@ -266,11 +268,11 @@ def straight_tick(
         lines.append(f'seen = new(Seen, {seen})')
         seen = 'seen'
     lines.append(f'return new(Tick, (message, {messages}, ({seen},), linkages))')
-    return _function(usual, lines, bound | packed.bound)
+    return _define_function(compiled, lines, bound | packed.bound)
 
 
-def _function(
-    usual: Straight,
+def _define_function(
+    compiled: CompiledTick,
     lines: Sequence[str],
     bound: dict[str, Any],
     parameters: Sequence[str] = ('now',),
@@ -278,21 +280,23 @@ def _function(
     # The constructor of a named tuple is a Python function; `tuple.__new__` is a C function.
 
     new = tuple.__new__
-    types = {'new': new, 'CrankState': CrankState, 'Reading': SensorReading, 'Seen': Seen}
-    source = '\n    '.join([f'def tick({", ".join(parameters)}):', *usual.lines, *lines])
-    function: Callable[..., Any] = written(source, 'tick', usual.bound | types | bound)
+    types = {'new': new, 'CrankState': CrankState, 'Reading': SensorReading, 'Seen': CompiledState}
+    source = '\n    '.join([f'def tick({", ".join(parameters)}):', *compiled.lines, *lines])
+    function: Callable[..., Any] = written(source, 'tick', compiled.bound | types | bound)
     return function
 
 
-def _reading(usual: Straight) -> str:
-    groups = usual.joints, usual.rates, usual.accelerations, usual.efforts
-    return f'(now, {", ".join(map(_tuple, groups))})'
+def _reading_text(compiled: CompiledTick) -> str:
+    groups = compiled.joints, compiled.rates, compiled.accelerations, compiled.efforts
+    return f'(now, {", ".join(map(_tuple_text, groups))})'
 
 
-def _reactions(usual: Straight) -> str:
-    numbers = iter(usual.reactions)
-    return _tuple([_tuple(three) for three in zip(numbers, numbers, numbers, strict=True)])
+def _reactions_text(compiled: CompiledTick) -> str:
+    numbers = iter(compiled.reactions)
+    return _tuple_text(
+        [_tuple_text(three) for three in zip(numbers, numbers, numbers, strict=True)]
+    )
 
 
-def _tuple(parts: Sequence[str]) -> str:
+def _tuple_text(parts: Sequence[str]) -> str:
     return f'({", ".join(parts)},)' if parts else '()'

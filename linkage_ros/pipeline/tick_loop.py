@@ -29,7 +29,7 @@ from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline, Tick
+from linkage_ros.pipeline.pipeline import LinkageState, Pipeline, Tick
 
 if TYPE_CHECKING:
     from linkage_ros.faults import FaultChange, Injection
@@ -49,7 +49,7 @@ class DurationHistogram:
         self.count = 0
         self.longest = 0
 
-    def add(self, duration: int) -> None:
+    def add_duration(self, duration: int) -> None:
         """Count a duration, in [ns]; a negative one counts as 0."""
         if duration > self.longest:
             self.longest = duration
@@ -91,7 +91,7 @@ class RecordedTopics(NamedTuple):
     crank: int | None  # The topic of the drives
     wrenches: tuple[int, ...]  # The topics of the wrenches on links
     faults: int | None  # Begin and end of faults
-    withheld: int | None  # Ticks without a message that a replay must know of
+    suppressed: int | None  # Ticks without a message that a replay must know of
     extras: tuple[int, ...]  # The auxiliary topics of the pipeline
     resets: int  # Resets, at which the pipeline is built again
     description: int  # The robot model. No tick publishes it.
@@ -106,7 +106,7 @@ def recorded_topics(pipeline: Pipeline) -> RecordedTopics:
         crank=next(handles) if pipeline.topic else None,
         wrenches=tuple(next(handles) for _ in pipeline.wrenches),
         faults=next(handles) if pipeline.injection is not None else None,
-        withheld=next(handles) if pipeline.withholds else None,
+        suppressed=next(handles) if pipeline.suppresses_ticks else None,
         extras=tuple(next(handles) for _ in pipeline.extras),
         resets=next(handles),
         description=next(handles),
@@ -139,12 +139,12 @@ class Counts:
 
     ticks: int = 0
     published: int = 0
-    silent: int = 0
-    withheld: int = 0
+    without_crank: int = 0
+    suppressed: int = 0
     lost: int = 0
     stalls: int = 0
     """Times at which ticks were lost."""
-    stall: Stall | None = None
+    last_stall: Stall | None = None
     """The last of them."""
     late: int = 0
     clock_jumps: int = 0
@@ -169,7 +169,7 @@ class Counts:
     """Likewise of messages with the published joints, where they come back on that topic."""
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
     lateness: DurationHistogram = field(default_factory=DurationHistogram)
-    last: Tick | None = None
+    last_tick: Tick | None = None
     unclosed: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
     last_unclosed: dict[Status, tuple[int, Position]] = field(default_factory=dict)
     """Index and position of the linkage that had each status last."""
@@ -177,8 +177,8 @@ class Counts:
     """Of each topic with a wrench."""
 
 
-_Taken = tuple[bytes, dict[str, Any]]
-Take = Callable[[], _Taken | None]
+_TakenMessage = tuple[bytes, dict[str, Any]]
+TakeMessage = Callable[[], _TakenMessage | None]
 Pace = Callable[['TickLoop', Event], None]
 """Runs a tick loop until the event is set: waits, and calls `tick_at` or `tick_samples`."""
 
@@ -216,27 +216,27 @@ class TickLoop:
     def __init__(
         self,
         build: Callable[[], Pipeline],
-        take: Take | None,
+        take_sample: TakeMessage | None,
         publish: Callable[[bytes], None],
-        own: Callable[[bytes], bool] | None = None,
+        is_own: Callable[[bytes], bool] | None = None,
         publish_extras: Sequence[Callable[[bytes], None]] = (),
         publish_change: Callable[[FaultChange], bytes] | None = None,
         depth: int = 100,
-        take_wrenches: Sequence[Take] = (),
+        take_wrenches: Sequence[TakeMessage] = (),
     ) -> None:
         self._build = build
-        self._take = take or _take_nothing
+        self._take_sample = take_sample or _take_nothing
         self._publish = publish
-        self._own = own
-        self._depth = depth
+        self._is_own = is_own
+        self._queue_depth = depth
         self._take_wrenches = take_wrenches
-        self._sequence = self._own_sequence = 0
+        self._sample_sequence = self._own_sequence = 0
         self._crank_sequences: dict[object, int] = {}
         """Number of the last message with the crank of the same linkages."""
         self._last_time = 0
-        self._jumped = 0
+        self._jump_time = 0
         """System's time at which the clock was seen to be back, in [ns]."""
-        self._old = 0
+        self._rejected_old = 0
         """Samples that the last tick rejected as older than the last one."""
         self._pipeline = build()
         self.injection = self._pipeline.injection
@@ -249,17 +249,17 @@ class TickLoop:
         self.counts = Counts(wrenches=tuple(WrenchCounts() for _ in take_wrenches))
         self.recorder: Recorder | None = None
         self.reset_requested = False
-        self.several_publishers = False
+        self.had_several_publishers = False
         """Whether the drives' topic ever had several publishers, each with its own numbers."""
         self.failure = ''
-        self._begun = 0
-        self.seconds = 0.0
+        self._start_time = 0
+        self.run_seconds = 0.0
 
     def start(self, pace: Pace) -> None:
         """Start ticking on a thread of its own."""
         self._stopping.clear()
-        self._begun = monotonic_ns()
-        self._thread = Thread(target=self._guarded, args=(pace,), name='tick', daemon=True)
+        self._start_time = monotonic_ns()
+        self._thread = Thread(target=self._guard_pace, args=(pace,), name='tick', daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -268,15 +268,15 @@ class TickLoop:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
-            self.seconds = (monotonic_ns() - self._begun) * 1e-9
+            self.run_seconds = (monotonic_ns() - self._start_time) * 1e-9
 
     @property
-    def running(self) -> bool:
+    def is_running(self) -> bool:
         """Whether the loop is started and not stopped."""
         return self._thread is not None
 
     @property
-    def samples(self) -> str:
+    def sample_counts_text(self) -> str:
         """Return the counts of messages on the drives' topic, as text."""
         counts = self.counts
         return (
@@ -284,18 +284,18 @@ class TickLoop:
             f'{sum(counts.rejected.values())} rejected'
             + (f', {counts.stale} stale' if counts.stale else '')
             + (f', {counts.ignored} without the crank' if counts.ignored else '')
-            + (f'; {self.missed} lost before' if self.missed else '')
+            + (f'; {self.missed_messages} lost before' if self.missed_messages else '')
         )
 
     @property
-    def missed(self) -> int | None:
+    def missed_messages(self) -> int | None:
         """
         Return the number of messages lost between publisher and tick; None if it is unknown.
 
         A full queue of the middleware drops its oldest message without a report. But publishers
         number their messages.
         """
-        if self.several_publishers or (self.counts.received and not self._sequence):
+        if self.had_several_publishers or (self.counts.received and not self._sample_sequence):
             return None
         return self.counts.missed
 
@@ -320,22 +320,22 @@ class TickLoop:
             self._take_wrench(which, take, clock)
         counts, pipeline = self.counts, self._pipeline
         good, end = 0, 0
-        self._old = 0
-        for _ in range(self._depth):
-            if (taken := self._take()) is None:
+        self._rejected_old = 0
+        for _ in range(self._queue_depth):
+            if (taken := self._take_sample()) is None:
                 break
             if clock is not None:
-                self._move_on(clock())
+                self._advance_time(clock())
             now = self._last_time
             message, info = taken
             number = info.get('publication_sequence_number')
-            if self._own is None or not self._own(message):
+            if self._is_own is None or not self._is_own(message):
                 counts.received += 1
                 if number:
                     # Neither the first message, nor a restarted publisher.
-                    if 0 < self._sequence < number:
-                        counts.missed += number - self._sequence - 1
-                    self._sequence = number
+                    if 0 < self._sample_sequence < number:
+                        counts.missed += number - self._sample_sequence - 1
+                    self._sample_sequence = number
                 # Another thread may set it to None.
                 recorder, topic = self.recorder, self.topics.crank
                 if recorder is not None and topic is not None:
@@ -344,20 +344,20 @@ class TickLoop:
                 if rejection is None:
                     good += 1
                     if tick_for_each:
-                        self._tick(now, pipeline.newest_stamp)
+                        self._run_tick(now, pipeline.newest_stamp)
                 elif rejection is Rejection.MISSING:
                     counts.ignored += 1
                     counts.last_ignored = message
                 elif (
                     rejection is Rejection.STAMP_FUTURE
-                    and info.get('received_timestamp', self._jumped) < self._jumped
+                    and info.get('received_timestamp', self._jump_time) < self._jump_time
                 ):
                     counts.superseded += 1
                 else:
                     counts.rejected[rejection] += 1
-                    self._old += rejection is Rejection.STAMP_OLD
+                    self._rejected_old += rejection is Rejection.STAMP_OLD
                 if number and rejection is not Rejection.MISSING:
-                    cranks = pipeline.addressed
+                    cranks = pipeline.addressed_linkages
                     counts.interleaved += number <= self._crank_sequences.get(cranks, 0)
                     self._crank_sequences[cranks] = number
             elif number:
@@ -370,30 +370,28 @@ class TickLoop:
         if good and tick_for_each:
             counts.used += good
         elif good:
-            used, stale = pipeline.newly_used(self._last_time)
+            used, stale = pipeline.count_fresh_and_stale(self._last_time)
             counts.used += used
             counts.superseded += good - used - stale
             if stale:
                 counts.stale += stale
                 counts.stale_age = self._last_time - pipeline.newest_stamp
 
-    def _take_wrench(self, number: int, take: Take, clock: Callable[[], int] | None) -> None:
+    def _take_wrench(self, index: int, take: TakeMessage, clock: Callable[[], int] | None) -> None:
         """Take the waiting messages of a topic with a wrench: record, offer and count them."""
-        counts, wrench = self.counts.wrenches[number], self._pipeline.wrenches[number]
+        counts, wrench = self.counts.wrenches[index], self._pipeline.wrenches[index]
         end = 0
-        for _ in range(self._depth):
+        for _ in range(self._queue_depth):
             if (taken := take()) is None:
                 break
             if clock is not None:
-                self._move_on(clock())
+                self._advance_time(clock())
             now = self._last_time
             message, info = taken
             counts.received += 1
             if (recorder := self.recorder) is not None:
-                recorder.offer(
-                    self.topics.wrenches[number], now, info['source_timestamp'], message
-                )
-            rejection = wrench.offer(message, now)
+                recorder.offer(self.topics.wrenches[index], now, info['source_timestamp'], message)
+            rejection = wrench.offer_wrench(message, now)
             if rejection is not None:
                 counts.rejected[rejection] += 1
             if not end:
@@ -401,7 +399,7 @@ class TickLoop:
             elif monotonic_ns() > end:
                 break
 
-    def _move_on(self, time: int) -> None:
+    def _advance_time(self, time: int) -> None:
         """Move `_last_time` on: a message may be newer than the tick that takes it."""
         if self.injection is not None:
             time = self.injection.tick_time(time)
@@ -421,31 +419,31 @@ class TickLoop:
 
         """
         if self.injection is not None:
-            now = self._inject(self.injection, now)
+            now = self._advance_faults(self.injection, now)
         if now < self._last_time or self.reset_requested:
-            self._rebuild(now)
+            self._rebuild_pipeline(now)
         self._last_time = now
         self._take_messages(clock, tick_for_each=False)
-        self._tick(self._last_time, now)
+        self._run_tick(self._last_time, now)
 
     def tick_samples(self, now: int, clock: Callable[[], int] | None = None) -> None:
         """Take the waiting messages, as in `tick_at`, and tick for each, at its stamp."""
         if self.injection is not None:
-            now = self._inject(self.injection, now)
+            now = self._advance_faults(self.injection, now)
         if now < self._last_time or self.reset_requested:
-            self._rebuild(now)
+            self._rebuild_pipeline(now)
         self._last_time = now
         self._take_messages(clock, tick_for_each=True)
 
-    def _rebuild(self, now: int) -> None:
+    def _rebuild_pipeline(self, now: int) -> None:
         """Build the pipeline again, after a reset request or a backward jump of time."""
         if now < self._last_time:
             # As where a bag is played in a loop: what waits is of the time before, and what came a
             # little before the clock did was not too old.
-            self._jumped = time_ns()
+            self._jump_time = time_ns()
             self.counts.clock_jumps += 1
-            self.counts.rejected[Rejection.STAMP_OLD] -= self._old
-            self.counts.superseded += self._old
+            self.counts.rejected[Rejection.STAMP_OLD] -= self._rejected_old
+            self.counts.superseded += self._rejected_old
         if self.reset_requested:
             self.reset_requested = False
             self.counts.resets += 1
@@ -455,7 +453,7 @@ class TickLoop:
             recorder.offer(self.topics.resets, now, now, time_message(now))
         self._pipeline = self._build()
 
-    def _inject(self, injection: Injection, now: int) -> int:
+    def _advance_faults(self, injection: Injection, now: int) -> int:
         """Let faults begin and end; return the time of the tick, in [ns]."""
         changes = injection.advance(now)
         now = injection.tick_time(now)
@@ -467,16 +465,16 @@ class TickLoop:
                     recorder.offer(topic, now, now, message)
         return now
 
-    def _tick(self, now: int, at: int) -> None:
+    def _run_tick(self, now: int, solve_time: int) -> None:
         """Solve at time ``now`` for time ``at``, in [ns]; publish, record and count."""
         counts = self.counts
-        counts.last = tick = self._pipeline.tick(at)
+        counts.last_tick = tick = self._pipeline.tick(solve_time)
         message, extras = tick.message, tick.extras
         recorder = self.recorder
         if message:
             self._publish(message)
             if recorder is not None:
-                recorder.offer(self.topics.joint_states, now, at, message)
+                recorder.offer(self.topics.joint_states, now, solve_time, message)
             counts.published += 1
         # A linkage without a pose may still have an auxiliary message, which then records the
         # tick.
@@ -485,28 +483,30 @@ class TickLoop:
                 if extra:
                     publish(extra)
                     if recorder is not None:
-                        recorder.offer(topic, now, at, extra)
+                        recorder.offer(topic, now, solve_time, extra)
         elif message or recorder is None:
             pass
-        elif (withheld := self.topics.withheld) is not None and self._pipeline.remembers(tick):
-            recorder.offer(withheld, now, at, time_message(at))
+        elif (withheld := self.topics.suppressed) is not None and self._pipeline.changes_state(
+            tick
+        ):
+            recorder.offer(withheld, now, solve_time, time_message(solve_time))
         counts.ticks += 1
-        for number, one in enumerate(tick.seen):
-            if not isinstance(one, LinkageTick):
+        for number, one in enumerate(tick.states):
+            if not isinstance(one, LinkageState):
                 _, reading, _ = one
-                counts.withheld += reading is None
+                counts.suppressed += reading is None
                 continue
             position = one.position
             if position is None:
-                counts.silent += 1
+                counts.without_crank += 1
                 continue
             if position.status is not Status.CLOSED:
                 counts.unclosed[position.status] += 1
                 counts.last_unclosed[position.status] = number, position
             if one.reading is None and position.joints:
-                counts.withheld += 1
+                counts.suppressed += 1
 
-    def _guarded(self, pace: Pace) -> None:
+    def _guard_pace(self, pace: Pace) -> None:
         # A defect here must be reported, and without a traceback.
         try:
             pace(self, self._stopping)

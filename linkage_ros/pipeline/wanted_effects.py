@@ -50,7 +50,7 @@ def choose_effects(member: SceneLinkage) -> WantedEffects:
     named = frozenset(member.effects)
     named |= {also for effect in named for also in PUBLISHED_WITH.get(effect, ())}
     moves_by_rates = getattr(drive_parameters, 'carry_forward', True)
-    starting = named - _between_readings(member, named, moves_by_rates)
+    starting = named - _rate_free_effects(member, named, moves_by_rates)
     computed = named | {need for effect in starting for need in needed_effects(effect)}
     effects = [effect_of(name) for name in in_order(computed)]
     computes_forces = drive == 'torque' or not computed.isdisjoint(FORCE_EFFECTS)
@@ -69,18 +69,18 @@ def _between_readings(
     mixing = {'jitter', 'delay'} & named
     if moves_by_rates and 'delay' in mixing:
         delay = module_of('delay')
-        parameters = member.effects.get('delay') or delay.PARAMETERS()
+        parameters = scene_linkage.effects.get('delay') or delay.PARAMETERS()
         return set() if delay.interpolates(parameters, named) else {'delay'}
     return set() if moves_by_rates else mixing
 
 
-def _refuse_not_imported(member: SceneLinkage) -> None:
-    if member.not_imported:
+def _refuse_not_imported(scene_linkage: SceneLinkage) -> None:
+    if scene_linkage.not_imported:
         from linkage_ros.effects.user_effects import (
             found_in,  # local import: only where a scene has one
         )
 
-        name = member.not_imported[0]
+        name = scene_linkage.not_imported[0]
         raise DefinitionError(
             f'effects.{name}',
             f'names a module, and what a bag names is not imported unasked; the name leads to '
@@ -89,13 +89,13 @@ def _refuse_not_imported(member: SceneLinkage) -> None:
         )
 
 
-def _refuse_idle(member: SceneLinkage, forced: bool) -> None:
+def _refuse_idle(scene_linkage: SceneLinkage, forced: bool) -> None:
     """Refuse an effect that has nothing to act on."""
     # With several linkages, one without forces may share an effect that another one needs.
-    section = member.content
+    section = scene_linkage.content
     for given, key in (
-        (member.loads and 'loads' in section, 'loads'),
-        ('friction' in member.effects and 'effects' in section, 'effects.friction'),
+        (scene_linkage.loads and 'loads' in section, 'loads'),
+        ('friction' in scene_linkage.effects and 'effects' in section, 'effects.friction'),
     ):
         if given and not forced:
             raise DefinitionError(
@@ -105,11 +105,11 @@ def _refuse_idle(member: SceneLinkage, forced: bool) -> None:
             )
 
 
-def _refuse_solver(member: SceneLinkage, forced: bool) -> None:
+def _refuse_solver(scene_linkage: SceneLinkage, forced: bool) -> None:
     """Refuse a solver without dyad poses where the forces start from these."""
-    if forced and member.solver is not None and member.solver[0] != 'closed_form':
+    if forced and scene_linkage.solver is not None and scene_linkage.solver[0] != 'closed_form':
         raise DefinitionError(
             'solver',
-            f'{member.solver[0]} finds no forces, and an effect or the drive asks for them',
+            f'{scene_linkage.solver[0]} finds no forces, and an effect or the drive asks for them',
             f'write closed_form, or leave {listed(FORCE_EFFECTS)} and torque out',
         )

@@ -57,15 +57,17 @@ class WrenchTopic:
 
     """
 
-    def __init__(self, member: SceneLinkage, link: str, drive: Any, held: HeldWrench) -> None:
-        given = member.loads.applied.wrenches[link] if member.loads else None
+    def __init__(
+        self, scene_linkage: SceneLinkage, link: str, drive: Any, held: HeldWrench
+    ) -> None:
+        given = scene_linkage.loads.applied.wrenches[link] if scene_linkage.loads else None
         self.key = f'loads.wrenches.{link}'
-        self.topic = (given and given.topic) or f'wrenches/{member.prefix}{link}'
-        self.held = held
-        self._load = getattr(drive, 'load', None)
-        self._content = member.content
+        self.topic = (given and given.topic) or f'wrenches/{scene_linkage.prefix}{link}'
+        self.wrench = held
+        self._change_load = getattr(drive, 'load', None)
+        self._content = scene_linkage.content
 
-    def offer(self, message: bytes, now: int) -> Rejection | None:
+    def offer_wrench(self, message: bytes, now: int) -> Rejection | None:
         """
         Take a serialized message, or return why it is rejected; a rejected one changes nothing.
 
@@ -85,20 +87,20 @@ class WrenchTopic:
                 if isfinite(number):
                     return Rejection.WRENCH_TOO_LARGE
                 return Rejection.WRENCH_NOT_FINITE
-        if self._load is None:
-            self.held.set_wrench(wrench, now)
+        if self._change_load is None:
+            self.wrench.set_wrench(wrench, now)
         else:
             # The drive moves the linkage up to this time under the load before.
-            self._load(self.held, wrench, now)
+            self._change_load(self.wrench, wrench, now)
         return None
 
-    def refused(self, reason: str, remedy: str) -> FileError:
+    def refusal(self, reason: str, remedy: str) -> FileError:
         """Return an error of the name of the topic."""
         return self._content.error(f'{self.key}.topic', reason, remedy)
 
 
-def wrench_topics(
-    linkages: Sequence[tuple[SceneLinkage, Any, Mapping[str, HeldWrench]]], of_drives: str
+def make_wrench_topics(
+    linkages: Sequence[tuple[SceneLinkage, Any, Mapping[str, HeldWrench]]], drive_topic: str
 ) -> tuple[WrenchTopic, ...]:
     """
     Return the topics of all wrenches on linkages.
@@ -121,19 +123,19 @@ def wrench_topics(
         for member, drive, wrenches in linkages
         for link, held in wrenches.items()
     )
-    taken = {of_drives: 'the drive', 'joint_states': 'the joint states'}
+    taken = {drive_topic: 'the drive', 'joint_states': 'the joint states'}
     for number, one in enumerate(topics):
         name = one.topic
         if number == MOST_WRENCHES:
-            raise one.refused(
+            raise one.refusal(
                 f'is one of {len(topics)}, more than {MOST_WRENCHES}', 'leave some out'
             )
         if not fullmatch(_NAME, name) or len(name) > _LONGEST:
-            raise one.refused(
+            raise one.refusal(
                 f'{quoted(name)} is no ROS topic', 'write a topic, as topic: wrenches/coupler'
             )
         name = name.removeprefix('/')
         if name in taken:
-            raise one.refused(f'{quoted(name)} is the topic of {taken[name]}', 'write another')
+            raise one.refusal(f'{quoted(name)} is the topic of {taken[name]}', 'write another')
         taken[name] = one.key
     return topics

@@ -123,7 +123,7 @@ class Counterfactual:
         self._closures = self._pipeline.closures
         self.extras = self._pipeline.extras
         """Auxiliary topics of the scene."""
-        self.withholds = self._pipeline.withholds
+        self.withholds = self._pipeline.suppresses_ticks
         """Whether ticks without a message may matter to a replay."""
         self._seen = self._last = 0  # the log times of the last event, and of what was written
         self._period = round(1e9 / scene.rate) if scene.rate else 0
@@ -155,7 +155,7 @@ class Counterfactual:
     def withheld(self, tick: Tick) -> bool:
         """Return whether a tick without a message is one that a replay has to know of."""
         published = tick.message or tick.extras
-        return self.withholds and not published and self._pipeline.remembers(tick)
+        return self.withholds and not published and self._pipeline.changes_state(tick)
 
     def _on_samples(self, events: Iterable[HeardEvent]) -> Iterator[ReplayEvent]:
         made: Remade | None = None  # its recorded messages may follow

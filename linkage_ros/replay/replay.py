@@ -206,7 +206,7 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
         elif isinstance(event, WrenchEvent):
             # The account of a damaged bag may name more topics than its scene.
             if event.number < len(pipeline.wrenches):
-                pipeline.wrenches[event.number].offer(event.data, event.log_time)
+                pipeline.wrenches[event.number].offer_wrench(event.data, event.log_time)
         elif injection is not None:
             turn(bag, injection, event.data)
 

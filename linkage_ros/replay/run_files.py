@@ -79,9 +79,9 @@ def _scene_folder(scene: Scene, bag: Path | None) -> dict[str, str]:
 def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:
     """Return the chosen solver of each linkage that has one, by name of the linkage."""
     return {
-        line.member.name: {line.choice.solver: line.choice.parameters}
+        line.scene_linkage.name: {line.solver_choice.solver: line.solver_choice.parameters}
         for line in lines
-        if line.choice is not None
+        if line.solver_choice is not None
     }
 
 

@@ -223,7 +223,7 @@ def examine(
 
     """
     # The replay builds equal closures itself: they follow from the scene alone.
-    watched = [_Watch(line.member, line.closure) for line in Pipeline(scene).lines]
+    watched = [_Watch(line.scene_linkage, line.closure) for line in Pipeline(scene).linkages]
     joint_states = same = number = 0
     damage, halted = '', False
     try:
@@ -231,7 +231,7 @@ def examine(
             if recorded:
                 joint_states += 1
                 same += recorded == tick.message
-            for watch, (crank, position, _, _) in zip(watched, tick.looks, strict=True):
+            for watch, (crank, position, _, _) in zip(watched, tick.full_states, strict=True):
                 if crank is not None and position is not None and position.joints:
                     watch.add(time, crank.angles, position)
             if not number % _REPORT_EVERY:

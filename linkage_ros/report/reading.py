@@ -249,15 +249,15 @@ class SceneRun:
                 tuple(given.unit for given in member.linkage.inputs),
                 Lane(APART, longest=True, most=_MOST_SILENCES, window=window),
             )
-            for member, line in zip(scene.linkages, pipeline.lines, strict=True)
+            for member, line in zip(scene.linkages, pipeline.linkages, strict=True)
         ]
         inputs = [name for member in scene.linkages for name in member.sampled_joints]
         self._states = JointStates(scene.joint_names, others=False)
         self._samples = JointStates(inputs, others=False)
         self._cranks = {
-            number: Crank(line, [inputs.index(name) for name in line.member.sampled_joints])
-            for number, line in enumerate(pipeline.lines)
-            if line.member.drive[0] == 'topic'
+            number: Crank(line, [inputs.index(name) for name in line.scene_linkage.sampled_joints])
+            for number, line in enumerate(pipeline.linkages)
+            if line.scene_linkage.drive[0] == 'topic'
         }
         self._first_joints = [
             scene.joint_names.index(linkage.joints[0]) for linkage in self._linkages

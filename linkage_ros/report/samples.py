@@ -47,7 +47,7 @@ class Crank:
 
     def __init__(self, line: LinkagePipeline, columns: Sequence[int]) -> None:
         self._columns = list(columns)
-        of = line.member.drive[1]
+        of = line.scene_linkage.drive[1]
         self._carried = bool(of.carry_forward)
         self._branch = None
         if of.joint:

@@ -146,7 +146,7 @@ def simulate(
     topics = _topics(loop, first)
     named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
-    files = scene_files(scene, named, WITH_THE_RUN, first.lines, folder)
+    files = scene_files(scene, named, WITH_THE_RUN, first.linkages, folder)
     # A signal ends the run between two ticks: raised here, it would cut a record of the bag.
     with heeded():
         writer = BagWriter(folder, [topic for _, topic in topics], attachments(files))
@@ -160,7 +160,7 @@ def simulate(
         finally:
             counts = dict(zip((topic.name for _, topic in topics), recording.written, strict=True))
             writer.close({'linkage_ros.dropped': json.dumps(dict.fromkeys(counts, 0))})
-    for line in loop.pipeline.lines:
+    for line in loop.pipeline.linkages:
         if line.drive.chatter_count:
             warn(describe_chatter(line.drive.chatter_count))
     return counts
@@ -210,8 +210,8 @@ def _topics(loop: TickLoop, pipeline: Pipeline) -> list[tuple[str, Topic]]:
         found[handles.crank] = 'crank_topic', f'/{pipeline.topic}', JOINT_STATE, QosProfile()
     if handles.faults is not None:
         found[handles.faults] = 'faults_topic', f'{_NODE}/faults', 'std_msgs/msg/String', _LATCHED
-    if handles.withheld is not None:
-        found[handles.withheld] = 'withheld_topic', f'{_NODE}/withheld', _TIME, QosProfile()
+    if handles.suppressed is not None:
+        found[handles.suppressed] = 'withheld_topic', f'{_NODE}/withheld', _TIME, QosProfile()
     for handle, extra in zip(handles.extras, pipeline.extras, strict=True):
         found[handle] = EXTRA, extra.topic.replace('~', _NODE, 1), extra.message, QosProfile()
     return [

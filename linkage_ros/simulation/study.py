@@ -32,8 +32,8 @@ from typing import NamedTuple
 
 from linkage_ros.effects.stage import SensorReading
 from linkage_ros.errors import clean, LinkageError, quoted
-from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline
-from linkage_ros.pipeline.straight_tick import Numbers, Seen
+from linkage_ros.pipeline.pipeline import LinkageState, Pipeline
+from linkage_ros.pipeline.straight_tick import CompiledState, StateTuple
 from linkage_ros.scene.load import parse_scene
 from linkage_ros.simulation.run import check_simulated, times
 import numpy as np
@@ -183,8 +183,8 @@ def run_one(study: Study, settings: Settings) -> Outcome:
 
 def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
     """Tick a pipeline, and keep of it what a study needs."""
-    lines, injection = pipeline.lines, pipeline.injection
-    joints = [line.member.joint_names for line in lines]
+    lines, injection = pipeline.linkages, pipeline.injection
+    joints = [line.scene_linkage.joint_names for line in lines]
     firsts = [sum(map(len, joints[:number])) for number in range(len(joints))]
     reduced = {
         (number, quantity): _Reduction(len(joints[number]))
@@ -203,7 +203,7 @@ def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
         tick = pipeline.tick(now)
         messages += bool(tick.message)
         place = wanted.get(number)
-        for which, seen in enumerate(tick.seen):
+        for which, seen in enumerate(tick.states):
             reading = _reading(seen)
             if reading is None:
                 continue
@@ -222,9 +222,9 @@ def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
     return Outcome('', len(at), messages, statistics, kept)
 
 
-def _reading(seen: LinkageTick | Seen | Numbers) -> SensorReading | None:
+def _reading(seen: LinkageState | CompiledState | StateTuple) -> SensorReading | None:
     """Return the reading of a linkage at a tick; None without one."""
-    if isinstance(seen, LinkageTick | Seen):
+    if isinstance(seen, LinkageState | CompiledState):
         return seen.reading
     _, numbers, _ = seen
     return None if numbers is None else SensorReading(*numbers)

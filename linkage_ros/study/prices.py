@@ -88,7 +88,7 @@ def turn_crank(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
     period = 1e9 / (scene.rate or USUAL_RATE)
     names = [name for member in scene.linkages for name in member.sampled_joints]
     write = JointStateWriter(names).write
-    paths = [path for line in pipeline.lines for path in _paths(line)] if pipeline.topic else []
+    paths = [path for line in pipeline.linkages for path in _paths(line)] if pipeline.topic else []
     count = 0
     while True:
         now = _BEGIN + round(count * period)
@@ -106,10 +106,10 @@ Path = Callable[[float], tuple[float, float]]
 
 def _paths(line: LinkagePipeline) -> list[Path]:
     """Return for each input its value and rate at a time in [s]: a rotation or an oscillation."""
-    closure, joint = line.closure, line.member.dependent_joint
+    closure, joint = line.closure, line.scene_linkage.dependent_joint
     speed = tau * _CRANK_RATE
     if joint:
-        branch = sampled_inverse(closure, joint, line.member.drive[1].branch).branch
+        branch = sampled_inverse(closure, joint, line.scene_linkage.drive[1].branch).branch
         return [_swing(0.5 * (branch.low + branch.high), 0.4 * (branch.high - branch.low), speed)]
     centers = usual_inputs(closure)
     if len(centers) > 1:

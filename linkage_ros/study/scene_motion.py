@@ -79,7 +79,7 @@ def motions_of(scene: Scene, like: str | None, horizon: float) -> list[MemberMot
     scene = without_deliberate(scene)
     pipeline = Pipeline(scene)
     bag = None if like in (None, SINE) else read_bag(str(like))
-    return [_motion(scene, line, like, bag, horizon) for line in pipeline.lines]
+    return [_motion(scene, line, like, bag, horizon) for line in pipeline.linkages]
 
 
 def without_deliberate(scene: Scene) -> Scene:
@@ -97,7 +97,7 @@ def without_deliberate(scene: Scene) -> Scene:
 def _motion(
     scene: Scene, line: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
 ) -> MemberMotion:
-    member, context = line.member, line.context
+    member, context = line.scene_linkage, line.context
     closure = line.closure
     if type(closure) is not Closure:
         closure = Closure(closure.linkage)

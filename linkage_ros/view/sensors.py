@@ -105,7 +105,7 @@ class Sensors:
             now = round(time * _NANOSECONDS)
             assert isinstance(line.drive, TopicDrive)
             line.drive.sample = now, angles, tuple(rates), (0.0,) * self.count
-            self._reading = line.looked(line.see(now)).reading
+            self._reading = line.complete_state(line.compute_state(now)).reading
         return self._told(inputs)
 
     def _ticks(self, since: float, until: float) -> Iterator[float]:

@@ -100,7 +100,7 @@ def test_crank_without_a_rate_gets_that_of_the_differences() -> None:
         assert pipeline.offer(joint_message('rocker_joint', stamp, value, 0.0), stamp) is None
     found = pipeline.tick(SECOND + MS)
     assert found.message
-    (rate,) = found.looks[0].crank.rates
+    (rate,) = found.full_states[0].crank.rates
     cranks = [
         LINKAGE.driven_by('rocker_joint', branch=1).position(y)['crank_joint']
         for y in (end - 1e-3, end)
@@ -145,7 +145,7 @@ def test_linkages_of_one_scene_get_their_own_samples(tmp_path: Path) -> None:
 
 def test_cost_and_fmu_feed_the_dependent_joint() -> None:
     pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
-    (line,) = pipeline.lines
+    (line,) = pipeline.linkages
     names = [variable.name for variable in _Sender(line).variables]
     assert names == ['crank_states.rocker_joint.position', 'crank_states.rocker_joint.velocity']
     for now, message in islice(turn_crank(scene_of(RATES + BY_ROCKER, FILE), pipeline), 50):

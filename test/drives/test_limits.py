@@ -102,7 +102,7 @@ def test_what_is_refused_when_the_scene_is_built(name):
     if not expected:
         built = pipeline(drive, four_bar(limits))
         for number in range(4000):
-            (look,) = built.tick(BEGIN + number * MS).looks
+            (look,) = built.tick(BEGIN + number * MS).full_states
             assert look.position.status is Status.CLOSED
         return
     with pytest.raises(FileError) as error:
@@ -147,7 +147,7 @@ def pushed(limits, effort, rocker='', seconds=3.0, start=1.0, **more):
         f'torque: {{start: {start}, timeout: 100{said}}}',
         four_bar_text(0.1, 0.07, 0.06, 0.05, MASSES, limits, rocker),
     )
-    (line,) = built.lines
+    (line,) = built.linkages
     line.drive.state(BEGIN)
     assert line.drive.offer(EffortCommand(0, effort), BEGIN) is None
     (value,) = line.drive.state(BEGIN + round(seconds * 1000) * MS).angles

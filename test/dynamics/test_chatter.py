@@ -118,7 +118,7 @@ LIGHT = 'width: 0.02, inertia: 2.0e-4, restitution: 0.5'
 
 def drive_of(play=LIGHT):
     linkage = (FOLDER / 'four_bar.yaml').read_bytes()
-    return pipeline_of(SCENE.replace('PLAY', play), linkage).lines[0].drive
+    return pipeline_of(SCENE.replace('PLAY', play), linkage).linkages[0].drive
 
 
 def pushed(drive, every, until=1500):

@@ -102,7 +102,7 @@ effects: {velocity: {}}
 def test_a_rocker_leaves_its_stop_as_scipy_says(method, stiffness):
     scene = BLOW.replace('K}', f'{stiffness}}}').replace('METHOD', method)
     step = recommended(scene, STOPPED)
-    (line,) = pipeline_of(scene.replace('STEP', repr(step)), STOPPED).lines
+    (line,) = pipeline_of(scene.replace('STEP', repr(step)), STOPPED).linkages
     found = [line.drive.state(BEGIN + 1_000_000 * ms) for ms in range(26)][-1]
 
     closure = Closure(shipped('four_bar'))
@@ -185,7 +185,7 @@ def rubbed_by_scipy(rate, count):
 def test_friction_that_falls_with_the_rate_is_followed_as_scipy_says(method, rate):
     scene = CURVED.replace('METHOD', method).replace('RATE', repr(rate))
     step = recommended(scene)
-    (line,) = pipeline_of(scene.replace('STEP', repr(step)), FOUR_BAR).lines
+    (line,) = pipeline_of(scene.replace('STEP', repr(step)), FOUR_BAR).linkages
     line.drive.state(BEGIN)
     for number in range(20):
         now = BEGIN + 10_000_000 * number
@@ -228,7 +228,7 @@ loads: {{LOADS}}
     closure, touched = Closure(shipped('four_bar')), 0
     for number in range(0, 1000, 20):
         now = BEGIN + 1_000_000 * number
-        one, other = (pipeline.tick(now).looks[0] for pipeline in (into, free))
+        one, other = (pipeline.tick(now).full_states[0] for pipeline in (into, free))
         assert one.reading.joints == other.reading.joints
         assert one.reading.rates == other.reading.rates
         rocker, rate = one.reading.joints[2], one.reading.rates[2]

@@ -299,14 +299,14 @@ effects: {velocity: {}, effort: {}}
 
 def read(drive, commands=(), ticks=200, loads=''):
     """Return motor and crank, their values and rates, at each tick of a pendulum's scene."""
-    (line,) = pipeline_of(SCENE.replace('DRIVE', drive).replace('LOADS', loads), PENDULUM).lines
+    (line,) = pipeline_of(SCENE.replace('DRIVE', drive).replace('LOADS', loads), PENDULUM).linkages
     found = []
     for number in range(ticks):
         now = BEGIN + 2_000_000 * number
         for tick, effort in commands:
             if tick == number:
                 assert line.drive.offer(EffortCommand(0, effort), now) is None
-        reading = line.see(now).reading
+        reading = line.compute_state(now).reading
         found.append((*line.drive.motor[:2], reading.joints[0], reading.rates[0]))
     return found
 

@@ -249,8 +249,11 @@ def test_the_effort_of_a_crank_that_is_held_contains_a_wrench_until_it_is_too_ol
     efforts = []
     for tick in range(40):
         if tick == 10:
-            assert pipeline.wrenches[0].offer(wrench_stamped(3, 2, 0.5), BEGIN + 10 * MS) is None
-        efforts.append(pipeline.tick(BEGIN + tick * MS).looks[0].reading.efforts[0])
+            assert (
+                pipeline.wrenches[0].offer_wrench(wrench_stamped(3, 2, 0.5), BEGIN + 10 * MS)
+                is None
+            )
+        efforts.append(pipeline.tick(BEGIN + tick * MS).full_states[0].reading.efforts[0])
     assert efforts == pytest.approx([0.0] * 10 + [-1.5] * 10 + [0.0] * 20, abs=1e-14)
 
 
@@ -286,8 +289,8 @@ def test_a_message_that_is_rejected_changes_nothing(name):
     one, other = pipeline_of(scene, PENDULUM), pipeline_of(scene, PENDULUM)
     for pipeline in (one, other):
         pipeline.tick(BEGIN)
-        assert pipeline.wrenches[0].offer(wrench_stamped(0, 0, 1e9), BEGIN) is None
-    assert one.wrenches[0].offer(message, BEGIN + MS // 2) is reason
+        assert pipeline.wrenches[0].offer_wrench(wrench_stamped(0, 0, 1e9), BEGIN) is None
+    assert one.wrenches[0].offer_wrench(message, BEGIN + MS // 2) is reason
     for tick in range(1, 150):
         now = BEGIN + tick * MS
         assert one.tick(now).message == other.tick(now).message

@@ -210,7 +210,7 @@ def timeline(linkage, torque, commands, until, friction=''):
     text = f'drive: {{torque: {torque}}}\nloads: {{gravity: [0, -9.81], drive_inertia: 0.02}}\n'
     text += f'effects: {{velocity: {{}}, effort: {{}}{friction and ", friction: " + friction}}}\n'
     pipeline = pipeline_of(text, linkage)
-    (joint,) = pipeline.lines[0].member.input_names
+    (joint,) = pipeline.linkages[0].scene_linkage.input_names
     found = {}
     for time in range(until):
         now = BEGIN + time * MS

@@ -52,9 +52,9 @@ class Held:
 
     def __init__(self, linkage, effects='markers: {}'):
         self.pipeline = built(linkage, f'drive: {{topic: {{}}}}\neffects: {{{effects}}}')
-        (line,) = self.pipeline.lines
+        (line,) = self.pipeline.linkages
         self.closure = line.closure
-        self._write = JointStateWriter(line.member.input_names).write
+        self._write = JointStateWriter(line.scene_linkage.input_names).write
         self._now = BEGIN
 
     def at(self, *inputs):
@@ -448,7 +448,7 @@ def test_an_arrow_shows_the_force_that_is_published(start, rate, scale):
     told = extra(pipeline, tick, '~/pin_forces')
     markers = extra(pipeline, tick).markers
     arrows = named(markers, 'forces')
-    (line,) = pipeline.lines
+    (line,) = pipeline.linkages
     points = line.closure.points(line.closure.position(start))
     pins = {point: place for (_, point), place in points.items()}
     size = named(markers, 'pins')[0].scale.x / 1.1
@@ -498,7 +498,7 @@ def test_the_effort_of_a_cylinder_is_straight():
     tick = pipeline.tick(BEGIN)
     effort = read_joint_state(tick.message).effort[0]
     begin, end = places(named(extra(pipeline, tick).markers, 'efforts')[0])[:2]
-    (line,) = pipeline.lines
+    (line,) = pipeline.linkages
     points = line.closure.points(line.closure.position(1.0))
     rod, tube = points['cylinder_rod', 'C'], points['cylinder_tube', 'K']
     way = (rod - tube) / abs(rod - tube)

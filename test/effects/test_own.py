@@ -146,7 +146,7 @@ def scene_file(folder, effects):
 def joints(file, second=0):
     pipeline = Pipeline(load_scene(file))
     for now in range(second + 1):
-        (look,) = pipeline.tick(now * SECOND).looks
+        (look,) = pipeline.tick(now * SECOND).full_states
     return look.reading.joints
 
 
@@ -185,7 +185,7 @@ def test_the_order_in_the_file_does_not_matter(tmp_path, package):
     mine = package(add=HEAD + ADD, double=HEAD + DOUBLE)
     lines = [f'{mine}.add: {{}}', f'{mine}.double: {{}}', 'velocity: {}']
     stages = [
-        Pipeline(load_scene(scene_file(tmp_path, order))).lines[0].stages
+        Pipeline(load_scene(scene_file(tmp_path, order))).linkages[0].effect_names
         for order in (lines, lines[::-1])
     ]
     assert stages == [('velocity', f'{mine}.add', f'{mine}.double')] * 2
@@ -208,9 +208,9 @@ def test_what_it_starts_from_is_computed_and_not_published(tmp_path, package):
     mine = package(soft=HEAD + YIELD)
     rigid = joints(scene_file(tmp_path, ['velocity: {}']))
     pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.soft: {{}}'])))
-    (line,) = pipeline.lines
-    assert line.stages == ('velocity', 'acceleration', 'pin_forces', f'{mine}.soft')
-    (look,) = pipeline.tick(0).looks
+    (line,) = pipeline.linkages
+    assert line.effect_names == ('velocity', 'acceleration', 'pin_forces', f'{mine}.soft')
+    (look,) = pipeline.tick(0).full_states
     assert look.reading.rates == ()
     assert pipeline.extras == []
     force = look.motion.reactions[0].fx
@@ -392,5 +392,7 @@ def test_the_node_writes_it_into_its_bag(tmp_path, package):
     run_recording = pytest.importorskip('linkage_ros.node.run_recording', reason='needs rclpy')
     mine = package(add=HEAD + ADD)
     scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
-    files = run_recording._attachments(scene, [], 'with the run', Pipeline(scene).lines, tmp_path)
+    files = run_recording._attachments(
+        scene, [], 'with the run', Pipeline(scene).linkages, tmp_path
+    )
     assert json.loads(files[RUN_FILE][1])['effects'] == user_effects_here(scene)

@@ -124,5 +124,5 @@ def test_of_several_linkages_each_has_its_topic_and_its_names():
 def test_without_it_no_forces_are_computed(effects):
     at_work = pipeline(effects)
     at_work.tick(10**9)
-    assert all('reactions' not in vars(line.context) for line in at_work.lines)
+    assert all('reactions' not in vars(line.context) for line in at_work.linkages)
     assert '~/pin_forces' not in [each.topic for each in at_work.extras]

@@ -238,8 +238,8 @@ def _message(inputs: dict[str, float], now: int) -> bytes:
 
 
 def test_a_reading_that_is_not_finite_does_not_come_out():
-    (line,) = Pipeline(load_scene('four_bar')).lines
-    look = line.look(SECOND, CrankState((1.0,), (2.0,), (0.0,), 0))
+    (line,) = Pipeline(load_scene('four_bar')).linkages
+    look = line.interpret_from_crank(SECOND, CrankState((1.0,), (2.0,), (0.0,), 0))
     outputs = LinkageOutputs(line)
     outputs.take(look)
     good = {field: [*values] for field, values in outputs.values.items()}
@@ -253,7 +253,7 @@ def test_accelerations_are_those_of_the_pipeline(bench):
     scene = load_scene('four_bar', ['effects.acceleration={}'])
     pipeline = Pipeline(scene)
     outputs = bench(scene).start()
-    (look,) = pipeline.tick(SECOND).looks
+    (look,) = pipeline.tick(SECOND).full_states
     shown = [value for name, value in outputs.items() if name.endswith('.acceleration')]
     assert tuple(shown) == look.reading.accelerations
     assert any(shown)

@@ -51,8 +51,8 @@ def test_what_huge_messages_are_for_is_not_remembered():
     for number in range(3):
         names = ['crank_joint', f'of_message_{number}', *(f'joint_{n}' for n in range(20_000))]
         message = JointStateWriter(names).write(1, [0.0] * len(names), [])
-        assert routes.find(message) == ('left',)
+        assert routes.find_receivers(message) == ('left',)
     assert routes._found == {}
     small = JointStateWriter(['crank_joint', 'other']).write(1, [0.0, 0.0], [])
-    assert routes.find(small) == routes.find(small) == ('left', 'right')
+    assert routes.find_receivers(small) == routes.find_receivers(small) == ('left', 'right')
     assert len(routes._found) == 1

@@ -51,14 +51,14 @@ def summary(loop, before):
 def test_it_is_told_once_for_each_new_step():
     loop, lines = loop_of(), Said()
     warnings, before = Warnings(lines), Snapshot()
-    warnings.check_chatter(loop.pipeline.lines, 0.0)
+    warnings.check_chatter(loop.pipeline.linkages, 0.0)
     before, status = summary(loop, before)
     assert (status.message, lines) == ('Ticking', [])
     run(loop, 0, 1000)
-    steps = chattered(loop.pipeline.lines)
+    steps = chattered(loop.pipeline.linkages)
     assert steps > 10
-    warnings.check_chatter(loop.pipeline.lines, 0.0)
-    warnings.check_chatter(loop.pipeline.lines, 0.0)
+    warnings.check_chatter(loop.pipeline.linkages, 0.0)
+    warnings.check_chatter(loop.pipeline.linkages, 0.0)
     (line,) = lines
     assert f'too often in {steps} steps' in line
     assert 'shorten the step' in line
@@ -70,10 +70,10 @@ def test_it_is_told_once_for_each_new_step():
     # A reset counts anew.
     loop.reset_requested = True
     loop.tick_at(BEGIN + NS)
-    warnings.check_chatter(loop.pipeline.lines, 0.0)
+    warnings.check_chatter(loop.pipeline.linkages, 0.0)
     run(loop, 1010, 2000)
-    warnings.check_chatter(loop.pipeline.lines, 0.0)
-    assert f'too often in {chattered(loop.pipeline.lines)} steps' in lines[-1]
+    warnings.check_chatter(loop.pipeline.linkages, 0.0)
+    assert f'too often in {chattered(loop.pipeline.linkages)} steps' in lines[-1]
 
 
 def test_a_run_that_ends_says_why_in_a_line():

@@ -50,7 +50,7 @@ def test_by_default_the_same_is_published_as_within():
     tick = at(Pipeline(scene('effects: {velocity: {}}')), 2.0)
     free = LIMITED.replace(', input: {limits: [0.5, 1.5]}', '')
     other = at(Pipeline(scene('effects: {velocity: {}}', free)), 2.0)
-    assert tick.looks[0].position.status is Status.LIMITED
+    assert tick.full_states[0].position.status is Status.LIMITED
     assert tick.message == other.message != b''
 
 
@@ -64,7 +64,7 @@ def test_silent_is_silent_beyond_and_within_the_same(effects):
         assert other.message
         if angle in (1.6, 2.0, 0.4):
             assert tick.message == b''
-            assert tick.looks[0].position.status is Status.LIMITED
+            assert tick.full_states[0].position.status is Status.LIMITED
         else:
             assert tick.message == other.message
 
@@ -141,7 +141,7 @@ def test_what_is_counted_and_told(said, published):
     loop, messages = ran(said, ANGLES)
     counts = loop.counts
     assert Counter(counts.unclosed) == Counter({Status.LIMITED: 2})
-    assert (len(messages), counts.published, counts.withheld) == (published, published, 0)
+    assert (len(messages), counts.published, counts.suppressed) == (published, published, 0)
     lines = Said()
     Warnings(lines).check(counts, loop.pipeline.closures, '/crank', 1.0)
     what = 'nothing published' if said else 'published all the same'
@@ -173,7 +173,7 @@ def test_rates_and_efforts_are_told_by_their_limits():
         rate
         for name, rate in zip(
             loop.pipeline.closures[0].linkage.joints,
-            loop.counts.last.looks[0].reading.rates,
+            loop.counts.last_tick.full_states[0].reading.rates,
             strict=True,
         )
         if name == 'rocker_joint'

@@ -44,7 +44,7 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
     )
     member = SimpleNamespace(name='', linkage=SimpleNamespace(inputs=inputs, joints={}, limits={}))
     lines = [SimpleNamespace(member=member, closure=closure, drive=None)]
-    counts.last = SimpleNamespace(lines=lines, looks=(look,))
+    counts.last_tick = SimpleNamespace(lines=lines, looks=(look,))
     pipeline = SimpleNamespace(lines=lines, max_age=1, newest_stamp=0)
     loop = SimpleNamespace(
         counts=counts,

@@ -36,13 +36,13 @@ class Said(list):
 )
 def test_a_crank_that_jumps_by_more_than_a_turn_is_told_once(linkage, angles, said):
     pipeline = Pipeline(load_scene(linkage, ['drive={topic: {}}']))
-    (line,) = pipeline.lines
+    (line,) = pipeline.linkages
     for number, angle in enumerate(angles):
         stamp = (1 + number) * SECOND // 100
         assert line.drive.offer(CrankSample(stamp, (angle,), (0.0,)), stamp) is None
     lines = Said()
     warnings = Warnings(lines)
     for _ in range(3):
-        warnings.check_jumps(pipeline.lines, '/crank_states')
+        warnings.check_jumps(pipeline.linkages, '/crank_states')
     assert len(lines) == said
     assert all('if these are degrees, publish radians' in each for each in lines)

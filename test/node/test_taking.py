@@ -194,8 +194,8 @@ def test_what_is_too_old_when_it_arrives_is_counted_as_stale(kind):
     assert (c.used, c.stale, c.superseded) == expected
     assert rig.counts()[0] == len(messages)
     assert bool(rig.published) == bool(c.used)
-    assert ('stale' in rig.loop.samples) == bool(c.stale)
-    assert ('without the crank' in rig.loop.samples) == bool(c.ignored)
+    assert ('stale' in rig.loop.sample_counts_text) == bool(c.stale)
+    assert ('without the crank' in rig.loop.sample_counts_text) == bool(c.ignored)
     if 'differs' in kind:
         assert c.stale_age == 100_000 * MS
 
@@ -257,10 +257,10 @@ def test_what_the_middleware_lost_is_told_by_the_numbers_that_are_missing(kind):
     for number in numbers:
         rig.send(number=number)
     rig.tick(BEGIN)
-    assert rig.loop.missed == missed
-    assert ('lost before' in rig.loop.samples) == bool(missed)
-    rig.loop.several_publishers = True
-    assert rig.loop.missed is None, 'their numbers go apart'
+    assert rig.loop.missed_messages == missed
+    assert ('lost before' in rig.loop.sample_counts_text) == bool(missed)
+    rig.loop.had_several_publishers = True
+    assert rig.loop.missed_messages is None, 'their numbers go apart'
 
 
 CRANK, LEFT, RIGHT = ('crank_joint',), ('left_crank_joint',), ('right_crank_joint',)

@@ -77,7 +77,7 @@ def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
         **({'crank_topic': '/crank'} if pipeline.topic else {}),
         **{name: name for name in loads},
         **({'faults_topic': '/faults'} if injection else {}),
-        **({'withheld_topic': '/withheld'} if pipeline.withholds else {}),
+        **({'withheld_topic': '/withheld'} if pipeline.suppresses_ticks else {}),
         **{name: name for name in others},
         'resets_topic': '/resets',
     }

@@ -22,7 +22,7 @@ BIN = 1.0 / 32.0
 def test_percentiles_are_those_of_the_durations_to_a_bin(durations):
     histogram = DurationHistogram()
     for duration in durations:
-        histogram.add(duration)
+        histogram.add_duration(duration)
     assert (histogram.count, histogram.longest) == (len(durations), max(durations))
     for percent in (1, 50, 90, 99, 100):
         exact = int(np.percentile(durations, percent, method='inverted_cdf'))
@@ -33,15 +33,15 @@ def test_percentiles_are_those_of_the_durations_to_a_bin(durations):
 def test_one_late_tick_in_a_thousand_changes_no_percentile(percent):
     histogram = DurationHistogram()
     for _ in range(999):
-        histogram.add(1_000)
-    histogram.add(1_000_000)
+        histogram.add_duration(1_000)
+    histogram.add_duration(1_000_000)
     assert 1_000 <= histogram.percentile(percent) <= 1_000 * (1.0 + BIN)
     assert histogram.percentile(100) == histogram.longest == 1_000_000
 
 
 def test_a_clock_that_steps_back_counts_as_on_time():
     histogram = DurationHistogram()
-    histogram.add(-5)
+    histogram.add_duration(-5)
     assert (histogram.count, histogram.longest, histogram.percentile(100)) == (1, 0, 0)
 
 

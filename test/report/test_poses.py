@@ -156,7 +156,7 @@ TICKS = 40
 
 def moments(scene):
     """Return ticks over the middle of the range, each with its sample of all inputs."""
-    (line,) = Pipeline(scene).lines
+    (line,) = Pipeline(scene).linkages
     (member,) = scene.members
     usual = usual_inputs(line.closure)
     interval = InputSweep(line.closure, usual).range_about(usual[0])

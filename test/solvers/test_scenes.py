@@ -55,9 +55,9 @@ BEGIN = 1_700_000_000_000_000_000
 @pytest.mark.parametrize('name', SOLVERS)
 def test_what_is_named_is_built(name):
     text, kind = SOLVERS[name]
-    (line,) = Pipeline(scene_of(text)).lines
+    (line,) = Pipeline(scene_of(text)).linkages
     assert type(line.closure) is kind
-    assert line.choice is None
+    assert line.solver_choice is None
 
 
 def error_bounds(closure):
@@ -77,12 +77,12 @@ def test_a_scene_runs_with_it(name):
     effects = 'drive: {constant_rate: {rate: 3.0}}\neffects: {acceleration: {}}\n'
     plain = Pipeline(scene_of(effects))
     pipeline = Pipeline(scene_of(effects + SOLVERS[name][0]))
-    closure = plain.lines[0].closure
-    of_position, of_rate, of_acceleration = error_bounds(pipeline.lines[0].closure)
+    closure = plain.linkages[0].closure
+    of_position, of_rate, of_acceleration = error_bounds(pipeline.linkages[0].closure)
     for number in range(3000):
         now = BEGIN + number * 1_000_000
         tick = pipeline.tick(now)
-        (look,), (expected,) = tick.looks, plain.tick(now).looks
+        (look,), (expected,) = tick.full_states, plain.tick(now).full_states
         assert tick.message
         assert all(tick.extras)
         assert apart(closure, look.reading.joints, expected.reading.joints) <= of_position
@@ -125,8 +125,8 @@ def test_a_reset_builds_no_table_again():
     scene = scene_of('accuracy: 1.0e-6')
     first = Pipeline(scene)
     again = Pipeline(scene, first.closures)
-    assert again.lines[0].closure is first.lines[0].closure
-    assert again.lines[0].choice == first.lines[0].choice is not None
+    assert again.linkages[0].closure is first.linkages[0].closure
+    assert again.linkages[0].solver_choice == first.linkages[0].solver_choice is not None
 
 
 def test_linkages_may_differ(tmp_path):
@@ -139,14 +139,14 @@ linkages:
   - {name: three, linkage: l.yaml, accuracy: 1.0e-3}
   - {name: four, linkage: l.yaml, solver: closed_form}
 """)
-    lines = Pipeline(load_scene(tmp_path / 's.yaml')).lines
+    lines = Pipeline(load_scene(tmp_path / 's.yaml')).linkages
     assert [type(line.closure) for line in lines[:2]] == [TableClosure, NewtonClosure]
-    assert [line.choice is not None for line in lines] == [False, False, True, False]
+    assert [line.solver_choice is not None for line in lines] == [False, False, True, False]
     assert type(lines[3].closure) is Closure
 
 
 def test_several_inputs_take_newton():
-    (line,) = Pipeline(scene_of('solver: {newton: {tolerance: 1.0e-9}}', FIVE_BAR)).lines
+    (line,) = Pipeline(scene_of('solver: {newton: {tolerance: 1.0e-9}}', FIVE_BAR)).linkages
     assert line.closure.position(0.5, 1.5).joints
 
 
@@ -164,7 +164,7 @@ def test_a_replay_does_not_choose_again(monkeypatch):
         ({'newton': {'tolerance': 1e-6}}, NewtonClosure),
         ({'closed_form': {}}, Closure),
     ):
-        (line,) = Pipeline(parse_scene('s', 'here', files, '', {'': chosen})).lines
+        (line,) = Pipeline(parse_scene('s', 'here', files, '', {'': chosen})).linkages
         assert type(line.closure) is kind
 
 
@@ -180,9 +180,9 @@ def test_the_bag_s_account_tells_what_was_chosen(tmp_path):
 
 def test_forces_leave_the_closed_form_alone():
     heavy = (LINKAGES / 'four_bar.yaml').read_bytes()
-    (line,) = Pipeline(scene_of('accuracy: 1.0e-6\ndrive: {torque: {}}', heavy)).lines
+    (line,) = Pipeline(scene_of('accuracy: 1.0e-6\ndrive: {torque: {}}', heavy)).linkages
     assert type(line.closure) is Solver
-    assert line.choice.why == 'closed form: forces start from it'
+    assert line.solver_choice.why == 'closed form: forces start from it'
 
 
 REFUSED = {
@@ -229,7 +229,7 @@ def test_refused_when_it_is_built(text):
 def test_the_closed_form_that_the_refusal_recommends_is_taken(forces):
     masses = ((0.2, 0.02, 1e-4), (0.3, 0.06, 1e-3), (0.2, 0.04, 1e-3))
     linkage = four_bar_text(0.04, 0.12, 0.08, 0.1, masses)
-    assert Pipeline(scene_of(f'solver: closed_form\n{forces}', linkage)).lines
+    assert Pipeline(scene_of(f'solver: closed_form\n{forces}', linkage)).linkages
 
 
 def test_what_is_read_the_schema_takes():

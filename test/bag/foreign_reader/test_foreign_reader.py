@@ -95,7 +95,7 @@ def run(folder: Path, text: str, linkage: str = 'four_bar') -> Path:
             latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             described.append(('faults_topic', '/node/faults', 'std_msgs/msg/String', latched))
         time = 'builtin_interfaces/msg/Time'
-        if pipeline.withholds:
+        if pipeline.suppresses_ticks:
             described.append(('withheld_topic', '/node/withheld', time, QoSProfile(depth=10)))
         for extra in pipeline.extras:
             name = extra.topic.replace('~', '/node')
