@@ -42,7 +42,7 @@ from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import BagError, clean, listed
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.replay.verify import Examined, WorstResiduals
+from linkage_ros.replay.verify import ExaminedRun, WorstResiduals
 from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heeded, StoppedError
 
@@ -296,7 +296,7 @@ def worst_account(worst: WorstResiduals) -> dict[str, Any]:
     return account
 
 
-def replay_account(examined: Examined) -> dict[str, Any]:
+def replay_account(examined: ExaminedRun) -> dict[str, Any]:
     """Return how well the replayed scene agrees with the bag."""
     return {'joint_states': examined.joint_states, 'same_bytes': examined.same}
 

@@ -30,7 +30,7 @@ from linkage_ros.cli.replay import deviations_account, joints_table
 from linkage_ros.cli.terminal import show
 from linkage_ros.errors import BagError, clean, LinkageError, listed
 from linkage_ros.messages.joint_values import JOINT_STATE, Key, MessageValues, POSITION
-from linkage_ros.replay.compare import At, Deviation
+from linkage_ros.replay.compare import Deviation, TickPlace
 from linkage_ros.replay.replay import recorded_scene
 from linkage_ros.replay.verify import turning_joints
 from linkage_ros.report.decimation import MinMaxCurve
@@ -79,7 +79,7 @@ class Differences:
             deviation = self.deviations.setdefault(key, Deviation())
             deviation.compared += 1
             if a != b:
-                deviation.add(a, b, At(self.compared, time))
+                deviation.add_difference(a, b, TickPlace(self.compared, time))
         if not self.positions:
             self.positions = [
                 name for name, what in first if what == POSITION and (name, what) in second

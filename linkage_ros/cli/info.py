@@ -37,7 +37,7 @@ from linkage_ros.cli.bag_reading import (
 )
 from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import clean, LinkageError
-from linkage_ros.replay.verify import examine
+from linkage_ros.replay.verify import examine_states
 from linkage_ros.signals import heeded
 
 _MIB = 2**20
@@ -84,7 +84,7 @@ def info(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any
         account['scene'] = scene_account(scene)
         states = max((topic['messages'] for topic in account['topics']), default=0)
         with progress('states looked at') as advance:
-            examined = examine(
+            examined = examine_states(
                 bag, scene, lambda done: advance(done, max(done, states)), stop.is_set
             )
     except LinkageError as error:

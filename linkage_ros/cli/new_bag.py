@@ -35,7 +35,7 @@ from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.counterfactual import Counterfactual, ReplayEvent
 from linkage_ros.replay.replay import user_effects_here, versions_here
-from linkage_ros.replay.topic_description import described, message_type
+from linkage_ros.replay.topic_description import describe_topic, message_type
 from linkage_ros.scene.scene import Scene
 
 _FLUSHED_EVERY = 50_000
@@ -132,7 +132,7 @@ class NewBag:
             topics.append(('resets_topic', names.resets, _TIME, QosProfile()))
         if scene.faults:
             topics.append(('faults_topic', names.faults, 'std_msgs/msg/String', _CHANGES_QOS))
-        if counterfactual.withholds:
+        if counterfactual.suppresses_ticks:
             topics.append(('withheld_topic', names.withheld, _TIME, QosProfile()))
         self._counterfactual = counterfactual
         self._numbers = {key: number for number, (key, *_) in enumerate(topics)}
@@ -185,7 +185,7 @@ class NewBag:
             for number, message in enumerate(tick.extras, self._first_extra):
                 if message:
                     self._write(number, log_time, time, message)
-            if self._counterfactual.withheld(tick):
+            if self._counterfactual.must_record(tick):
                 withheld = time_message(time)
                 self._write(self._numbers['withheld_topic'], log_time, time, withheld)
 
@@ -207,4 +207,4 @@ def _described(bag: Bag, name: str, kind: str, qos: QosProfile) -> Topic:
     for topic in bag.topics:
         if topic.type == kind and topic.definition:
             return replace(topic, name=name, qos=qos)
-    return described(name, message_type(kind, '--scene'), qos)
+    return describe_topic(name, message_type(kind, '--scene'), qos)

@@ -33,7 +33,7 @@ from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.messages.joint_state import JointStateReader, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.names import picture_text
-from linkage_ros.replay.replay import replay
+from linkage_ros.replay.replay import replay_ticks
 from linkage_ros.signals import StoppedError
 import numpy as np
 from numpy.typing import NDArray
@@ -105,7 +105,7 @@ def draw(
     cranks: list[Values] = []
     positions: list[Values] = []
     rates: list[Values] = []
-    for at, recorded, _, tick in replay(bag, scene):
+    for at, recorded, _, tick in replay_ticks(bag, scene):
         if stop.is_set():
             raise StoppedError
         crank_state = tick.full_states[0].crank

@@ -67,7 +67,7 @@ def proof_of(folder: Path, ticks: int, longest: float) -> str:
         f'{topic.same} of {topic.recorded} {name}'
         for name, topic in zip(names, proof.comparison.topics, strict=True)
     )
-    notes = [beginning_text(proof)] if proof.beginning else []
+    notes = [beginning_text(proof)] if proof.missing_start else []
     if proof.verdict == DIFFERENT:
         notes += gaps(bag)
     notes.append(f'worst loop residual {worst:.1e} m')

@@ -47,12 +47,19 @@ from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import BagError, clean, LinkageError, listed
 from linkage_ros.files.file_access import remove_bag
 from linkage_ros.messages.joint_values import JOINT_STATE, Key, UNITS
-from linkage_ros.replay.compare import At, Comparison, Deviation, First, TopicComparison, ulps
+from linkage_ros.replay.compare import (
+    Comparison,
+    Deviation,
+    FirstDifference,
+    TickPlace,
+    TopicComparison,
+    ulp_distance,
+)
 from linkage_ros.replay.counterfactual import (
     check_drives,
     Counterfactual,
+    CounterfactualTick,
     find_crank_topic,
-    Remade,
 )
 from linkage_ros.replay.replay import (
     own_joint_states,
@@ -103,12 +110,12 @@ def _proof_account(
     comparison = proof.comparison
     return {
         'verdict': proof.verdict,
-        'ticks': proof.ticks,
+        'ticks': proof.tick_count,
         'compared_ticks': comparison.ticks,
         'different_ticks': comparison.differing,
-        'withheld_ticks': comparison.withheld,
+        'withheld_ticks': comparison.suppressed,
         'untold_ticks': proof.undecided,
-        'beginning_missing': beginning_text(proof) if proof.beginning else None,
+        'beginning_missing': beginning_text(proof) if proof.missing_start else None,
         'topics': [topic_account(topic) for topic in comparison.topics],
         'first_difference': first_account(comparison.first or proof.first_undecided, turning),
         'last_different_tick': at_account(comparison.last) if comparison.last else None,
@@ -125,12 +132,14 @@ def topic_account(topic: TopicComparison) -> dict[str, Any]:
         'same': topic.same,
         'same_but_for_turns': topic.but_turns,
         'different': topic.different,
-        'not_made_now': topic.gone,
+        'not_made_now': topic.not_reproduced,
         'not_recorded': topic.not_recorded,
     }
 
 
-def first_account(first: First | None, turning: Mapping[str, bool]) -> dict[str, Any] | None:
+def first_account(
+    first: FirstDifference | None, turning: Mapping[str, bool]
+) -> dict[str, Any] | None:
     """Return the first difference, and by how much the two values differ."""
     if first is None:
         return None
@@ -142,12 +151,12 @@ def first_account(first: First | None, turning: Mapping[str, bool]) -> dict[str,
             'recorded': finite(first.recorded),
             'now': finite(first.now),
             'difference': finite(abs(first.now - first.recorded)),
-            'ulp': ulps(first.recorded, first.now),
+            'ulp': ulp_distance(first.recorded, first.now),
         }
     return account
 
 
-def at_account(at: At) -> dict[str, Any]:
+def at_account(at: TickPlace) -> dict[str, Any]:
     """Return the place of a message: its topic, tick and time."""
     return {'tick': at.tick, 'time_ns': at.time}
 
@@ -326,14 +335,14 @@ def _replayed_with(
             for event in counterfactual.run(recorded_events(run, own, messages, topic)):
                 if new_bag is not None:
                     new_bag.add(event)
-                if isinstance(event, Remade):
+                if isinstance(event, CounterfactualTick):
                     if event.tick is not None and event.tick.message:
                         published += 1
                     then, now = _side_by_side(event, run, names, shared)
                     if any(then) or any(now):
                         begin = begin or [event.time]
-                        comparison.add(At(comparison.ticks + 1, event.time), then, now)
-    comparison.settle()
+                        comparison.add_tick(TickPlace(comparison.ticks + 1, event.time), then, now)
+    comparison.update_deviations()
     turning = turning_joints(scene) | (turning_joints(recorded) if recorded else {})
     recorded_joints = recorded.joint_names if recorded is not None else ()
     return bag_account(bag, scene, reading, begin) | {
@@ -379,7 +388,7 @@ def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path |
 
 
 def _side_by_side(
-    event: Remade, run: RunMetadata, names: Names, shared: list[str]
+    event: CounterfactualTick, run: RunMetadata, names: Names, shared: list[str]
 ) -> tuple[list[bytes], list[bytes]]:
     """Return the messages of a tick, recorded and new, on each topic that both runs have."""
     then = dict(zip((run.joint_states_topic, *run.extras), event.recorded, strict=False))

@@ -16,7 +16,7 @@ from typing import Any
 
 from linkage_ros.bag.topic import INFINITE, QosProfile, Topic
 from linkage_ros.errors import LinkageError, quoted
-from linkage_ros.replay.topic_description import described, message_type
+from linkage_ros.replay.topic_description import describe_topic, message_type
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -24,7 +24,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 def bag_topic(name: str, message_class: Any, qos: QoSProfile) -> Topic:
     """Describe a topic for a bag, as `described` does, with the QoS of a publisher."""
-    return described(name, message_class, _qos(qos))
+    return describe_topic(name, message_class, _qos(qos))
 
 
 def _qos(profile: QoSProfile) -> QosProfile:

@@ -28,7 +28,7 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 from linkage_ros.pipeline.pipeline import LinkagePipeline
 from linkage_ros.pipeline.tick_loop import TickLoop
-from linkage_ros.replay.run_files import attachments, EXTRA, scene_files
+from linkage_ros.replay.run_files import EXTRA, scene_files, to_attachments
 from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
@@ -237,7 +237,7 @@ def _attachments(
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
     if wrenches := [topic.name for key, topic in topics if key == WRENCH_TOPICS]:
         named[WRENCH_TOPICS] = wrenches
-    return attachments(scene_files(scene, named, begun, lines, folder))
+    return to_attachments(scene_files(scene, named, begun, lines, folder))
 
 
 def _folder(directory: Path, name: str, scene: str) -> Path:

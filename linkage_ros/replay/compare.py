@@ -25,17 +25,17 @@ from linkage_ros.messages.joint_values import Key, MessageContent, MessageValues
 _DOUBLE, _BITS = Struct('<d'), Struct('<q')
 
 
-class At(NamedTuple):
+class TickPlace(NamedTuple):
     """A tick of the bag: its number, counted from 1, and the time it is solved for, in [ns]."""
 
     tick: int
     time: int
 
 
-class First(NamedTuple):
+class FirstDifference(NamedTuple):
     """A difference between the two runs."""
 
-    at: At  # The tick
+    at: TickPlace  # The tick
     topic: str  # The topic
     what: str  # Description, or the quantity of a joint
     joint: str = ''  # Name of the joint; '' if the difference does not concern one joint
@@ -51,9 +51,9 @@ class Deviation:
 
     def __init__(self) -> None:
         self.compared = self.differing = 0
-        self.greatest, self.at = 0.0, At(0, 0)
+        self.greatest, self.at = 0.0, TickPlace(0, 0)
         """The greatest difference, without its sign; infinite where one is no number."""
-        self.ulps, self.ulps_at = 0, At(0, 0)
+        self.ulps, self.ulps_at = 0, TickPlace(0, 0)
         self._squares = 0.0
 
     @property
@@ -61,7 +61,7 @@ class Deviation:
         """Return the root mean square of the differences."""
         return sqrt(self._squares / self.compared) if self.compared else 0.0
 
-    def add(self, recorded: float, now: float, at: At) -> None:
+    def add_difference(self, recorded: float, now: float, at: TickPlace) -> None:
         """Add two numbers that differ."""
         self.differing += 1
         difference = abs(now - recorded)
@@ -70,7 +70,7 @@ class Deviation:
         self._squares += difference * difference
         if difference > self.greatest:
             self.greatest, self.at = difference, at
-        between = ulps(recorded, now)
+        between = ulp_distance(recorded, now)
         if between > self.ulps:
             self.ulps, self.ulps_at = between, at
 
@@ -90,7 +90,7 @@ class TopicComparison:
         self.name = name
         self.recorded = self.same = self.but_turns = self.different = 0
         """Messages in the bag: the same, the same up to whole turns, and different."""
-        self.gone = self.not_recorded = 0
+        self.not_reproduced = self.not_recorded = 0
         """Messages in the bag that were not reproduced, and the reverse."""
         self.deviations: dict[Key, Deviation] = {}
         self.only_recorded: dict[str, None] = {}
@@ -108,19 +108,19 @@ class TopicComparison:
             return
         # Look deviations up only when the layout changes, which is rare.
         if values.keys is not self._last:
-            self.settle()
+            self.update_deviations()
             self._last = values.keys
         self._in_last += 1
 
-    def settle(self) -> None:
+    def update_deviations(self) -> None:
         """Include the reproduced messages in the deviations."""
         for key in self._last if self._in_last else ():
             self.deviations.setdefault(key, Deviation()).compared += self._in_last
         self._in_last = 0
 
     def add_different(
-        self, recorded: bytes, now: bytes, at: At, turning: Mapping[str, bool]
-    ) -> First | None:
+        self, recorded: bytes, now: bytes, at: TickPlace, turning: Mapping[str, bool]
+    ) -> FirstDifference | None:
         """
         Add two different messages; return their first difference.
 
@@ -138,13 +138,13 @@ class TopicComparison:
         then, again = self._then.read(recorded), self._now.read(now)
         if isinstance(then, str) or isinstance(again, str):
             self.different += 1
-            return First(at, self.name, f'a message that cannot be read: {then}')
+            return FirstDifference(at, self.name, f'a message that cannot be read: {then}')
         numbers = dict(zip(again.keys, again.numbers, strict=True))
-        numbers |= _unturned(then, numbers, turning)
+        numbers |= _without_turns(then, numbers, turning)
         apart = [
             (key, number, numbers[key])
             for key, number in zip(then.keys, then.numbers, strict=True)
-            if key in numbers and not _equal(number, numbers[key])
+            if key in numbers and not _is_identical(number, numbers[key])
         ]
         if not apart and turning and (then.stamp, then.keys) == (again.stamp, again.keys):
             self.but_turns += 1
@@ -154,14 +154,14 @@ class TopicComparison:
             if key in numbers:
                 self.deviations.setdefault(key, Deviation()).compared += 1
         for key, number, other in apart:
-            self.deviations[key].add(number, other, at)
+            self.deviations[key].add_difference(number, other, at)
         if then.names != again.names:
             self.only_recorded |= dict.fromkeys(n for n in then.names if n not in again.names)
             self.only_now |= dict.fromkeys(n for n in again.names if n not in then.names)
         if apart:
             (joint, quantity), number, other = apart[0]
-            return First(at, self.name, quantity, joint, number, other)
-        return First(at, self.name, _why(then, again))
+            return FirstDifference(at, self.name, quantity, joint, number, other)
+        return FirstDifference(at, self.name, _difference_text(then, again))
 
 
 class Comparison:
@@ -183,29 +183,31 @@ class Comparison:
         self.topics = [TopicComparison(name, kind) for name, kind in topics]
         self.ticks = self.differing = 0
         """Numbers of compared and of different ticks."""
-        self.withheld = 0
+        self.suppressed = 0
         """Numbers of ticks without a message, recorded and now."""
-        self.first: First | None = None
-        self.last: At | None = None
+        self.first: FirstDifference | None = None
+        self.last: TickPlace | None = None
         """Last tick that differs."""
         self._turning = turning or {}
 
-    def add(self, at: At, recorded: Sequence[bytes], now: Sequence[bytes]) -> None:
+    def add_tick(self, at: TickPlace, recorded: Sequence[bytes], now: Sequence[bytes]) -> None:
         """Add a tick: a message for each topic, empty if there is none."""
         self.ticks += 1
-        first_difference: First | None = None
+        first_difference: FirstDifference | None = None
         silent = not any(recorded)
         if silent and not any(now):
-            self.withheld += 1
+            self.suppressed += 1
             return
         for topic, then, again in zip(self.topics, recorded, now, strict=True):
-            difference: First | None = None
+            difference: FirstDifference | None = None
             if not then:
                 if again:
                     topic.not_recorded += 1
                     # If other messages of the tick are there, the recorder had to drop this one.
                     if silent:
-                        difference = First(at, topic.name, 'withheld then, published now')
+                        difference = FirstDifference(
+                            at, topic.name, 'withheld then, published now'
+                        )
             else:
                 topic.recorded += 1
                 if then == again:
@@ -213,36 +215,36 @@ class Comparison:
                 elif again:
                     difference = topic.add_different(then, again, at, self._turning)
                 else:
-                    topic.gone += 1
-                    difference = First(at, topic.name, 'published then, nothing now')
+                    topic.not_reproduced += 1
+                    difference = FirstDifference(at, topic.name, 'published then, nothing now')
             first_difference = first_difference or difference
         if first_difference:
             self.differing += 1
             self.first = self.first or first_difference
             self.last = at
 
-    def settle(self) -> None:
+    def update_deviations(self) -> None:
         """Bring the deviations up to date; call this before reading them."""
         for topic in self.topics:
-            topic.settle()
+            topic.update_deviations()
 
 
-def ulps(a: float, b: float) -> int:
+def ulp_distance(a: float, b: float) -> int:
     """Return the number of steps from one double to another; 0 between -0 and 0."""
-    return abs(_rank(a) - _rank(b))
+    return abs(_ulp_rank(a) - _ulp_rank(b))
 
 
-def _rank(value: float) -> int:
+def _ulp_rank(value: float) -> int:
     (bits,) = _BITS.unpack(_DOUBLE.pack(value))
     return int(bits) if bits >= 0 else -(int(bits) + 2**63)
 
 
-def _equal(a: float, b: float) -> bool:
+def _is_identical(a: float, b: float) -> bool:
     """Return whether two numbers are the same, including the sign of zero."""
     return (a == b and copysign(1.0, a) == copysign(1.0, b)) or (isnan(a) and isnan(b))
 
 
-def _unturned(
+def _without_turns(
     then: MessageContent, numbers: Mapping[Key, float], turning: Mapping[str, bool]
 ) -> dict[Key, float]:
     """Return the positions, with whole-turn differences replaced by the recorded values."""
@@ -258,7 +260,7 @@ def _unturned(
     return unturned
 
 
-def _why(then: MessageContent, again: MessageContent) -> str:
+def _difference_text(then: MessageContent, again: MessageContent) -> str:
     """Return the difference of two messages whose numbers are equal, as text."""
     if then.names != again.names:
         return f'joints: {", ".join(then.names)} then, {", ".join(again.names)} now'

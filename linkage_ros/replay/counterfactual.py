@@ -62,7 +62,7 @@ _LARGEST_LEAD = 2 * 3600 * 1_000_000_000
 """Bound on the lead of a sample's stamp over its tick, in [ns]."""
 
 
-class Remade(NamedTuple):
+class CounterfactualTick(NamedTuple):
     """A tick of the other scene."""
 
     # Time of the tick, and the time it is solved for, in [ns].
@@ -73,7 +73,7 @@ class Remade(NamedTuple):
 
 
 HeardEvent = SampleEvent | FaultEvent | ResetEvent | TickEvent
-ReplayEvent = SampleEvent | FaultEvent | ResetEvent | Remade
+ReplayEvent = SampleEvent | FaultEvent | ResetEvent | CounterfactualTick
 
 
 def check_drives(scene: Scene, where: str) -> None:
@@ -111,29 +111,31 @@ class Counterfactual:
 
     def __init__(self, scene: Scene, recorded: Scene | None) -> None:
         self._scene = scene
-        self._followed: set[str] = set()
+        self._shared_faults: set[str] = set()
         # Under torque the linkage moves without commands, too.
-        self._goes_on = scene.linkages[0].drive[0] == 'torque'
+        self._moves_without_samples = scene.linkages[0].drive[0] == 'torque'
         if recorded is not None:
-            self._followed = {
+            self._shared_faults = {
                 name for name, fault in scene.faults.items() if recorded.faults.get(name) == fault
             }
-        self._injection = self._inject()
+        self._injection = self._make_injection()
         self._pipeline = Pipeline(scene, None, self._injection)
         self._closures = self._pipeline.closures
         self.extras = self._pipeline.extras
         """Auxiliary topics of the scene."""
-        self.withholds = self._pipeline.suppresses_ticks
+        self.suppresses_ticks = self._pipeline.suppresses_ticks
         """Whether ticks without a message may matter to a replay."""
-        self._seen = self._last = 0  # the log times of the last event, and of what was written
+        self._last_event_time = self._last_written = (
+            0  # the log times of the last event, and of what was written
+        )
         self._period = round(1e9 / scene.rate) if scene.rate else 0
         theirs = recorded.rate if recorded is not None else 0.0
-        self._clocked = theirs > 0.0
+        self._recorded_has_rate = theirs > 0.0
         self._same_rate = theirs == scene.rate
         self._slack = min(self._period, round(1e9 / theirs)) // 2 if theirs else 0
         self._due: int | None = None
 
-    def _inject(self) -> Injection | None:
+    def _make_injection(self) -> Injection | None:
         if not self._scene.faults:
             return None
         from linkage_ros.faults import (
@@ -142,7 +144,7 @@ class Counterfactual:
 
         return Injection(
             {
-                name: replace(fault, at=()) if name in self._followed else fault
+                name: replace(fault, at=()) if name in self._shared_faults else fault
                 for name, fault in self._scene.faults.items()
             }
         )
@@ -152,31 +154,31 @@ class Counterfactual:
         heard = (event for event in events if not isinstance(event, WrenchEvent))
         return self._on_clock(heard) if self._period else self._on_samples(heard)
 
-    def withheld(self, tick: Tick) -> bool:
+    def must_record(self, tick: Tick) -> bool:
         """Return whether a tick without a message is one that a replay has to know of."""
         published = tick.message or tick.extras
-        return self.withholds and not published and self._pipeline.changes_state(tick)
+        return self.suppresses_ticks and not published and self._pipeline.changes_state(tick)
 
     def _on_samples(self, events: Iterable[HeardEvent]) -> Iterator[ReplayEvent]:
-        made: Remade | None = None  # its recorded messages may follow
+        made: CounterfactualTick | None = None  # its recorded messages may follow
         for event in events:
             if isinstance(event, TickEvent):
                 if made is not None and made.time == event.time:
                     yield made._replace(recorded=event.messages)
                     made = None
                 else:
-                    yield Remade(event.log_time, event.time, event.messages, None)
+                    yield CounterfactualTick(event.log_time, event.time, event.messages, None)
                 continue
             if made is not None:
                 yield made
                 made = None
             if isinstance(event, FaultEvent):
-                yield from self._follow(event)
+                yield from self._follow_fault(event)
             elif isinstance(event, ResetEvent):
-                yield self._reset(event)
-            elif (yield from self._offer(event)):
-                now = self._clock(event.log_time)
-                made = self._tick(now, self._pipeline.newest_stamp, ())
+                yield self._reset_pipeline(event)
+            elif (yield from self._offer_sample(event)):
+                now = self._faulty_time(event.log_time)
+                made = self._run_tick(now, self._pipeline.newest_stamp, ())
         if made is not None:
             yield made
 
@@ -185,131 +187,133 @@ class Counterfactual:
         for event in events:
             at = event.log_time
             if taken is not None and taken != at:
-                yield from self._known(taken, taken, ())
+                yield from self._tick_when_due(taken, taken, ())
                 taken = None
-            if at < self._seen:
-                yield from self._catch_up(self._seen + 1)
+            if at < self._last_event_time:
+                yield from self._catch_up(self._last_event_time + 1)
                 self._due = None
             if isinstance(event, TickEvent):
-                yield from self._known(at, event.time, event.messages)
+                yield from self._tick_when_due(at, event.time, event.messages)
                 taken = None
-                self._seen = at
+                self._last_event_time = at
                 continue
             yield from self._catch_up(at)
-            self._seen = at
+            self._last_event_time = at
             if isinstance(event, FaultEvent):
-                yield from self._follow(event)
+                yield from self._follow_fault(event)
                 continue
             if isinstance(event, ResetEvent):
-                yield self._reset(event)
+                yield self._reset_pipeline(event)
                 continue
-            yield from self._offer(event)
-            if self._clocked:
+            yield from self._offer_sample(event)
+            if self._recorded_has_rate:
                 taken = at
             elif self._due is None:
                 self._due = at
         if taken is not None:
-            yield from self._known(taken, taken, ())
-        yield from self._catch_up(self._seen + 1)
+            yield from self._tick_when_due(taken, taken, ())
+        yield from self._catch_up(self._last_event_time + 1)
 
-    def _known(
+    def _tick_when_due(
         self, log_time: int, at: int, recorded: tuple[bytes, ...]
-    ) -> Iterator[FaultEvent | Remade]:
+    ) -> Iterator[FaultEvent | CounterfactualTick]:
         """Tick at a tick of the run, if it is due; times in [ns]."""
         yield from self._catch_up(at)
         due = self._due
         if due is not None and at < due - self._slack and not self._same_rate:
             if recorded:
-                yield Remade(log_time, at, recorded, None)
+                yield CounterfactualTick(log_time, at, recorded, None)
             return
-        yield from self._change(log_time)
-        yield from self._tick_unless_back(self._clock(log_time), self._clock(at), recorded)
+        yield from self._change_faults(log_time)
+        yield from self._tick_unless_back(
+            self._faulty_time(log_time), self._faulty_time(at), recorded
+        )
         self._due = (at if due is None or self._same_rate else due) + self._period
 
-    def _catch_up(self, to: int) -> Iterator[FaultEvent | Remade]:
+    def _catch_up(self, to: int) -> Iterator[FaultEvent | CounterfactualTick]:
         """Compute the ticks that were due before a time, in [ns]."""
         while (due := self._due) is not None and due + self._slack < to:
-            if self._goes_on:
-                ticks = due - self._seen <= _LONGEST_GAP
+            if self._moves_without_samples:
+                ticks = due - self._last_event_time <= _LONGEST_GAP
             else:
-                age = self._clock(due) - self._pipeline.newest_stamp
+                age = self._faulty_time(due) - self._pipeline.newest_stamp
                 ticks = -_LARGEST_LEAD <= age <= self._pipeline.max_age
             # Without a crank state, ticks have no result, however many there are; and the times of
             # a damaged bag may span years.
             if not ticks:
                 self._due = due + -(-(to - self._slack - due) // self._period) * self._period
                 return
-            now = max(due, self._seen)
-            yield from self._change(now)
-            now = self._clock(now)
+            now = max(due, self._last_event_time)
+            yield from self._change_faults(now)
+            now = self._faulty_time(now)
             yield from self._tick_unless_back(now, now, ())
             self._due = due + self._period
 
     def _tick_unless_back(
         self, now: int, at: int, recorded: tuple[bytes, ...]
-    ) -> Iterator[Remade]:
+    ) -> Iterator[CounterfactualTick]:
         """Tick; after a backward jump of time there is no crank state until the next sample."""
-        if now >= self._last:
-            yield self._tick(now, at, recorded)
+        if now >= self._last_written:
+            yield self._run_tick(now, at, recorded)
         elif recorded:
-            yield Remade(now, at, recorded, None)
+            yield CounterfactualTick(now, at, recorded, None)
 
-    def _tick(self, now: int, at: int, recorded: tuple[bytes, ...]) -> Remade:
+    def _run_tick(self, now: int, at: int, recorded: tuple[bytes, ...]) -> CounterfactualTick:
         if at >= TIME_END:
-            return Remade(now, at, recorded, None)
+            return CounterfactualTick(now, at, recorded, None)
         tick = self._pipeline.tick(at)
-        if tick.message or tick.extras or self.withheld(tick):
-            self._last = now
-        return Remade(now, at, recorded, tick)
+        if tick.message or tick.extras or self.must_record(tick):
+            self._last_written = now
+        return CounterfactualTick(now, at, recorded, tick)
 
-    def _offer(self, event: SampleEvent) -> Generator[SampleEvent | FaultEvent, None, bool]:
+    def _offer_sample(self, event: SampleEvent) -> Generator[SampleEvent | FaultEvent, None, bool]:
         """Offer a sample; return whether it was good."""
-        yield from self._change(event.log_time)
-        now = self._clock(event.log_time)
-        self._write_at(now)
+        yield from self._change_faults(event.log_time)
+        now = self._faulty_time(event.log_time)
+        self._advance_written(now)
         good = self._pipeline.offer(event.data, now) is None
         yield event._replace(log_time=now)
         return good
 
-    def _reset(self, event: ResetEvent) -> ResetEvent:
+    def _reset_pipeline(self, event: ResetEvent) -> ResetEvent:
         """Reset where the run did."""
-        self._last = now = self._clock(event.log_time)
+        self._last_written = now = self._faulty_time(event.log_time)
         self._pipeline = Pipeline(self._scene, self._closures, self._injection)
         return ResetEvent(now, now, event.data)
 
-    def _follow(self, event: FaultEvent) -> Iterator[FaultEvent]:
+    def _follow_fault(self, event: FaultEvent) -> Iterator[FaultEvent]:
         """Let a fault begin or end as in the run."""
         try:
             name, on = read_change(event.data)
         except ValueError:
             return
-        if self._injection is None or name not in self._followed:
+        if self._injection is None or name not in self._shared_faults:
             return
         # The times of the bag already contain the effect of a time jump.
         if self._scene.faults[name].kind != 'time_jump':
             self._injection.switch_fault(name, on)
-        now = self._clock(event.log_time)
-        self._write_at(now)
+        now = self._faulty_time(event.log_time)
+        self._advance_written(now)
         yield FaultEvent(now, now, event.data)
 
-    def _change(self, now: int) -> Iterator[FaultEvent]:
+    def _change_faults(self, now: int) -> Iterator[FaultEvent]:
         """Let faults of this scene begin and end at a time, in [ns]."""
         if self._injection is None:
             return
         for change in self._injection.advance(now):
-            shifted = self._clock(now)
-            self._write_at(shifted)
+            shifted = self._faulty_time(now)
+            self._advance_written(shifted)
             text = change_text(change, self._scene.faults[change.name].kind)
             yield FaultEvent(shifted, shifted, text_message(text))
 
-    def _clock(self, time: int) -> int:
+    def _faulty_time(self, time: int) -> int:
         return time if self._injection is None else self._injection.tick_time(time)
 
-    def _write_at(self, now: int) -> None:
+    def _advance_written(self, now: int) -> None:
         """Reset where the written time jumps back; a replay resets there too."""
-        if now < self._last:
+        if now < self._last_written:
             self._pipeline = Pipeline(self._scene, self._closures, self._injection)
-        self._last = now
+        self._last_written = now
 
 
 def find_crank_topic(
@@ -346,8 +350,8 @@ def find_crank_topic(
     """
     drive = scene.linkages[0].drive[0]
     readers = {
-        topic: [_reader(member, scene.dependent_joints) for member in scene.linkages]
-        for topic in _candidates(bag, drive, run, recorded, typed)
+        topic: [_sample_reader(member, scene.dependent_joints) for member in scene.linkages]
+        for topic in _candidate_topics(bag, drive, run, recorded, typed)
     }
     if drive == 'torque' and len(readers) == 1:
         return next(iter(readers))  # also where no command came: the linkage moved without
@@ -387,16 +391,18 @@ def find_crank_topic(
             'its run took no commands, which a torque drive needs',
             'name their topic with --crank-topic, or write drive: {topic: {}}',
         )
-    raise _none(bag, inputs, list(readers), list(names))
+    raise _no_samples_error(bag, inputs, list(readers), list(names))
 
 
-def _reader(member: SceneLinkage, dependent: Collection[str]) -> Callable[[bytes], object]:
-    if member.drive[0] == 'torque':
-        return JointEffortReader(member.input_names[0], dependent).read
-    return JointStateReader(member.sampled_joints).read
+def _sample_reader(
+    scene_linkage: SceneLinkage, dependent: Collection[str]
+) -> Callable[[bytes], object]:
+    if scene_linkage.drive[0] == 'torque':
+        return JointEffortReader(scene_linkage.input_names[0], dependent).read
+    return JointStateReader(scene_linkage.sampled_joints).read
 
 
-def _candidates(
+def _candidate_topics(
     bag: Bag, drive: str, run: RunMetadata, recorded: Scene | None, typed: str | None
 ) -> Sequence[str]:
     held = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
@@ -418,7 +424,7 @@ def _candidates(
     return held
 
 
-def _none(
+def _no_samples_error(
     bag: Bag, inputs: Sequence[str], topics: Sequence[str], names: Sequence[str]
 ) -> BagError:
     """Return an error message with the missing joints and the existing topics."""

@@ -161,7 +161,7 @@ def read_announced(message: bytes, topic: str) -> AnnouncedScene:
     )
 
 
-def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
+def replay_ticks(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
     """Run a scene on a bag's samples; yield every tick with a message in the bag."""
     for tick in replay_all(bag, scene, bag.messages()):
         if tick.recorded or any(tick.recorded_extras):
@@ -208,7 +208,7 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
             if event.number < len(pipeline.wrenches):
                 pipeline.wrenches[event.number].offer_wrench(event.data, event.log_time)
         elif injection is not None:
-            turn(bag, injection, event.data)
+            turn_fault(bag, injection, event.data)
 
 
 def own_joint_states(scene: Scene) -> OwnJointStates:
@@ -243,7 +243,7 @@ def read_change(message: bytes) -> tuple[str, bool]:
     return name, on
 
 
-def turn(bag: Bag, injection: Injection, message: bytes) -> None:
+def turn_fault(bag: Bag, injection: Injection, message: bytes) -> None:
     """Turn a fault on or off by a message of a bag; raise `BagError` if that is impossible."""
     try:
         injection.switch_fault(*read_change(message))

@@ -59,7 +59,7 @@ def scene_files(
         BEGUN: begun,
         SEED: scene.seed,
         # A replay must use the same solver.
-        **({CHOSEN: chosen} if (chosen := _chosen(lines)) else {}),
+        **({CHOSEN: chosen} if (chosen := _chosen_solvers(lines)) else {}),
         **({USER_EFFECTS: own} if (own := user_effects_here(scene)) else {}),
         'linkage_ros': __version__,
         'python': platform.python_version(),
@@ -76,7 +76,7 @@ def _scene_folder(scene: Scene, bag: Path | None) -> dict[str, str]:
     return {'scene_folder': str(folder if bag is None else os.path.relpath(folder, bag.resolve()))}
 
 
-def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:
+def _chosen_solvers(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:
     """Return the chosen solver of each linkage that has one, by name of the linkage."""
     return {
         line.scene_linkage.name: {line.solver_choice.solver: line.solver_choice.parameters}
@@ -85,7 +85,7 @@ def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str
     }
 
 
-def attachments(files: Mapping[str, bytes]) -> dict[str, tuple[str, bytes]]:
+def to_attachments(files: Mapping[str, bytes]) -> dict[str, tuple[str, bytes]]:
     """Return such files as attachments of a bag, each with its media type."""
     return {
         name: ('application/json' if name == RUN_FILE else 'application/yaml', data)

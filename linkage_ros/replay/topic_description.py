@@ -67,7 +67,7 @@ def message_type(name: str, key: str) -> Any:
     )
 
 
-def described(name: str, message_class: Any, qos: QosProfile) -> Topic:
+def describe_topic(name: str, message_class: Any, qos: QosProfile) -> Topic:
     """
     Describe a topic for a bag.
 
@@ -88,7 +88,7 @@ def described(name: str, message_class: Any, qos: QosProfile) -> Topic:
     """
     package, kind = message_class.__module__.split('.')[0], message_class.__name__
     texts: dict[str, str] = {}
-    _collect(message_class, package, kind, texts)
+    _collect_definitions(message_class, package, kind, texts)
     first, *others = texts
     definition = texts[first] + ''.join(
         f'{_SEPARATOR}MSG: {other}\n{texts[other]}' for other in others
@@ -96,25 +96,27 @@ def described(name: str, message_class: Any, qos: QosProfile) -> Topic:
     return Topic(name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), qos)
 
 
-def _collect(message_class: Any, package: str, kind: str, texts: dict[str, str]) -> None:
+def _collect_definitions(
+    message_class: Any, package: str, kind: str, texts: dict[str, str]
+) -> None:
     """Collect the text of a type and, after it, those of all types that it contains."""
     if f'{package}/{kind}' in texts:
         return
-    texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
+    texts[f'{package}/{kind}'] = _installed_file(package, f'{kind}.msg').read_text('utf-8')
     nested = _NESTED.findall(' '.join(message_class.get_fields_and_field_types().values()))
     # Sorted by full name, as rosbag2 does.
     for other, other_kind in sorted(nested):
         other_class = message_type(f'{other}/msg/{other_kind}', f'{package}/msg/{kind}')
-        _collect(other_class, other, other_kind, texts)
+        _collect_definitions(other_class, other, other_kind, texts)
 
 
 def _type_hash(package: str, kind: str) -> str:
-    described = json.loads(_share(package, f'{kind}.json').read_text('utf-8'))
+    described = json.loads(_installed_file(package, f'{kind}.json').read_text('utf-8'))
     hashes = {entry['type_name']: entry['hash_string'] for entry in described['type_hashes']}
     return str(hashes[f'{package}/msg/{kind}'])
 
 
-def _share(package: str, file: str) -> Path:
+def _installed_file(package: str, file: str) -> Path:
     for folder in share_folders(package):
         if (folder / 'msg' / file).is_file():
             return folder / 'msg' / file

@@ -30,8 +30,8 @@ from linkage_ros.kinematics.results import Position, SingularityMargin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.replay.compare import At, Comparison, First
-from linkage_ros.replay.replay import replay, replay_all, ReplayedTick
+from linkage_ros.replay.compare import Comparison, FirstDifference, TickPlace
+from linkage_ros.replay.replay import replay_all, replay_ticks, ReplayedTick
 from linkage_ros.scene.scene import Scene, SceneLinkage
 
 IDENTICAL, DIFFERENT, UNDECIDED = 'identical', 'different', 'cannot be told'
@@ -50,12 +50,12 @@ class ReplayVerification(NamedTuple):
     comparison: Comparison  # Comparison of the ticks that could be compared
     # Number of ticks at the start that cannot be judged, since the bag lacks the start of the run.
     undecided: int
-    first_undecided: First | None  # First difference of the first such tick
-    beginning: str  # Reason why the start of the run is missing; '' if it is there
-    lost: tuple[str, ...]  # Drives and effects that then never reproduce the run
+    first_undecided: FirstDifference | None  # First difference of the first such tick
+    missing_start: str  # Reason why the start of the run is missing; '' if it is there
+    unrecoverable: tuple[str, ...]  # Drives and effects that then never reproduce the run
 
     @property
-    def ticks(self) -> int:
+    def tick_count(self) -> int:
         """Return the number of ticks in the bag."""
         return self.comparison.ticks + self.undecided
 
@@ -66,7 +66,7 @@ class ReplayVerification(NamedTuple):
         if self.undecided and not comparison.ticks:
             return UNDECIDED
         if comparison.differing:
-            return UNDECIDED if self.lost else DIFFERENT
+            return UNDECIDED if self.unrecoverable else DIFFERENT
         return IDENTICAL
 
 
@@ -106,16 +106,16 @@ def verify_replay(
         observe(replayed)
         recorded = (joint_states, *extras)
         now = (tick.message, *tick.extras, *silent)[: len(topics)]
-        at = At(number, time)
+        at = TickPlace(number, time)
         if not in_step:
-            probe.add(at, recorded, now)
+            probe.add_tick(at, recorded, now)
             in_step = probe.last != at and any(recorded)
             if not in_step:
                 undecided += 1
                 continue
-        comparison.add(at, recorded, now)
-    comparison.settle()
-    lost = _lost(scene) if beginning else ()
+        comparison.add_tick(at, recorded, now)
+    comparison.update_deviations()
+    lost = _lost_state(scene) if beginning else ()
     return ReplayVerification(
         comparison, undecided, probe.first if undecided else None, beginning, lost
     )
@@ -123,10 +123,12 @@ def verify_replay(
 
 def beginning_text(proof: ReplayVerification) -> str:
     """Return text on the ticks that cannot be judged in a bag without the start of its run."""
-    text = f'{proof.beginning}: what the node remembered then is not in it, so {proof.undecided} '
-    text += f'of {proof.ticks} ticks, at the start, could not be told'
-    if proof.verdict == UNDECIDED and proof.lost:
-        text += f'; {" and ".join(proof.lost)} cannot come to the same again'
+    text = (
+        f'{proof.missing_start}: what the node remembered then is not in it, so {proof.undecided} '
+    )
+    text += f'of {proof.tick_count} ticks, at the start, could not be told'
+    if proof.verdict == UNDECIDED and proof.unrecoverable:
+        text += f'; {" and ".join(proof.unrecoverable)} cannot come to the same again'
     return text
 
 
@@ -141,7 +143,7 @@ def turning_joints(scene: Scene) -> dict[str, bool]:
     return revolute
 
 
-def _lost(scene: Scene) -> tuple[str, ...]:
+def _lost_state(scene: Scene) -> tuple[str, ...]:
     named = []
     for member in scene.linkages:
         drive, parameters = member.drive
@@ -168,7 +170,7 @@ def _lost(scene: Scene) -> tuple[str, ...]:
 _REPORT_EVERY = 1024
 
 
-class Place(NamedTuple):
+class StatePlace(NamedTuple):
     """A state of a run."""
 
     time: int  # Time that was solved for, in [ns]
@@ -179,19 +181,19 @@ class WorstResiduals(NamedTuple):
     """The worst states of a linkage over a run."""
 
     # The linkage in its scene, and its closure.
-    member: SceneLinkage
+    scene_linkage: SceneLinkage
     closure: Closure
     states: int  # Number of states that closed, and so were examined
     # Number of these at a toggle, and number of these beyond joint limits.
     toggles: int
     limited: int
     # Greatest `Closure.residual`, in [m], and its place; None without states.
-    residual: tuple[float, Place] | None
+    residual: tuple[float, StatePlace] | None
     # The singularity measures at the least conditioning, and the place.
-    nearest: tuple[SingularityMargin, Place] | None
+    nearest: tuple[SingularityMargin, StatePlace] | None
 
 
-class Examined(NamedTuple):
+class ExaminedRun(NamedTuple):
     """Result of running a scene again on its bag."""
 
     linkages: tuple[WorstResiduals, ...]  # The worst states of each linkage
@@ -201,9 +203,9 @@ class Examined(NamedTuple):
     stopped: bool  # Whether the examination was stopped early
 
 
-def examine(
+def examine_states(
     bag: Bag, scene: Scene, progress: Callable[[int], None], stopped: Callable[[], bool]
-) -> Examined:
+) -> ExaminedRun:
     """
     Run a scene again on its bag and examine every state; memory does not grow with them.
 
@@ -227,13 +229,13 @@ def examine(
     joint_states = same = number = 0
     damage, halted = '', False
     try:
-        for number, (time, recorded, _, tick) in enumerate(replay(bag, scene), 1):
+        for number, (time, recorded, _, tick) in enumerate(replay_ticks(bag, scene), 1):
             if recorded:
                 joint_states += 1
                 same += recorded == tick.message
             for watch, (crank, position, _, _) in zip(watched, tick.full_states, strict=True):
                 if crank is not None and position is not None and position.joints:
-                    watch.add(time, crank.angles, position)
+                    watch.add_state(time, crank.angles, position)
             if not number % _REPORT_EVERY:
                 progress(number)
                 if stopped():
@@ -241,8 +243,8 @@ def examine(
                     break
     except BagError as error:
         damage = f'{error.where}: {error.reason}'
-    linkages = tuple(watch.found() for watch in watched)
-    return Examined(linkages, joint_states, same, damage, halted)
+    linkages = tuple(watch.worst_residuals() for watch in watched)
+    return ExaminedRun(linkages, joint_states, same, damage, halted)
 
 
 class _Watch:
@@ -264,22 +266,22 @@ class _Watch:
         self.of, self.closure = member, closure
         self._states = self._toggles = self._limited = 0
         self._worst, self._least = -1.0, inf
-        self._place: Place | None = None
-        self._nearest: tuple[SingularityMargin, Place] | None = None
+        self._place: StatePlace | None = None
+        self._nearest: tuple[SingularityMargin, StatePlace] | None = None
 
-    def add(self, time: int, inputs: Sequence[float], position: Position) -> None:
+    def add_state(self, time: int, inputs: Sequence[float], position: Position) -> None:
         self._states += 1
         self._toggles += position.status is Status.TOGGLE
         self._limited += position.status is Status.LIMITED
         residual = self.closure.residual(position)
         if residual > self._worst:
-            self._worst, self._place = residual, Place(time, tuple(inputs))
+            self._worst, self._place = residual, StatePlace(time, tuple(inputs))
         nearness = self.closure.singularity_margin(position)
         if nearness.conditioning < self._least:
             self._least = nearness.conditioning
-            self._nearest = nearness, Place(time, tuple(inputs))
+            self._nearest = nearness, StatePlace(time, tuple(inputs))
 
-    def found(self) -> WorstResiduals:
+    def worst_residuals(self) -> WorstResiduals:
         residual = (self._worst, self._place) if self._place else None
         return WorstResiduals(
             self.of,

@@ -23,7 +23,7 @@ from linkage_ros.drives.dependent_samples import crank_of, sampled_inverse
 from linkage_ros.errors import BagError
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
-from linkage_ros.replay.replay import read_change, turn
+from linkage_ros.replay.replay import read_change, turn_fault
 from linkage_ros.report.blocks import Rows
 from linkage_ros.report.decimation import Flags, Numbers, Times
 from linkage_ros.report.labels import short
@@ -177,7 +177,7 @@ class SampleJudge:
         try:
             if injection is None:
                 return
-            turn(self._bag, injection, message)
+            turn_fault(self._bag, injection, message)
             name, on = read_change(message)
         except (BagError, ValueError):
             return

@@ -33,8 +33,8 @@ from linkage_ros.messages.single_values import text_message
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.replay import change_text
-from linkage_ros.replay.run_files import attachments, EXTRA, scene_files
-from linkage_ros.replay.topic_description import described, message_type
+from linkage_ros.replay.run_files import EXTRA, scene_files, to_attachments
+from linkage_ros.replay.topic_description import describe_topic, message_type
 from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import heeded
 
@@ -149,7 +149,7 @@ def simulate(
     files = scene_files(scene, named, WITH_THE_RUN, first.linkages, folder)
     # A signal ends the run between two ticks: raised here, it would cut a record of the bag.
     with heeded():
-        writer = BagWriter(folder, [topic for _, topic in topics], attachments(files))
+        writer = BagWriter(folder, [topic for _, topic in topics], to_attachments(files))
         recording = _Recording(writer, len(topics))
         loop.recorder = cast('Recorder', recording)
         try:
@@ -215,6 +215,6 @@ def _topics(loop: TickLoop, pipeline: Pipeline) -> list[tuple[str, Topic]]:
     for handle, extra in zip(handles.extras, pipeline.extras, strict=True):
         found[handle] = EXTRA, extra.topic.replace('~', _NODE, 1), extra.message, QosProfile()
     return [
-        (key, described(name, message_type(kind, 'scene'), qos))
+        (key, describe_topic(name, message_type(kind, 'scene'), qos))
         for _, (key, name, kind, qos) in sorted(found.items())
     ]

@@ -22,7 +22,7 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.replay.replay import recorded_scene, replay
+from linkage_ros.replay.replay import recorded_scene, replay_ticks
 import numpy as np
 import pytest
 
@@ -88,7 +88,7 @@ class Run:
     def replayed(self) -> list[tuple[bytes, bytes]]:
         self.recorder.stop()
         bag = read_bag(self.folder)
-        return [(r.recorded, r.tick.message) for r in replay(bag, recorded_scene(bag))]
+        return [(r.recorded, r.tick.message) for r in replay_ticks(bag, recorded_scene(bag))]
 
 
 @pytest.mark.parametrize(
@@ -161,7 +161,7 @@ def test_another_scene_replays_to_other_bytes(tmp_path):
     run.tick(SECOND, SECOND)
     run.recorder.stop()
     other = Run(tmp_path / 'other', 'angles: wrapped\n')
-    (again,) = replay(read_bag(run.folder), other.scene)
+    (again,) = replay_ticks(read_bag(run.folder), other.scene)
     assert again.tick.message != again.recorded
 
 
@@ -174,7 +174,7 @@ def test_motions_replay_beside_their_joint_states_also_where_time_jumps_back(tmp
             run.tick(now, now)
         run.pipeline = Pipeline(run.scene)  # as the tick loop does where time jumps back
     assert run.replayed() == [(message, message) for message in run.published]
-    again = list(replay(read_bag(run.folder), run.scene))
+    again = list(replay_ticks(read_bag(run.folder), run.scene))
     assert [each.recorded_extras for each in again] == [(motion,) for motion in run.motions]
     assert [each.tick.extras for each in again] == [(motion,) for motion in run.motions]
     assert len(run.motions) == 600
@@ -194,7 +194,7 @@ def test_what_the_recorder_had_to_drop_shifts_nothing(tmp_path, ticks_at_first, 
             run.offer(stamp + 250_000, sample(stamp, 0.9 * k, 900.0))
         run.tick(stamp + 250_000, stamp, drop)
     run.recorder.stop()
-    again = list(replay(read_bag(run.folder), run.scene))
+    again = list(replay_ticks(read_bag(run.folder), run.scene))
     assert [bool(each.recorded) for each in again] == [drop != 'joint state' for drop in drops]
     motions = [each.recorded_extras != (b'',) for each in again]
     assert motions == [drop != 'motion' for drop in drops]

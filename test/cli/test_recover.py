@@ -13,7 +13,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay
+from linkage_ros.replay.replay import recorded_scene, replay_ticks
 import pytest
 from rosbags.highlevel import AnyReader
 
@@ -49,7 +49,9 @@ def test_what_is_left_of_a_run_replays_to_the_same_bytes(
     assert any(line.startswith(f'LOST         {file.name} at byte ') for line in lines)
     assert lines[-1] == f'bag          {bag}_recovered'
     recovered = read_bag(tmp_path / 'runs' / 'run_recovered')
-    ticks = [(t.recorded, t.tick.message) for t in replay(recovered, recorded_scene(recovered))]
+    ticks = [
+        (t.recorded, t.tick.message) for t in replay_ticks(recovered, recorded_scene(recovered))
+    ]
     assert len(ticks) > 100
     assert [then for then, _ in ticks] == [now for _, now in ticks]
     for place in (recovered.path, recovered.files[0]):

@@ -30,9 +30,9 @@ from linkage_ros.cli import replay
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.node.run_recording import RunRecording
-from linkage_ros.replay.compare import At, Comparison, ulps
+from linkage_ros.replay.compare import Comparison, TickPlace, ulp_distance
 from linkage_ros.replay.replay import recorded_scene, versions_here
-from linkage_ros.replay.replay import replay as replayed
+from linkage_ros.replay.replay import replay_ticks as replayed
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 import pytest
@@ -502,15 +502,15 @@ NAMES = ['crank', 'slide']
 
 WRITE = JointStateWriter(NAMES).write
 
-AT = At(7, 70)
+AT = TickPlace(7, 70)
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 
 
 def compared(recorded: bytes, now: bytes, turning: tuple[str, ...] = ()) -> Comparison:
     found = Comparison([('/s', JOINT_STATE)], dict.fromkeys(turning, True))
-    found.add(AT, [recorded], [now])
-    found.settle()
+    found.add_tick(AT, [recorded], [now])
+    found.update_deviations()
     return found
 
 
@@ -524,11 +524,11 @@ def test_ulps_are_the_steps_from_one_double_to_the_other(value, steps, towards):
     for _ in repeat(None, steps):
         other = nextafter(other, towards)
     assume(abs(other) != inf)
-    assert ulps(value, other) == ulps(other, value) == steps
+    assert ulp_distance(value, other) == ulp_distance(other, value) == steps
 
 
 def test_the_zeros_are_none_apart():
-    assert ulps(-0.0, 0.0) == 0
+    assert ulp_distance(-0.0, 0.0) == 0
 
 
 @given(st.floats(-3.141, 3.141), st.integers(-10_000, 10_000), st.integers(-10_000, 10_000))
@@ -597,12 +597,14 @@ def test_deviations_are_those_of_all_messages():
     found = Comparison([('/s', JOINT_STATE)])
     positions = [(0.0, 0.0), (0.0, 3.0), (1.0, 1.0), (2.0, -2.0)]
     for number, (then, now) in enumerate(positions, 1):
-        found.add(At(number, number), [WRITE(1, [then, 1], [])], [WRITE(1, [now, 1], [])])
-    found.settle()
+        found.add_tick(
+            TickPlace(number, number), [WRITE(1, [then, 1], [])], [WRITE(1, [now, 1], [])]
+        )
+    found.update_deviations()
     crank = found.topics[0].deviations['crank', 'position']
     assert (crank.compared, crank.differing, crank.greatest) == (4, 2, 4.0)
     assert crank.rms == sqrt((9.0 + 16.0) / 4)
-    assert crank.at == At(4, 4)
+    assert crank.at == TickPlace(4, 4)
     slide = found.topics[0].deviations['slide', 'position']
     assert (slide.compared, slide.differing, slide.rms) == (4, 0, 0.0)
 

@@ -33,7 +33,7 @@ from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.faults import FAULTS
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.replay.replay import recorded_scene, replay
+from linkage_ros.replay.replay import recorded_scene, replay_ticks
 from linkage_ros.scene.load import load_scene
 import pytest
 
@@ -207,7 +207,7 @@ def test_they_replay_to_the_last_bit(recorded, name):
     force, sparse, *_ = done.loop.counts.wrenches
     assert (force.received, sum(force.rejected.values())) == (208, 0)
     assert (sparse.received, sum(sparse.rejected.values())) == (12, 6)
-    again = list(replay(done.bag, recorded_scene(done.bag)))
+    again = list(replay_ticks(done.bag, recorded_scene(done.bag)))
     assert [each.recorded for each in again if each.recorded] == done.published
     extras = [extra for each in again for extra in each.recorded_extras if extra]
     assert extras == done.extras
@@ -234,7 +234,7 @@ print(digest.hexdigest())
 def test_they_replay_so_in_another_process(recorded, name):
     folder, done = recorded(name)
     digest = hashlib.sha256()
-    for each in replay(done.bag, recorded_scene(done.bag)):
+    for each in replay_ticks(done.bag, recorded_scene(done.bag)):
         for message in (each.recorded, *each.recorded_extras):
             digest.update(message)
     again = subprocess.run(
@@ -254,7 +254,7 @@ def test_another_seed_replays_to_other_bytes(recorded, name):
     folder, done = recorded(name)
     other = folder / 'other.yaml'
     other.write_text(SCENES[name].replace('seed: 7', 'seed: 8'))
-    again = [each.tick.message for each in replay(done.bag, load_scene(other))]
+    again = [each.tick.message for each in replay_ticks(done.bag, load_scene(other))]
     assert len(again) > 500
     assert sum(a != b for a, b in zip(again, done.published, strict=False)) > 500
     assert any(a != b for a, b in pairwise(done.published))

@@ -18,7 +18,7 @@ import time
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay
+from linkage_ros.replay.replay import recorded_scene, replay_ticks
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -142,7 +142,7 @@ def test_by_service(graph, folder, drill):
     assert drill.node.end() == 0
     assert 'Traceback' not in drill.node.log
     bag = read_bag(folder / 'drilled')
-    again = list(replay(bag, recorded_scene(bag)))
+    again = list(replay_ticks(bag, recorded_scene(bag)))
     assert len(again) > 1000
     assert all(each.recorded == each.tick.message for each in again)
 

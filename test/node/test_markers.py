@@ -14,7 +14,7 @@ from pathlib import Path
 import re
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay
+from linkage_ros.replay.replay import recorded_scene, replay_ticks
 import pytest
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
@@ -122,7 +122,7 @@ def test_the_bag_holds_them_and_replays_them(folder, graph, write_scene, start, 
     assert any(text.startswith('open') for text in texts)
     bag = read_bag(folder / 'seen')
     alone = seen = 0
-    for tick in replay(bag, recorded_scene(bag)):
+    for tick in replay_ticks(bag, recorded_scene(bag)):
         assert tick.tick.message == tick.recorded
         if any(tick.recorded_extras):
             seen += 1

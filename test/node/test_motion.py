@@ -19,7 +19,7 @@ import time
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay
+from linkage_ros.replay.replay import recorded_scene, replay_ticks
 import pytest
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
@@ -200,7 +200,7 @@ def test_the_bag_holds_it_and_replays_it(folder, write_scene, start, publisher, 
         assert list(kept.velocities) == list(heard.velocities)
         assert list(kept.accelerations) == list(heard.accelerations)
     bag = read_bag(folder / 'm')
-    again = list(replay(bag, recorded_scene(bag)))
+    again = list(replay_ticks(bag, recorded_scene(bag)))
     assert len(again) == len(bagged)
     assert all(each.recorded == each.tick.message for each in again)
     assert all(each.recorded_extras == each.tick.extras for each in again)

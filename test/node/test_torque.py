@@ -24,7 +24,7 @@ import time
 
 from builtin_interfaces.msg import Time
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay
+from linkage_ros.replay.replay import recorded_scene, replay_ticks
 import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -145,7 +145,7 @@ def replays(folder):
     """Return whether the bag in a folder replays to the same bytes, and its joint states."""
     (path,) = folder.iterdir()
     bag = read_bag(path)
-    again = list(replay(bag, recorded_scene(bag)))
+    again = list(replay_ticks(bag, recorded_scene(bag)))
     assert again
     return all(each.recorded == each.tick.message for each in again), len(again)
 

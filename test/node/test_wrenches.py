@@ -18,7 +18,7 @@ from math import nan
 from geometry_msgs.msg import WrenchStamped
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.replay.replay import recorded_scene, replay, replay_all
+from linkage_ros.replay.replay import recorded_scene, replay_all, replay_ticks
 import pytest
 from sensor_msgs.msg import JointState
 
@@ -95,7 +95,7 @@ def test_a_bag_whose_account_names_more_wrenches_than_its_scene_can_be_read(reco
     (member,) = scene.linkages
     loads = replace(member.loads, applied=type(member.loads.applied)())
     bare = replace(scene, members=(replace(member, loads=loads),))
-    assert len(list(replay(done.bag, bare))) == len(done.published)
+    assert len(list(replay_ticks(done.bag, bare))) == len(done.published)
 
 
 def wrench(torque):
@@ -138,7 +138,7 @@ def test_over_the_graph_a_wrench_moves_the_crank_and_what_is_no_number_is_counte
     assert len({state.velocity[0] for state in states[count:]}) == 1, 'nothing pushes it any more'
     assert node.end() == 0
     bag = read_bag(folder / 'pushed')
-    again = list(replay(bag, recorded_scene(bag)))
+    again = list(replay_ticks(bag, recorded_scene(bag)))
     assert len(again) >= len(states)
     assert all(each.recorded == each.tick.message for each in again)
 

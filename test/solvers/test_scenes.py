@@ -18,7 +18,7 @@ from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.replay.replay import replay
+from linkage_ros.replay.replay import replay_ticks
 from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.schema import scene_schema
 from linkage_ros.scene.violations import find_violations
@@ -116,7 +116,7 @@ def test_a_bag_replays_to_the_same_bytes(tmp_path, name):
             run.offer(now, sample(now, 0.007 * number, 3.5))
         run.tick(now, now)
     run.recorder.stop()
-    ticks = list(replay(read_bag(tmp_path / 'bag'), run.scene))
+    ticks = list(replay_ticks(read_bag(tmp_path / 'bag'), run.scene))
     assert len(ticks) == 400
     assert all(tick.recorded == tick.tick.message for tick in ticks)
 
