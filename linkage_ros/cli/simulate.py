@@ -38,16 +38,16 @@ from linkage_ros.scene.notes import scene_notes
 from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
 from linkage_ros.simulation.finished_runs import FinishedRuns
-from linkage_ros.simulation.run import check_simulated, simulate
+from linkage_ros.simulation.run import check_simulated, simulate_run
 from linkage_ros.simulation.study import (
     instants_of,
     Outcome,
-    outcomes,
+    ParameterSweep,
+    run_outcomes,
     runs_of,
     Settings,
     Statistics,
     Study,
-    Sweep,
     sweep_of,
 )
 from linkage_ros.workbench import find_tool
@@ -175,7 +175,7 @@ def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str,
                 stopped_at = number
             return stopped_at is None
 
-        counts = simulate(scene, folder, ticks, goes_on, warnings.append)
+        counts = simulate_run(scene, folder, ticks, goes_on, warnings.append)
     for warning in warnings:
         print(f'linkage simulate: {warning}', file=sys.stderr)
     if stopped_at is not None:
@@ -185,7 +185,7 @@ def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str,
     return counts
 
 
-def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) -> int:
+def _study(arguments: argparse.Namespace, sweeps: Sequence[ParameterSweep], stop: Event) -> int:
     """Run a study; return 1 if a signal stopped it, or no run succeeded."""
     output: Path = arguments.output
     check_output_name(output, (*KINDS, *PICTURES))  # not a folder
@@ -208,8 +208,8 @@ def _study(arguments: argparse.Namespace, sweeps: Sequence[Sweep], stop: Event) 
         workers = max(1, min(arguments.workers or cpu_count() or 1, len(waiting)))
         try:
             with progress('runs') as advance:
-                for number, outcome in outcomes(study, waiting, workers, arguments.dask):
-                    finished.add(number, outcome)
+                for number, outcome in run_outcomes(study, waiting, workers, arguments.dask):
+                    finished.add_run(number, outcome)
                     advance(len(found), len(runs))
                     if stop.is_set():
                         raise StoppedError
@@ -236,7 +236,7 @@ def _written(
     if failed:
         _say(f'{len(failed)} of {len(runs)} runs failed')
     if len(failed) == len(runs):
-        finished.remove()
+        finished.remove_file()
         return 1
     if output.suffix in KINDS:
         heads, rows = _table(scene, runs, found)
@@ -246,7 +246,7 @@ def _written(
     for picture in pictures:
         _draw(scene, arguments.seconds, found, picture)
         print(picture)
-    finished.remove()
+    finished.remove_file()
     return 0
 
 

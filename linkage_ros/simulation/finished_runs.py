@@ -55,11 +55,11 @@ class FinishedRuns:
         self._head = f'{sha256(repr(decides).encode()).hexdigest()}\n'.encode()
         try:
             if self.file.exists():
-                self._read(len(runs))
+                self._read_runs(len(runs))
         except OSError as error:
-            raise self._unusable(error) from None
+            raise self._unusable_error(error) from None
 
-    def _read(self, count: int) -> None:
+    def _read_runs(self, count: int) -> None:
         """Read the runs; of a line that was cut, and behind it, nothing is kept."""
         with self.file.open('r+b') as stream:
             head = stream.readline(len(self._head))
@@ -81,7 +81,7 @@ class FinishedRuns:
                 whole += len(line)
             stream.truncate(whole)
 
-    def add(self, number: int, outcome: Outcome) -> None:
+    def add_run(self, number: int, outcome: Outcome) -> None:
         """Keep the outcome of a run."""
         self.outcomes[number] = outcome
         try:
@@ -92,9 +92,9 @@ class FinishedRuns:
             self._stream.write(_line_of(number, outcome))
             self._stream.flush()
         except OSError as error:
-            raise self._unusable(error) from None
+            raise self._unusable_error(error) from None
 
-    def remove(self) -> None:
+    def remove_file(self) -> None:
         """Remove the file, when the output is written."""
         self.close()
         self.file.unlink(missing_ok=True)
@@ -105,7 +105,7 @@ class FinishedRuns:
             self._stream.close()
             self._stream = None
 
-    def _unusable(self, error: OSError) -> LinkageError:
+    def _unusable_error(self, error: OSError) -> LinkageError:
         return LinkageError(
             self.file, f'cannot be read and written ({error.strerror})', 'name another output'
         )

@@ -86,16 +86,16 @@ def check_simulated(scene: Scene, seconds: float) -> int:
     return ticks
 
 
-def times(scene: Scene, ticks: int) -> Sequence[int]:
+def tick_times(scene: Scene, ticks: int) -> Sequence[int]:
     """Return the times of ticks, in [ns]."""
     return [BEGIN + round(number * 1e9 / scene.rate) for number in range(ticks)]
 
 
-def simulate(
+def simulate_run(
     scene: Scene,
     folder: Path,
     ticks: int,
-    goes_on: Callable[[int], bool],
+    keep_going: Callable[[int], bool],
     warn: Callable[[str], None] = lambda _: None,
 ) -> dict[str, int]:
     """
@@ -132,18 +132,18 @@ def simulate(
     def change_message(change: FaultChange) -> bytes:
         return text_message(change_text(change, kinds[change.name]))
 
-    def published(_message: bytes) -> None:
+    def ignore_message(_message: bytes) -> None:
         """Take a message that nobody receives."""
 
     loop = TickLoop(
         partial(Pipeline, scene, first.closures, first.injection),
         None,
-        published,
+        ignore_message,
         None,
-        [published] * len(first.extras),
+        [ignore_message] * len(first.extras),
         change_message,
     )
-    topics = _topics(loop, first)
+    topics = _bag_topics(loop, first)
     named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
     files = scene_files(scene, named, WITH_THE_RUN, first.linkages, folder)
@@ -153,8 +153,8 @@ def simulate(
         recording = _Recording(writer, len(topics))
         loop.recorder = cast('Recorder', recording)
         try:
-            for number, now in enumerate(times(scene, ticks)):
-                if not number % _ASKED_EVERY and not goes_on(number):
+            for number, now in enumerate(tick_times(scene, ticks)):
+                if not number % _ASKED_EVERY and not keep_going(number):
                     break
                 loop.tick_at(now)
         finally:
@@ -193,7 +193,7 @@ class _Recording:
             self._unflushed = 0
 
 
-def _topics(loop: TickLoop, pipeline: Pipeline) -> list[tuple[str, Topic]]:
+def _bag_topics(loop: TickLoop, pipeline: Pipeline) -> list[tuple[str, Topic]]:
     """Return the topics of the bag, in the order of their handles, each with its key."""
     handles = loop.topics
     found = {

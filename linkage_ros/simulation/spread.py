@@ -49,9 +49,9 @@ def draw_spread(title: str, seconds: float, joints: Sequence[JointSpread], file:
         for number, ((left, right), joint) in enumerate(zip(grid, joints, strict=True)):
             colour = COLOURS[number % len(COLOURS)]
             times = np.linspace(0.0, seconds, joint.values.shape[1])
-            levels = _levels(joint.values)
-            _band(left, times, levels, colour)
-            _band(right, times, levels - levels[_MEDIAN], colour)
+            levels = _percentile_levels(joint.values)
+            _draw_band(left, times, levels, colour)
+            _draw_band(right, times, levels - levels[_MEDIAN], colour)
             left.set_ylabel(f'{picture_text(joint.name, 30)} [{joint.unit}]')
             right.set_ylabel(f'less the median [{joint.unit}]')
         for axes in grid[-1]:
@@ -60,7 +60,7 @@ def draw_spread(title: str, seconds: float, joints: Sequence[JointSpread], file:
         save(figure, file)
 
 
-def _levels(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _percentile_levels(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the percentiles of the runs at each instant; not a number where no run has any."""
     there = ~np.isnan(values).all(axis=0)
     levels = np.full((len(_PERCENTILES), values.shape[1]), np.nan)
@@ -68,7 +68,9 @@ def _levels(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return levels
 
 
-def _band(axes: Any, times: NDArray[np.float64], levels: NDArray[np.float64], colour: str) -> None:
+def _draw_band(
+    axes: Any, times: NDArray[np.float64], levels: NDArray[np.float64], colour: str
+) -> None:
     least, low, middle, high, most = levels
     axes.fill_between(times, least, most, color=colour, alpha=0.15, lw=0, label='all runs')
     axes.fill_between(times, low, high, color=colour, alpha=0.35, lw=0, label='5 to 95 %')

@@ -35,7 +35,7 @@ from linkage_ros.errors import clean, LinkageError, quoted
 from linkage_ros.pipeline.pipeline import LinkageState, Pipeline
 from linkage_ros.pipeline.straight_tick import CompiledState, StateTuple
 from linkage_ros.scene.load import parse_scene
-from linkage_ros.simulation.run import check_simulated, times
+from linkage_ros.simulation.run import check_simulated, tick_times
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,7 +50,7 @@ QUANTITIES = ('', ' rate', ' effort')
 Settings = tuple[tuple[str, float], ...]
 
 
-class Sweep(NamedTuple):
+class ParameterSweep(NamedTuple):
     """A key of a scene as for ``--set``, and the values that it takes."""
 
     key: str
@@ -94,7 +94,7 @@ class Outcome(NamedTuple):
     positions: NDArray[np.float64]
 
 
-def sweep_of(text: str) -> Sweep:
+def sweep_of(text: str) -> ParameterSweep:
     """Read KEY=LOW:HIGH:N or KEY=a,b,c; a LinkageError if it is neither."""
     key, equals, values = text.partition('=')
     low, *rest = values.split(':')
@@ -122,7 +122,7 @@ def sweep_of(text: str) -> Sweep:
         ) from None
     if len(set(found)) < len(found):
         raise LinkageError(f'--sweep {quoted(text)}', 'names a value twice', 'name each once')
-    return Sweep(key, found)
+    return ParameterSweep(key, found)
 
 
 def _too_many(count: int) -> LinkageError:
@@ -131,7 +131,7 @@ def _too_many(count: int) -> LinkageError:
     )
 
 
-def runs_of(sweeps: Sequence[Sweep], seeds: int, seed: int) -> list[Settings]:
+def runs_of(sweeps: Sequence[ParameterSweep], seeds: int, seed: int) -> list[Settings]:
     """
     Return the settings of each run: every combination of the values, with every seed.
 
@@ -173,7 +173,7 @@ def run_one(study: Study, settings: Settings) -> Outcome:
             trust_effects=True, settings=written,
         )  # fmt: skip
         ticks = check_simulated(scene, study.seconds)
-        return _reduced(Pipeline(scene), times(scene, ticks), study.instants)
+        return _reduce_run(Pipeline(scene), tick_times(scene, ticks), study.instants)
     except LinkageError as error:
         failure = str(error)
     except Exception as error:  # noqa: BLE001 (the other runs go on)
@@ -181,7 +181,7 @@ def run_one(study: Study, settings: Settings) -> Outcome:
     return Outcome(clean(failure), 0, 0, {}, np.empty((0, 0)))
 
 
-def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
+def _reduce_run(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
     """Tick a pipeline, and keep of it what a study needs."""
     lines, injection = pipeline.linkages, pipeline.injection
     joints = [line.scene_linkage.joint_names for line in lines]
@@ -204,29 +204,29 @@ def _reduced(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
         messages += bool(tick.message)
         place = wanted.get(number)
         for which, seen in enumerate(tick.states):
-            reading = _reading(seen)
+            reading = _reading_of(seen)
             if reading is None:
                 continue
             values = (reading.joints, reading.rates, reading.efforts)
             for quantity, of_all in zip(QUANTITIES, values, strict=True):
                 if of_all:
-                    reduced[which, quantity].add(of_all)
+                    reduced[which, quantity].add_row(of_all)
             if place is not None:
                 rows = slice(firsts[which], firsts[which] + len(reading.joints))
                 kept[rows, place] = reading.joints
     statistics = {
         f'{joint}{quantity}': one
         for (which, quantity), reduction in reduced.items()
-        for joint, one in zip(joints[which], reduction.statistics(), strict=False)
+        for joint, one in zip(joints[which], reduction.column_statistics(), strict=False)
     }
     return Outcome('', len(at), messages, statistics, kept)
 
 
-def _reading(seen: LinkageState | CompiledState | StateTuple) -> SensorReading | None:
+def _reading_of(state: LinkageState | CompiledState | StateTuple) -> SensorReading | None:
     """Return the reading of a linkage at a tick; None without one."""
-    if isinstance(seen, LinkageState | CompiledState):
-        return seen.reading
-    _, numbers, _ = seen
+    if isinstance(state, LinkageState | CompiledState):
+        return state.reading
+    _, numbers, _ = state
     return None if numbers is None else SensorReading(*numbers)
 
 
@@ -239,15 +239,15 @@ class _Reduction:
         self._least, self._most = np.full(width, inf), np.full(width, -inf)
         self._sum, self._squares = np.zeros(width), np.zeros(width)
 
-    def add(self, row: Sequence[float]) -> None:
+    def add_row(self, row: Sequence[float]) -> None:
         """Take a row."""
         self._rows.append(row)
         if len(self._rows) == _BLOCK:
-            self._flush()
+            self._reduce_rows()
 
-    def statistics(self) -> list[Statistics]:
+    def column_statistics(self) -> list[Statistics]:
         """Return the statistics of each column; none without rows."""
-        self._flush()
+        self._reduce_rows()
         if not self._count:
             return []
         columns = zip(self._least, self._most, self._sum, self._squares, strict=True)
@@ -259,7 +259,7 @@ class _Reduction:
             for least, most, total, squares in columns
         ]  # fmt: skip
 
-    def _flush(self) -> None:
+    def _reduce_rows(self) -> None:
         if not self._rows:
             return
         block = np.array(self._rows)
@@ -271,7 +271,7 @@ class _Reduction:
         self._rows.clear()
 
 
-def outcomes(
+def run_outcomes(
     study: Study, runs: Sequence[tuple[int, Settings]], workers: int, dask: str = ''
 ) -> Iterator[tuple[int, Outcome]]:
     """
@@ -280,7 +280,7 @@ def outcomes(
     They run in a number of processes here, or on the workers of a Dask scheduler, if its address
     is not ''. A LinkageError says that the workers failed.
     """
-    work = partial(_numbered, study)
+    work = partial(_run_numbered, study)
     if dask:
         from linkage_ros.dask_workers import results_of  # local import: only with Dask
 
@@ -338,6 +338,6 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _numbered(study: Study, part: tuple[int, Settings]) -> tuple[int, Outcome]:
+def _run_numbered(study: Study, part: tuple[int, Settings]) -> tuple[int, Outcome]:
     number, settings = part
     return number, run_one(study, settings)

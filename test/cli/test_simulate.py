@@ -22,7 +22,7 @@ from linkage_ros.messages.joint_state import JointStateReader
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from linkage_ros.simulation import run as simulated_run
-from linkage_ros.simulation.run import BEGIN, simulate
+from linkage_ros.simulation.run import BEGIN, simulate_run
 import pytest
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
@@ -105,7 +105,7 @@ def test_a_replay_of_the_bag_gives_the_same_bytes(tmp_path, monkeypatch, capsys,
 
 def test_ticks_are_those_of_the_pipeline_at_whole_nanoseconds(tmp_path):
     scene = load_scene('torque_crank', ['rate=300'])
-    simulate(scene, tmp_path / 'bag', 7, lambda _: True)
+    simulate_run(scene, tmp_path / 'bag', 7, lambda _: True)
     pipeline = Pipeline(scene)
     expected = []
     for number in range(7):
@@ -180,7 +180,9 @@ def test_what_cannot_be_simulated_is_refused_in_a_line(tmp_path, monkeypatch, ca
 def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path):
     scene = load_scene('torque_crank')
     asked = []
-    simulate(scene, tmp_path / 'bag', 10_000, lambda number: asked.append(number) or number < 2000)
+    simulate_run(
+        scene, tmp_path / 'bag', 10_000, lambda number: asked.append(number) or number < 2000
+    )
     kept = messages_of(tmp_path / 'bag')
     assert len(kept) == 2000
     assert asked == [*range(0, 2001, 50)]

@@ -17,7 +17,14 @@ from linkage_ros.messages.joint_state import JointStateReader
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from linkage_ros.simulation.run import BEGIN
-from linkage_ros.simulation.study import instants_of, run_one, runs_of, Study, Sweep, sweep_of
+from linkage_ros.simulation.study import (
+    instants_of,
+    ParameterSweep,
+    run_one,
+    runs_of,
+    Study,
+    sweep_of,
+)
 import numpy as np
 import pytest
 from scipy.stats import kstest
@@ -44,7 +51,10 @@ def study_of(scene, seconds, instants=11):
 
 
 def test_all_combinations_run_with_every_seed():
-    sweeps = [Sweep('rate', (100.0, 200.0)), Sweep('loads.drive_inertia', (1e-4, 1e-3, 1e-2))]
+    sweeps = [
+        ParameterSweep('rate', (100.0, 200.0)),
+        ParameterSweep('loads.drive_inertia', (1e-4, 1e-3, 1e-2)),
+    ]
     runs = runs_of(sweeps, 4, 9)
     assert len(set(runs)) == 24
     assert runs[0] == (('rate', 100.0), ('loads.drive_inertia', 1e-4), ('seed', 9))
@@ -53,8 +63,8 @@ def test_all_combinations_run_with_every_seed():
 
 
 def test_values_of_a_sweep():
-    assert sweep_of('rate=1:2:5') == Sweep('rate', (1.0, 1.25, 1.5, 1.75, 2.0))
-    assert sweep_of('a.b=-1,2e3') == Sweep('a.b', (-1.0, 2000.0))
+    assert sweep_of('rate=1:2:5') == ParameterSweep('rate', (1.0, 1.25, 1.5, 1.75, 2.0))
+    assert sweep_of('a.b=-1,2e3') == ParameterSweep('a.b', (-1.0, 2000.0))
 
 
 @pytest.mark.parametrize(
@@ -71,11 +81,11 @@ def test_a_study_is_bounded():
     with pytest.raises(LinkageError, match='has 1,000,000,000 runs, more than 100,000'):
         sweep_of('rate=1:2:1000000000')
     with pytest.raises(LinkageError, match='has 1,000,000 runs, more than 100,000'):
-        runs_of([Sweep('rate', tuple(range(1000)))], 1000, 0)
+        runs_of([ParameterSweep('rate', tuple(range(1000)))], 1000, 0)
     with pytest.raises(LinkageError, match='names a value twice'):
         sweep_of('rate=1,2,1.0')
     with pytest.raises(LinkageError, match='sweep each key once'):
-        runs_of([Sweep('rate', (1.0,)), Sweep('rate', (2.0,))], 1, 0)
+        runs_of([ParameterSweep('rate', (1.0,)), ParameterSweep('rate', (2.0,))], 1, 0)
     for runs, joints, ticks in ((1, 1, 5), (10, 3, 10**6), (10**5, 12, 10**6)):
         instants = instants_of(runs, joints, ticks)
         assert 1 <= instants <= ticks
