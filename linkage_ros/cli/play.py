@@ -30,8 +30,8 @@ from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.terminal import progress, ProgressCallback
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.bag_topics import offer
-from linkage_ros.node.playback import LATE, Part, Playback
+from linkage_ros.node.bag_topics import create_publishers
+from linkage_ros.node.playback import LATE, Playback, PlaybackPart
 from linkage_ros.node.player import CLOCK, play, PlaybackOptions, player_node
 from linkage_ros.signals import heeded
 
@@ -107,10 +107,12 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         )
     ros = ['--ros-args', *arguments.ros_args] if arguments.ros_args else []
     with heeded(), player_node(ros) as node, progress('played [s]') as advance:
-        publishers = offer(node, topics, _say)
+        publishers = create_publishers(node, topics, _say)
         if not publishers:
             raise BagError(bag.path, 'has no topic that can be published', 'nothing to play')
-        part = Part(first, first + arguments.seconds * NANOSECONDS, publishers, arguments.loop)
+        part = PlaybackPart(
+            first, first + arguments.seconds * NANOSECONDS, publishers, arguments.loop
+        )
         options = PlaybackOptions(arguments.rate, arguments.clock, arguments.wait)
         last = min(part.last, inf if order.end is None else order.end)
         tell = partial(_tell, advance, first, last)

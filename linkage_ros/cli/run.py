@@ -223,7 +223,7 @@ def summary(node: LinkageNode, longest: float) -> Table:
             for t in memory.topics
         ]
         rows.append(('snapshots', memory.snapshots))
-    for recording in node.recording.ended:
+    for recording in node.recording.ended_bags:
         rows += [
             (
                 'recorded',
@@ -293,7 +293,7 @@ def run_scene(
     bags: list[Path] = []
 
     def at_end(node: LinkageNode) -> None:
-        bags.extend(recording.folder for recording in node.recording.ended)
+        bags.extend(recording.folder for recording in node.recording.ended_bags)
         show(summary(node, inf if arguments.prove else LONGEST_PROOF))
 
     if arguments.view:

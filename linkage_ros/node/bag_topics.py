@@ -24,10 +24,10 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 def bag_topic(name: str, message_class: Any, qos: QoSProfile) -> Topic:
     """Describe a topic for a bag, as `described` does, with the QoS of a publisher."""
-    return describe_topic(name, message_class, _qos(qos))
+    return describe_topic(name, message_class, _recorded_qos(qos))
 
 
-def _qos(profile: QoSProfile) -> QosProfile:
+def _recorded_qos(profile: QoSProfile) -> QosProfile:
     return QosProfile(
         history=profile.history.name.lower(),
         depth=profile.depth,
@@ -45,7 +45,7 @@ def _qos(profile: QoSProfile) -> QosProfile:
 _MOST_DEPTH = 2**31 - 1  # as DDS counts it
 
 
-def offer(
+def create_publishers(
     node: Node, topics: Collection[Topic], left_out: Callable[[LinkageError], None]
 ) -> dict[str, Publisher]:
     """
@@ -69,13 +69,13 @@ def offer(
     publishers = {}
     for topic in topics:
         try:
-            publishers[topic.name] = _publisher(node, topic)
+            publishers[topic.name] = _create_publisher(node, topic)
         except LinkageError as error:  # noqa: PERF203 (a bag has a few topics)
             left_out(error)
     return publishers
 
 
-def offered(qos: QosProfile) -> QoSProfile:
+def offered_qos(qos: QosProfile) -> QoSProfile:
     """
     Return the QoS to offer for a topic that was recorded with this one.
 
@@ -98,7 +98,7 @@ def offered(qos: QosProfile) -> QoSProfile:
     )
 
 
-def _publisher(node: Node, topic: Topic) -> Publisher:
+def _create_publisher(node: Node, topic: Topic) -> Publisher:
     """Return a publisher for a topic; raise LinkageError if there can be none."""
     kind = _class_of(topic)
     unfit = LinkageError(
@@ -107,7 +107,7 @@ def _publisher(node: Node, topic: Topic) -> Publisher:
     if '\0' in topic.name:  # rclpy would publish on the part before it
         raise unfit
     try:
-        return node.create_publisher(kind, topic.name, offered(topic.qos))
+        return node.create_publisher(kind, topic.name, offered_qos(topic.qos))
     except Exception:  # noqa: BLE001 (a space, a {word}, a name too long: each has its own)
         raise unfit from None
 

@@ -53,7 +53,7 @@ class DemoNode(Node):
         super().__init__(name)
         declare_parameters(self, self.PARAMETERS)
 
-    def value(self, name: str) -> Any:
+    def value_of_parameter(self, name: str) -> Any:
         """Return the value of a parameter."""
         return self.get_parameter(name).value
 
@@ -120,22 +120,22 @@ class PDController(DemoNode):
 
     def __init__(self) -> None:
         super().__init__('pd_controller')
-        self._joint = self.value('joint')
-        self._target = self.value('target')
-        self._swing = self.value('swing')
-        self._period = self.value('period')
-        self._kp, self._kd = self.value('kp'), self.value('kd')
-        self._seconds = self.value('seconds')
+        self._joint = self.value_of_parameter('joint')
+        self._target = self.value_of_parameter('target')
+        self._swing = self.value_of_parameter('swing')
+        self._period = self.value_of_parameter('period')
+        self._kp, self._kd = self.value_of_parameter('kp'), self.value_of_parameter('kd')
+        self._seconds = self.value_of_parameter('seconds')
         self._state = (0.0, 0.0)
-        self._heard = -inf
-        self._begun = self.get_clock().now()
+        self._last_heard = -inf
+        self._begin_time = self.get_clock().now()
         # Reliable, for any subscriber; depth 1, since only the newest command matters.
         self._publisher = self.create_publisher(JointState, 'crank_commands', 1)
-        self.create_subscription(JointState, 'joint_states', self._hear, 10)
-        self.create_timer(1.0 / self.value('rate'), self._command)
+        self.create_subscription(JointState, 'joint_states', self._on_joint_state, 10)
+        self.create_timer(1.0 / self.value_of_parameter('rate'), self._publish_effort)
         ClockGuard(self._time_source)
 
-    def _hear(self, message: JointState) -> None:
+    def _on_joint_state(self, message: JointState) -> None:
         """Store position and rate of the joint."""
         if self._joint not in message.name:
             return
@@ -143,15 +143,15 @@ class PDController(DemoNode):
         # Array fields without values are empty, not None.
         if place < min(len(message.position), len(message.velocity)):
             self._state = message.position[place], message.velocity[place]
-            self._heard = monotonic()
+            self._last_heard = monotonic()
 
-    def _command(self) -> None:
+    def _publish_effort(self) -> None:
         """Publish an effort."""
-        if monotonic() - self._heard > _OLDEST:
+        if monotonic() - self._last_heard > _OLDEST:
             return
         now = self.get_clock().now()
         frequency = tau / self._period
-        phase = frequency * (now - self._begun).nanoseconds * 1e-9
+        phase = frequency * (now - self._begin_time).nanoseconds * 1e-9
         target = self._target + self._swing * sin(phase)
         target_rate = self._swing * frequency * cos(phase)
         position, rate = self._state
@@ -192,12 +192,12 @@ class CrankSource(DemoNode):
 
     def __init__(self) -> None:
         super().__init__('crank_source')
-        self._rate = self.value('rate')
-        self._speed = self.value('speed')
-        self._ripple = self.value('ripple')
-        self._start = self.value('start')
-        self._seconds = self.value('seconds')
-        self._writer = JointStateWriter([self.value('joint')])
+        self._rate = self.value_of_parameter('rate')
+        self._speed = self.value_of_parameter('speed')
+        self._ripple = self.value_of_parameter('ripple')
+        self._start = self.value_of_parameter('start')
+        self._seconds = self.value_of_parameter('seconds')
+        self._writer = JointStateWriter([self.value_of_parameter('joint')])
         # Reliable, as a broadcaster is: some subscribers refuse less, as joint_state_publisher.
         self._publisher = self.create_publisher(JointState, 'crank_states', 10)
 

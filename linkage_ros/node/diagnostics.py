@@ -63,7 +63,7 @@ _NEARNESS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Snapshot:
+class CountsSnapshot:
     """Counts at one instant; two snapshots delimit a window."""
 
     time: int = 0
@@ -78,10 +78,10 @@ class Snapshot:
     interleaved: int = 0
     own_interleaved: int = 0
     stale: int = 0
-    chattered: int = 0
+    chatter_count: int = 0
 
     @classmethod
-    def of(cls, counts: Counts, time: int, chattered: int = 0) -> Snapshot:
+    def take(cls, counts: Counts, time: int, chattered: int = 0) -> CountsSnapshot:
         """Return the counts at a time, in [ns] of the steady clock."""
         return cls(
             time,
@@ -112,8 +112,8 @@ class DiagnosticsSummary:
     publishers: Sequence[str]  # Other publishers on that topic
     loop: TickLoop  # The tick loop
     # Counts of the tick at the start and at the end of the window.
-    before: Snapshot
-    now: Snapshot
+    window_start: CountsSnapshot
+    window_end: CountsSnapshot
     recording_failure: str  # Reason why a wanted recording does not run; '' otherwise
     limits: Mapping[str, float]  # Warning threshold for each attribute of `Nearness`; 0 for never
     # Memory of the last seconds; None when a bag is recorded continuously.
@@ -127,19 +127,24 @@ class DiagnosticsSummary:
     # Settings of middleware and operating system that affect the ticks.
     system: Mapping[str, str] = field(default_factory=dict)
 
-    def statuses(self) -> list[DiagnosticStatus]:
+    def make_statuses(self) -> list[DiagnosticStatus]:
         """Return the statuses, one for each task."""
-        statuses = [self._tick(), self._crank(), self._closure(), self._recording()]
+        statuses = [
+            self._tick_status(),
+            self._crank_status(),
+            self._closure_status(),
+            self._recording_status(),
+        ]
         if self.loop.injection is not None:
-            statuses.append(self._faults(self.loop.injection))
+            statuses.append(self._faults_status(self.loop.injection))
         if self.loop.counts.wrenches:
-            statuses.append(self._wrenches())
+            statuses.append(self._wrenches_status())
         return statuses
 
-    def _tick(self) -> DiagnosticStatus:
-        window = max(self.now.time - self.before.time, 1) / NANOSECONDS
-        ticks = self.now.ticks - self.before.ticks
-        lost = self.now.lost - self.before.lost
+    def _tick_status(self) -> DiagnosticStatus:
+        window = max(self.window_end.time - self.window_start.time, 1) / NANOSECONDS
+        ticks = self.window_end.ticks - self.window_start.ticks
+        lost = self.window_end.lost - self.window_start.lost
         actual = ticks / window
         lowest = self.rate * (1.0 - _RATE_TOLERANCE)
         level, message = OK, 'Ticking'
@@ -149,7 +154,7 @@ class DiagnosticsSummary:
             level, message = WARN, f'{actual:.1f} ticks a second, {self.rate:g} wanted'
         elif lost:
             level, message = WARN, f'{lost} ticks lost'
-        elif self.now.chattered > self.before.chattered:
+        elif self.window_end.chatter_count > self.window_start.chatter_count:
             level, message = WARN, 'Motor and crank meet and part too often for the step'
         elif self.node_doubled:
             level, message = WARN, self.node_doubled
@@ -180,7 +185,7 @@ class DiagnosticsSummary:
             'Resets': self.loop.counts.resets,
         }
         values |= self.system
-        return self._status('tick', level, message, values)
+        return self._make_status('tick', level, message, values)
 
     def _lost_time(self) -> dict[str, object]:
         """Return the time that integrating drives skipped because they could not keep up."""
@@ -197,22 +202,24 @@ class DiagnosticsSummary:
         ):
             cut = sum(drive.saturated for drive in drives if hasattr(drive, 'saturated'))
             values['Commands cut to the effort limit'] = cut
-        if self.now.chattered:
-            values['Steps with too many meetings of motor and crank'] = self.now.chattered
+        if self.window_end.chatter_count:
+            values['Steps with too many meetings of motor and crank'] = (
+                self.window_end.chatter_count
+            )
         return values
 
-    def _crank(self) -> DiagnosticStatus:
+    def _crank_status(self) -> DiagnosticStatus:
         counts = self.loop.counts
         stamp = self.loop.newest_stamp
         age = (self.clock - stamp) / NANOSECONDS if stamp else inf
-        rejected = self.now.rejected - self.before.rejected
+        rejected = self.window_end.rejected - self.window_start.rejected
         level, message = OK, 'Samples arriving'
         max_age = self.loop.pipeline.max_age
         if not self.crank_topic:
             message = 'Driven by the scene'
         elif counts.ignored and counts.ignored == counts.received:
             level, message = STALE if max_age else WARN, 'No crank yet, but messages without it'
-        elif self.now.stale > self.before.stale and age * NANOSECONDS > max_age:
+        elif self.window_end.stale > self.window_start.stale and age * NANOSECONDS > max_age:
             level, message = STALE, f'Samples arrive, but are {age:.1f} s old by their stamps'
         elif max_age and age * NANOSECONDS > max_age:
             level = STALE
@@ -229,31 +236,32 @@ class DiagnosticsSummary:
             'Samples used': counts.used,
             'Samples superseded': counts.superseded,
             'Samples stale': counts.stale,
-            'Samples rejected': self.now.rejected,
+            'Samples rejected': self.window_end.rejected,
             'Messages without the crank': counts.ignored,
             'Messages lost before': 'unknown' if missed is None else missed,
             'Age of the newest sample (s)': f'{age:.3f}',
         }
         values |= {f'Rejected: {why.value}': n for why, n in counts.rejected.items() if n}
-        return self._status('crank', level, message, values)
+        return self._make_status('crank', level, message, values)
 
-    def _closure(self) -> DiagnosticStatus:
+    def _closure_status(self) -> DiagnosticStatus:
         counts = self.loop.counts
         level, message = OK, 'Closed'
         lines = self.loop.pipeline.linkages
         number, last = counts.last_unclosed.get(Status.OPEN, (0, None))
         reachable = describe_ranges(lines[number].closure.input_ranges)
-        if self.now.unclosed > self.before.unclosed:
+        if self.window_end.unclosed > self.window_start.unclosed:
             level = ERROR
             message = (
                 f'Open by {last.gap:.6g} m; reachable: {reachable}'
-                if last is not None and self.now.indeterminate == self.before.indeterminate
+                if last is not None
+                and self.window_end.indeterminate == self.window_start.indeterminate
                 else 'The pose cannot be told: two pins coincide, or a link is broken'
             )
-        elif self.now.limited > self.before.limited:
+        elif self.window_end.limited > self.window_start.limited:
             number, beyond = counts.last_unclosed[Status.LIMITED]
             level, message = WARN, f'Beyond limits: {lines[number].closure.limit_exceeded(beyond)}'
-        elif self.now.toggles > self.before.toggles:
+        elif self.window_end.toggles > self.window_start.toggles:
             level, message = WARN, 'At a toggle: position valid, velocity not'
         values: dict[str, object] = {
             'Scene': self.scene,
@@ -277,23 +285,23 @@ class DiagnosticsSummary:
         ]
         if posed:
             if len(lines) == 1:
-                values |= _inputs(*looks[0])
+                values |= _input_values(*looks[0])
             line, worst = max(
                 ((line, line.closure.residual(position)) for line, position in posed),
                 key=itemgetter(1),
             )
-            values['Residual (m)'] = f'{worst:.3g}{_of(line)}'
-            near, warning = self._nearness(posed)
+            values['Residual (m)'] = f'{worst:.3g}{_linkage_text(line)}'
+            near, warning = self._worst_nearness(posed)
             values |= near
             if warning and level == OK:
                 level, message = WARN, warning
-        shares, warning = _shares(looks)
+        shares, warning = _limit_utilisation(looks)
         values |= shares
         if warning and level == OK:
             level, message = WARN, warning
-        return self._status('loop closure', level, message, values)
+        return self._make_status('loop closure', level, message, values)
 
-    def _nearness(
+    def _worst_nearness(
         self, posed: Sequence[tuple[LinkagePipeline, Position]]
     ) -> tuple[dict[str, str], str]:
         """Return the singularity measures of the worst linkage, and the warning text."""
@@ -306,23 +314,23 @@ class DiagnosticsSummary:
                 ((line, getattr(near, name)) for line, near in nearness), key=itemgetter(1)
             )
             key, limit = text.format(unit=unit), self.limits[name]
-            values[key] = f'{value:.6g}{_of(line)}'
+            values[key] = f'{value:.6g}{_linkage_text(line)}'
             if value < limit:
                 warnings.append(
-                    f'{key} is {value:.3g}{_of(line)}, below warn.{name} of {limit:.3g}'
+                    f'{key} is {value:.3g}{_linkage_text(line)}, below warn.{name} of {limit:.3g}'
                 )
         return values, '; '.join(warnings)
 
-    def _faults(self, injection: Injection) -> DiagnosticStatus:
+    def _faults_status(self, injection: Injection) -> DiagnosticStatus:
         on = [name for name, switch in injection.switches.items() if switch.on]
         message = f'Injected: {", ".join(on)}' if on else 'None injected'
         values: dict[str, object] = {}
         for name, fault in injection.faults.items():
             values[f'{name} ({fault.kind})'] = 'injected' if name in on else 'off'
             values[f'Times injected: {name}'] = injection.injected[name]
-        return self._status('faults', WARN if on else OK, message, values)
+        return self._make_status('faults', WARN if on else OK, message, values)
 
-    def _wrenches(self) -> DiagnosticStatus:
+    def _wrenches_status(self) -> DiagnosticStatus:
         values: dict[str, object] = {}
         silent = []
         for topic, counts in zip(
@@ -340,17 +348,17 @@ class DiagnosticsSummary:
             values |= {
                 f'Rejected: {name}: {why.value}': n for why, n in counts.rejected.items() if n
             }
-        rejected = self.now.wrenches_rejected - self.before.wrenches_rejected
+        rejected = self.window_end.wrenches_rejected - self.window_start.wrenches_rejected
         level, message = OK, 'Wrenches arriving'
         if rejected:
             level, message = WARN, f'{rejected} wrenches rejected'
         elif silent:
             level, message = STALE, f'No load, for want of messages: {", ".join(silent)}'
-        return self._status('wrenches', level, message, values)
+        return self._make_status('wrenches', level, message, values)
 
-    def _recording(self) -> DiagnosticStatus:
+    def _recording_status(self) -> DiagnosticStatus:
         if self.snapshots is not None:
-            return self._memory(self.snapshots)
+            return self._memory_status(self.snapshots)
         level, message = OK, 'Not recording'
         values: dict[str, object] = {}
         recorder = self.loop.recorder
@@ -372,9 +380,9 @@ class DiagnosticsSummary:
                 level, message = WARN, f'Recording again, in a new file: {recorder.failure}'
         elif self.recording_failure:
             level, message = ERROR, self.recording_failure
-        return self._status('recording', level, message, values)
+        return self._make_status('recording', level, message, values)
 
-    def _memory(self, snapshots: RunSnapshots) -> DiagnosticStatus:
+    def _memory_status(self, snapshots: RunSnapshots) -> DiagnosticStatus:
         memory = snapshots.memory
         seconds, size, crowded = memory.extent
         level, message = OK, f'In memory: the last {memory.seconds:g} s'
@@ -388,10 +396,10 @@ class DiagnosticsSummary:
         values |= {
             'In memory (s)': f'{seconds:.3f}',
             'In memory (bytes)': size,
-            'Snapshot being written': 'yes' if snapshots.writing else 'no',
+            'Snapshot being written': 'yes' if snapshots.is_writing else 'no',
             'Snapshots written': snapshots.written,
             'Snapshots failed': snapshots.failed,
-            'Last snapshot': snapshots.last,
+            'Last snapshot': snapshots.last_folder,
         }
         if crowded:
             level = WARN
@@ -402,9 +410,9 @@ class DiagnosticsSummary:
             level, message = ERROR, f'Last snapshot: {snapshots.failure}'
         if memory.failure is not None:
             level, message = ERROR, str(memory.failure)
-        return self._status('recording', level, message, values)
+        return self._make_status('recording', level, message, values)
 
-    def _status(
+    def _make_status(
         self, task: str, level: bytes, message: str, values: dict[str, object]
     ) -> DiagnosticStatus:
         return DiagnosticStatus(
@@ -416,7 +424,7 @@ class DiagnosticsSummary:
         )
 
 
-def chattered(lines: Sequence[LinkagePipeline]) -> int:
+def chatter_count(lines: Sequence[LinkagePipeline]) -> int:
     """Return the number of steps in which motor and crank met and parted too often."""
     return sum(line.drive.chatter_count for line in lines)
 
@@ -435,11 +443,13 @@ def no_clock(silence: float) -> str:
     return 'No /clock yet' if silence == inf else f'No /clock for {silence:.1f} s'
 
 
-def _shares(looks: Sequence[tuple[LinkagePipeline, LinkageState]]) -> tuple[dict[str, str], str]:
+def _limit_utilisation(
+    states: Sequence[tuple[LinkagePipeline, LinkageState]],
+) -> tuple[dict[str, str], str]:
     """Return the share of its limits that each joint used at the last tick, and the excess."""
     values, warnings = {}, []
-    for line, look in looks:
-        for name, (rate, effort) in _exertions(line, look).items():
+    for line, look in states:
+        for name, (rate, effort) in _rates_and_efforts(line, look).items():
             limits = line.scene_linkage.linkage.limits[name]
             for what, value, most in (
                 ('Velocity', rate, limits.velocity),
@@ -454,33 +464,33 @@ def _shares(looks: Sequence[tuple[LinkagePipeline, LinkageState]]) -> tuple[dict
     return values, '; '.join(warnings)
 
 
-def _inputs(line: LinkagePipeline, look: LinkageState) -> dict[str, str]:
+def _input_values(pipeline: LinkagePipeline, state: LinkageState) -> dict[str, str]:
     """Return the inputs of a linkage, as diagnostic values."""
-    angles = look.crank.angles if look.crank is not None else ()
+    angles = state.crank.angles if state.crank is not None else ()
     return {
         f'Input {driven.joint} ({driven.unit})': f'{angle:.6f}'
-        for driven, angle in zip(line.scene_linkage.linkage.inputs, angles, strict=False)
+        for driven, angle in zip(pipeline.scene_linkage.linkage.inputs, angles, strict=False)
     }
 
 
-def _exertions(
-    line: LinkagePipeline, look: LinkageState
+def _rates_and_efforts(
+    pipeline: LinkagePipeline, state: LinkageState
 ) -> dict[str, tuple[float | None, float | None]]:
     """Return rate and effort of the joints that have limits, as far as they are known."""
-    linkage, reading = line.scene_linkage.linkage, look.reading
+    linkage, reading = pipeline.scene_linkage.linkage, state.reading
     exertions: dict[str, tuple[float | None, float | None]] = {}
     if reading is not None:
         for number, name in enumerate(linkage.joints):
             # A reading has rates, and efforts, for all of its joints or for none.
             rate = reading.rates[number] if reading.rates else None
             exertions[name] = rate, reading.efforts[number] if reading.efforts else None
-    driven = look.crank.rates if look.crank is not None else ()
+    driven = state.crank.rates if state.crank is not None else ()
     for given, rate in zip(linkage.inputs, driven, strict=False):
         exertions[given.joint] = rate, exertions.get(given.joint, (None, None))[1]
     return {name: of for name, of in exertions.items() if name in linkage.limits}
 
 
-def _of(line: LinkagePipeline) -> str:
+def _linkage_text(line: LinkagePipeline) -> str:
     """Return the name of the linkage for a message, if there are several."""
     return f' ({line.scene_linkage.name})' if line.scene_linkage.name else ''
 
@@ -535,8 +545,8 @@ class Warnings:
         self._unclosed = dict.fromkeys(Status, 0)
         self._lost = self._stalls = self._ticks = self._stale = 0
         self._chattered: dict[str, int] = {}
-        self._heard = (0, 0, monotonic())
-        self._looked = (0, monotonic())
+        self._last_message = (0, 0, monotonic())
+        self._last_tick = (0, monotonic())
 
     def check_age(self, counts: Counts, crank_topic: str, max_age: int, period: float) -> None:
         """
@@ -610,10 +620,10 @@ class Warnings:
                 period,
             )
         handled = counts.used + counts.superseded + counts.ignored + sum(counts.rejected.values())
-        ticks, looked = self._looked
+        ticks, looked = self._last_tick
         if counts.ticks != ticks or (not interval and handled == counts.received):
             looked = monotonic()
-        self._looked = counts.ticks, looked
+        self._last_tick = counts.ticks, looked
         late = monotonic() - looked
         if late > _PATIENCE + 2.0 * interval:
             self.warn(
@@ -622,9 +632,9 @@ class Warnings:
                 f'{crank_topic} wait or are lost; lower the rate, or make the scene cheaper',
                 period,
             )
-        received, published, since = self._heard
+        received, published, since = self._last_message
         if (counts.received, counts.published) != (received, published):
-            self._heard = (counts.received, counts.published, monotonic())
+            self._last_message = (counts.received, counts.published, monotonic())
             return
         waited = looked - since
         if (counts.received and not max_age) or waited <= max(_PATIENCE, max_age / NANOSECONDS):
@@ -639,7 +649,7 @@ class Warnings:
             period,
         )
 
-    def check(
+    def check_events(
         self, counts: Counts, closures: Sequence[Closure], crank_topic: str, period: float
     ) -> None:
         """
@@ -682,19 +692,19 @@ class Warnings:
                 if self.warn(status.value, line, period):
                     self._unclosed[status] = counts.unclosed[status]
 
-    def check_chatter(self, lines: Sequence[LinkagePipeline], period: float) -> None:
+    def check_chatter(self, linkages: Sequence[LinkagePipeline], period: float) -> None:
         """Warn of steps in which motor and crank met and parted too often, once a period [s]."""
-        for line in lines:
+        for line in linkages:
             kind, count = f'chatter {line.scene_linkage.name}', line.drive.chatter_count
             before = min(self._chattered.get(kind, 0), count)  # a reset counts anew
             if count > before:
-                told = f'{describe_chatter(count - before)}{_of(line)}'
+                told = f'{describe_chatter(count - before)}{_linkage_text(line)}'
                 before = count if self.warn(kind, told, period) else before
             self._chattered[kind] = before
 
-    def check_jumps(self, lines: Sequence[LinkagePipeline], crank_topic: str) -> None:
+    def check_jumps(self, linkages: Sequence[LinkagePipeline], crank_topic: str) -> None:
         """Warn once of a crank that jumps by more than a turn from one sample to the next."""
-        for line in lines:
+        for line in linkages:
             given, jump = line.closure.linkage.inputs[0], getattr(line.drive, 'jump', 0.0)
             if jump > _MORE_THAN_A_TURN and not given.slider:
                 self.warn(

@@ -46,24 +46,26 @@ class FollowedRun(NamedTuple):
     """The scene of a running node."""
 
     scene: Scene  # The scene
-    account: RunMetadata  # The run's account of itself: its topics
-    shown: SceneLinkage  # The first linkage, which is drawn
+    metadata: RunMetadata  # The run's account of itself: its topics
+    drawn_linkage: SceneLinkage  # The first linkage, which is drawn
     closure: Closure  # The closure of that one
     # The linkage whose crank or effort comes from a topic; None if there is none.
-    turned: SceneLinkage | None
+    topic_driven: SceneLinkage | None
     model: dict[str, Any]  # What a page gets
 
     @property
     def crank_topic(self) -> str:
         """Return the topic of crank or effort; '' for none."""
-        return self.account.crank_topic
+        return self.metadata.crank_topic
 
     @property
-    def drive(self) -> str:
+    def drive_name(self) -> str:
         """Return the drive of the linkage that can be turned, else of the first one."""
-        return (self.turned or self.shown).drive[0]
+        return (self.topic_driven or self.drawn_linkage).drive[0]
 
-    def state(self, joints: CrankSample, crank: CrankSample | None, now: int) -> dict[str, Any]:
+    def state_content(
+        self, joints: CrankSample, crank: CrankSample | None, now: int
+    ) -> dict[str, Any]:
         """
         Return the state of the joints, as a page gets it.
 
@@ -79,34 +81,36 @@ class FollowedRun(NamedTuple):
         """
         names = self.scene.joint_names
         inputs = self._inputs_at(joints.stamp, crank)
-        known = dict.fromkeys(self.shown.joint_names, nan)
+        known = dict.fromkeys(self.drawn_linkage.joint_names, nan)
         known |= dict(zip(names, joints.angles, strict=True))
-        known |= dict(zip(self.shown.input_names, inputs, strict=True))
+        known |= dict(zip(self.drawn_linkage.input_names, inputs, strict=True))
         rates = joints.rates or (nan,) * len(names)
         return {
             't': joints.stamp * 1e-9,
             'age': (now - joints.stamp) * 1e-9,
-            'inputs': [_finite(value) for value in inputs],
+            'inputs': [_finite_or_none(value) for value in inputs],
             'joints': {
-                name: [_finite(value), _finite(rate)]
+                name: [_finite_or_none(value), _finite_or_none(rate)]
                 for name, value, rate in zip(names, joints.angles, rates, strict=True)
             },
-            'frames': self._frames(known),
+            'frames': self._link_frames(known),
         }
 
     def _inputs_at(self, stamp: int, crank: CrankSample | None) -> list[float]:
         """Return the inputs at the time of the joints; NaN where they are unknown."""
         if crank is None:
-            return [nan] * len(self.shown.input_names)
+            return [nan] * len(self.drawn_linkage.input_names)
         lead = (stamp - crank.stamp) * 1e-9
         if crank.rates is None or abs(lead) > _LONGEST_LEAD:
             return list(crank.angles)
         return [angle + rate * lead for angle, rate in zip(crank.angles, crank.rates, strict=True)]
 
-    def _frames(self, known: Mapping[str, float]) -> list[float] | None:
+    def _link_frames(self, known: Mapping[str, float]) -> list[float] | None:
         """Return place and angle of the frame of each link; None if they are unknown."""
         values = {name: np.array([value]) for name, value in known.items()}
-        found = poses(self.closure, self.shown.prefix, values, self.shown.input_names)
+        found = poses(
+            self.closure, self.drawn_linkage.prefix, values, self.drawn_linkage.input_names
+        )
         if not set(self.model['links']) <= set(found.links):
             return None
         order = [found.links.index(link) for link in self.model['links']]
@@ -139,7 +143,9 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
     return FollowedRun(scene, account, shown, closure, turned, model)
 
 
-def _beside_model(scene: Scene, closure: Closure, turned: SceneLinkage | None) -> dict[str, Any]:
+def _beside_model(
+    scene: Scene, closure: Closure, topic_driven: SceneLinkage | None
+) -> dict[str, Any]:
     """Return what a page shows of a scene beside the model of its first linkage."""
     shown = scene.linkages[0]
     cranks: list[list[float] | None] = []
@@ -161,8 +167,8 @@ def _beside_model(scene: Scene, closure: Closure, turned: SceneLinkage | None) -
         ],
         'inputs': list(shown.input_names),
         'cranks': cranks,
-        'turned': turned is shown,
-        'drive': (turned or shown).drive[0],
+        'turned': topic_driven is shown,
+        'drive': (topic_driven or shown).drive[0],
         'effort': _range_of_effort(closure),
         'linkages': len(scene.linkages),
     }
@@ -174,10 +180,10 @@ def _range_of_effort(closure: Closure) -> float:
     return limit if isfinite(limit) else _USUAL_EFFORT
 
 
-def diagnosed(statuses: Sequence[DiagnosticStatus]) -> dict[str, Any]:
+def diagnostics_content(statuses: Sequence[DiagnosticStatus]) -> dict[str, Any]:
     """Return what the newest diagnostics say of a node, as a page gets it."""
     values = {
-        _task(status): {each.key: each.value for each in status.values} for status in statuses
+        _task_name(status): {each.key: each.value for each in status.values} for status in statuses
     }
     tick, recording = values.get('tick', {}), values.get('recording', {})
     return {
@@ -186,16 +192,16 @@ def diagnosed(statuses: Sequence[DiagnosticStatus]) -> dict[str, Any]:
         'lost': tick.get('Lost ticks', ''),
         'lateness': [tick.get(f'Lateness {each} (us)', '') for each in ('p50', 'p99', 'max')],
         'diagnostics': [
-            [status.level[0], f'{_task(status)}: {status.message}'] for status in statuses
+            [status.level[0], f'{_task_name(status)}: {status.message}'] for status in statuses
         ],
         'memory': any(key.startswith('In memory') for key in recording),
         'recording': any(key.startswith('Recorded: ') for key in recording),
     }
 
 
-def _task(status: DiagnosticStatus) -> str:
+def _task_name(status: DiagnosticStatus) -> str:
     return str(status.name.partition(': ')[2])
 
 
-def _finite(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return value if isfinite(value) else None

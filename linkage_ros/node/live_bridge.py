@@ -36,7 +36,7 @@ from linkage_ros.drives.dependent_samples import DependentSampleReader, joint_of
 from linkage_ros.errors import clean, did_you_mean, LinkageError, listed, quoted, shortened
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, JointStateWriter
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.followed_run import diagnosed, FollowedRun, read_run
+from linkage_ros.node.followed_run import diagnostics_content, FollowedRun, read_run
 from linkage_ros.node.real_time import leave_out_shared_memory
 from linkage_ros.node.scene_topics import (
     CHANGES_QOS,
@@ -154,19 +154,19 @@ class LiveBridge:
         self._lock = Lock()
         self._newest: dict[str, tuple[int, str]] = dict.fromkeys(KINDS, (0, ''))
         self._listeners: list[Callable[[], None]] = []
-        self._asked: SimpleQueue[tuple[Mapping[str, Any], Future[str]]] = SimpleQueue()
+        self._requests: SimpleQueue[tuple[Mapping[str, Any], Future[str]]] = SimpleQueue()
         self._calls: list[_Call] = []
         self._clients: dict[str, Any] = {}
         self._run: FollowedRun | None = None
         self._trouble = ''
         self._faults: dict[str, bool] = {}
-        self._followed: list[Any] = []
+        self._run_subscriptions: list[Any] = []
         self._statuses: list[DiagnosticStatus] = []
         self._lifecycle = ''
-        self._asked_state: tuple[float, Any] | None = None
-        self._heard = -inf
-        self._there = False
-        self._told = -inf
+        self._pending_state: tuple[float, Any] | None = None
+        self._last_heard = -inf
+        self._is_present = False
+        self._last_told = -inf
         self._cranks: CrankSample | None = None
         self._hand = HandCrank(())
         self._hand_publisher: Any = None
@@ -174,35 +174,35 @@ class LiveBridge:
         self._effort: tuple[float, float] = (0.0, -inf)
         self.name = ''
         try:
-            self.name = self._find(name, patience)
-            self._begin(patience)
+            self.name = self._find_node(name, patience)
+            self._wait_for_scene(patience)
         except BaseException:
             self.end()
             raise
-        self._thread = Thread(target=self._spin, name='bridge', daemon=True)
+        self._thread = Thread(target=self._spin_thread, name='bridge', daemon=True)
         self._thread.start()
 
     # For the pages; called on any thread.
 
-    def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
+    def add_listener(self, heard: Callable[[], None]) -> Callable[[], None]:
         """Call a function whenever there is news; return one that ends this."""
         with self._lock:
             self._listeners = [*self._listeners, heard]
 
-        def end() -> None:
+        def stop_listening() -> None:
             with self._lock:
                 self._listeners = [each for each in self._listeners if each is not heard]
 
-        return end
+        return stop_listening
 
-    def newest(self, kind: str) -> tuple[int, str]:
+    def newest_message(self, kind: str) -> tuple[int, str]:
         """Return the number and the JSON of the newest message of a kind; 0 and '' for none."""
         return self._newest[kind]
 
-    def ask(self, content: Mapping[str, Any]) -> Future[str]:
+    def send_request(self, content: Mapping[str, Any]) -> Future[str]:
         """Ask for something; the future has what the answer says, one line."""
         future: Future[str] = Future()
-        self._asked.put((content, future))
+        self._requests.put((content, future))
         with suppress(Exception):  # the bridge has ended
             self._news.trigger()
         return future
@@ -219,13 +219,13 @@ class LiveBridge:
 
     # The beginning.
 
-    def _find(self, name: str, patience: float) -> str:
+    def _find_node(self, name: str, patience: float) -> str:
         """Return the full name of the node to follow."""
         wanted = f'/{name.lstrip("/")}' if name else ''
         until, settled = monotonic() + patience, inf
         names: list[str] = []
         while monotonic() < min(until, settled):
-            names = self._announcing()
+            names = self._scene_nodes()
             if wanted in names:
                 return wanted
             if names and not wanted:
@@ -234,12 +234,12 @@ class LiveBridge:
         if len(names) == 1 and not wanted:
             return names[0]
         if wanted:
-            remedy = did_you_mean(wanted, names, _remedy(names))
+            remedy = did_you_mean(wanted, names, _node_remedy(names))
             raise LinkageError(f'--node {name}', 'is no linkage node on this graph', remedy)
         reason = f'there are {len(names)} linkage nodes' if names else 'there is no linkage node'
-        raise LinkageError('--node', f'{reason} on this graph', _remedy(names))
+        raise LinkageError('--node', f'{reason} on this graph', _node_remedy(names))
 
-    def _announcing(self) -> list[str]:
+    def _scene_nodes(self) -> list[str]:
         """Return the full names of the nodes that publish a scene."""
         ending = SCENE_TOPIC.removeprefix('~')
         names = set()
@@ -251,11 +251,11 @@ class LiveBridge:
                         names.add(name)
         return sorted(names)
 
-    def _begin(self, patience: float) -> None:
+    def _wait_for_scene(self, patience: float) -> None:
         """Subscribe, and wait for the scene."""
         node = self._node
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._news = node.create_guard_condition(self._answer_asked)
+        self._news = node.create_guard_condition(self._answer_requests)
         topic = self.name + SCENE_TOPIC.removeprefix('~')
         node.create_subscription(String, topic, self._on_scene, SCENE_QOS, raw=True)
         node.create_subscription(
@@ -272,9 +272,9 @@ class LiveBridge:
             remedy = 'run the same version of linkage_ros here and there'
             raise LinkageError(self.name, reason, remedy)
         node.create_timer(_STATES_PERIOD, self._take_states, clock=self._steady)
-        node.create_timer(_LOOK, self._look, clock=self._steady)
+        node.create_timer(_LOOK, self._check_node, clock=self._steady)
 
-    def _spin(self) -> None:
+    def _spin_thread(self) -> None:
         while not self._ending.is_set():
             try:
                 self._executor.spin_once(timeout_sec=0.1)
@@ -294,15 +294,15 @@ class LiveBridge:
         else:
             self._trouble = ''
             self._run = run
-            self._follow(run)
-            self._say('model', {'model': run.model})
-            self._heard, self._there = monotonic(), True
-        self._told = -inf
+            self._follow_run(run)
+            self._publish_news('model', {'model': run.model})
+            self._last_heard, self._is_present = monotonic(), True
+        self._last_told = -inf
 
-    def _follow(self, run: FollowedRun) -> None:
+    def _follow_run(self, run: FollowedRun) -> None:
         """Subscribe to the topics of a run, and forget those of the run before."""
         node = self._node
-        for subscription in self._followed:
+        for subscription in self._run_subscriptions:
             node.destroy_subscription(subscription)
         if self._hand_publisher is not None:
             node.destroy_timer(self._hand_timer)
@@ -311,32 +311,32 @@ class LiveBridge:
         self._cranks = None
         self._effort = 0.0, -inf
         self._faults = dict.fromkeys(run.scene.faults, False)
-        self._followed = []
+        self._run_subscriptions = []
         # Taken by a timer, so that a fast node costs this process nothing.
-        self._joint_states = self._subscribe(JointState, run.account.joint_states_topic)
+        self._joint_states = self._subscribe_polled(JointState, run.metadata.joint_states_topic)
         self._read_joints = JointStateReader(run.scene.joint_names)
-        self._read_inputs = _crank_reader(run.shown)
+        self._read_inputs = _crank_reader(run.drawn_linkage)
         self._crank_states = None
-        if run.crank_topic not in ('', run.account.joint_states_topic):
-            self._crank_states = self._subscribe(JointState, run.crank_topic)
-        if faults := run.account.faults_topic:
+        if run.crank_topic not in ('', run.metadata.joint_states_topic):
+            self._crank_states = self._subscribe_polled(JointState, run.crank_topic)
+        if faults := run.metadata.faults_topic:
             # Latched: what began before comes now.
-            self._followed.append(
+            self._run_subscriptions.append(
                 node.create_subscription(String, faults, self._on_fault, CHANGES_QOS, raw=True)
             )
-        if run.turned is not None:
+        if run.topic_driven is not None:
             self._hand = HandCrank(
                 [
                     given.unit == 'rad' and not isfinite(given.limits.high - given.limits.low)
-                    for given in run.turned.linkage.inputs
+                    for given in run.topic_driven.linkage.inputs
                 ]
             )
 
-    def _subscribe(self, kind: Any, topic: str) -> Any:
+    def _subscribe_polled(self, kind: Any, topic: str) -> Any:
         subscription = self._node.create_subscription(
             kind, topic, never_called, _NEWEST_QOS, callback_group=TakenByTick()
         )
-        self._followed.append(subscription)
+        self._run_subscriptions.append(subscription)
         return subscription
 
     def _on_fault(self, message: bytes) -> None:
@@ -344,76 +344,80 @@ class LiveBridge:
             name, on = read_change(message)
             if name in self._faults:
                 self._faults[name] = on
-                self._tell_node()
+                self._publish_node()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         own = [each for each in message.status if each.name.startswith(f'{self.name}: ')]
         if own:
-            self._statuses, self._heard = own, monotonic()
+            self._statuses, self._last_heard = own, monotonic()
             self._lifecycle = ''
-            self._tell_node()
+            self._publish_node()
 
     def _take_states(self) -> None:
         """Take the newest joint states and crank, and tell them."""
         run = self._run
         assert run is not None
         joints = None
-        for message in _all(self._joint_states):
+        for message in _take_all(self._joint_states):
             # Other nodes may publish on the same topic, or the crank comes by it.
             read = self._read_joints.read(message)
             joints = read if isinstance(read, CrankSample) else joints
             inputs = self._read_inputs.read(message)
             self._cranks = inputs if isinstance(inputs, CrankSample) else self._cranks
-        for message in _all(self._crank_states):
+        for message in _take_all(self._crank_states):
             inputs = self._read_inputs.read(message)
             self._cranks = inputs if isinstance(inputs, CrankSample) else self._cranks
         if joints is not None:
-            self._heard = monotonic()
-            self._say('state', {'state': run.state(joints, self._cranks, time_ns())})
+            self._last_heard = monotonic()
+            self._publish_news(
+                'state', {'state': run.state_content(joints, self._cranks, time_ns())}
+            )
 
-    def _look(self) -> None:
+    def _check_node(self) -> None:
         """Find out whether the node is there, and give up what it does not answer."""
         now = monotonic()
         self._attend_calls(now)
-        if self._asked_state is not None and now > self._asked_state[0]:
-            self._client(GetState, 'get_state').remove_pending_request(self._asked_state[1])
-            self._asked_state = None
-        if now - self._heard > _SILENT and self._asked_state is None:
-            client = self._client(GetState, 'get_state')
+        if self._pending_state is not None and now > self._pending_state[0]:
+            self._service_client(GetState, 'get_state').remove_pending_request(
+                self._pending_state[1]
+            )
+            self._pending_state = None
+        if now - self._last_heard > _SILENT and self._pending_state is None:
+            client = self._service_client(GetState, 'get_state')
             if client.service_is_ready():
                 called = client.call_async(GetState.Request())
                 called.add_done_callback(self._on_lifecycle)
-                self._asked_state = now + 2 * _SILENT, called
-        there = now - self._heard <= _GONE
-        if there != self._there or now - self._told >= _NODE_PERIOD:
-            self._there = there
-            self._tell_node()
+                self._pending_state = now + 2 * _SILENT, called
+        there = now - self._last_heard <= _GONE
+        if there != self._is_present or now - self._last_told >= _NODE_PERIOD:
+            self._is_present = there
+            self._publish_node()
 
     def _on_lifecycle(self, called: Any) -> None:
-        self._asked_state = None
+        self._pending_state = None
         if called.exception() is None and called.result() is not None:
-            self._heard = monotonic()
+            self._last_heard = monotonic()
             self._lifecycle = str(called.result().current_state.label)
 
-    def _tell_node(self) -> None:
+    def _publish_node(self) -> None:
         """Tell how the node is."""
         if self._run is None:
             return
-        self._told = monotonic()
+        self._last_told = monotonic()
         troubles = [[2, f'the node {self._trouble}']] if self._trouble else []
-        told = diagnosed(self._statuses)
+        told = diagnostics_content(self._statuses)
         node = {
             'name': self.name,
-            'there': self._there,
+            'there': self._is_present,
             'state': self._lifecycle,
             'faults': self._faults,
-            'drive': self._run.drive,
+            'drive': self._run.drive_name,
             **told,
             'diagnostics': troubles + told['diagnostics'],
         }
-        self._say('node', {'node': node})
+        self._publish_news('node', {'node': node})
 
-    def _say(self, kind: str, content: dict[str, Any]) -> None:
+    def _publish_news(self, kind: str, content: dict[str, Any]) -> None:
         number, _ = self._newest[kind]
         self._newest[kind] = number + 1, json.dumps(content, allow_nan=False)
         for heard in self._listeners:
@@ -421,48 +425,48 @@ class LiveBridge:
 
     # What the pages ask for.
 
-    def _answer_asked(self) -> None:
+    def _answer_requests(self) -> None:
         while True:
             try:
-                content, future = self._asked.get_nowait()
+                content, future = self._requests.get_nowait()
             except Empty:
                 return
             try:
-                self._do(content, future)
+                self._handle_request(content, future)
             except LinkageError as error:
-                _reply(future, str(error))
+                _send_reply(future, str(error))
             except Exception as error:  # noqa: BLE001 (rcl's have no base class)
-                _reply(future, f'{type(error).__name__}: {shortened(clean(str(error)), 200)}')
+                _send_reply(future, f'{type(error).__name__}: {shortened(clean(str(error)), 200)}')
 
-    def _do(self, content: Mapping[str, Any], future: Future[str]) -> None:
+    def _handle_request(self, content: Mapping[str, Any], future: Future[str]) -> None:
         """Do what a page asks for; the answer may come later."""
         do = content['do']
         if do == 'fault':
             name = content.get('name')
             if not isinstance(name, str) or name not in self._faults:
                 raise LinkageError(
-                    'fault', f'{quoted(name)} is not in the scene', _any_of(self._faults)
+                    'fault', f'{quoted(name)} is not in the scene', _choices_text(self._faults)
                 )
-            request = SetBool.Request(data=_flag(content))
-            self._call(SetBool, f'inject/{name}', request, future)
+            request = SetBool.Request(data=_read_flag(content))
+            self._call_service(SetBool, f'inject/{name}', request, future)
         elif do == 'record':
-            service = 'start_recording' if _flag(content) else 'stop_recording'
-            self._call(Trigger, service, Trigger.Request(), future)
+            service = 'start_recording' if _read_flag(content) else 'stop_recording'
+            self._call_service(Trigger, service, Trigger.Request(), future)
         elif do in _PLAIN:
-            self._call(Trigger, do, Trigger.Request(), future)
+            self._call_service(Trigger, do, Trigger.Request(), future)
         elif do == 'crank':
-            _reply(future, self._turn(content))
+            _send_reply(future, self._turn_crank(content))
         elif do == 'effort':
-            _reply(future, self._push(content))
+            _send_reply(future, self._apply_effort(content))
         else:
-            raise LinkageError('do', f'{quoted(do)} is not known', _any_of(_REQUESTS))
+            raise LinkageError('do', f'{quoted(do)} is not known', _choices_text(_REQUESTS))
 
-    def _call(self, kind: Any, service: str, request: Any, future: Future[str]) -> None:
-        if not self._there:
+    def _call_service(self, kind: Any, service: str, request: Any, future: Future[str]) -> None:
+        if not self._is_present:
             remedy = 'see whether the node runs'
             raise LinkageError(f'{self.name}/{service}', 'does not answer', remedy)
         patience = _SNAPSHOT_PATIENCE if service == 'snapshot' else _SERVICE_PATIENCE
-        client = self._client(kind, service)
+        client = self._service_client(kind, service)
         self._calls.append(_Call(client, request, future, monotonic() + patience))
         self._attend_calls(monotonic())
 
@@ -476,52 +480,52 @@ class LiveBridge:
                 self._calls.remove(call)
                 if call.answer is not None:
                     call.client.remove_pending_request(call.answer)
-                _reply(call.future, f'{self.name} does not answer')
+                _send_reply(call.future, f'{self.name} does not answer')
 
     def _on_answer(self, call: _Call, answer: Any) -> None:
         if call in self._calls:
             self._calls.remove(call)
             failed = answer.exception()
-            _reply(call.future, str(failed) if failed else str(answer.result().message))
+            _send_reply(call.future, str(failed) if failed else str(answer.result().message))
 
-    def _client(self, kind: Any, service: str) -> Any:
+    def _service_client(self, kind: Any, service: str) -> Any:
         if service not in self._clients:
             self._clients[service] = self._node.create_client(kind, f'{self.name}/{service}')
         return self._clients[service]
 
-    def _turn(self, content: Mapping[str, Any]) -> str:
-        run, target = self._turnable('topic', 'crank'), _number(content, 'angle')
-        assert run.turned is not None
+    def _turn_crank(self, content: Mapping[str, Any]) -> str:
+        run, target = self._require_drive('topic', 'crank'), _read_number(content, 'angle')
+        assert run.topic_driven is not None
         number = content.get('input', 0)
-        if type(number) is not int or not 0 <= number < len(run.turned.input_names):
-            count = len(run.turned.input_names)
+        if type(number) is not int or not 0 <= number < len(run.topic_driven.input_names):
+            count = len(run.topic_driven.input_names)
             raise LinkageError('input', f'{quoted(number)} is none', f'name one of {count}')
-        at = [0.0] * len(run.turned.input_names)
-        if self._cranks is not None and run.turned is run.shown:
+        at = [0.0] * len(run.topic_driven.input_names)
+        if self._cranks is not None and run.topic_driven is run.drawn_linkage:
             at = list(self._cranks.angles)
         else:
             at[number] = target
         self._hand.turn(number, target, at, monotonic())
-        self._hold(run)
-        return f'{listed(run.turned.sampled_joints)} on {run.crank_topic}, by hand'
+        self._start_hand(run)
+        return f'{listed(run.topic_driven.sampled_joints)} on {run.crank_topic}, by hand'
 
-    def _push(self, content: Mapping[str, Any]) -> str:
-        run = self._turnable('torque', 'effort')
-        self._effort = _number(content, 'value'), monotonic()
-        self._hold(run)
+    def _apply_effort(self, content: Mapping[str, Any]) -> str:
+        run = self._require_drive('torque', 'effort')
+        self._effort = _read_number(content, 'value'), monotonic()
+        self._start_hand(run)
         return f'effort {self._effort[0]:g} on {run.crank_topic}'
 
-    def _turnable(self, drive: str, what: str) -> FollowedRun:
+    def _require_drive(self, drive: str, what: str) -> FollowedRun:
         run = self._run
         assert run is not None
-        if run.turned is None or run.turned.drive[0] != drive:
+        if run.topic_driven is None or run.topic_driven.drive[0] != drive:
             remedy = f'run a scene with the drive {drive}'
-            raise LinkageError(what, f'is not taken by the drive {run.drive}', remedy)
+            raise LinkageError(what, f'is not taken by the drive {run.drive_name}', remedy)
         return run
 
-    def _hold(self, run: FollowedRun) -> None:
+    def _start_hand(self, run: FollowedRun) -> None:
         """Publish from now on, as long as a hand holds the crank."""
-        assert run.turned is not None
+        assert run.topic_driven is not None
         if self._hand_publisher is None:
             self._hand_publisher = self._node.create_publisher(
                 JointState, run.crank_topic, _HAND_QOS
@@ -529,19 +533,19 @@ class LiveBridge:
             self._hand_timer = self._node.create_timer(
                 _HAND_PERIOD, self._publish_hand, clock=self._steady
             )
-            self._write_crank = _crank_writer(run.turned)
+            self._write_crank = _crank_writer(run.topic_driven)
         if self._hand_timer.is_canceled():
             self._hand_timer.reset()
 
     def _publish_hand(self) -> None:
         assert self._run is not None
-        assert self._run.turned is not None
+        assert self._run.topic_driven is not None
         now, stamp = monotonic(), time_ns()
         if (followed := self._hand.follow(now)) is not None:
             message = self._write_crank(stamp, *followed)
             self._hand_publisher.handle.publish_raw(message)
         elif now - self._effort[1] <= HELD:
-            command = JointState(name=list(self._run.turned.input_names[:1]))
+            command = JointState(name=list(self._run.topic_driven.input_names[:1]))
             command.effort = [self._effort[0]]
             command.header.stamp.sec, command.header.stamp.nanosec = divmod(stamp, NANOSECONDS)
             self._hand_publisher.publish(command)
@@ -555,7 +559,7 @@ _PLAIN = ('snapshot', 'reset')
 _REQUESTS = ('fault', 'record', *_PLAIN, 'crank', 'effort')
 
 
-def _all(subscription: Any) -> list[bytes]:
+def _take_all(subscription: Any) -> list[bytes]:
     """Take the waiting messages of a subscription."""
     if subscription is None:
         return []
@@ -568,38 +572,40 @@ def _all(subscription: Any) -> list[bytes]:
     return taken
 
 
-def _number(content: Mapping[str, Any], key: str) -> float:
+def _read_number(content: Mapping[str, Any], key: str) -> float:
     value: Any = content.get(key)
     if type(value) not in (int, float) or not abs(value) <= _FARTHEST:
         raise LinkageError(key, f'{quoted(value)} is not valid', 'send a number')
     return float(value)
 
 
-def _flag(content: Mapping[str, Any]) -> bool:
+def _read_flag(content: Mapping[str, Any]) -> bool:
     on = content.get('on')
     if not isinstance(on, bool):
         raise LinkageError('on', f'{quoted(on)} is not valid', 'send true or false')
     return on
 
 
-def _branch_of(member: SceneLinkage) -> CrankBranch:
+def _branch_of(scene_linkage: SceneLinkage) -> CrankBranch:
     """Return the branch on which a dependent joint moves a crank."""
-    return sampled_inverse(member.closure, member.dependent_joint, member.drive[1].branch).branch
+    return sampled_inverse(
+        scene_linkage.closure, scene_linkage.dependent_joint, scene_linkage.drive[1].branch
+    ).branch
 
 
-def _crank_reader(member: SceneLinkage) -> JointStateReader | DependentSampleReader:
+def _crank_reader(scene_linkage: SceneLinkage) -> JointStateReader | DependentSampleReader:
     """Return the reader of its inputs, as samples or published joints name them."""
-    if not member.dependent_joint:
-        return JointStateReader(member.input_names)
-    return DependentSampleReader(_branch_of(member), member.sampled_joints[0])
+    if not scene_linkage.dependent_joint:
+        return JointStateReader(scene_linkage.input_names)
+    return DependentSampleReader(_branch_of(scene_linkage), scene_linkage.sampled_joints[0])
 
 
-def _crank_writer(member: SceneLinkage) -> Callable[[int, Floats, Floats], bytes]:
+def _crank_writer(scene_linkage: SceneLinkage) -> Callable[[int, Floats, Floats], bytes]:
     """Return the writer of samples as its drive takes them: of inputs, or of a dependent joint."""
-    write = JointStateWriter(member.sampled_joints).write
-    if not member.dependent_joint:
+    write = JointStateWriter(scene_linkage.sampled_joints).write
+    if not scene_linkage.dependent_joint:
         return write
-    branch = _branch_of(member)
+    branch = _branch_of(scene_linkage)
 
     def write_joint(stamp: int, cranks: Floats, rates: Floats) -> bytes:
         value, rate = joint_of(branch, cranks[0], rates[0])
@@ -608,16 +614,16 @@ def _crank_writer(member: SceneLinkage) -> Callable[[int, Floats, Floats], bytes
     return write_joint
 
 
-def _any_of(names: Sequence[str] | Mapping[str, Any]) -> str:
+def _choices_text(names: Sequence[str] | Mapping[str, Any]) -> str:
     return f'there are: {listed(names)}' if names else 'there is none'
 
 
-def _reply(future: Future[str], line: str) -> None:
+def _send_reply(future: Future[str], line: str) -> None:
     with suppress(InvalidStateError):  # the page has gone
         future.set_result(line)
 
 
-def _remedy(names: Sequence[str]) -> str:
+def _node_remedy(names: Sequence[str]) -> str:
     if names:
         return f'name one of them: {listed(names)}'
     return 'start one, in the same ROS_DOMAIN_ID (linkage run says it)'

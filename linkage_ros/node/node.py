@@ -31,17 +31,17 @@ from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node import pacing
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.diagnostics import (
-    chattered,
+    chatter_count,
     CLOCK_PATIENCE,
+    CountsSnapshot,
     DiagnosticsSummary,
     is_interleaved,
     no_clock,
-    Snapshot,
     Warnings,
 )
 from linkage_ros.node.pacing import ClockGuard
 from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE, nearness_limits
-from linkage_ros.node.real_time import RealTime, STANDSTILL, standstill
+from linkage_ros.node.real_time import RealTime, STANDSTILL, standstill_reason
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -79,24 +79,24 @@ class DeferredResponse:
 
     def __init__(self, service: Any) -> None:
         self._send = service.send_response
-        self._late: Any = None
-        self._to: Any = None
+        self._deferred: Any = None
+        self._request_header: Any = None
         service.send_response = self._send_or_keep
 
-    def defer(self, response: Any) -> Any:
+    def keep_response(self, response: Any) -> Any:
         """Return the response for the callback to return; it is not sent yet."""
-        self._late = response
+        self._deferred = response
         return response
 
-    def answer(self, success: bool, message: str) -> None:
+    def send_answer(self, success: bool, message: str) -> None:
         """Send the deferred response; call it on the executor's thread or after its end."""
-        response, self._late = self._late, None
+        response, self._deferred = self._deferred, None
         response.success, response.message = success, message
-        self._send(response, self._to)
+        self._send(response, self._request_header)
 
     def _send_or_keep(self, response: Any, to: Any) -> None:
-        if response is self._late:
-            self._to = to
+        if response is self._deferred:
+            self._request_header = to
         else:
             self._send(response, to)
 
@@ -111,18 +111,18 @@ _TWIN_PATIENCE = 0.5
 Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
 
 
-def _reporting(transition: Transition) -> Transition:
+def _log_errors(transition: Transition) -> Transition:
     """Log an exception that a transition raises; rclpy would hide it."""
 
     @wraps(transition)
-    def reported(node: LinkageNode, state: LifecycleState) -> TransitionCallbackReturn:
+    def report_errors(node: LinkageNode, state: LifecycleState) -> TransitionCallbackReturn:
         try:
             return transition(node, state)
         except Exception as error:  # noqa: BLE001 (rclpy would hide any of them)
             node.get_logger().error(f'{transition.__name__}: {type(error).__name__}: {error}')
             return TransitionCallbackReturn.ERROR
 
-    return reported
+    return report_errors
 
 
 class LinkageNode(LifecycleNode):
@@ -148,7 +148,7 @@ class LinkageNode(LifecycleNode):
         self._diagnostics = self.create_publisher(
             DiagnosticArray, '/diagnostics', _DIAGNOSTICS_QOS
         )
-        self._simulation = self.create_subscription(
+        self._clock_subscription = self.create_subscription(
             ClockMessage, '/clock', never_called, _CLOCK_QOS, callback_group=TakenByTick()
         )
         self.create_service(Trigger, '~/reset', self._on_reset)
@@ -157,24 +157,24 @@ class LinkageNode(LifecycleNode):
         self._snapshot_answers = DeferredResponse(
             self.create_service(Trigger, '~/snapshot', self._on_snapshot)
         )
-        self._snapshot_written = self.create_guard_condition(self.recording.collect)
+        self._snapshot_written = self.create_guard_condition(self.recording.collect_snapshot)
         # On the steady clock: the node's clock stops when the simulation does.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_WATCH_PERIOD, self._watch, clock=steady)
+        self.create_timer(_WATCH_PERIOD, self._watch_tick, clock=steady)
         change = self._service_change_state
         change.callback = partial(self._on_change_state, change.callback)
         self._clock_guard = ClockGuard(self._time_source)
-        self._activated = 0
+        self._activation_time = 0
         self.add_on_set_parameters_callback(self._on_parameters)
         self._warnings = Warnings(self.get_logger())
-        self._before = self._before_last = Snapshot()
+        self._last_counts = self._previous_counts = CountsSnapshot()
         self._twin_since = inf
         self._real_time = RealTime(
             self.get_parameter('thread_priority').value,
             [each for each in self.get_parameter('cpu_affinity').value if each != -1],
             self.get_parameter('lock_memory').value,
         )
-        why = standstill()
+        why = standstill_reason()
         self._middleware = {'Middleware': why} if why else {}
 
     @property
@@ -184,7 +184,7 @@ class LinkageNode(LifecycleNode):
 
     # Transitions.
 
-    @_reporting
+    @_log_errors
     def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Load the scene and check that it can be built."""
         file = self.get_parameter('scene').value
@@ -201,8 +201,8 @@ class LinkageNode(LifecycleNode):
                 # linkage is followed at this point.
                 _ = closure.singular_inputs
             if scene.robot_description:
-                self._scene_topics.describe(scene, pipeline)
-            self._scene_topics.announce(scene, pipeline, self._joint_states.topic_name)
+                self._scene_topics.publish_description(scene, pipeline)
+            self._scene_topics.publish_scene(scene, pipeline, self._joint_states.topic_name)
         except LinkageError as error:
             self._scene_topics.disconnect()
             self.failure = error
@@ -219,22 +219,24 @@ class LinkageNode(LifecycleNode):
         self.failure, self.scene, self._closures = None, scene, pipeline.closures
         return TransitionCallbackReturn.SUCCESS
 
-    @_reporting
+    @_log_errors
     def on_activate(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Start ticking, and recording if the scene says so."""
         assert self.scene is not None
         self.loop = self._build_loop(self.scene)
         self._warnings = Warnings(self.get_logger())  # starts with the counts that it compares
-        take_crank = self._scene_topics.take
+        take_crank = self._scene_topics.take_sample
         for take in (*([take_crank] if take_crank else []), *self._scene_topics.take_wrenches):
             while take() is not None:
                 pass  # discard messages from before this run
-        self._activated = time.monotonic_ns()
-        self._before = self._before_last = Snapshot.of(self.loop.counts, self._activated)
+        self._activation_time = time.monotonic_ns()
+        self._last_counts = self._previous_counts = CountsSnapshot.take(
+            self.loop.counts, self._activation_time
+        )
         if self.scene.record is not None:
             self._start_recording()
         self._real_time.lock_memory()
-        self.loop.start(self._real_time.paced(self._pace(self.scene.rate)))
+        self.loop.start(self._real_time.wrap_pace(self._make_pace(self.scene.rate)))
         if self._middleware:
             self.get_logger().info(STANDSTILL)
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
@@ -252,30 +254,30 @@ class LinkageNode(LifecycleNode):
         )
         return TransitionCallbackReturn.SUCCESS
 
-    @_reporting
+    @_log_errors
     def on_deactivate(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Stop ticking and close the bag."""
-        self.end()
+        self.end_run()
         return TransitionCallbackReturn.SUCCESS
 
-    @_reporting
+    @_log_errors
     def on_cleanup(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Forget the scene."""
         self.scene = None
         self._scene_topics.disconnect()
         return TransitionCallbackReturn.SUCCESS
 
-    @_reporting
+    @_log_errors
     def on_shutdown(self, _: LifecycleState) -> TransitionCallbackReturn:
         """End the run, from any state."""
-        self.end()
+        self.end_run()
         return TransitionCallbackReturn.SUCCESS
 
-    @_reporting
+    @_log_errors
     def on_error(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Return to unconfigured."""
         self.get_logger().error('a transition failed; the node is unconfigured now')
-        self.end()
+        self.end_run()
         self._scene_topics.disconnect()
         return TransitionCallbackReturn.SUCCESS
 
@@ -285,7 +287,7 @@ class LinkageNode(LifecycleNode):
         crank = self._scene_topics.crank
         return TickLoop(
             partial(Pipeline, scene, closures, injection),
-            self._scene_topics.take,
+            self._scene_topics.take_sample,
             self._joint_states.handle.publish_raw,
             own_joint_states(scene) if self._shares_topic else None,
             [extra.handle.publish_raw for extra in self._scene_topics.extras],
@@ -295,23 +297,23 @@ class LinkageNode(LifecycleNode):
             take_wrenches=self._scene_topics.take_wrenches,
         )
 
-    def _pace(self, rate: float) -> Pace:
+    def _make_pace(self, rate: float) -> Pace:
         simulated = self.get_parameter('use_sim_time').value
         if rate and simulated:
-            return pacing.on_clock(self.context, self._simulation, rate)
+            return pacing.on_clock(self.context, self._clock_subscription, rate)
         if rate:
-            return pacing.steady(rate)
+            return pacing.on_steady_clock(rate)
         assert self._scene_topics.crank is not None  # a scene without samples has a rate
         clock = self.get_clock()
         now = (lambda: int(clock.now().nanoseconds)) if simulated else time.time_ns
         return pacing.on_samples(self.context, self._scene_topics.crank, now)
 
-    def end(self) -> None:
+    def end_run(self) -> None:
         """Stop ticking and close the bag; do nothing if nothing runs."""
         if self.loop is not None and self.loop.is_running:
             self.loop.stop()
             self._watch_failure(self.loop)
-            self._diagnose()
+            self._publish_diagnostics()
             if self.crank_topic:
                 self.get_logger().info(f'{self.crank_topic}: {self.loop.sample_counts_text}')
             self.recording.stop(self.loop)
@@ -333,7 +335,7 @@ class LinkageNode(LifecycleNode):
         topics = {
             handles.joint_states: ('joint_states_topic', joint_states),
             handles.diagnostics: ('diagnostics_topic', diagnostics),
-            **self._scene_topics.described(handles),
+            **self._scene_topics.describe_topics(handles),
         }
         return [topics[handle] for handle in sorted(topics)]
 
@@ -352,47 +354,51 @@ class LinkageNode(LifecycleNode):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.loop is None or not self.loop.is_running:
-            return _answer(response, False, 'not active: nothing to reset')
+            return _fill_response(response, False, 'not active: nothing to reset')
         self.loop.reset_requested = True
-        return _answer(response, True, 'crank and turns are forgotten before the next tick')
+        return _fill_response(response, True, 'crank and turns are forgotten before the next tick')
 
     def _on_inject(
         self, name: str, request: SetBool.Request, response: SetBool.Response
     ) -> SetBool.Response:
         if self.loop is None or not self.loop.is_running or self.loop.injection is None:
-            return _answer(response, False, 'not active: nothing to inject into')
+            return _fill_response(response, False, 'not active: nothing to inject into')
         self.loop.injection.request_change(name, bool(request.data))
         what = 'begins' if request.data else 'ends'
-        return _answer(response, True, f'{name} {what} at the next tick')
+        return _fill_response(response, True, f'{name} {what} at the next tick')
 
     def _on_start_recording(
         self, _: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
         if self.loop is None or not self.loop.is_running:
-            return _answer(response, False, 'not active: nothing to record')
+            return _fill_response(response, False, 'not active: nothing to record')
         if self.recording.has_ended(self.loop):
             self.recording.stop(self.loop)
         if self.loop.recorder is not None:
-            return _answer(response, False, f'already {self.recording.describe(self.loop)}')
+            return _fill_response(
+                response, False, f'already {self.recording.describe_state(self.loop)}'
+            )
         line = self._start_recording()
-        return _answer(response, self.loop.recorder is not None, line)
+        return _fill_response(response, self.loop.recorder is not None, line)
 
     def _on_stop_recording(
         self, _: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
         if self.loop is None or self.loop.recorder is None:
-            return _answer(response, False, 'not recording')
-        return _answer(response, *self.recording.stop(self.loop))
+            return _fill_response(response, False, 'not recording')
+        return _fill_response(response, *self.recording.stop(self.loop))
 
     def _on_snapshot(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.loop is None or not self.loop.is_running:
-            return _answer(response, False, 'not active: nothing is kept in memory')
-        refusal = self.recording.snapshot(self._snapshot_answers.answer, self._wake)
+            return _fill_response(response, False, 'not active: nothing is kept in memory')
+        refusal = self.recording.begin_snapshot(
+            self._snapshot_answers.send_answer, self._trigger_collect
+        )
         if refusal:
-            return _answer(response, False, refusal)
-        return self._snapshot_answers.defer(response)
+            return _fill_response(response, False, refusal)
+        return self._snapshot_answers.keep_response(response)
 
-    def _wake(self) -> None:
+    def _trigger_collect(self) -> None:
         """Make the executor collect a snapshot; called on the thread that has written it."""
         with suppress(InvalidHandle):  # the write may finish after the node is destroyed
             self._snapshot_written.trigger()
@@ -409,26 +415,29 @@ class LinkageNode(LifecycleNode):
                 )
         return SetParametersResult(successful=True)
 
-    def report(self, failure: str) -> None:
+    def warn_of_failure(self, failure: str) -> None:
         """Log a warning about a call that failed, at a limited rate."""
         self._warnings.warn('failure', failure, self.get_parameter('warning_period').value)
 
     # Monitoring.
 
-    def _watch(self) -> None:
+    def _watch_tick(self) -> None:
         """Log the counts of the tick, and publish the diagnostics when they are due."""
         loop = self.loop
         if loop is None or not loop.is_running:
             return
         period = self.get_parameter('warning_period').value
-        self._warnings.check(loop.counts, loop.pipeline.closures, self.crank_topic, period)
+        self._warnings.check_events(loop.counts, loop.pipeline.closures, self.crank_topic, period)
         self._warnings.check_age(loop.counts, self.crank_topic, loop.pipeline.max_age, period)
         self._warnings.check_jumps(loop.pipeline.linkages, self.crank_topic)
         wrenches = [each.topic_name for each in self._scene_topics.wrenches]
         self._warnings.check_chatter(loop.pipeline.linkages, period)
         self._warnings.check_wrenches([*zip(wrenches, loop.counts.wrenches, strict=True)], period)
         silence = self._clock_silence()
-        if min(silence, (time.monotonic_ns() - self._activated) / NANOSECONDS) > CLOCK_PATIENCE:
+        if (
+            min(silence, (time.monotonic_ns() - self._activation_time) / NANOSECONDS)
+            > CLOCK_PATIENCE
+        ):
             remedy = 'start the simulation, or set use_sim_time: false'
             self._warnings.warn('clock', f'{no_clock(silence)}: {remedy}', period)
         while self._real_time.refused:
@@ -449,27 +458,27 @@ class LinkageNode(LifecycleNode):
                 self._crank_publishers,
             )
         self._watch_failure(loop)
-        news = self.recording.check(loop)
-        due = self._before.time + self.get_parameter('diagnostics_period').value * NANOSECONDS
+        news = self.recording.check_failure(loop)
+        due = self._last_counts.time + self.get_parameter('diagnostics_period').value * NANOSECONDS
         if news or time.monotonic_ns() >= due - 0.5 * _WATCH_PERIOD * NANOSECONDS:
-            self._diagnose()
+            self._publish_diagnostics()
 
     def _watch_failure(self, loop: TickLoop) -> None:
         if loop.failure:
             period = self.get_parameter('warning_period').value
             self._warnings.warn('tick', f'the tick has stopped: {loop.failure}', period)
 
-    def _diagnose(self) -> None:
+    def _publish_diagnostics(self) -> None:
         assert self.scene is not None
         assert self.loop is not None
         publishers = self._crank_publishers()
         self.loop.had_several_publishers |= len(publishers) > 1
-        now = Snapshot.of(
-            self.loop.counts, time.monotonic_ns(), chattered(self.loop.pipeline.linkages)
+        now = CountsSnapshot.take(
+            self.loop.counts, time.monotonic_ns(), chatter_count(self.loop.pipeline.linkages)
         )
         cranks_doubled = self._doubled_cranks(publishers, now)
         node_doubled = self._doubled_node(now)
-        self._before_last = self._before
+        self._previous_counts = self._last_counts
         period = self.get_parameter('warning_period').value
         for kind, line in (('publishers', cranks_doubled), ('twin', node_doubled)):
             if line:
@@ -482,21 +491,21 @@ class LinkageNode(LifecycleNode):
             rate=0.0 if simulated else self.scene.rate,
             clock=clock.nanoseconds,
             clock_silence=self._clock_silence(),
-            clock_refused=self._clock_guard.refused,
+            clock_refused=self._clock_guard.refused_count,
             crank_topic=self.crank_topic,
             publishers=publishers,
             cranks_doubled=cranks_doubled,
             node_doubled=node_doubled,
             loop=self.loop,
-            before=self._before,
-            now=now,
+            window_start=self._last_counts,
+            window_end=now,
             recording_failure=self.recording.failure,
             snapshots=self.recording.snapshots,
             limits=nearness_limits(self),
             system=self._real_time.in_force | self._middleware,
         )
-        self._before = now
-        message = DiagnosticArray(status=health.statuses())
+        self._last_counts = now
+        message = DiagnosticArray(status=health.make_statuses())
         message.header.stamp = clock.to_msg()
         data = serialize_message(message)
         self._diagnostics.publish(data)
@@ -505,19 +514,19 @@ class LinkageNode(LifecycleNode):
                 self.loop.topics.diagnostics, clock.nanoseconds, clock.nanoseconds, data
             )
 
-    def _doubled_cranks(self, publishers: Sequence[str], now: Snapshot) -> str:
+    def _doubled_cranks(self, publishers: Sequence[str], now: CountsSnapshot) -> str:
         """Return that several publishers send the same crank, and the remedy; '' if none do."""
         assert self.loop is not None
         topic, shared = self.crank_topic, self._shares_topic or self.loop.counts.ignored
         among = ' and '.join(publishers) or 'nodes without a name yet'
         # Where others share the topic, or each linkage has a publisher, only the numbers tell.
-        if is_interleaved(self._before_last.interleaved, now.interleaved):
+        if is_interleaved(self._previous_counts.interleaved, now.interleaved):
             return f'{topic}: several publishers send the crank, among {among}; stop all but one'
         if len(publishers) > 1 and not shared and len(self.loop.pipeline.linkages) == 1:
             return f'{topic}: several publishers, {among}; stop all but one'
         return ''
 
-    def _doubled_node(self, now: Snapshot) -> str:
+    def _doubled_node(self, now: CountsSnapshot) -> str:
         """Return that there is another node of this name, or of these joints; '' if not."""
         name = self.get_fully_qualified_name()
         nodes = self.get_node_names_and_namespaces()
@@ -528,7 +537,7 @@ class LinkageNode(LifecycleNode):
                 f'another node is named {name}: services and diagnostics of both mix; rename one, '
                 'as by -r __ns:=/left'
             )
-        if is_interleaved(self._before_last.own_interleaved, now.own_interleaved):
+        if is_interleaved(self._previous_counts.own_interleaved, now.own_interleaved):
             topic = self._joint_states.topic_name
             return f'{topic}: another publisher sends the same joints as {name}; stop one of them'
         return ''
@@ -554,11 +563,11 @@ class LinkageNode(LifecycleNode):
         """Return the time since the last ``/clock`` message, in [s]; 0 if unused."""
         if not self.get_parameter('use_sim_time').value:
             return 0.0
-        heard = self._clock_guard.heard
+        heard = self._clock_guard.last_heard
         return (time.monotonic_ns() - heard) / NANOSECONDS if heard else inf
 
 
-def _answer(response: Any, success: bool, message: str) -> Any:
+def _fill_response(response: Any, success: bool, message: str) -> Any:
     response.success = success
     response.message = message
     return response

@@ -36,7 +36,7 @@ _LONGEST_WAIT = 100_000_000
 """Longest wait for a message, in [ns], between two checks for a stop."""
 
 
-def steady(rate: float) -> Pace:
+def on_steady_clock(rate: float) -> Pace:
     """
     Tick at a rate, in [Hz], on the steady clock, stamped with the system's time.
 
@@ -91,7 +91,7 @@ def on_samples(context: Context, subscription: Subscription, now: Callable[[], i
     """
 
     def pace(loop: TickLoop, stopping: Event) -> None:
-        wait = _waiter(context, subscription)
+        wait = _make_waiter(context, subscription)
         while not stopping.is_set():
             if wait():
                 loop.tick_samples(now(), now)
@@ -116,11 +116,11 @@ def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
     period = round(NANOSECONDS / rate)
 
     def pace(loop: TickLoop, stopping: Event) -> None:
-        wait = _waiter(context, clock)
+        wait = _make_waiter(context, clock)
         due = 0
         last = newest = -1
 
-        def read() -> int:
+        def read_newest() -> int:
             nonlocal newest
             # The queue has depth 1, so the message taken is the newest.
             taken = clock.handle.take_message(ClockMessage, False)
@@ -129,7 +129,7 @@ def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
             return newest
 
         while not stopping.is_set():
-            now = read()
+            now = read_newest()
             if now == last:
                 wait()
                 continue
@@ -137,24 +137,24 @@ def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
                 due = now
             last = now
             if now >= due:
-                loop.tick_at(now, read)
+                loop.tick_at(now, read_newest)
                 due = now - now % period + period
 
     return pace
 
 
-def _waiter(context: Context, subscription: Subscription) -> Callable[[], bool]:
+def _make_waiter(context: Context, subscription: Subscription) -> Callable[[], bool]:
     """Return a function that waits for a message and returns whether one has arrived."""
     # Like rclpy.wait_for_message; an executor would cost more than the tick.
     wait_set = _rclpy.WaitSet(1, 0, 0, 0, 0, 0, context.handle)
 
-    def wait() -> bool:
+    def wait_for_message() -> bool:
         wait_set.clear_entities()
         wait_set.add_subscription(subscription.handle)
         wait_set.wait(_LONGEST_WAIT)
         return bool(wait_set.get_ready_entities('subscription'))
 
-    return wait
+    return wait_for_message
 
 
 def nanoseconds_of(message: ClockMessage) -> int | None:
@@ -178,18 +178,18 @@ class ClockGuard:
 
     def __init__(self, source: TimeSource) -> None:
         self._pass_on: Callable[[ClockMessage], None] = source.clock_callback
-        self.refused = 0
+        self.refused_count = 0
         """Number of messages without a valid time."""
-        self.heard = 0
+        self.last_heard = 0
         """Arrival of the last valid message, by the steady clock, in [ns]; 0 before the first."""
         # For a subscription made later, and for an existing one.
-        source.clock_callback = self._look  # type: ignore[method-assign, assignment]
+        source.clock_callback = self._check_message  # type: ignore[method-assign, assignment]
         if source._clock_sub is not None:  # noqa: SLF001 (rclpy offers no other way)
-            source._clock_sub.callback = self._look  # noqa: SLF001
+            source._clock_sub.callback = self._check_message  # noqa: SLF001
 
-    def _look(self, message: ClockMessage) -> None:
+    def _check_message(self, message: ClockMessage) -> None:
         if nanoseconds_of(message) is None:
-            self.refused += 1
+            self.refused_count += 1
             return
-        self.heard = monotonic_ns()
+        self.last_heard = monotonic_ns()
         self._pass_on(message)

@@ -143,11 +143,11 @@ def show_help(program: str, purpose: str, declared: Sequence[NodeParameter], exa
         typed = typed[: typed.index('--ros-args')]
     if not {'--help', '-h'} & {*typed}:
         return False
-    print('\n'.join(_help(program, purpose, declared, example)))
+    print('\n'.join(_help_lines(program, purpose, declared, example)))
     return True
 
 
-def _help(
+def _help_lines(
     program: str, purpose: str, declared: Sequence[NodeParameter], example: str
 ) -> Iterator[str]:
     command = f'ros2 run linkage_ros {program}'

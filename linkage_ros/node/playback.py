@@ -34,7 +34,7 @@ _BATCHES = 8
 _LOOK = 0.1
 
 
-class Part(NamedTuple):
+class PlaybackPart(NamedTuple):
     """The part of a bag that is played."""
 
     # Range of log times to play, in [ns].
@@ -54,7 +54,7 @@ class QueuedMessage(NamedTuple):
     data: bytes
 
 
-def playback_queue(order: LogTimeOrder, part: Part) -> Iterator[QueuedMessage]:
+def playback_queue(order: LogTimeOrder, part: PlaybackPart) -> Iterator[QueuedMessage]:
     """
     Yield the messages to play.
 
@@ -105,7 +105,7 @@ def read_ahead(
             return True
         return False
 
-    def read() -> None:
+    def read_batches() -> None:
         batch: list[QueuedMessage] = []
         size = 0
         error: Exception | None = None
@@ -123,7 +123,7 @@ def read_ahead(
             return
         hand_over(error or [])
 
-    reader = Thread(target=read, name='read ahead', daemon=True)
+    reader = Thread(target=read_batches, name='read ahead', daemon=True)
     reader.start()
     try:
         while not stop.is_set():
@@ -178,7 +178,7 @@ class SteadyClock:
         return self._stop.is_set()
 
 
-class Ticks(NamedTuple):
+class ClockTicks(NamedTuple):
     """Publication of bag time on ``/clock``: the period, in [ns], and the publishing function."""
 
     period: float
@@ -225,7 +225,7 @@ class Playback:
         rate: float,
         publish: Mapping[str, Callable[[bytes], None]],
         steady: Steady,
-        ticks: Ticks | None = None,
+        ticks: ClockTicks | None = None,
         progress: Callable[[int], None] = lambda _: None,
     ) -> None:
         self._first = first
@@ -237,7 +237,7 @@ class Playback:
         self.counts = dict.fromkeys(publish, 0)
         self.late = self.latest = self.played = self.took = 0
 
-    def run(self, cues: Iterable[QueuedMessage]) -> None:
+    def send_messages(self, cues: Iterable[QueuedMessage]) -> None:
         """Send the messages, until there are no more or the clock reports a stop."""
         steady, counts = self._steady, self.counts
         begun: int | None = None

@@ -22,12 +22,12 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.messages.single_values import TIME_END, time_message
 from linkage_ros.node.playback import (
-    Part,
+    ClockTicks,
     Playback,
     playback_queue,
+    PlaybackPart,
     read_ahead,
     SteadyClock,
-    Ticks,
 )
 from linkage_ros.node.real_time import leave_out_shared_memory
 from linkage_ros.signals import bounded_end
@@ -110,7 +110,7 @@ def play(
     node: Node,
     publishers: Mapping[str, Publisher],
     order: LogTimeOrder,
-    part: Part,
+    part: PlaybackPart,
     options: PlaybackOptions,
     stop: Event,
     progress: Callable[[int], None],
@@ -152,7 +152,7 @@ def play(
     if options.clock:
         _clock_message(part.first)  # checks the time before anything is sent
         publish = node.create_publisher(Clock, CLOCK, 10).publish
-        ticks = Ticks(NANOSECONDS / options.clock, lambda time: publish(_clock_message(time)))
+        ticks = ClockTicks(NANOSECONDS / options.clock, lambda time: publish(_clock_message(time)))
     if options.wait:
         _wait_for_listener(publishers.values(), stop, options.wait)
     playback = Playback(
@@ -166,11 +166,11 @@ def play(
     error = None
     try:
         with closing(read_ahead(playback_queue(order, part), stop)) as messages:
-            playback.run(messages)
+            playback.send_messages(messages)
     except LinkageError as raised:
         error = raised
     if not stop.is_set():
-        _see_delivered(publishers.values())
+        _wait_for_delivery(publishers.values())
     return playback, error
 
 
@@ -193,7 +193,7 @@ def _wait_for_listener(publishers: Collection[Publisher], stop: Event, seconds: 
         stop.wait(_LOOK)
 
 
-def _see_delivered(publishers: Collection[Publisher]) -> None:
+def _wait_for_delivery(publishers: Collection[Publisher]) -> None:
     """Wait until the last reliable messages have reached the subscribers."""
     deadline = monotonic() + _DELIVERY
     for publisher in publishers:

@@ -72,18 +72,18 @@ class RealTime:
 
             if CDLL(None, use_errno=True).mlockall(_CURRENT | _FUTURE):
                 self.refused.append(f'lock_memory: {os.strerror(get_errno())}; add memory')
-        self.in_force['Locked memory'] = _status('VmLck')
+        self.in_force['Locked memory'] = _process_status('VmLck')
 
-    def paced(self, pace: Pace) -> Pace:
+    def wrap_pace(self, pace: Pace) -> Pace:
         """Wrap a pace so that its thread first requests the settings."""
 
-        def asking(loop: TickLoop, stopping: Event) -> None:
-            self.refused += [*self._ask()]
+        def request_and_pace(loop: TickLoop, stopping: Event) -> None:
+            self.refused += [*self._request_settings()]
             pace(loop, stopping)
 
-        return asking if self.priority or self.processors else pace
+        return request_and_pace if self.priority or self.processors else pace
 
-    def _ask(self) -> Iterator[str]:
+    def _request_settings(self) -> Iterator[str]:
         """Make the requests for the calling thread; yield a line for each refused one."""
         if self.processors:
             with suppress(OSError, ValueError, OverflowError):  # such a processor may not exist
@@ -107,10 +107,10 @@ class RealTime:
 
 
 def _may_lock() -> bool:
-    return bool(int(_status('CapEff'), 16) >> _IPC_LOCK & 1)
+    return bool(int(_process_status('CapEff'), 16) >> _IPC_LOCK & 1)
 
 
-def _status(key: str) -> str:
+def _process_status(key: str) -> str:
     """Return a value of this process from the kernel's status file."""
     lines = Path('/proc/self/status').read_text().splitlines()
     return next(line.split(':')[1].strip() for line in lines if line.startswith(f'{key}:'))
@@ -169,7 +169,7 @@ STANDSTILL = (
 """The same for a reader who does not know DDS."""
 
 
-def standstill() -> str:
+def standstill_reason() -> str:
     """
     Return why ticks may stand still when a subscriber comes, and the remedy; '' if they do not.
 

@@ -79,7 +79,7 @@ class CommandRelay:
             )
 
     @property
-    def joints(self) -> tuple[str, ...]:
+    def joint_names(self) -> tuple[str, ...]:
         """Return the joints whose commands it takes."""
         return tuple(self._inverses)
 
@@ -93,7 +93,7 @@ class CommandRelay:
             [array[place] for place in places] if len(array) == len(message.name) else []
             for array in (message.position, message.velocity)
         ]
-        positions, velocities, _ = self._turn(known, *rows, [])
+        positions, velocities, _ = self._crank_arrays(known, *rows, [])
         cranks = [self._inverses[name][1] for name in known]
         return JointState(
             header=message.header, name=cranks, position=positions, velocity=velocities
@@ -104,11 +104,13 @@ class CommandRelay:
         names = list(message.joint_names)
         strange = [name for name in names if name not in self._inverses]
         if strange:
-            raise RefusedError(f'names {listed(strange)}; send {listed(self.joints)} only')
+            raise RefusedError(f'names {listed(strange)}; send {listed(self.joint_names)} only')
         points = []
         for number, point in enumerate(message.points, 1):
             try:
-                found = self._turn(names, point.positions, point.velocities, point.accelerations)
+                found = self._crank_arrays(
+                    names, point.positions, point.velocities, point.accelerations
+                )
             except RefusedError as error:
                 raise RefusedError(f'point {number} of {len(message.points)}: {error}') from None
             points.append(
@@ -122,7 +124,7 @@ class CommandRelay:
         cranks = [self._inverses[name][1] for name in names]
         return JointTrajectory(header=message.header, joint_names=cranks, points=points)
 
-    def _turn(self, names: Sequence[str], *rows: Sequence[float]) -> list[list[float]]:
+    def _crank_arrays(self, names: Sequence[str], *rows: Sequence[float]) -> list[list[float]]:
         """Return positions, velocities and accelerations of cranks, as far as they are given."""
         positions, velocities, accelerations = rows
         if len(positions) != len(names):
@@ -130,7 +132,7 @@ class CommandRelay:
         if not {len(velocities), len(accelerations)} <= {0, len(names)}:
             raise RefusedError('arrays of unequal length')
         columns = [
-            self._crank(
+            self._crank_motion(
                 name,
                 positions[i],
                 velocities[i] if velocities else nan,
@@ -141,7 +143,7 @@ class CommandRelay:
         turned = [list(row) for row in zip(*columns, strict=True)]
         return [row if given else [] for row, given in zip(turned, rows, strict=True)]
 
-    def _crank(
+    def _crank_motion(
         self, joint: str, value: float, rate: float, change: float
     ) -> tuple[float, float, float]:
         """Return crank, rate and acceleration, NaN where that of the joint is NaN."""
@@ -180,27 +182,27 @@ class RelayNode(Node):
         set_keys = [key for key in self.get_parameter('set').value if key]
         self.relay = CommandRelay(load_scene(file, settings=set_keys))
         self._counts = {'sent': 0, 'refused': 0, 'of other joints': 0}
-        self._last = ''
-        self._told = 0
+        self._last_refusal = ''
+        self._reported_refusals = 0
         self._states = self.create_publisher(JointState, 'crank_commands', 10)
         self._trajectories = self.create_publisher(JointTrajectory, 'crank_trajectory', 10)
         self.create_subscription(JointState, 'joint_commands', self._take_state, 10)
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._take_trajectory, 10)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self.create_timer(self.get_parameter('diagnostics_period').value, self._report)
+        self.create_timer(self.get_parameter('diagnostics_period').value, self._publish_counts)
 
     def _take_state(self, message: JointState) -> None:
-        self._send(self._states, self.relay.turn_state, message)
+        self._send_turned(self._states, self.relay.turn_state, message)
 
     def _take_trajectory(self, message: JointTrajectory) -> None:
-        self._send(self._trajectories, self.relay.turn_trajectory, message)
+        self._send_turned(self._trajectories, self.relay.turn_trajectory, message)
 
-    def _send(self, publisher: Any, turn: Any, message: Any) -> None:
+    def _send_turned(self, publisher: Any, turn: Any, message: Any) -> None:
         try:
             found = turn(message)
         except RefusedError as error:
             self._counts['refused'] += 1
-            self._last = str(error)
+            self._last_refusal = str(error)
             text = f'{publisher.topic_name}: not sent: {error}'
             self.get_logger().warning(text, throttle_duration_sec=_QUIET)
             return
@@ -210,24 +212,24 @@ class RelayNode(Node):
         publisher.publish(found)
         self._counts['sent'] += 1
 
-    def _report(self) -> None:
+    def _publish_counts(self) -> None:
         """Publish the counts; a warning if something was refused since the last time."""
-        refused = self._counts['refused'] > self._told
-        self._told = self._counts['refused']
+        refused = self._counts['refused'] > self._reported_refusals
+        self._reported_refusals = self._counts['refused']
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if refused else DiagnosticStatus.OK,
             name=f'{self.get_name()}: commands',
-            message=f'not sent: {self._last}' if refused else 'all commands are sent',
+            message=f'not sent: {self._last_refusal}' if refused else 'all commands are sent',
             values=[KeyValue(key=key, value=str(count)) for key, count in self._counts.items()]
-            + [KeyValue(key='last refused', value=self._last)],
+            + [KeyValue(key='last refused', value=self._last_refusal)],
         )
         array = DiagnosticArray(status=[status])
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
 
 
-def _spin(node: RelayNode, stop: Event, seconds: float) -> None:
-    print(f'relays commands of {listed(node.relay.joints)}', flush=True)
+def _spin_relay(node: RelayNode, stop: Event, seconds: float) -> None:
+    print(f'relays commands of {listed(node.relay.joint_names)}', flush=True)
     end = monotonic() + (seconds or inf)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
@@ -241,7 +243,9 @@ def run_relay(
 ) -> int:
     """Relay until the event is set, or for some time in [s], and return the exit code."""
 
-    def spin(node: RelayNode, stop: Event) -> None:
-        _spin(node, stop, seconds)
+    def spin_until_stop(node: RelayNode, stop: Event) -> None:
+        _spin_relay(node, stop, seconds)
 
-    return run_demo_node('linkage_relay', lambda: RelayNode(scene, settings), spin, stop)
+    return run_demo_node(
+        'linkage_relay', lambda: RelayNode(scene, settings), spin_until_stop, stop
+    )

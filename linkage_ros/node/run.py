@@ -40,7 +40,7 @@ _AFTER_FAILURE = 0.01
 """Pause of the executor after a failure, in [s], so that it does not fail continuously."""
 
 
-class View(Protocol):
+class LiveView(Protocol):
     """Displays a run while it goes on."""
 
     def begin(self, node: LinkageNode) -> None:
@@ -60,7 +60,7 @@ def run_linkage_node(
     *,
     seconds: float = inf,
     patience: float = 0.0,
-    view: View | None = None,
+    view: LiveView | None = None,
     at_end: Callable[[LinkageNode], None] | None = None,
     raise_errors: bool = False,
 ) -> int:
@@ -116,7 +116,7 @@ def run_linkage_node(
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
-        code = _spin(node, executor, stop, seconds, patience, view)
+        code = _run_node(node, executor, stop, seconds, patience, view)
         if raise_errors and node.failure is not None:
             raise node.failure
         if code == EXIT_OK and at_end is not None:
@@ -125,20 +125,20 @@ def run_linkage_node(
             code = code or EXIT_INCOMPLETE
         return code
     finally:
-        node.end()
+        node.end_run()
         with bounded_end():
             executor.shutdown()
             node.destroy_node()
             rclpy.try_shutdown()
 
 
-def _spin(
+def _run_node(
     node: LinkageNode,
     executor: SingleThreadedExecutor,
     stop: Event,
     seconds: float,
     patience: float,
-    view: View | None,
+    view: LiveView | None,
 ) -> int:
     """Start the node, unless told otherwise, and run it to its end."""
     autostart = node.get_parameter('autostart').value
@@ -155,7 +155,7 @@ def _spin(
         if autostart and node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
             return EXIT_INCOMPLETE
         gc.freeze()  # includes the objects built for the ticks
-        return _attend(node, executor, stop, seconds, patience, view)
+        return _spin_until_end(node, executor, stop, seconds, patience, view)
 
 
 @contextmanager
@@ -177,19 +177,21 @@ def _no_garbage_in_ticks() -> Iterator[None]:
         gc.unfreeze()
 
 
-def _attend(
+def _spin_until_end(
     node: LinkageNode,
     executor: SingleThreadedExecutor,
     stop: Event,
     seconds: float,
     patience: float,
-    view: View | None,
+    view: LiveView | None,
 ) -> int:
     """Spin until the end, and end the run of the node."""
     # The executor waits without a timeout, which no signal would interrupt. So it has its own
     # thread and does not poll: each of its rounds costs as much as five ticks.
     ended = Event()
-    serving = Thread(target=_serve, args=(node, executor, ended), name='executor', daemon=True)
+    serving = Thread(
+        target=_serve_callbacks, args=(node, executor, ended), name='executor', daemon=True
+    )
     serving.start()
     begin = monotonic()
     waits_until, end = begin + patience, begin + seconds
@@ -211,7 +213,7 @@ def _attend(
     serving.join()
     if view is not None:
         view.close()
-    node.end()
+    node.end_run()
     return EXIT_OK if served else EXIT_INCOMPLETE
 
 
@@ -223,7 +225,7 @@ def _is_heard(node: LinkageNode) -> bool:
     return bool(counts.received if node.crank_topic else counts.published)
 
 
-def _serve(node: LinkageNode, executor: SingleThreadedExecutor, ended: Event) -> None:
+def _serve_callbacks(node: LinkageNode, executor: SingleThreadedExecutor, ended: Event) -> None:
     # rclpy raises here what a service callback raises; its own services raise for a parameter of
     # unknown type. A client's request must neither end the node nor show a traceback.
     while not ended.is_set():
@@ -233,7 +235,7 @@ def _serve(node: LinkageNode, executor: SingleThreadedExecutor, ended: Event) ->
             node.get_logger().error(f'the executor has stopped: {type(error).__name__}: {error}')
             return
         except Exception as error:  # noqa: BLE001 (see above)
-            node.report(f'a call failed: {type(error).__name__}: {_first_line(error)}')
+            node.warn_of_failure(f'a call failed: {type(error).__name__}: {_first_line(error)}')
             ended.wait(_AFTER_FAILURE)
 
 

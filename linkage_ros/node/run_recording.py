@@ -53,13 +53,13 @@ class RunRecording:
 
     def __init__(self, logger: RcutilsLogger) -> None:
         self._logger = logger
-        self.ended: list[RecordingSummary] = []
+        self.ended_bags: list[RecordingSummary] = []
         """Summaries of finished recordings and snapshots."""
         self.memories: list[MemorySummary] = []
         """Summaries of finished memories."""
         self.failure = ''
         """Reason why a recording is incomplete or could not be started; '' otherwise."""
-        self._seen: tuple[RecordingError, bool] | None = None
+        self._last_state: tuple[RecordingError, bool] | None = None
         self.snapshots: RunSnapshots | None = None
         """The memory; None when a bag is recorded continuously."""
 
@@ -96,8 +96,8 @@ class RunRecording:
 
         def new_bag(whole: bool) -> BagWriter:
             begun = WITH_THE_RUN if whole and with_the_run else MID_RUN
-            folder = _folder(runs, record.name, scene.name)
-            files = _attachments(scene, described, begun, loop.pipeline.linkages, folder)
+            folder = _new_folder(runs, record.name, scene.name)
+            files = _make_attachments(scene, described, begun, loop.pipeline.linkages, folder)
             opening = [
                 (number, description)
                 for number, (key, _) in enumerate(described)
@@ -111,7 +111,7 @@ class RunRecording:
             described = topics()
             if storage.snapshot_seconds:
                 compression_type(storage.compression, runs)  # fails now, not at the first snapshot
-                return self._remember(loop, storage, [t for _, t in described], new_bag)
+                return self._start_memory(loop, storage, [t for _, t in described], new_bag)
             writer = new_bag(True)
         except (RecordingError, FileNotFoundError) as error:  # no working directory any more
             self.failure = f'not recording: {error}'
@@ -124,7 +124,7 @@ class RunRecording:
         self._logger.info(line)
         return line
 
-    def describe(self, loop: TickLoop) -> str:
+    def describe_state(self, loop: TickLoop) -> str:
         """Return the state of the recording as text; '' for none."""
         if self.snapshots is not None:
             return str(self.snapshots)
@@ -137,29 +137,29 @@ class RunRecording:
         """Return whether a bag has failed for good and is not reported on yet."""
         return self.snapshots is None and loop.recorder is not None and loop.recorder.has_ended
 
-    def snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
+    def begin_snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
         """Begin to write the memory to a bag; as `RunSnapshots.begin`."""
         if self.snapshots is None:
             return (
                 'nothing is kept in memory; write record.snapshot_seconds in the scene, or call '
                 '~/start_recording'
             )
-        return self.snapshots.begin(answer, wake)
+        return self.snapshots.begin_snapshot(answer, wake)
 
-    def collect(self) -> None:
+    def collect_snapshot(self) -> None:
         """Finish a snapshot that has been written, if any: log it and send the answer."""
-        outcome = self.snapshots.collect() if self.snapshots is not None else None
+        outcome = self.snapshots.collect_snapshot() if self.snapshots is not None else None
         if outcome is None:
             return
         if outcome.bag is not None:
-            self.ended.append(outcome.bag)
+            self.ended_bags.append(outcome.bag)
         if outcome.failure:
             self.failure = outcome.line
             self._logger.error(outcome.line)
         else:
             self._logger.info(outcome.line)
 
-    def check(self, loop: TickLoop) -> bool:
+    def check_failure(self, loop: TickLoop) -> bool:
         """Log that the recording has failed, or goes on again; return whether it logged."""
         recorder = loop.recorder
         if recorder is None or recorder.failure is None:
@@ -168,9 +168,9 @@ class RunRecording:
             self.stop(loop)
             return True
         state = recorder.failure, recorder.is_recording
-        if state == self._seen:
+        if state == self._last_state:
             return False
-        self._seen, self.failure = state, str(recorder.failure)
+        self._last_state, self.failure = state, str(recorder.failure)
         if recorder.is_recording:
             line = f'recording to {recorder.folder} again, in a new file'
             self._logger.info(line)
@@ -184,9 +184,9 @@ class RunRecording:
             return False, 'not recording'
         recorder, loop.recorder = loop.recorder, None
         if self.snapshots is not None:
-            return self._forget(self.snapshots)
+            return self._end_memory(self.snapshots)
         summary = recorder.stop()
-        self.ended.append(summary)
+        self.ended_bags.append(summary)
         failure = summary.failure or losses_text(summary.folder, summary.topics)
         if failure:
             self.failure = failure
@@ -197,7 +197,7 @@ class RunRecording:
             self._logger.info(line)
         return not failure, line
 
-    def _remember(
+    def _start_memory(
         self,
         loop: TickLoop,
         storage: Storage,
@@ -212,10 +212,10 @@ class RunRecording:
         self._logger.info(line)
         return line
 
-    def _forget(self, snapshots: RunSnapshots) -> tuple[bool, str]:
-        snapshots.wait()
-        self.collect()
-        self.snapshots, summary = None, snapshots.end()
+    def _end_memory(self, snapshots: RunSnapshots) -> tuple[bool, str]:
+        snapshots.wait_for_snapshot()
+        self.collect_snapshot()
+        self.snapshots, summary = None, snapshots.end_memory()
         self.memories.append(summary)
         if summary.failure:
             self.failure = summary.failure
@@ -225,7 +225,7 @@ class RunRecording:
         return not summary.failure, str(summary)
 
 
-def _attachments(
+def _make_attachments(
     scene: Scene,
     topics: Sequence[tuple[str, Topic]],
     begun: str,
@@ -240,7 +240,7 @@ def _attachments(
     return to_attachments(scene_files(scene, named, begun, lines, folder))
 
 
-def _folder(directory: Path, name: str, scene: str) -> Path:
+def _new_folder(directory: Path, name: str, scene: str) -> Path:
     """Return a folder for a bag that does not exist yet, by adding a number if needed."""
     name = name or f'{scene}_{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
     folder, number = directory / name, 1
@@ -299,7 +299,7 @@ class RunSnapshots:
         self.memory = memory
         self.written = self.failed = 0
         """Number of written snapshots; a partly written one counts as failed."""
-        self.last = ''
+        self.last_folder = ''
         """Folder of the last written snapshot."""
         self.failure = ''
         """Reason why the last snapshot failed; '' if it did not."""
@@ -313,19 +313,19 @@ class RunSnapshots:
         return f'keeping the last {seconds:g} s in memory; ~/snapshot writes them'
 
     @property
-    def writing(self) -> bool:
+    def is_writing(self) -> bool:
         """Whether a snapshot is being written."""
         return self._writing is not None
 
     @property
-    def count(self) -> str:
+    def count_text(self) -> str:
         """Return the number of snapshots as text."""
         if not self.written and not self.failed:
             return 'no snapshot was asked for: nothing was written'
         written = f'{self.written} snapshot{"s" * (self.written != 1)} written'
         return written + (f', {self.failed} failed' if self.failed else '')
 
-    def begin(self, answer: Answer, wake: Callable[[], None]) -> str:
+    def begin_snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
         """
         Begin to write the memory to a new bag, on another thread.
 
@@ -354,33 +354,33 @@ class RunSnapshots:
         self._writing = SnapshotWriting(kept, partial(self._new_bag, kept.is_complete), wake)
         return ''
 
-    def collect(self) -> SnapshotOutcome | None:
+    def collect_snapshot(self) -> SnapshotOutcome | None:
         """Send the answer for a written snapshot, and return its outcome, or None."""
         writing = self._writing
         if writing is None or writing.outcome is None:
             return None
         self._writing = None
-        outcome = _outcome(writing.outcome, writing.kept.seconds)
+        outcome = _make_outcome(writing.outcome, writing.kept.seconds)
         if outcome.bag is None or outcome.failure:
             self.failed += 1
         else:
             self.written += 1
-            self.last = str(outcome.bag.folder)
+            self.last_folder = str(outcome.bag.folder)
         self.failure = outcome.failure
         self._answer(not outcome.failure, outcome.line)
         return outcome
 
-    def wait(self) -> None:
+    def wait_for_snapshot(self) -> None:
         """Wait until the current snapshot, if any, is written."""
         if self._writing is not None:
             self._writing.outcome = self._writing.wait()
 
-    def end(self) -> MemorySummary:
+    def end_memory(self) -> MemorySummary:
         """End the memory, and return its summary."""
         topics, failure = self.memory.stop(), self.memory.failure
         where = 'the memory of the last seconds'
         failure_text = str(failure) if failure else losses_text(where, topics)
-        return MemorySummary(topics, self.count, failure_text)
+        return MemorySummary(topics, self.count_text, failure_text)
 
 
 def counts_text(summary: RecordingSummary) -> str:
@@ -404,7 +404,7 @@ def losses_text(where: object, topics: Sequence[TopicCounts] | Sequence[KeptCoun
     )
 
 
-def _outcome(result: RecordingSummary | RecordingError, seconds: float) -> SnapshotOutcome:
+def _make_outcome(result: RecordingSummary | RecordingError, seconds: float) -> SnapshotOutcome:
     if isinstance(result, RecordingError):
         return SnapshotOutcome(None, str(result), f'no snapshot: {result}; the memory goes on')
     counts = counts_text(result)

@@ -76,12 +76,12 @@ class SceneTopics:
     def __init__(self, node: Node, on_inject: Inject) -> None:
         self._node = node
         self._on_inject = on_inject
-        self._kinds: dict[str, str] = {}
-        self._changes: Publisher | None = None
+        self._fault_kinds: dict[str, str] = {}
+        self._change_publisher: Publisher | None = None
         self._description: Publisher | None = None
         self.description = b''
         """Serialized message with the robot model; empty if the scene asks for none."""
-        self._announced: Publisher | None = None
+        self._scene_publisher: Publisher | None = None
         self._injectors: list[Any] = []
         self.extras: list[Publisher] = []
         """Publishers of the pipeline's auxiliary topics."""
@@ -123,11 +123,11 @@ class SceneTopics:
                 qos_overriding_options=overridable,
             )
         if pipeline.injection is not None:
-            self._changes = node.create_publisher(
+            self._change_publisher = node.create_publisher(
                 message_type('std_msgs/msg/String', 'faults'), '~/faults', CHANGES_QOS
             )
             for name, fault in pipeline.injection.faults.items():
-                self._kinds[name] = fault.kind
+                self._fault_kinds[name] = fault.kind
                 serve = partial(self._on_inject, name)
                 self._injectors.append(node.create_service(SetBool, f'~/inject/{name}', serve))
         if pipeline.wrenches:
@@ -160,7 +160,7 @@ class SceneTopics:
                 )
             )
 
-    def describe(self, scene: Scene, pipeline: Pipeline) -> None:
+    def publish_description(self, scene: Scene, pipeline: Pipeline) -> None:
         """
         Publish the linkages as a robot model, once, with transient-local durability.
 
@@ -178,7 +178,7 @@ class SceneTopics:
         self.description = text_message(model)
         self._description.publish(self.description)
 
-    def announce(self, scene: Scene, pipeline: Pipeline, joint_states: str) -> None:
+    def publish_scene(self, scene: Scene, pipeline: Pipeline, joint_states: str) -> None:
         """
         Publish the files of the scene, once, with transient-local durability.
 
@@ -195,16 +195,21 @@ class SceneTopics:
         topics = {'joint_states_topic': joint_states}
         if self.crank is not None:
             topics['crank_topic'] = self.crank_topic
-        if self._changes is not None:
-            topics['faults_topic'] = self._changes.topic_name
+        if self._change_publisher is not None:
+            topics['faults_topic'] = self._change_publisher.topic_name
         text_type = message_type('std_msgs/msg/String', '~/scene')
-        self._announced = self._node.create_publisher(text_type, SCENE_TOPIC, SCENE_QOS)
+        self._scene_publisher = self._node.create_publisher(text_type, SCENE_TOPIC, SCENE_QOS)
         files = scene_files(scene, topics, '', pipeline.linkages)
-        self._announced.publish(text_message(announced_text(files)))
+        self._scene_publisher.publish(text_message(announced_text(files)))
 
     def disconnect(self) -> None:
         """Remove all topics and services."""
-        for publisher in (*self.extras, self._changes, self._description, self._announced):
+        for publisher in (
+            *self.extras,
+            self._change_publisher,
+            self._description,
+            self._scene_publisher,
+        ):
             if publisher is not None:
                 self._node.destroy_publisher(publisher)
         for service in self._injectors:
@@ -213,8 +218,8 @@ class SceneTopics:
             if subscription is not None:
                 self._node.destroy_subscription(subscription)
         self.wrenches = []
-        self.extras, self._injectors, self._kinds = [], [], {}
-        self._changes = self._description = self._announced = self.crank = None
+        self.extras, self._injectors, self._fault_kinds = [], [], {}
+        self._change_publisher = self._description = self._scene_publisher = self.crank = None
         self.description = b''
 
     @property
@@ -231,7 +236,7 @@ class SceneTopics:
         return self._node.get_publishers_info_by_topic(self._crank_name)
 
     @property
-    def take(self) -> TakeMessage | None:
+    def take_sample(self) -> TakeMessage | None:
         """Return a function that takes the next message for the drives; None without a topic."""
         if self.crank is None:
             return None
@@ -244,12 +249,12 @@ class SceneTopics:
 
     def publish_change(self, change: FaultChange) -> bytes:
         """Publish the begin or end of a fault; return the serialized message."""
-        assert self._changes is not None
-        message = text_message(change_text(change, self._kinds[change.name]))
-        self._changes.handle.publish_raw(message)
+        assert self._change_publisher is not None
+        message = text_message(change_text(change, self._fault_kinds[change.name]))
+        self._change_publisher.handle.publish_raw(message)
         return message
 
-    def described(self, handles: RecordedTopics) -> dict[int, tuple[str, Topic]]:
+    def describe_topics(self, handles: RecordedTopics) -> dict[int, tuple[str, Topic]]:
         """Describe the topics for a bag, by their handles."""
         node, topics = self._node, {}
         if handles.crank is not None:
@@ -259,7 +264,7 @@ class SceneTopics:
         for handle, wrench in zip(handles.wrenches, self.wrenches, strict=True):
             described = bag_topic(wrench.topic_name, wrench.msg_type, CRANK_QOS)
             topics[handle] = WRENCH_TOPICS, described
-        if handles.faults is not None and (changes := self._changes) is not None:
+        if handles.faults is not None and (changes := self._change_publisher) is not None:
             described = bag_topic(changes.topic_name, changes.msg_type, CHANGES_QOS)
             topics[handles.faults] = 'faults_topic', described
         # Recorded for the replay only; not published on the graph.

@@ -9,7 +9,12 @@
 """Motor and crank behind play that meet too often: the node keeps ticking, and says so."""
 
 from linkage_ros.messages.joint_state import EffortCommand
-from linkage_ros.node.diagnostics import chattered, DiagnosticsSummary, Snapshot, Warnings
+from linkage_ros.node.diagnostics import (
+    chatter_count,
+    CountsSnapshot,
+    DiagnosticsSummary,
+    Warnings,
+)
 from linkage_ros.pipeline.tick_loop import TickLoop
 from sensor_msgs.msg import JointState
 
@@ -41,21 +46,21 @@ def run(loop, begin, end):
 
 
 def summary(loop, before):
-    now = Snapshot.of(loop.counts, BEGIN + NS, chattered(loop.pipeline.lines))
+    now = CountsSnapshot.take(loop.counts, BEGIN + NS, chatter_count(loop.pipeline.lines))
     return now, DiagnosticsSummary(
         'node', 's', 0.0, BEGIN, '', (), loop, before, now, '',
         {'transmission_angle': 0.0, 'conditioning': 0.0, 'toggle_distance': 0.0},
-    ).statuses()[0]  # fmt: skip
+    ).make_statuses()[0]  # fmt: skip
 
 
 def test_it_is_told_once_for_each_new_step():
     loop, lines = loop_of(), Said()
-    warnings, before = Warnings(lines), Snapshot()
+    warnings, before = Warnings(lines), CountsSnapshot()
     warnings.check_chatter(loop.pipeline.linkages, 0.0)
     before, status = summary(loop, before)
     assert (status.message, lines) == ('Ticking', [])
     run(loop, 0, 1000)
-    steps = chattered(loop.pipeline.linkages)
+    steps = chatter_count(loop.pipeline.linkages)
     assert steps > 10
     warnings.check_chatter(loop.pipeline.linkages, 0.0)
     warnings.check_chatter(loop.pipeline.linkages, 0.0)
@@ -73,7 +78,7 @@ def test_it_is_told_once_for_each_new_step():
     warnings.check_chatter(loop.pipeline.linkages, 0.0)
     run(loop, 1010, 2000)
     warnings.check_chatter(loop.pipeline.linkages, 0.0)
-    assert f'too often in {chattered(loop.pipeline.linkages)} steps' in lines[-1]
+    assert f'too often in {chatter_count(loop.pipeline.linkages)} steps' in lines[-1]
 
 
 def test_a_run_that_ends_says_why_in_a_line():

@@ -9,7 +9,7 @@
 """What diagnostics say of a run, by a clock that a test sets, and without a graph."""
 
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.node.diagnostics import DiagnosticsSummary, Snapshot
+from linkage_ros.node.diagnostics import CountsSnapshot, DiagnosticsSummary
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.scene.load import parse_scene
@@ -39,7 +39,7 @@ def test_the_worst_residual_is_said_with_its_linkage(residuals, said, monkeypatc
         monkeypatch.setattr(closure, 'residual', lambda _, found=residual: found, raising=False)
     summary = DiagnosticsSummary(
         'node', 's', 1000.0, BEGIN, '/crank', (), loop,
-        Snapshot(), Snapshot.of(loop.counts, BEGIN), '', NO_LIMITS,
+        CountsSnapshot(), CountsSnapshot.take(loop.counts, BEGIN), '', NO_LIMITS,
     )  # fmt: skip
-    values = {pair.key: pair.value for status in summary.statuses() for pair in status.values}
+    values = {pair.key: pair.value for status in summary.make_statuses() for pair in status.values}
     assert values['Residual (m)'] == said

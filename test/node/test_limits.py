@@ -13,7 +13,7 @@ from math import pi, tau
 
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.node.diagnostics import DiagnosticsSummary, Snapshot, Warnings
+from linkage_ros.node.diagnostics import CountsSnapshot, DiagnosticsSummary, Warnings
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.scene.load import parse_scene
@@ -126,7 +126,7 @@ def ran(said, angles, linkage=LIMITED):
 
 
 def health(loop):
-    window = Snapshot(), Snapshot.of(loop.counts, BEGIN)
+    window = CountsSnapshot(), CountsSnapshot.take(loop.counts, BEGIN)
     return DiagnosticsSummary(
         'node', 's', 1000.0, BEGIN, '/crank', (), loop, *window, '',
         {'transmission_angle': 0.0, 'conditioning': 0.0, 'toggle_distance': 0.0},
@@ -143,12 +143,12 @@ def test_what_is_counted_and_told(said, published):
     assert Counter(counts.unclosed) == Counter({Status.LIMITED: 2})
     assert (len(messages), counts.published, counts.suppressed) == (published, published, 0)
     lines = Said()
-    Warnings(lines).check(counts, loop.pipeline.closures, '/crank', 1.0)
+    Warnings(lines).check_events(counts, loop.pipeline.closures, '/crank', 1.0)
     what = 'nothing published' if said else 'published all the same'
     assert lines == [
         f'2 ticks beyond limits, {what}: crank_joint at 2.1 rad, limits [0.5, 1.5] rad'
     ]
-    status = health(loop).statuses()[2]
+    status = health(loop).make_statuses()[2]
     assert (status.level, status.message) == (
         WARN, 'Beyond limits: crank_joint at 2.1 rad, limits [0.5, 1.5] rad',
     )  # fmt: skip
@@ -163,7 +163,7 @@ def test_rates_and_efforts_are_told_by_their_limits():
         'input: {velocity: 0.8}, joints: {rocker_joint: {velocity: 100}}',
     )
     loop, _ = ran('effects: {velocity: {}}', (1.0,), linkage)
-    status = health(loop).statuses()[2]
+    status = health(loop).make_statuses()[2]
     assert (status.level, status.message) == (
         WARN, 'Velocity of crank_joint is 1, its limit 0.8',
     )  # fmt: skip
@@ -180,11 +180,11 @@ def test_rates_and_efforts_are_told_by_their_limits():
     ]
     assert values['Velocity of rocker_joint, of its limit'] == f'{abs(rate) / 100:.4g}'
     bare, _ = ran('', (1.0,), linkage)
-    keys = [pair.key for pair in health(bare).statuses()[2].values]
+    keys = [pair.key for pair in health(bare).make_statuses()[2].values]
     assert not any('rocker_joint, of its limit' in key for key in keys)
 
 
 def test_where_nothing_has_limits_nothing_is_told_of_them():
     loop, _ = ran('', (1.0,), LIMITED.replace(', input: {limits: [0.5, 1.5]}', ''))
-    keys = [pair.key for status in health(loop).statuses() for pair in status.values]
+    keys = [pair.key for status in health(loop).make_statuses() for pair in status.values]
     assert [key for key in keys if 'limit' in key] == ['Ticks beyond limits']

@@ -48,7 +48,7 @@ def run(monkeypatch):
 
         monkeypatch.setattr(pacing, 'monotonic_ns', lambda: now[0])
         monkeypatch.setattr(pacing, 'sleep', sleep)
-        pacing.steady(500.0)(SimpleNamespace(counts=counts, tick_at=tick_at), stopping)
+        pacing.on_steady_clock(500.0)(SimpleNamespace(counts=counts, tick_at=tick_at), stopping)
         return counts
 
     return run
@@ -56,7 +56,7 @@ def run(monkeypatch):
 
 def told(counts):
     lines = Said()
-    Warnings(lines).check(counts, [], '/crank', 1.0)
+    Warnings(lines).check_events(counts, [], '/crank', 1.0)
     return lines
 
 

@@ -11,7 +11,7 @@
 from types import SimpleNamespace
 
 from linkage_ros.kinematics.linkage import Input
-from linkage_ros.node.diagnostics import DiagnosticsSummary, Snapshot
+from linkage_ros.node.diagnostics import CountsSnapshot, DiagnosticsSummary
 from linkage_ros.pipeline.tick_loop import Counts
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
@@ -57,9 +57,9 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
     health = DiagnosticsSummary(
         'node', 'scene', 0.0, 0, '/crank', (),
         loop,
-        Snapshot(), Snapshot(unclosed=opened), '', limits,
+        CountsSnapshot(), CountsSnapshot(unclosed=opened), '', limits,
     )  # fmt: skip
-    _, _, found, _ = health.statuses()
+    _, _, found, _ = health.make_statuses()
     return found, {pair.key: pair.value for pair in found.values}
 
 

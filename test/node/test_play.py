@@ -21,7 +21,7 @@ import time
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.topic import QosProfile
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.node.bag_topics import bag_topic, offered
+from linkage_ros.node.bag_topics import bag_topic, offered_qos
 from mcap.writer import Writer
 import pytest
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -219,7 +219,7 @@ def test_the_recorded_quality_of_service_is_offered(
     ],
 )
 def test_whatever_depth_a_bag_claims(recorded, history, depth):
-    qos = offered(recorded)
+    qos = offered_qos(recorded)
     assert (qos.history, qos.depth) == (history, depth)
     assert qos.reliability == ReliabilityPolicy.RELIABLE
     assert qos.durability == DurabilityPolicy.VOLATILE

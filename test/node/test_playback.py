@@ -14,13 +14,13 @@ from linkage_ros.bag.order import LogTimeOrder
 from linkage_ros.bag.reader import BagMessage
 from linkage_ros.errors import BagError, LinkageError
 from linkage_ros.node.playback import (
+    ClockTicks,
     LATE,
-    Part,
     Playback,
     playback_queue,
+    PlaybackPart,
     QueuedMessage,
     read_ahead,
-    Ticks,
 )
 import pytest
 
@@ -62,9 +62,9 @@ def played(events, rate=1.0, clock_period=None, takes=None, stop_at=None):
         sent.append(((clock.time - BEGUN) / MS, (time - FIRST) / MS))
 
     publish = {topic: publisher(topic) for topic in ('a', 'b', 'slow')}
-    ticks = None if clock_period is None else Ticks(clock_period * MS, tick)
+    ticks = None if clock_period is None else ClockTicks(clock_period * MS, tick)
     playback = Playback(FIRST, rate, publish, clock, ticks)
-    playback.run(
+    playback.send_messages(
         QueuedMessage(base[0] * MS if base else 0, FIRST + time * MS, topic, b'')
         for time, topic, *base in events
     )
@@ -88,7 +88,9 @@ def test_no_time_is_lost_on_the_way():
     clock = Clock()
     times = []
     playback = Playback(FIRST, 3.0, {'a': lambda _: times.append(clock.time)}, clock)
-    playback.run(QueuedMessage(0, FIRST + number * MS, 'a', b'') for number in range(1_000_000))
+    playback.send_messages(
+        QueuedMessage(0, FIRST + number * MS, 'a', b'') for number in range(1_000_000)
+    )
     assert all(abs(t - BEGUN - n * MS / 3) <= 0.5 + 1e-6 for n, t in enumerate(times))
 
 
@@ -180,20 +182,20 @@ HELD = [(10, 'a'), (20, 'b'), (30, 'a'), (40, 'b'), (50, 'c')]
     ],
 )
 def test_a_part_is_played(first, last, topics, expected):
-    found = list(playback_queue(Order(HELD), Part(first, last, topics, loop=False)))
+    found = list(playback_queue(Order(HELD), PlaybackPart(first, last, topics, loop=False)))
     assert [(cue.log_time, cue.topic) for cue in found] == expected
     assert {cue.base for cue in found} <= {0}
 
 
 def test_a_loop_repeats_its_part():
-    endless = playback_queue(Order(HELD), Part(20, 40, 'ab', loop=True))
+    endless = playback_queue(Order(HELD), PlaybackPart(20, 40, 'ab', loop=True))
     found = [next(endless) for _ in range(7)]
     assert [cue.base for cue in found] == [0, 0, 0, 20, 20, 20, 40]
     assert [cue.log_time for cue in found] == [20, 30, 40, 20, 30, 40, 20]
 
 
 def test_a_loop_over_one_instant_is_refused_after_it():
-    instant = playback_queue(Order([(10, 'a'), (10, 'b')]), Part(10, 99, 'ab', loop=True))
+    instant = playback_queue(Order([(10, 'a'), (10, 'b')]), PlaybackPart(10, 99, 'ab', loop=True))
     assert [next(instant).topic, next(instant).topic] == ['a', 'b']
     with pytest.raises(LinkageError, match='all that is played is of one instant'):
         next(instant)
@@ -244,7 +246,9 @@ def test_what_was_read_before_an_error_is_played_before_it():
     order = Order([(number, 'a') for number in range(1000)], error)
     found = []
     with pytest.raises(BagError, match='is damaged'):
-        found.extend(read_ahead(playback_queue(order, Part(0, 1e9, 'a', loop=False)), Event()))
+        found.extend(
+            read_ahead(playback_queue(order, PlaybackPart(0, 1e9, 'a', loop=False)), Event())
+        )
     assert [cue.log_time for cue in found] == list(range(1000))
 
 

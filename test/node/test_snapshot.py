@@ -395,21 +395,21 @@ def test_a_run_that_ends_waits_for_its_snapshot_and_answers(tmp_path, write_scen
     answers, woken = [], Event()
 
     def ask():
-        return recording.snapshot(lambda *answer: answers.append(answer), woken.set)
+        return recording.begin_snapshot(lambda *answer: answers.append(answer), woken.set)
 
     assert ask().startswith('nothing is in memory yet')
     loop.recorder.offer(0, 1, 1, b'\0\1\0\0')
     assert ask() == ''
     assert ask().startswith('a snapshot is being written; ask again')
-    recording.collect()
+    recording.collect_snapshot()
     assert answers == []
     Timer(0.2, slow_disk.set).start()
     assert recording.stop(loop)[0]
     ((success, message),) = answers
     assert success
     assert message.endswith(f'recorded to {tmp_path}/bag: /joint_states 1 recorded 0 dropped')
-    assert [summary.folder for summary in recording.ended] == [tmp_path / 'bag']
+    assert [summary.folder for summary in recording.ended_bags] == [tmp_path / 'bag']
     assert [summary.snapshots for summary in recording.memories] == ['1 snapshot written']
     assert woken.wait(10)
-    recording.collect()
+    recording.collect_snapshot()
     assert len(answers) == 1, 'what wakes the executor late finds nothing more to do'

@@ -128,7 +128,7 @@ def run(folder: Path, text: str, linkage: str = 'four_bar') -> Path:
     loop.stop()
     assert not loop.failure
     recording.stop(loop)
-    (summary,) = recording.ended
+    (summary,) = recording.ended_bags
     assert not any(counts.dropped for counts in summary.topics)
     return summary.folder
 
