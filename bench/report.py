@@ -31,10 +31,12 @@ class Table:
     head: Sequence[str]
     rows: list[Sequence[str]] = field(default_factory=list)
 
-    def for_terminal(self) -> terminal.Table:
+    def for_terminal(self) -> terminal.TerminalTable:
         """Return the table for the terminal, with numbers aligned to the right."""
         name, *values = self.head
-        return terminal.Table(self.title, [name, *(f'>{value}' for value in values)], self.rows)
+        return terminal.TerminalTable(
+            self.title, [name, *(f'>{value}' for value in values)], self.rows
+        )
 
     def markdown(self) -> str:
         """Return the table as Markdown."""
@@ -50,7 +52,7 @@ def say(line: str) -> None:
 
 def show(table: Table) -> None:
     """Print a table, and an empty line after it."""
-    terminal.show(table.for_terminal())
+    terminal.print_tables(table.for_terminal())
     say('')
 
 

@@ -23,7 +23,7 @@ from pathlib import Path
 import shutil
 import sys
 
-from linkage_ros.cli.arguments import angle_text, fixed
+from linkage_ros.cli.arguments import angle_text, fixed_text
 from linkage_ros.cli.check import describe_group
 from linkage_ros.drawing.animation import animate, range_motion
 from linkage_ros.drawing.figure import paint_background, picture
@@ -198,7 +198,7 @@ def _range(closure: Closure) -> str:
         intervals.append(
             f'{angle_text(low, 2)} to {angle_text(high, 2)}'
             if sweep.turning
-            else f'{fixed(low, 4)} to {fixed(high, 4)} m'
+            else f'{fixed_text(low, 4)} to {fixed_text(high, 4)} m'
         )
     return ' or '.join(intervals)
 
@@ -221,7 +221,9 @@ def _worst(closure: Closure) -> str:
     at = extremes.lowest.at
     if not at:
         return f'{text}, everywhere'
-    places = [angle_text(value, 1) if sweep.turning else f'{fixed(value, 4)} m' for value in at]
+    places = [
+        angle_text(value, 1) if sweep.turning else f'{fixed_text(value, 4)} m' for value in at
+    ]
     return f'{text} ({links}) at {", ".join(places)}'
 
 

@@ -17,8 +17,8 @@ from pathlib import Path
 from shlex import split
 from typing import NamedTuple
 
-from linkage_ros.cli.synthesis_tasks import Answer
-from linkage_ros.cli.synthesize import add_arguments, solutions
+from linkage_ros.cli.synthesis_tasks import DesignAnswer
+from linkage_ros.cli.synthesize import add_arguments, find_solutions
 
 from .markdown import prose
 
@@ -79,11 +79,11 @@ KINDS = (
 )
 
 
-def answer_to(kind: Kind) -> Answer:
+def answer_to(kind: Kind) -> DesignAnswer:
     """Return the first solution that the command line shows."""
     parser = argparse.ArgumentParser()
     add_arguments(parser)
-    found, _ = solutions(parser.parse_args(split(kind.command)), _ignore_progress)
+    found, _ = find_solutions(parser.parse_args(split(kind.command)), _ignore_progress)
     return found[0]
 
 
@@ -104,7 +104,7 @@ def chapter(folder: Path) -> Iterator[str]:
         yield from section(kind, answer)
 
 
-def section(kind: Kind, answer: Answer) -> Iterator[str]:
+def section(kind: Kind, answer: DesignAnswer) -> Iterator[str]:
     """Yield the lines on a kind of task."""
     yield f'### {kind.name}'
     yield ''
@@ -119,7 +119,7 @@ def section(kind: Kind, answer: Answer) -> Iterator[str]:
     yield ''
 
 
-def _facts(answer: Answer) -> Iterator[str]:
+def _facts(answer: DesignAnswer) -> Iterator[str]:
     design, assessment = answer.design, answer.assessment
     lengths = zip(_LINKS, design.four_bar.lengths, strict=True)
     text = ', '.join(f'{link} {length:.4g} m' for link, length in lengths)

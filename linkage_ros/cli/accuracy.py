@@ -23,9 +23,9 @@ from pathlib import Path
 from threading import Event
 from typing import NamedTuple
 
-from linkage_ros.cli.arguments import add_output, add_set, bounded, LINKAGES, output
-from linkage_ros.cli.bag_reading import opened, scene_of
-from linkage_ros.cli.terminal import progress, show, Table
+from linkage_ros.cli.arguments import add_output, add_set, bounded_number, LINKAGES, output_path
+from linkage_ros.cli.bag_reading import open_bag, scene_of
+from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
 from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.scene.load import load_scene
@@ -58,14 +58,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_set(parser)
     parser.add_argument(
         '--need',
-        type=bounded(1e-15, 10.0),
+        type=bounded_number(1e-15, 10.0),
         metavar='RAD',
         help='say the cheapest settings with no more error than this, or what stands in the way',
     )
     add_output(parser, LINKAGES, 'the lines are printed; with it, the scene that meets --need')
     parser.add_argument(
         '--horizon',
-        type=bounded(0.1, 1000.0),
+        type=bounded_number(0.1, 1000.0),
         default=10.0,
         metavar='S',
         help='how long the motion is followed, in s; errors that grow are those at its end '
@@ -88,23 +88,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--json', action='store_true', help='the same as JSON, in rad and µs')
     parser.add_argument(
         '--page',
-        type=output(('.html', '.htm')),
+        type=output_path(('.html', '.htm')),
         metavar='OUTPUT',
         help='write a page for the browser, OUTPUT.html',
     )
     parser.add_argument(
         '--picture',
-        type=output(('.svg',)),
+        type=output_path(('.svg',)),
         metavar='OUTPUT',
         help='draw error against cost, OUTPUT.svg',
     )
 
 
-class _StoppedError(Exception):
+class _StudyStoppedError(Exception):
     """A stop was requested."""
 
 
-class _Source(NamedTuple):
+class _StudySource(NamedTuple):
     """What is measured: a scene, and what its motion is like."""
 
     scene: Scene
@@ -114,18 +114,18 @@ class _Source(NamedTuple):
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Measure and answer; return 1 if stopped, or if nothing measured meets the need."""
-    parts = _parts(arguments.only)
-    _check(arguments, parts)
-    scene, like, is_bag = _source(arguments, stop)
+    parts = _read_parts(arguments.only)
+    _check_options(arguments, parts)
+    scene, like, is_bag = _load_source(arguments, stop)
     _check_content(scene, parts)
     if is_bag and arguments.output:
         raise LinkageError('-o', 'the scene is in a bag', 'write the lines into its file by hand')
     try:
-        with progress(f'accuracy of {scene.name}, percent') as advance:
+        with show_progress(f'accuracy of {scene.name}, percent') as advance:
 
-            def report(share: float) -> None:
+            def report_progress(share: float) -> None:
                 if stop.is_set():
-                    raise _StoppedError
+                    raise _StudyStoppedError
                 advance(round(100.0 * share), 100)
 
             budget = measure_budget(
@@ -134,12 +134,12 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
                 like=like,
                 quick=arguments.quick,
                 parts=parts,
-                progress=report,
+                progress=report_progress,
             )
-    except _StoppedError:
+    except _StudyStoppedError:
         return 1
     answer = None if arguments.need is None else answer_need(budget, arguments.need)
-    _write(arguments, scene, budget, answer)
+    _write_files(arguments, scene, budget, answer)
     if arguments.json:
         said = budget_json(budget)
         if answer is not None:
@@ -152,11 +152,11 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             }
         print(json.dumps(said, indent=2, allow_nan=False))
     else:
-        _print(budget, answer)
+        _print_answer(budget, answer)
     return 0 if answer is None or answer.is_met else 1
 
 
-def _parts(text: str) -> list[str]:
+def _read_parts(text: str) -> list[str]:
     parts = [part.strip() for part in text.split(',')]
     for part in parts:
         if part not in PARTS:
@@ -165,7 +165,7 @@ def _parts(text: str) -> list[str]:
     return parts
 
 
-def _check(arguments: argparse.Namespace, parts: Sequence[str]) -> None:
+def _check_options(arguments: argparse.Namespace, parts: Sequence[str]) -> None:
     """Raise if options do not fit together, before anything is measured."""
     if arguments.output and arguments.need is None:
         raise LinkageError('-o', 'is the scene that meets a need', 'say it: --need 1e-3')
@@ -184,19 +184,21 @@ def _check_content(scene: Scene, parts: Sequence[str]) -> None:
         )
 
 
-def _source(arguments: argparse.Namespace, stop: Event) -> _Source:
+def _load_source(arguments: argparse.Namespace, stop: Event) -> _StudySource:
     """Return the scene of a file, or of a bag with its motion."""
     path = Path(arguments.scene)
     is_bag = path.suffix == '.mcap' or any(path.glob('*.mcap')) if path.exists() else False
     if not is_bag:
-        return _Source(load_scene(arguments.scene, arguments.set), arguments.like, is_bag=False)
+        return _StudySource(
+            load_scene(arguments.scene, arguments.set), arguments.like, is_bag=False
+        )
     if arguments.like:
         raise LinkageError('--like', 'the bag itself has the motion', 'leave one of them out')
-    scene = scene_of(opened(path, stop), trust_effects=False, settings=arguments.set)
-    return _Source(scene, arguments.scene, is_bag=True)
+    scene = scene_of(open_bag(path, stop), trust_effects=False, settings=arguments.set)
+    return _StudySource(scene, arguments.scene, is_bag=True)
 
 
-def _write(
+def _write_files(
     arguments: argparse.Namespace, scene: Scene, budget: Budget, answer: NeedAnswer | None
 ) -> None:
     """Write the files that were asked for."""
@@ -213,10 +215,10 @@ def _write(
         atomic_write(arguments.picture, svg.encode())
 
 
-def _print(budget: Budget, answer: NeedAnswer | None) -> None:
+def _print_answer(budget: Budget, answer: NeedAnswer | None) -> None:
     if answer is not None:
         print(answer.text)
     print(*lead_lines(budget), sep='\n')
     print()
-    show(Table('', heads_of(budget), rows_of(budget)))
+    print_tables(TerminalTable('', heads_of(budget), rows_of(budget)))
     print(*closing_lines(budget), sep='\n')

@@ -22,9 +22,9 @@ from threading import Event
 from linkage_ros.bag.contents import layout_of
 from linkage_ros.bag.other_formats import is_bag_name
 from linkage_ros.cli.arguments import add_output, output_or
-from linkage_ros.cli.bag_reading import opened
+from linkage_ros.cli.bag_reading import open_bag
 from linkage_ros.cli.part_of_run import add_window, read_part, window_of
-from linkage_ros.cli.terminal import progress
+from linkage_ros.cli.terminal import show_progress
 from linkage_ros.drawing.animation import animate, check_kind, KINDS, Motion, range_motion
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.pose_view import view
@@ -58,23 +58,23 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     given = Path(arguments.file)
     file = output_or(arguments, Path(f'{given.stem}.gif'))
     check_kind(file)
-    motion = _motion(arguments, given, stop)
-    with progress('pictures') as advance:
+    motion = _load_motion(arguments, given, stop)
+    with show_progress('pictures') as advance:
 
-        def painted(done: int, of: int) -> None:
+        def report_picture(done: int, of: int) -> None:
             if stop.is_set():
                 raise StoppedError
             advance(done, of)
 
-        animate(motion, file, painted)
+        animate(motion, file, report_picture)
     print(file)
     return 0
 
 
-def _motion(arguments: argparse.Namespace, given: Path, stop: Event) -> Motion:
+def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> Motion:
     if is_bag_name(given):
         window = window_of(arguments.since, arguments.until)
-        bag = opened(given, stop)
+        bag = open_bag(given, stop)
         layouts = [layout_of(path) for path in bag.files]
         trusted = arguments.trust_effects
         found, scene, _ = read_part(bag, layouts, window, stop, trust_effects=trusted)

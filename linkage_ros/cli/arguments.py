@@ -60,7 +60,7 @@ def add_output(
     parser.add_argument(
         '-o',
         '--output',
-        type=output(suffixes),
+        type=output_path(suffixes),
         metavar='OUTPUT',
         required=not otherwise,
         help=f'file to write, {kinds}{otherwise and f"; without it {otherwise}"}',
@@ -94,15 +94,15 @@ def output_or(arguments: argparse.Namespace, default: Path) -> Path:
     return default
 
 
-def output(suffixes: Collection[str]) -> Callable[[str], Path]:
+def output_path(suffixes: Collection[str]) -> Callable[[str], Path]:
     """Return a reader of the name of a file to write, which refuses other suffixes."""
 
-    def read(text: str) -> Path:
+    def read_path(text: str) -> Path:
         file = Path(text)
         check_output_name(file, suffixes)
         return file
 
-    return read
+    return read_path
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:
@@ -135,7 +135,7 @@ def add_at(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument(
         '--at',
         action='append',
-        type=values,
+        type=read_numbers,
         default=[],
         metavar='VALUE',
         help=f'{text}; several inputs with commas: --at 40,20; --at=-40,20 where it begins with a '
@@ -143,7 +143,7 @@ def add_at(parser: argparse.ArgumentParser, text: str) -> None:
     )
 
 
-def values(text: str) -> tuple[float, ...]:
+def read_numbers(text: str) -> tuple[float, ...]:
     """Read numbers separated by commas."""
     try:
         numbers = tuple(float(part) for part in text.split(','))
@@ -154,21 +154,21 @@ def values(text: str) -> tuple[float, ...]:
     return numbers
 
 
-def bounded(least: float, most: float, kind: type[float] = float) -> Callable[[str], Any]:
+def bounded_number(least: float, most: float, kind: type[float] = float) -> Callable[[str], Any]:
     """Return a reader of a number within bounds, which is an integer if its kind is `int`."""
 
-    def read(text: str) -> float:
+    def read_number(text: str) -> float:
         value = kind(text)
         if not least <= value <= most:
             raise argparse.ArgumentTypeError(f'{text} is not between {least:g} and {most:g}')
         return value
 
     # argparse shows this name: "invalid number value".
-    read.__name__ = 'whole number' if kind is int else 'number'
-    return read
+    read_number.__name__ = 'whole number' if kind is int else 'number'
+    return read_number
 
 
-def inputs(
+def read_inputs(
     linkage: Linkage, typed: Sequence[float], option: str, *, in_degrees: bool = True
 ) -> tuple[float, ...]:
     """
@@ -194,18 +194,18 @@ _ALL_DIGITS = 1e15
 """From here on a double has no decimals."""
 
 
-def wrapped(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """Return an angle without its full turns, in (−π, π] rad."""
     rest = remainder(angle, tau)
     return pi if rest <= -pi else rest
 
 
-def finite(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
     """Return a number as JSON holds it: None stands for infinity and for NaN."""
     return value if isfinite(value) else None
 
 
-def fixed(value: float, digits: int) -> str:
+def fixed_text(value: float, digits: int) -> str:
     """Return a number with fixed decimals, a large one with an exponent; never a negative zero."""
     written = f'{value:.{digits}f}' if abs(value) < _ALL_DIGITS else f'{value:.15g}'
     return written.lstrip('-') if float(written) == 0.0 else written
@@ -221,27 +221,27 @@ class AngleUnit(NamedTuple):
         """Return whether angles are in degrees."""
         return self is DEGREES
 
-    def of(self, angle: float) -> float:
+    def convert(self, angle: float) -> float:
         """Return an angle in [rad], or its rate, in this unit."""
         return degrees(angle) if self.in_degrees else angle
 
-    def read(self, typed: float) -> float:
+    def to_radians(self, typed: float) -> float:
         """Return a typed angle in [rad]."""
         return radians(typed) if self.in_degrees else typed
 
-    def told(self, text: str) -> str:
+    def convert_text(self, text: str) -> str:
         """Return a text whose angles, such as ``-1.5°``, are in this unit."""
         if self.in_degrees:
             return text
         return _IN_DEGREES.sub(lambda one: f'{radians(float(one[1])):.6g} rad', text)
 
-    def text(self, angle: float, digits: int = 3) -> str:
+    def format_angle(self, angle: float, digits: int = 3) -> str:
         """Return an angle in [rad] as text; ``digits`` are the decimals of degrees."""
         return angle_text(angle, digits) if self.in_degrees else f'{angle + 0.0:.6g} rad'
 
     def value_text(self, value: float, turning: bool) -> str:
         """Return the value of an input or a joint, in [rad] if it turns, else in [m]."""
-        return self.text(value) if turning else f'{value + 0.0:.6g} m'
+        return self.format_angle(value) if turning else f'{value + 0.0:.6g} m'
 
 
 _IN_DEGREES = re.compile(r'([-+]?(?:nan|inf|\d[\d.]*(?:e[-+]?\d+)?))°')
@@ -263,4 +263,4 @@ def add_radians(parser: argparse.ArgumentParser, what: str = 'show angles') -> N
 
 def angle_text(angle: float, digits: int = 3) -> str:
     """Return an angle in degrees."""
-    return f'{fixed(degrees(angle), digits)}°'
+    return f'{fixed_text(degrees(angle), digits)}°'

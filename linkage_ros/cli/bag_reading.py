@@ -37,8 +37,8 @@ from linkage_ros.bag.run_events import (
     read_run_metadata,
     RunMetadata,
 )
-from linkage_ros.cli.arguments import finite
-from linkage_ros.cli.terminal import progress
+from linkage_ros.cli.arguments import finite_or_none
+from linkage_ros.cli.terminal import show_progress
 from linkage_ros.errors import BagError, clean, listed
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.replay.replay import recorded_scene
@@ -50,7 +50,7 @@ _MIB = 2**20
 _BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its content
 
 
-def opened(path: Path, stop: Event) -> Bag:
+def open_bag(path: Path, stop: Event) -> Bag:
     """
     Open a bag for reading as far as it goes; report attachments that are not read.
 
@@ -58,11 +58,11 @@ def opened(path: Path, stop: Event) -> Bag:
     searched because its index is missing.
     """
 
-    def look(_read: int) -> None:
+    def check_stop(_read: int) -> None:
         if stop.is_set():
             raise StoppedError
 
-    bag = read_bag(path, allow_truncated=True, progress=look)
+    bag = read_bag(path, allow_truncated=True, progress=check_stop)
     if bag.passed_over:
         line = (
             f'linkage: {path}: attachments beyond {MOST_ATTACHED // _MIB} MiB are not read: '
@@ -104,7 +104,7 @@ def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> 
     return recorded_scene(bag, trust_effects=True, settings=settings)
 
 
-def beside(bag: Path, suffix: str) -> Path:
+def path_beside(bag: Path, suffix: str) -> Path:
     """Return the path beside the bag that has its name and this suffix."""
     # The current folder, '.', has no name.
     named = bag if bag.name not in ('', '..') else bag.resolve()
@@ -125,7 +125,7 @@ def run_or_blank(bag: Bag) -> RunMetadata:
         return RunMetadata()
 
 
-def gaps(bag: Bag) -> Iterator[str]:
+def describe_gaps(bag: Bag) -> Iterator[str]:
     """Yield the gaps within a bag; what follows a gap may differ in a replay."""
     diagnostics = read_raw_metadata(bag).get('diagnostics_topic')
     dropped = sum(
@@ -155,7 +155,7 @@ class BagReading:
         self._advance: Callable[[int, int], None] = lambda _done, _of: None
         self._size = max(1, sum(layout_of(file).content for file in bag.files) // _MIB)
 
-    def glance(self) -> Iterator[BagMessage]:
+    def read_silently(self) -> Iterator[BagMessage]:
         """Yield the messages without progress; raise StoppedError if a signal came."""
         for number, message in enumerate(self._bag.messages(), 1):
             yield message
@@ -165,10 +165,10 @@ class BagReading:
     @contextmanager
     def with_progress(self) -> Iterator[Iterator[BagMessage]]:
         """Give an iterator over the messages, and show the progress on the terminal."""
-        with heeded(), progress('replayed [MiB]') as self._advance:
-            yield self._messages()
+        with heeded(), show_progress('replayed [MiB]') as self._advance:
+            yield self._read_messages()
 
-    def _messages(self) -> Iterator[BagMessage]:
+    def _read_messages(self) -> Iterator[BagMessage]:
         read = 0
         messages = self._bag.messages()
         for number in count(1):
@@ -178,7 +178,7 @@ class BagReading:
                 self.damage = f'{error.where}: {error.reason}'
                 return
             if message is None:
-                promised = expected_counts(_metadata(self._bag))
+                promised = expected_counts(_read_metadata(self._bag))
                 self.missing = max(0, sum(promised.values()) - (number - 1))
                 return
             read += len(message.data) + _BESIDE
@@ -193,10 +193,10 @@ class BagReading:
 # A bag as JSON: numbers are in SI units or [ns], and their keys say so.
 
 
-def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, Any]:
+def bag_json(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, Any]:
     """Return the description of any bag, recorded by this package or not."""
     begin, end = contents.begin, contents.end
-    metadata = _metadata(bag)
+    metadata = _read_metadata(bag)
     within = next((layout.rosbag2 for layout in layouts if layout.rosbag2), None)
     if not metadata and within is not None:
         metadata = serialized_metadata(within)
@@ -208,12 +208,12 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
         'bag': str(bag.path),
         'duration_ns': None if begin is None or end is None else end - begin,
         'begin_ns': begin,
-        'begin': local(begin),
+        'begin': local_time_text(begin),
         'end_ns': end,
-        'end': local(end),
+        'end': local_time_text(end),
         'size_bytes': sum(file.stat().st_size for file in bag.files),
         'files': [{'name': file.name, 'size_bytes': file.stat().st_size} for file in bag.files],
-        'compressions': _compressions(layouts),
+        'compressions': _sum_compressions(layouts),
         'truncated': bag.truncated,
         'unfinished': unfinished_text(bag) if bag.truncated else None,
         'beginning_missing': missing_start_reason(bag, run_or_blank(bag)) or None,
@@ -241,28 +241,28 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
             for topic, messages, size, _, _ in [each]
         ],
         'versions': {
-            'linkage_ros': _text(run.get('linkage_ros')),
-            'python': _text(run.get('python')),
-            'machine': _text(run.get('machine')),
-            'ros_distro': _text(metadata.get('ros_distro')),
-            'rosbag2_metadata': _whole(metadata.get('version')),
+            'linkage_ros': _text_or_none(run.get('linkage_ros')),
+            'python': _text_or_none(run.get('python')),
+            'machine': _text_or_none(run.get('machine')),
+            'ros_distro': _text_or_none(metadata.get('ros_distro')),
+            'rosbag2_metadata': _whole_number(metadata.get('version')),
             'written_by': ', '.join(dict.fromkeys(layout.library for layout in layouts)) or None,
         },
     }
 
 
-def _metadata(bag: Bag) -> Mapping[str, Any]:
+def _read_metadata(bag: Bag) -> Mapping[str, Any]:
     return information_of(bag.path) if bag.path.is_dir() else {}
 
 
-def scene_account(scene: Scene) -> dict[str, Any]:
+def scene_json(scene: Scene) -> dict[str, Any]:
     """Return the description of the scene that a bag carries."""
     return {
         'name': scene.name,
         'rate_hz': scene.rate,
         'seed': scene.seed,
         'faults': list(scene.faults),
-        'linkages': [_linkage(member) for member in scene.linkages],
+        'linkages': [_linkage_json(member) for member in scene.linkages],
     }
 
 
@@ -289,7 +289,7 @@ def worst_account(worst: WorstResiduals) -> dict[str, Any]:
         account['nearest_to_toggle'] = {
             'conditioning': near.conditioning,
             'transmission_angle_rad': near.transmission_angle,
-            'input_to_toggle': finite(near.toggle_distance),
+            'input_to_toggle': finite_or_none(near.toggle_distance),
             'time_ns': place.time,
             'inputs': list(place.inputs),
         }
@@ -301,7 +301,7 @@ def replay_account(examined: ExaminedRun) -> dict[str, Any]:
     return {'joint_states': examined.joint_states, 'same_bytes': examined.same}
 
 
-def local(time: int | None) -> str | None:
+def local_time_text(time: int | None) -> str | None:
     """Return a time in [ns] as local date and time, to the nanosecond."""
     if time is None:
         return None
@@ -310,23 +310,23 @@ def local(time: int | None) -> str | None:
     return f'{there:%Y-%m-%d %H:%M:%S}.{rest:09d}{there:%z}'
 
 
-def _linkage(member: SceneLinkage) -> dict[str, Any]:
-    linkage = member.linkage
+def _linkage_json(scene_linkage: SceneLinkage) -> dict[str, Any]:
+    linkage = scene_linkage.linkage
     return {
-        'name': member.name,
+        'name': scene_linkage.name,
         'links': len(linkage.links),
         'inputs': [
             {'joint': name, 'unit': given.unit}
-            for name, given in zip(member.input_names, linkage.inputs, strict=True)
+            for name, given in zip(scene_linkage.input_names, linkage.inputs, strict=True)
         ],
-        'joints': list(member.joint_names),
-        'drive': member.drive[0],
-        'effects': list(member.effects),
-        'effects_not_imported': list(member.not_imported),
+        'joints': list(scene_linkage.joint_names),
+        'drive': scene_linkage.drive[0],
+        'effects': list(scene_linkage.effects),
+        'effects_not_imported': list(scene_linkage.not_imported),
     }
 
 
-def _compressions(layouts: list[Layout]) -> list[dict[str, Any]]:
+def _sum_compressions(layouts: list[Layout]) -> list[dict[str, Any]]:
     sums: dict[str, tuple[int, int]] = {}
     for layout in layouts:
         for name, (stored, content) in layout.compressions.items():
@@ -338,10 +338,10 @@ def _compressions(layouts: list[Layout]) -> list[dict[str, Any]]:
     ]
 
 
-def _text(value: Any) -> str | None:
+def _text_or_none(value: Any) -> str | None:
     # Not for lists: with YAML aliases, a small file can make an enormous text.
     return str(value) if isinstance(value, str | int | float) else None
 
 
-def _whole(value: Any) -> int | None:
+def _whole_number(value: Any) -> int | None:
     return value if isinstance(value, int) else None

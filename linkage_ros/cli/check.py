@@ -19,8 +19,8 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.cli.arguments import add_file, add_radians, AngleUnit, finite
-from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
+from linkage_ros.cli.arguments import add_file, add_radians, AngleUnit, finite_or_none
+from linkage_ros.cli.terminal import print_tables, ProgressCallback, show_progress, TerminalTable
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.files.linkage_file import linkage_content, read_closure
 from linkage_ros.kinematics.closure import Closure
@@ -76,14 +76,14 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     closure = read_closure(content, file.stem)
     for note in linkage_notes(closure.linkage, content.units):
         print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
-    with progress('parts examined') as advance:
-        account = {'file': arguments.file, **account_of(closure, advance)}
+    with show_progress('parts examined') as advance:
+        account = {'file': arguments.file, **linkage_json(closure, advance)}
         if arguments.branches:
-            account['branches'] = list(_branches(closure))
+            account['branches'] = list(_list_branches(closure))
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
     else:
-        show(*tables(account, arguments.angles))
+        print_tables(*linkage_tables(account, arguments.angles))
     return 0
 
 
@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 # the 'unit' beside them.
 
 
-def account_of(
+def linkage_json(
     closure: Closure, advance: ProgressCallback = lambda _done, _of: None
 ) -> dict[str, Any]:
     """Return the description of a linkage, as JSON holds it."""
@@ -99,16 +99,22 @@ def account_of(
     moving = len(structure.links) - 1
     pins = sum(joint.kind == 'R' for joint in structure.joints)
     named = [point for points in linkage.links.values() for point in points]
-    units = dict(zip(linkage.joints, map(_unit, closure.turning), strict=True))
-    units |= {given.joint: _unit(not given.slider) for given in linkage.inputs}
-    way = InputSweep(closure) if len(linkage.inputs) == 1 else None
+    units = dict(zip(linkage.joints, map(_joint_unit, closure.turning), strict=True))
+    units |= {given.joint: _joint_unit(not given.slider) for given in linkage.inputs}
+    sweep = InputSweep(closure) if len(linkage.inputs) == 1 else None
     # Most of the time goes by here.
-    parts = (_reach, _residual, _other_assemblies, _transmission, _conditioning)
+    parts = (
+        _examine_reach,
+        _examine_residual,
+        _other_assemblies,
+        _examine_transmission,
+        _examine_conditioning,
+    )
     sides = sides_at(closure, closure.close_unlimited(*usual_inputs(closure)))
     examined: dict[str, Any] = {}
     for number, part in enumerate(parts):
         advance(number, len(parts))
-        examined |= part(closure, way)
+        examined |= part(closure, sweep)
     return {
         'moving_links': len(linkage.links) - 1,
         'slot_blocks': moving + 1 - len(linkage.links),
@@ -131,15 +137,15 @@ def account_of(
             {
                 'joint': name,
                 'unit': units[name],
-                'low': finite(limits.low),
-                'high': finite(limits.high),
-                'velocity': finite(limits.velocity),
-                'effort': finite(limits.effort),
+                'low': finite_or_none(limits.low),
+                'high': finite_or_none(limits.high),
+                'velocity': finite_or_none(limits.velocity),
+                'effort': finite_or_none(limits.effort),
             }
             for name, limits in linkage.limits.items()
         ],
         'unwrapped': _counts_turns(closure),
-        'groups': [_group(closure, number, sides) for number in range(len(structure.groups))],
+        'groups': [_group_json(closure, number, sides) for number in range(len(structure.groups))],
         'four_bars': [
             {
                 'group': bar.group + 1,
@@ -155,7 +161,7 @@ def account_of(
     }
 
 
-def _branches(closure: Closure) -> Iterator[dict[str, Any]]:
+def _list_branches(closure: Closure) -> Iterator[dict[str, Any]]:
     """Yield the branches of each joint that moves, and of each coordinate of a traced point."""
     linkage = closure.linkage
     if len(linkage.inputs) > 1:
@@ -170,7 +176,7 @@ def _branches(closure: Closure) -> Iterator[dict[str, Any]]:
                     'branch': branch.number,
                     'input_low': branch.least,
                     'input_high': branch.most,
-                    'unit': _unit(branch.turning),
+                    'unit': _joint_unit(branch.turning),
                     'low': branch.low,
                     'high': branch.high,
                     'turns_back': list(branch.turns_back),
@@ -188,18 +194,18 @@ def _counts_turns(closure: Closure) -> bool:
     return is_iterated(closure) or any(number == 1 for number in crossed)
 
 
-def _group(closure: Closure, number: int, sides: Mapping[str, str]) -> dict[str, Any]:
+def _group_json(closure: Closure, number: int, sides: Mapping[str, str]) -> dict[str, Any]:
     kind, links, method, assembly = describe_group(closure, number, sides)
     return {'kind': kind, 'links': links.split(', '), 'method': method, 'assembly': assembly}
 
 
-def _unit(turning: bool) -> str:
+def _joint_unit(turning: bool) -> str:
     return 'rad' if turning else 'm'
 
 
-def _reach(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
+def _examine_reach(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
     """Return ranges and singular inputs; None if they depend on several inputs."""
-    if way is None:
+    if sweep is None:
         return {'ranges': None, 'singular_inputs': None}
     return {
         'ranges': [
@@ -211,26 +217,26 @@ def _reach(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
                 'limited': list(interval.limited),
                 'limited_by': [by or None for by in interval.by],
             }
-            for interval in way.ranges
+            for interval in sweep.ranges
         ],
         'singular_inputs': [
             {
                 'status': singular.status.value,
                 'input': singular.value,
-                'within_limits': _is_reached(way, singular.value),
+                'within_limits': _is_reached(sweep, singular.value),
             }
             for singular in closure.singular_inputs
         ],
     }
 
 
-def _is_reached(way: InputSweep, value: float) -> bool:
+def _is_reached(sweep: InputSweep, value: float) -> bool:
     """Return whether a value of the input, up to full turns, is within the limits."""
-    turns = (0.0, -tau, tau) if way.turning else (0.0,)
-    return not way.closure.bounds or any(way.range_about(value + turn) for turn in turns)
+    turns = (0.0, -tau, tau) if sweep.turning else (0.0,)
+    return not sweep.closure.bounds or any(sweep.range_about(value + turn) for turn in turns)
 
 
-def _residual(closure: Closure, _way: InputSweep | None) -> dict[str, Any]:
+def _examine_residual(closure: Closure, _sweep: InputSweep | None) -> dict[str, Any]:
     found = worst_residual(closure)
     if found is None:
         return {'worst_residual': None}
@@ -268,28 +274,30 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
     return {'other_assemblies': groups}
 
 
-def _transmission(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
-    found = transmission_angles(way) if way is not None else {}
-    return {'transmission_angles': _curves(closure, found, 'angle_rad')}
+def _examine_transmission(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
+    found = transmission_angles(sweep) if sweep is not None else {}
+    return {'transmission_angles': _curve_extremes(closure, found, 'angle_rad')}
 
 
-def _conditioning(closure: Closure, way: InputSweep | None) -> dict[str, Any]:
-    found = conditioning_curves(way) if way is not None else {}
-    return {'conditioning': _curves(closure, found, 'conditioning')}
+def _examine_conditioning(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
+    found = conditioning_curves(sweep) if sweep is not None else {}
+    return {'conditioning': _curve_extremes(closure, found, 'conditioning')}
 
 
-def _curves(closure: Closure, found: Mapping[int, SweptCurve], key: str) -> list[dict[str, Any]]:
+def _curve_extremes(
+    closure: Closure, found: Mapping[int, SweptCurve], key: str
+) -> list[dict[str, Any]]:
     """Return the extreme values by group, and the inputs where they occur; none if constant."""
 
-    def extreme(one: Extreme) -> dict[str, Any]:
-        return {key: finite(one.value), 'inputs': list(one.at)}
+    def extreme_json(one: Extreme) -> dict[str, Any]:
+        return {key: finite_or_none(one.value), 'inputs': list(one.at)}
 
     return [
         {
             'group': number + 1,
             'links': list(links_of(closure.structure.groups[number])),
-            'least': extreme(curve.lowest),
-            'greatest': extreme(curve.highest),
+            'least': extreme_json(curve.lowest),
+            'greatest': extreme_json(curve.highest),
         }
         for number, curve in found.items()
     ]
@@ -316,7 +324,7 @@ def describe_group(
         links = ', '.join(' + '.join(body) for body in group.bodies)
         assembly = 'the only one'
         if closes_in_two_ways(group):
-            assembly = _assembly(group, sides.get(closing_name(group), 'in line with'))
+            assembly = _assembly_text(group, sides.get(closing_name(group), 'in line with'))
             parts = (getattr(one, 'diagonal', getattr(one, 'rail', None)) for one in steps)
             if any(any(getattr(part, 'crosses', ())) for part in parts):
                 assembly += ' as drawn, changing at change points'
@@ -330,7 +338,7 @@ def describe_group(
     )
 
 
-def _assembly(dyad: Dyad, side: str) -> str:
+def _assembly_text(dyad: Dyad, side: str) -> str:
     first, second = dyad.outer
     if dyad.kind == 'RRR':
         return f'pin {dyad.inner.name} {side} of {first.name}→{second.name}'
@@ -341,9 +349,9 @@ def _assembly(dyad: Dyad, side: str) -> str:
 # The same as tables.
 
 
-def tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[Table]:
+def linkage_tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[TerminalTable]:
     """Yield the tables that describe a linkage."""
-    yield Table(account['file'], ('', ''), list(_facts(account, angles)))
+    yield TerminalTable(account['file'], ('', ''), list(_linkage_facts(account, angles)))
     yield _order_table(account)
     yield from map(_assemblies_table, account['other_assemblies'])
     for table in (
@@ -357,7 +365,7 @@ def tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[Table]:
         yield _branches_table(account, angles)
 
 
-def _order_table(account: Mapping[str, Any]) -> Table:
+def _order_table(account: Mapping[str, Any]) -> TerminalTable:
     heads = ('>', 'group', 'links', 'how', 'assembly')
     rows = [
         (
@@ -369,10 +377,10 @@ def _order_table(account: Mapping[str, Any]) -> Table:
         )
         for number, group in enumerate(account['groups'], 1)
     ]
-    return Table('Solved in this order', heads, rows)
+    return TerminalTable('Solved in this order', heads, rows)
 
 
-def _four_bars_table(account: Mapping[str, Any]) -> Table:
+def _four_bars_table(account: Mapping[str, Any]) -> TerminalTable:
     heads = ('>', 'links', 'lengths [m]', '>Grashof margin [m]', 'Barker', 'name')
     rows = [
         (
@@ -386,10 +394,10 @@ def _four_bars_table(account: Mapping[str, Any]) -> Table:
         for bar in account['four_bars']
     ]
     title = 'Four-bars: input, coupler, output and the frame that they are seen from'
-    return Table(title, heads, rows)
+    return TerminalTable(title, heads, rows)
 
 
-def _transmission_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
+def _transmission_table(account: Mapping[str, Any], angles: AngleUnit) -> TerminalTable:
     turning = account['inputs'][0]['unit'] == 'rad'
     heads = ('>', 'links', '>least', 'at', '>greatest', 'at')
     rows = [
@@ -400,17 +408,19 @@ def _transmission_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
                 cell
                 for extreme in (one['least'], one['greatest'])
                 for cell in (
-                    '' if extreme['angle_rad'] is None else angles.text(extreme['angle_rad'], 2),
-                    _places(extreme['inputs'], turning, angles),
+                    ''
+                    if extreme['angle_rad'] is None
+                    else angles.format_angle(extreme['angle_rad'], 2),
+                    _inputs_text(extreme['inputs'], turning, angles),
                 )
             ),
         )
         for one in account['transmission_angles']
     ]
-    return Table('Transmission angles over the range, acute', heads, rows)
+    return TerminalTable('Transmission angles over the range, acute', heads, rows)
 
 
-def _conditioning_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
+def _conditioning_table(account: Mapping[str, Any], angles: AngleUnit) -> TerminalTable:
     turning = account['inputs'][0]['unit'] == 'rad'
     heads = ('>', 'links', '>least', 'at')
     rows = [
@@ -418,14 +428,14 @@ def _conditioning_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
             str(one['group']),
             ', '.join(one['links']),
             f'{one["least"]["conditioning"]:.4f}',
-            _places(one['least']['inputs'], turning, angles),
+            _inputs_text(one['least']['inputs'], turning, angles),
         )
         for one in account['conditioning']
     ]
-    return Table('Conditioning over the range, of what is iterated', heads, rows)
+    return TerminalTable('Conditioning over the range, of what is iterated', heads, rows)
 
 
-def _branches_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
+def _branches_table(account: Mapping[str, Any], angles: AngleUnit) -> TerminalTable:
     given = account['inputs'][0]
     rows = []
     for one in account['branches']:
@@ -449,10 +459,10 @@ def _branches_table(account: Mapping[str, Any], angles: AngleUnit) -> Table:
         '',
         'limits of',
     )
-    return Table('Branches: between their ends a joint moves one way', heads, rows)
+    return TerminalTable('Branches: between their ends a joint moves one way', heads, rows)
 
 
-def _facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str, str]]:
+def _linkage_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str, str]]:
     blocks, inputs = account['slot_blocks'], account['inputs']
     beside = f' and {blocks} block(s) in slots' if blocks else ''
     yield 'moving links', f'{account["moving_links"]}{beside}'
@@ -538,7 +548,7 @@ def _limits_text(limits: Mapping[str, Any], angles: AngleUnit) -> str:
             f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}'
         )
     if limits['velocity'] is not None:
-        velocity = angles.of(limits['velocity']) if turning else limits['velocity']
+        velocity = angles.convert(limits['velocity']) if turning else limits['velocity']
         texts.append(f'at most {velocity:.6g} {angles.name if turning else "m"}/s')
     if limits['effort'] is not None:
         texts.append(f'at most {limits["effort"]:.6g} {"N·m" if turning else "N"}')
@@ -559,14 +569,17 @@ def _range_text(interval: Mapping[str, Any], turning: bool, angles: AngleUnit) -
     return f'{ends[0]}, and on' if interval['limited'][0] else f'up to {ends[1]}'
 
 
-def _assemblies_table(group: Mapping[str, Any]) -> Table:
+def _assemblies_table(group: Mapping[str, Any]) -> TerminalTable:
     """Return the other assemblies of a group, each as a pose to paste into the file."""
     inputs = ', '.join(f'{value + 0.0:.9g}' for value in group['inputs'])
     rows = [
-        (f'{{inputs: [{inputs}], points: {{{_points(one["points_m"])}}}}}', _turns(one['turns']))
+        (
+            f'{{inputs: [{inputs}], points: {{{_points_text(one["points_m"])}}}}}',
+            _turns_text(one['turns']),
+        )
         for one in group['assemblies']
     ]
-    return Table(
+    return TerminalTable(
         f'Other assemblies of group {group["group"]} at the inputs of the pose: '
         f'{len(rows)} found from {group["starts"]} starts',
         ('pose', "on the pose's branch") if rows else ('',),
@@ -574,19 +587,21 @@ def _assemblies_table(group: Mapping[str, Any]) -> Table:
     )
 
 
-def _points(points: Mapping[str, Sequence[float]]) -> str:
+def _points_text(points: Mapping[str, Sequence[float]]) -> str:
     return ', '.join(f'{name}: [{x:.7g}, {y:.7g}]' for name, (x, y) in points.items())
 
 
-def _turns(turns: int) -> str:
+def _turns_text(turns: int) -> str:
     if not turns:
         return 'no'
     return f'{abs(turns)} turn{"s" if abs(turns) > 1 else ""} {"on" if turns > 0 else "back"}'
 
 
-def _places(inputs: Sequence[float], turning: bool, angles: AngleUnit) -> str:
+def _inputs_text(inputs: Sequence[float], turning: bool, angles: AngleUnit) -> str:
     if not inputs:
         return 'everywhere'
-    places = [angles.text(at, 2) if turning else f'{at + 0.0:.6g} m' for at in inputs[:_PLACES]]
+    places = [
+        angles.format_angle(at, 2) if turning else f'{at + 0.0:.6g} m' for at in inputs[:_PLACES]
+    ]
     more = len(inputs) - _PLACES
     return ', '.join(places) + (f' and {more} more' if more > 0 else '')

@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 
 from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.arguments import add_output, PICTURES
-from linkage_ros.cli.bag_reading import BagReading, opened, run_or_blank
+from linkage_ros.cli.bag_reading import BagReading, open_bag, run_or_blank
 from linkage_ros.cli.replay import deviations_account, joints_table
-from linkage_ros.cli.terminal import show
+from linkage_ros.cli.terminal import print_tables
 from linkage_ros.errors import BagError, clean, LinkageError, listed
 from linkage_ros.messages.joint_values import JOINT_STATE, Key, MessageValues, POSITION
 from linkage_ros.replay.compare import Deviation, TickPlace
@@ -44,14 +44,14 @@ _INTERVALS = 1000
 _ROWS = 1024
 
 
-class State(NamedTuple):
+class TimedState(NamedTuple):
     """A joint state of a run."""
 
     time: int  # Since the first one, in [ns]
     values: Mapping[Key, float]
 
 
-class Differences:
+class BagDifferences:
     """The differences of two runs: by joint and quantity, and of positions over the time."""
 
     def __init__(self, turning: Mapping[str, bool], *, wrapped: bool) -> None:
@@ -66,7 +66,9 @@ class Differences:
         self._curves: MinMaxCurve | None = None
         self._rows: list[tuple[int, list[float]]] = []
 
-    def add(self, time: int, first: Mapping[Key, float], second: Mapping[Key, float]) -> None:
+    def add_states(
+        self, time: int, first: Mapping[Key, float], second: Mapping[Key, float]
+    ) -> None:
         """Add two states of one time, in [ns]."""
         self.compared += 1
         self.end = time
@@ -92,17 +94,17 @@ class Differences:
             row.append(remainder(apart, tau) if self._wrapped and self._is_angle(key) else apart)
         self._rows.append((time, row))
         if len(self._rows) == _ROWS:
-            self._flush()
+            self._flush_rows()
 
-    def curves(self) -> tuple[Any, Any, Any]:
+    def difference_curves(self) -> tuple[Any, Any, Any]:
         """Return times in [s], and the least and greatest difference in each interval."""
-        self._flush()
+        self._flush_rows()
         assert self._curves is not None
         found = self._curves.intervals()
         lows, highs = np.fmin(found.first, found.second), np.fmax(found.first, found.second)
         return found.begins * 1e-9, lows, highs
 
-    def between(self, before: State, after: State, time: int) -> Mapping[Key, float]:
+    def interpolate(self, before: TimedState, after: TimedState, time: int) -> Mapping[Key, float]:
         """Return the values at a time between two states, in [ns]."""
         if after.time == time or after.time == before.time:
             return after.values
@@ -118,7 +120,7 @@ class Differences:
     def _is_angle(self, key: Key) -> bool:
         return key[1] == POSITION and self._turning.get(key[0], True)
 
-    def _flush(self) -> None:
+    def _flush_rows(self) -> None:
         if self._rows and self._curves is not None:
             times, rows = zip(*self._rows, strict=True)
             self._curves.add(np.array(times, np.int64), np.array(rows, float))
@@ -137,13 +139,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Compare; return 1 if it was stopped, or a bag is damaged."""
-    bags = [opened(path, stop) for path in (arguments.bag, arguments.other)]
-    scenes = [_wrapping(bag) for bag in bags]
+    bags = [open_bag(path, stop) for path in (arguments.bag, arguments.other)]
+    scenes = [_find_wrapping(bag) for bag in bags]
     turning = scenes[0][0] | scenes[1][0]
-    differences = Differences(turning, wrapped=scenes[0][1] or scenes[1][1])
+    differences = BagDifferences(turning, wrapped=scenes[0][1] or scenes[1][1])
     readings = [BagReading(bag, stop) for bag in bags]
     with readings[0].with_progress() as first, readings[1].with_progress() as second:
-        _compare(differences, _states(bags[0], first), _states(bags[1], second))
+        _compare_states(differences, _read_states(bags[0], first), _read_states(bags[1], second))
     if not differences.deviations:
         raise LinkageError(
             arguments.other,
@@ -160,7 +162,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         'joints': deviations_account(differences.deviations, turning),
     }
     if arguments.output is not None:
-        _draw(differences, turning, arguments.output)
+        _draw_differences(differences, turning, arguments.output)
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
     else:
@@ -168,13 +170,13 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             f'{account["other"]} against {account["bag"]}: {account["compared"]} joint states, '
             f'{account["seconds"]:.3f} s\n'
         )
-        show(joints_table(account, 0))
+        print_tables(joints_table(account, 0))
         if arguments.output is not None:
             print(arguments.output)
     return int(stop.is_set() or bool(account['damage']))
 
 
-def _wrapping(bag: Bag) -> tuple[dict[str, bool], bool]:
+def _find_wrapping(bag: Bag) -> tuple[dict[str, bool], bool]:
     """Return which joints turn, and whether angles are wrapped; without a scene they may be."""
     try:
         scene = recorded_scene(bag)
@@ -183,7 +185,7 @@ def _wrapping(bag: Bag) -> tuple[dict[str, bool], bool]:
     return turning_joints(scene), scene.wrapped
 
 
-def _states(bag: Bag, messages: Iterator[Any]) -> Iterator[State]:
+def _read_states(bag: Bag, messages: Iterator[Any]) -> Iterator[TimedState]:
     """Yield the joint states of a bag whose time goes on."""
     held = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
     topic = run_or_blank(bag).joint_states_topic or '/joint_states'
@@ -203,26 +205,30 @@ def _states(bag: Bag, messages: Iterator[Any]) -> Iterator[State]:
         begin = time if begin is None else begin
         if last is None or time > last:
             last = time
-            yield State(time - begin, dict(zip(values.keys, values.numbers, strict=True)))
+            yield TimedState(time - begin, dict(zip(values.keys, values.numbers, strict=True)))
 
 
-def _compare(differences: Differences, first: Iterator[State], second: Iterator[State]) -> None:
+def _compare_states(
+    differences: BagDifferences, first: Iterator[TimedState], second: Iterator[TimedState]
+) -> None:
     before = after = next(second, None)
     for time, values in first:
         while after is not None and after.time < time:
             before, after = after, next(second, None)
         if before is None or after is None:
             return
-        differences.add(time, values, differences.between(before, after, time))
+        differences.add_states(time, values, differences.interpolate(before, after, time))
 
 
-def _draw(differences: Differences, turning: Mapping[str, bool], file: Path) -> None:
+def _draw_differences(
+    differences: BagDifferences, turning: Mapping[str, bool], file: Path
+) -> None:
     from linkage_ros.drawing.painting import save, settings  # local import: only for a picture
 
     context = settings()
     from matplotlib.figure import Figure
 
-    times, lows, highs = differences.curves()
+    times, lows, highs = differences.difference_curves()
     kinds = [(True, '°', 180.0 / pi), (False, 'mm', 1e3)]
     panels = [
         (unit, scale, columns)

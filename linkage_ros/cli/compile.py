@@ -58,10 +58,10 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     in_c = output.suffix.lower() in ('.c', '.h')
     subject = Subject(
         closure,
-        _name(file, arguments.name) if in_c else file.stem,
+        _source_name(file, arguments.name) if in_c else file.stem,
         file.name,
         arguments.derivatives,
-        _joints(closure, arguments.joints),
+        _requested_joints(closure, arguments.joints),
     )
     try:
         text = write_source(subject, language(subject))
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     return 0
 
 
-def _name(file: Path, typed: str | None) -> str:
+def _source_name(file: Path, typed: str | None) -> str:
     """Return an identifier: the typed one, or one made from the file's name."""
     name = c_name(file.stem) if typed is None else typed
     if not C_NAME.fullmatch(name):
@@ -83,7 +83,7 @@ def _name(file: Path, typed: str | None) -> str:
     return name
 
 
-def _joints(closure: Closure, typed: str | None) -> tuple[str, ...]:
+def _requested_joints(closure: Closure, typed: str | None) -> tuple[str, ...]:
     """Return the requested joints, each once."""
     published = closure.linkage.joints
     if typed is None:

@@ -85,8 +85,8 @@ def complete() -> None:
 def _names_or(files: Any, *lists: Callable[[], list[str]]) -> Callable[..., list[str]]:
     """Return a completer of shipped names, and of files if there is a completer of files."""
 
-    def completed(prefix: str, **more: Any) -> list[str]:
+    def complete_name(prefix: str, **more: Any) -> list[str]:
         names = {name for names in lists for name in names() if name.startswith(prefix)}
         return [*sorted(names), *(files(prefix=prefix, **more) if files is not None else ())]
 
-    return completed
+    return complete_name

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.cli.gallery import first_sentence
 from linkage_ros.cli.run import add_run_arguments, run_scene
-from linkage_ros.cli.terminal import show, Table
+from linkage_ros.cli.terminal import print_tables, TerminalTable
 from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.node.real_time import stay_on_this_machine
 from linkage_ros.processes import private_domain
@@ -73,8 +73,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Run the demo."""
     if arguments.list:
-        rows = [_row(shipped(f'scenes/{name}.yaml')) for name in scene_names()]
-        show(Table('', ('scene', 'drive', 'recorded', ''), rows))
+        rows = [_scene_row(shipped(f'scenes/{name}.yaml')) for name in scene_names()]
+        print_tables(TerminalTable('', ('scene', 'drive', 'recorded', ''), rows))
         return 0
     name, names = arguments.name, scene_names()
     if name not in names:
@@ -94,14 +94,14 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         flush=True,  # needed during the run, also by a pipe
     )
     if scene.faults:
-        print(f'faults    {listed(map(_fault, scene.faults, scene.faults.values()), "; ")}')
-    with heeded(), _beside(scene, arguments.seconds):
+        print(f'faults    {listed(map(_fault_text, scene.faults, scene.faults.values()), "; ")}')
+    with heeded(), _run_companions(scene, arguments.seconds):
         code, bag = run_scene(str(file), arguments, stop, patience=_PATIENCE)
     if bag is not None:
         picture = Path(f'{bag}.png')
         try:
             # Ctrl-C ended the run; it must not stop the drawing.
-            find_tool('plot').draw(bag, picture, Event())
+            find_tool('plot').draw_bag(bag, picture, Event())
         except LinkageError as error:
             # The run ended before it began, or matplotlib is missing: the run itself succeeded.
             print(f'picture   none: {error}')
@@ -113,7 +113,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 @contextmanager
-def _beside(scene: Scene, seconds: float) -> Iterator[None]:
+def _run_companions(scene: Scene, seconds: float) -> Iterator[None]:
     """Run the companions of the scene's drives in processes of their own."""
     processes = [
         subprocess.Popen(
@@ -121,7 +121,7 @@ def _beside(scene: Scene, seconds: float) -> Iterator[None]:
             start_new_session=True,  # Ctrl-C goes to this process only, which ends the others
         )
         for member in scene.linkages
-        if (command := _command(member, seconds))
+        if (command := _companion_command(member, seconds))
     ]
     try:
         yield
@@ -132,27 +132,27 @@ def _beside(scene: Scene, seconds: float) -> Iterator[None]:
             process.wait()
 
 
-def _command(member: SceneLinkage, seconds: float) -> list[str]:
+def _companion_command(scene_linkage: SceneLinkage, seconds: float) -> list[str]:
     """Return the command of a linkage's companion; empty if it needs none."""
-    drive, _ = member.drive
+    drive, _ = scene_linkage.drive
     if drive not in _BESIDE:
         return []
     module, *parameters = _BESIDE[drive]
     # A time limit, so that it ends by itself even if this process is killed.
     limit = seconds + _PATIENCE + 10.0
-    parameters += [f'joint:={member.sampled_joints[0]}', f'seconds:={limit:.1f}']
+    parameters += [f'joint:={scene_linkage.sampled_joints[0]}', f'seconds:={limit:.1f}']
     pairs = [part for parameter in parameters for part in ('-p', parameter)]
     return [sys.executable, '-m', module, '--ros-args', *pairs]
 
 
-def _fault(name: str, fault: Fault) -> str:
+def _fault_text(name: str, fault: Fault) -> str:
     """Return a fault as text: its name, its kind, and when it happens."""
     times = listed(f'{time:g}' for time in fault.at)
     when = f'at {times} s for {fault.seconds:g} s' if fault.at else 'by service call'
     return f'{name} ({fault.kind}) {when}'
 
 
-def _row(file: Path) -> tuple[str, ...]:
+def _scene_row(file: Path) -> tuple[str, ...]:
     """Return the list's text on a scene: its drives, and its own description."""
     scene = load_scene(file)
     drives = ' and '.join(dict.fromkeys(member.drive[0] for member in scene.linkages))

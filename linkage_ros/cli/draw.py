@@ -22,10 +22,10 @@ from linkage_ros.cli.arguments import (
     add_at,
     add_file,
     add_output,
-    bounded,
-    inputs,
+    bounded_number,
     output_or,
     PICTURES,
+    read_inputs,
 )
 from linkage_ros.drawing.dxf import links_dxf
 from linkage_ros.drawing.figure import assemblies_picture, picture
@@ -60,10 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     parts = parser.add_argument_group('parts, in a DXF')
     parts.add_argument(
-        '--width', type=bounded(1e-6, 1e6), metavar='MM', help='width of a bar, in mm'
+        '--width', type=bounded_number(1e-6, 1e6), metavar='MM', help='width of a bar, in mm'
     )
     parts.add_argument(
-        '--hole', type=bounded(1e-6, 1e6), metavar='MM', help='diameter of a hole, in mm'
+        '--hole', type=bounded_number(1e-6, 1e6), metavar='MM', help='diameter of a hole, in mm'
     )
 
 
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     for option in ('width', 'hole'):
         if getattr(arguments, option) is not None:
             raise LinkageError(f'--{option}', 'is of the parts in a DXF', 'add -o FILE.dxf')
-    typed = [inputs(closure.linkage, at, '--at') for at in arguments.at]
+    typed = [read_inputs(closure.linkage, at, '--at') for at in arguments.at]
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem
     file = output_or(arguments, Path(f'{name}.png'))
@@ -101,7 +101,7 @@ def _draw_assemblies(arguments: argparse.Namespace) -> int:
     found = list(find_assemblies(arguments.file).values())
     first = found[0]
     if arguments.at:
-        pose = inputs(first.linkage, arguments.at[0], '--at')
+        pose = read_inputs(first.linkage, arguments.at[0], '--at')
         closed = [each for each in found if each.position(*pose).joints]
         # If it closes in no assembly there, `view` says so.
         views = [view(each, pose) for each in closed or [first]]

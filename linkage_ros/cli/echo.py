@@ -24,7 +24,7 @@ from threading import Event
 from time import monotonic
 from typing import Any
 
-from linkage_ros.cli.arguments import bounded
+from linkage_ros.cli.arguments import bounded_number
 from linkage_ros.errors import clean, did_you_mean, LinkageError, listed, shortened
 from linkage_ros.messages.joint_values import EFFORT, JOINT_STATE, POSITION, RATE, UNITS
 from linkage_ros.node.player import player_node
@@ -67,17 +67,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--count',
-        type=bounded(1, 10**9, int),
+        type=bounded_number(1, 10**9, int),
         default=inf,
         metavar='N',
         help='end after so many messages',
     )
     parser.add_argument(
-        '--seconds', type=bounded(1e-9, 1e9), default=inf, help='how long; without it, to Ctrl-C'
+        '--seconds',
+        type=bounded_number(1e-9, 1e9),
+        default=inf,
+        help='how long; without it, to Ctrl-C',
     )
     parser.add_argument(
         '--timeout',
-        type=bounded(1e-9, 1e9),
+        type=bounded_number(1e-9, 1e9),
         metavar='SECONDS',
         help='end when no message comes for so long; without it, '
         f'{_TIMEOUT:g} with --count, else never',
@@ -97,7 +100,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         silence = _Silence(node, topic, timeout)
         kind = _await_type(node, topic, silence, end, stop)
         if kind is not None:
-            seen = _receive(node, topic, kind, arguments, silence, end, stop)
+            seen = _receive_messages(node, topic, kind, arguments, silence, end, stop)
     missing = not seen or (isfinite(arguments.count) and seen < arguments.count)
     return int(missing and not stop.is_set())
 
@@ -128,13 +131,15 @@ class _Silence:
         patience = min(_PATIENCE, self._timeout)
         if silent >= patience and not self._reported:
             self._reported = True
-            _say(f'{self._topic}: no message for {patience:g} s {self._whereabouts()}')
+            _print_note(f'{self._topic}: no message for {patience:g} s {self._publishers_text()}')
         if silent < self._timeout:
             return False
-        _say(f'{self._topic}: ended after {self._timeout:g} s without a message (--timeout)')
+        _print_note(
+            f'{self._topic}: ended after {self._timeout:g} s without a message (--timeout)'
+        )
         return True
 
-    def _whereabouts(self) -> str:
+    def _publishers_text(self) -> str:
         """Return how many publishers the topic has, and which topics have some."""
         topics = {
             name: self._node.count_publishers(name)
@@ -157,7 +162,7 @@ def _await_type(node: Node, topic: str, silence: _Silence, end: float, stop: Eve
     return None
 
 
-def _receive(
+def _receive_messages(
     node: Node,
     topic: str,
     kind: str,
@@ -170,7 +175,7 @@ def _receive(
     seen = 0
     arrivals: list[float] = []
 
-    def arrive(message: Any) -> None:
+    def take_message(message: Any) -> None:
         nonlocal seen
         # More messages than asked for may wait at once.
         if seen >= arguments.count:
@@ -182,7 +187,11 @@ def _receive(
             print(f'{as_yaml(message, kind)}---', flush=True)
 
     node.create_subscription(
-        message_type(kind, topic), topic, arrive, _qos(node, topic), raw=arguments.rate
+        message_type(kind, topic),
+        topic,
+        take_message,
+        _compatible_qos(node, topic),
+        raw=arguments.rate,
     )
     told = monotonic()
     while not stop.is_set() and monotonic() < end and seen < arguments.count:
@@ -200,11 +209,11 @@ def _receive(
         if arguments.rate:
             print(f'{topic}: {rate_text(arrivals)}', flush=True)
         else:
-            _say(f'{topic}: {seen} messages, {rate_text(arrivals)}')
+            _print_note(f'{topic}: {seen} messages, {rate_text(arrivals)}')
     return seen
 
 
-def _qos(node: Node, topic: str) -> QoSProfile:
+def _compatible_qos(node: Node, topic: str) -> QoSProfile:
     """Return a quality of service that is compatible with all publishers of a topic."""
     offered = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
     reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offered)
@@ -218,7 +227,7 @@ def _qos(node: Node, topic: str) -> QoSProfile:
     )
 
 
-def _say(text: str) -> None:
+def _print_note(text: str) -> None:
     print(clean(f'linkage echo: {text}'), file=sys.stderr, flush=True)
 
 
@@ -233,7 +242,11 @@ def rate_text(arrivals: Sequence[float]) -> str:
 def as_yaml(message: Any, kind: str) -> str:
     """Return a message as YAML, with the units of a joint state as comments."""
     text: str = yaml.safe_dump(
-        _plain(message), default_flow_style=None, sort_keys=False, allow_unicode=True, width=inf
+        _yaml_value(message),
+        default_flow_style=None,
+        sort_keys=False,
+        allow_unicode=True,
+        width=inf,
     )
     if kind != JOINT_STATE:
         return text
@@ -244,14 +257,16 @@ def as_yaml(message: Any, kind: str) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def _plain(value: Any) -> Any:
+def _yaml_value(value: Any) -> Any:
     """Return a field of a message as YAML holds it; of a long one the beginning."""
     if hasattr(value, 'get_fields_and_field_types'):
-        return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+        return {
+            name: _yaml_value(getattr(value, name)) for name in value.get_fields_and_field_types()
+        }
     if isinstance(value, str):
         return shortened(value, _LONGEST_TEXT)
     if isinstance(value, bool | int | float | Mapping):
         return value
     items = list(value[:_MOST_ITEMS])
     more = len(value) - len(items)
-    return [*map(_plain, items), *([f'… and {more} more'] if more else [])]
+    return [*map(_yaml_value, items), *([f'… and {more} more'] if more else [])]

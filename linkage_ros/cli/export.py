@@ -29,8 +29,8 @@ from typing import NamedTuple
 from linkage_ros.bag.contents import layout_of, REPORT_EVERY
 from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.arguments import add_bag, add_output
-from linkage_ros.cli.bag_reading import opened, run_or_blank, unfinished_text
-from linkage_ros.cli.terminal import progress
+from linkage_ros.cli.bag_reading import open_bag, run_or_blank, unfinished_text
+from linkage_ros.cli.terminal import show_progress
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError, listed
 from linkage_ros.files.tables import block_rows, check_kind, KINDS, table_file
 from linkage_ros.messages.joint_values import (
@@ -69,7 +69,7 @@ Row = list[float | int | None]
 ProgressCallback = Callable[[int], None]
 
 
-class Source(NamedTuple):
+class ExportSource(NamedTuple):
     """The origin of the rows."""
 
     bag: Bag  # The bag
@@ -81,7 +81,7 @@ class Source(NamedTuple):
     dependent: Collection[str] = ()
 
 
-class Found(NamedTuple):
+class ExportResult(NamedTuple):
     """
     Result of the first pass: columns beyond the first four, and number of rows.
 
@@ -94,7 +94,7 @@ class Found(NamedTuple):
     left_out: Mapping[tuple[str, str], int]
 
 
-class _Tick(NamedTuple):
+class _ExportTick(NamedTuple):
     """The messages of a tick, by topic, with its publish time and log time."""
 
     published: int
@@ -102,7 +102,9 @@ class _Tick(NamedTuple):
     messages: dict[str, MessageContent]
 
 
-def survey(source: Source, order: Sequence[str], report_progress: ProgressCallback) -> Found:
+def survey_columns(
+    source: ExportSource, order: Sequence[str], report_progress: ProgressCallback
+) -> ExportResult:
     """
     Collect the columns of the rows (first pass).
 
@@ -126,7 +128,7 @@ def survey(source: Source, order: Sequence[str], report_progress: ProgressCallba
     counts: Counter[str] = Counter()
     left_out: Counter[tuple[str, str]] = Counter()
     rows = 0
-    for tick in _ticks(source, left_out, report_progress):
+    for tick in _read_ticks(source, left_out, report_progress):
         rows += 1
         for topic, values in tick.messages.items():
             counts[topic] += 1
@@ -139,10 +141,10 @@ def survey(source: Source, order: Sequence[str], report_progress: ProgressCallba
                         f'its joints take more than {_MOST_COLUMNS} columns',
                         'name one topic with --topic',
                     )
-    return Found(_sorted(columns, order), rows, counts, left_out)
+    return ExportResult(_sort_columns(columns, order), rows, counts, left_out)
 
 
-def _sorted(keys: Iterable[Key], order: Sequence[str]) -> tuple[Key, ...]:
+def _sort_columns(keys: Iterable[Key], order: Sequence[str]) -> tuple[Key, ...]:
     """Sort the columns by quantity, then joint; force and torque of a pin stay together."""
     keys = tuple(keys)
     names = dict.fromkeys([*order, *(name for name, _ in keys)])
@@ -157,14 +159,14 @@ def _sorted(keys: Iterable[Key], order: Sequence[str]) -> tuple[Key, ...]:
 
 
 def rows_of(
-    source: Source, keys: Sequence[Key], report_progress: ProgressCallback
+    source: ExportSource, keys: Sequence[Key], report_progress: ProgressCallback
 ) -> Iterator[Row]:
     """Yield the rows of a bag: the first four columns, and the numbers under these keys."""
     places = {key: 4 + number for number, key in enumerate(keys)}
     placed: dict[tuple[Key, ...], tuple[int, ...]] = {}
     blank: Row = [None] * len(keys)
     begin: int | None = None
-    for published, logged, messages in _ticks(source, Counter(), report_progress):
+    for published, logged, messages in _read_ticks(source, Counter(), report_progress):
         stamp = next(iter(messages.values())).stamp
         if begin is None:
             begin = stamp
@@ -180,15 +182,15 @@ def rows_of(
         yield row
 
 
-def _ticks(
-    source: Source, left_out: Counter[tuple[str, str]], report_progress: ProgressCallback
-) -> Iterator[_Tick]:
+def _read_ticks(
+    source: ExportSource, left_out: Counter[tuple[str, str]], report_progress: ProgressCallback
+) -> Iterator[_ExportTick]:
     """Yield the ticks of a bag; count the messages that are left out."""
     readers = {
         topic: MessageValues(kind, source.dependent) for topic, kind in source.types.items()
     }
     closing, wanted = source.closing, source.wanted
-    tick: _Tick | None = None
+    tick: _ExportTick | None = None
     read = 0
     for number, (topic, logged, published, data) in enumerate(source.bag.messages(), 1):
         read += len(data)
@@ -204,7 +206,7 @@ def _ticks(
                     tick.messages[topic] = values
                     continue
                 yield tick
-            tick = _Tick(published, logged, {topic: values})
+            tick = _ExportTick(published, logged, {topic: values})
             continue
         if tick is not None and topic in closing:
             yield tick
@@ -228,7 +230,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Write the file; return 1 if a signal stopped it."""
     try:
-        result = export(arguments.bag, arguments.output, arguments.topic, stop)
+        result = export_bag(arguments.bag, arguments.output, arguments.topic, stop)
     except StoppedError:
         print('linkage export: stopped; nothing was written', file=sys.stderr)
         return 1
@@ -240,7 +242,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return 0
 
 
-def export(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Found:
+def export_bag(bag_path: Path, file: Path, topic: str | None, stop: Event) -> ExportResult:
     """
     Write a bag's joints to a file; memory does not grow with the bag.
 
@@ -264,39 +266,47 @@ def export(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Found:
 
     """
     check_kind(file)
-    bag = opened(bag_path, stop)
+    bag = open_bag(bag_path, stop)
     if bag.truncated:
         unfinished = f'unfinished: {unfinished_text(bag)}; what it holds is taken'
         print(f'linkage export: {bag_path}: {unfinished}', file=sys.stderr)
-    scene = _scene(bag)
-    source = _source(bag, scene, topic)
+    scene = _scene_or_none(bag)
+    source = _choose_topics(bag, scene, topic)
     turning = turning_joints(scene) if scene is not None else {}
 
-    def bounded(advance: Callable[[int, int], None], of: int) -> Callable[[int], None]:
-        def tell(read: int) -> None:
+    def bounded_progress(advance: Callable[[int, int], None], of: int) -> Callable[[int], None]:
+        def report_read(read: int) -> None:
             if stop.is_set():
                 raise StoppedError
             advance(read // _MIB, max(of, read // _MIB))
 
-        return tell
+        return report_read
 
     size = sum(layout_of(path).content for path in bag.files) // _MIB
-    with progress('columns looked for [MiB]') as advance:
-        found = survey(source, [] if scene is None else scene.joint_names, bounded(advance, size))
+    with show_progress('columns looked for [MiB]') as advance:
+        found = survey_columns(
+            source, [] if scene is None else scene.joint_names, bounded_progress(advance, size)
+        )
     if not found.rows:
-        raise _nothing(source, found)
-    heads = [TIME, STAMP, PUBLISHED, LOGGED, *(_head(key, turning) for key in found.keys)]
+        raise _nothing_error(source, found)
+    heads = [
+        TIME,
+        STAMP,
+        PUBLISHED,
+        LOGGED,
+        *(_column_heading(key, turning) for key in found.keys),
+    ]
     with (
         table_file(file, heads, (STAMP, PUBLISHED, LOGGED)) as write,
-        progress('written [MiB]') as advance,
+        show_progress('written [MiB]') as advance,
     ):
-        rows = rows_of(source, found.keys, bounded(advance, size))
+        rows = rows_of(source, found.keys, bounded_progress(advance, size))
         while block := list(islice(rows, block_rows(len(heads)))):
             write(block)
     return found
 
 
-def _scene(bag: Bag) -> Scene | None:
+def _scene_or_none(bag: Bag) -> Scene | None:
     """Return the scene in a bag; None if there is none that this version can read."""
     try:
         return recorded_scene(bag)
@@ -304,7 +314,7 @@ def _scene(bag: Bag) -> Scene | None:
         return None
 
 
-def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
+def _choose_topics(bag: Bag, scene: Scene | None, topic: str | None) -> ExportSource:
     """Return the topics to write: those asked for, or those that the bag names."""
     types = {each.name: each.type for each in bag.topics}
     readable = {name: kind for name, kind in types.items() if kind in TYPES}
@@ -323,16 +333,16 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
         dependent: frozenset[str] = frozenset()
         if scene is not None and topic == run.crank_topic:
             dependent = scene.dependent_joints
-        return Source(bag, {topic: types[topic]}, (), {}, dependent)
+        return ExportSource(bag, {topic: types[topic]}, (), {}, dependent)
     joint_states = run.joint_states_topic
     if joint_states not in readable:
         joint_states = _only_joint_states(bag, readable)
-        return Source(bag, {joint_states: JOINT_STATE}, (), {})
+        return ExportSource(bag, {joint_states: JOINT_STATE}, (), {})
     written = [joint_states, *(name for name in run.extras if name in readable)]
     wanted = {}
     if scene is not None and run.crank_topic == joint_states:
         wanted[joint_states] = own_joint_states(scene)
-    return Source(
+    return ExportSource(
         bag,
         {name: types[name] for name in written},
         {run.crank_topic, run.faults_topic, run.withheld_topic, run.resets_topic},
@@ -355,7 +365,7 @@ def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
     )
 
 
-def _nothing(source: Source, result: Found) -> BagError:
+def _nothing_error(source: ExportSource, result: ExportResult) -> BagError:
     reasons = Counter(dict(result.left_out)).most_common(1)
     why = f' ({reasons[0][1]} left out: {reasons[0][0][1]})' if reasons else ''
     return BagError(
@@ -365,7 +375,7 @@ def _nothing(source: Source, result: Found) -> BagError:
     )
 
 
-def _head(key: Key, turning: Mapping[str, bool]) -> str:
+def _column_heading(key: Key, turning: Mapping[str, bool]) -> str:
     """Return the heading of a column: joint, quantity and unit."""
     name, quantity = key
     angular, linear = UNITS[quantity]

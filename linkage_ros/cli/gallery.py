@@ -21,7 +21,7 @@ import re
 from threading import Event
 
 from linkage_ros.cli.arguments import add_output, LINKAGES
-from linkage_ros.cli.terminal import show, Table
+from linkage_ros.cli.terminal import print_tables, TerminalTable
 from linkage_ros.errors import FileError
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.resources import linkage_names, named_file, scene_names, shipped
@@ -52,25 +52,25 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     if arguments.name is None:
         if arguments.output is not None:
             raise FileError('-o', '', 'needs a NAME', 'name what to copy')
-        show(*(_listed(folder) for folder in _FOLDERS))
+        print_tables(*(_gallery_table(folder) for folder in _FOLDERS))
         return 0
-    file = _shipped(arguments.name, ('scenes',) if arguments.scene else _FOLDERS)
+    file = _shipped_file(arguments.name, ('scenes',) if arguments.scene else _FOLDERS)
     if arguments.output is None:
         print(file.read_text('utf-8'), end='')
         return 0
-    for copy, text in _copies(file, arguments.output).items():
+    for copy, text in _copied_files(file, arguments.output).items():
         atomic_write(copy, text.encode())
         print(copy)
     return 0
 
 
-def _listed(folder: str) -> Table:
+def _gallery_table(folder: str) -> TerminalTable:
     names = {'linkages': linkage_names, 'scenes': scene_names}[folder]()
     rows = [(name, first_sentence(shipped(f'{folder}/{name}.yaml'))) for name in names]
-    return Table('', (folder, ''), rows)
+    return TerminalTable('', (folder, ''), rows)
 
 
-def _shipped(name: str, folders: tuple[str, ...]) -> Path:
+def _shipped_file(name: str, folders: tuple[str, ...]) -> Path:
     """Return a file of the gallery; a path is none, even of a file that exists."""
     file = named_file(name, *folders)
     if file.parent.parent != shipped(''):
@@ -78,7 +78,7 @@ def _shipped(name: str, folders: tuple[str, ...]) -> Path:
     return file
 
 
-def _copies(file: Path, output: Path) -> dict[Path, str]:
+def _copied_files(file: Path, output: Path) -> dict[Path, str]:
     """
     Return the files of a copy and their texts: the file, and the linkages that it names.
 

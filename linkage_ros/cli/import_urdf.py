@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--close',
         action='append',
-        type=_pair,
+        type=_read_pair,
         default=[],
         metavar='FRAME=FRAME',
         help='links of the URDF whose origins meet in a pin, or places on them, LINK.x,y,z in '
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--at',
         action='append',
-        type=_value,
+        type=_read_value,
         default=[],
         metavar='JOINT=VALUE',
         help='value of a joint in a pose in which the loops close, in radians or metres '
@@ -83,14 +83,14 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     return 0
 
 
-def _pair(text: str) -> tuple[str, str]:
+def _read_pair(text: str) -> tuple[str, str]:
     one, equal, other = text.partition('=')
     if not (one and equal and other):
         raise argparse.ArgumentTypeError(f'{text!r} is no pair; write FRAME=FRAME')
     return one, other
 
 
-def _value(text: str) -> tuple[str, float]:
+def _read_value(text: str) -> tuple[str, float]:
     joint, equal, value = text.rpartition('=')
     try:
         number = float(value)

@@ -25,17 +25,17 @@ from typing import Any
 
 from linkage_ros.bag.contents import contents_of, layout_of
 from linkage_ros.bag.reader import Bag
-from linkage_ros.cli.arguments import add_bag, add_radians, AngleUnit, wrapped
+from linkage_ros.cli.arguments import add_bag, add_radians, AngleUnit, wrap_angle
 from linkage_ros.cli.bag_reading import (
-    account_of,
     add_trust,
-    opened,
+    bag_json,
+    open_bag,
     replay_account,
-    scene_account,
+    scene_json,
     scene_of,
     worst_account,
 )
-from linkage_ros.cli.terminal import progress, show, Table
+from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
 from linkage_ros.errors import clean, LinkageError
 from linkage_ros.replay.verify import examine_states
 from linkage_ros.signals import heeded
@@ -55,19 +55,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Describe the bag; return 1 if stopped."""
-    bag = opened(arguments.bag, stop)
+    bag = open_bag(arguments.bag, stop)
     with heeded():  # a signal ends the reading; the part read so far is still shown
-        account = info(bag, stop, trust_effects=arguments.trust_effects)
+        account = describe_bag(bag, stop, trust_effects=arguments.trust_effects)
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
     else:
-        show(*tables(account, arguments.angles))
+        print_tables(*bag_tables(account, arguments.angles))
     if account['stopped']:
         print('linkage info: stopped; not all of the bag was read', file=sys.stderr)
     return int(account['stopped'])
 
 
-def info(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any]:
+def describe_bag(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any]:
     """
     Return the description of a bag, as JSON holds it.
 
@@ -75,15 +75,15 @@ def info(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any
     """
     layouts = [layout_of(file) for file in bag.files]
     size = max(1, sum(layout.content for layout in layouts) // _MIB)
-    with progress('read [MiB]') as advance:
+    with show_progress('read [MiB]') as advance:
         contents = contents_of(bag, lambda read: advance(read // _MIB, size), stop.is_set)
-    account = account_of(bag, layouts, contents)
+    account = bag_json(bag, layouts, contents)
     account |= {'scene': None, 'scene_missing': None, 'replay': None}
     try:
         scene = scene_of(bag, trust_effects=trust_effects)
-        account['scene'] = scene_account(scene)
+        account['scene'] = scene_json(scene)
         states = max((topic['messages'] for topic in account['topics']), default=0)
-        with progress('states looked at') as advance:
+        with show_progress('states looked at') as advance:
             examined = examine_states(
                 bag, scene, lambda done: advance(done, max(done, states)), stop.is_set
             )
@@ -97,13 +97,13 @@ def info(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any
     return account
 
 
-def tables(account: dict[str, Any], angles: AngleUnit) -> Iterator[Table]:
+def bag_tables(account: dict[str, Any], angles: AngleUnit) -> Iterator[TerminalTable]:
     """Yield the description of a bag as tables."""
-    yield _table(account['bag'], _facts(account))
+    yield _facts_table(account['bag'], _bag_facts(account))
     words = [
         word
         for word in ('received', 'dropped', 'let_go')
-        if word == 'dropped' or _sum(account, word)
+        if word == 'dropped' or _sum_counters(account, word)
     ]
     counted = [f'>{word.replace("_", " ")}' for word in words]
     heads = ('topic', 'type', '>messages', '>rate [Hz]', *counted, 'QoS')
@@ -114,24 +114,24 @@ def tables(account: dict[str, Any], angles: AngleUnit) -> Iterator[Table]:
             str(topic['messages']),
             '' if topic['rate_hz'] is None else f'{topic["rate_hz"]:.6g}',
             *('?' if topic[word] is None else str(topic[word]) for word in words),
-            _qos(topic),
+            _qos_text(topic),
         )
         for topic in account['topics']
     ]
-    yield Table('Topics', heads, rows)
+    yield TerminalTable('Topics', heads, rows)
     for linkage in (account['scene'] or {'linkages': []})['linkages']:
         title = f'Linkage {linkage["name"]}' if linkage['name'] else 'Linkage'
-        yield _table(title, _linkage(linkage, account['begin_ns'], angles))
+        yield _facts_table(title, _linkage_rows(linkage, account['begin_ns'], angles))
 
 
-def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
+def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     duration = account['duration_ns']
     yield 'duration', 'no messages' if duration is None else f'{duration / 1e9:.9f} s'
     for name in ('begin', 'end') if duration is not None else ():
         yield name, f'{account[name]} ({account[f"{name}_ns"]} ns)'
     yield 'size', f'{account["size_bytes"]} bytes'
     yield 'files', ', '.join(clean(file['name']) for file in account['files'])
-    yield 'compression', ', '.join(map(_compression, account['compressions'])) or 'none'
+    yield 'compression', ', '.join(map(_compression_text, account['compressions'])) or 'none'
     yield 'unfinished', account['unfinished'] or 'no'
     if account['beginning_missing']:
         yield 'beginning', account['beginning_missing']
@@ -141,7 +141,7 @@ def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield 'FAILED', account['recording_failure']
     yield 'messages', str(account['messages'])
     received, dropped, discarded = (
-        _sum(account, word) for word in ('received', 'dropped', 'let_go')
+        _sum_counters(account, word) for word in ('received', 'dropped', 'let_go')
     )
     if received is not None:
         yield 'received', str(received)
@@ -149,7 +149,7 @@ def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield 'dropped', unknown if dropped is None else str(dropped)
     if discarded:
         yield 'let go', f'{discarded}, with files that made way for newer ones'
-    yield 'versions', ', '.join(_versions(account['versions'])) or 'not told'
+    yield 'versions', ', '.join(_version_texts(account['versions'])) or 'not told'
     scene = account['scene']
     if scene:
         rate = f'{scene["rate_hz"]:g} ticks a second' if scene['rate_hz'] else 'a tick a sample'
@@ -165,13 +165,13 @@ def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield 'run again', f'{same} of {of} joint states come to the same bytes'
 
 
-def _sum(account: dict[str, Any], word: str) -> int | None:
+def _sum_counters(account: dict[str, Any], word: str) -> int | None:
     """Return the bag's counters over all topics; None if it has none."""
     counts = [topic[word] for topic in account['topics']]
     return sum(counts) if counts and None not in counts else None
 
 
-def _linkage(
+def _linkage_rows(
     linkage: dict[str, Any], begin: int | None, angles: AngleUnit
 ) -> Iterator[tuple[str, str]]:
     bars = [
@@ -193,39 +193,39 @@ def _linkage(
     if worst:
         yield (
             'worst residual',
-            f'{worst["residual_m"]:.1e} m, {_place(worst, inputs, begin, angles)}',
+            f'{worst["residual_m"]:.1e} m, {_event_text(worst, inputs, begin, angles)}',
         )
     if near:
         distance = near['input_to_toggle']
-        away = '' if distance is None else f', {_input(distance, inputs[0], angles)} from one'
-        angle = f'transmission angle {angles.text(near["transmission_angle_rad"])}'
+        away = '' if distance is None else f', {_input_text(distance, inputs[0], angles)} from one'
+        angle = f'transmission angle {angles.format_angle(near["transmission_angle_rad"])}'
         nearness = f'conditioning {near["conditioning"]:.4g}, {angle}{away}'
-        yield 'nearest toggle', f'{nearness}, {_place(near, inputs, begin, angles)}'
+        yield 'nearest toggle', f'{nearness}, {_event_text(near, inputs, begin, angles)}'
 
 
-def _place(
+def _event_text(
     found: dict[str, Any], inputs: list[dict[str, str]], begin: int | None, angles: AngleUnit
 ) -> str:
     """Return the time and place of an event."""
     values = ', '.join(
-        f'{given["joint"]} {_input(value, given, angles)}'
+        f'{given["joint"]} {_input_text(value, given, angles)}'
         for given, value in zip(inputs, found['inputs'], strict=True)
     )
     return f'at {(found["time_ns"] - (begin or 0)) / 1e9:+.6f} s, {values}'
 
 
-def _input(value: float, given: dict[str, str], angles: AngleUnit) -> str:
+def _input_text(value: float, given: dict[str, str], angles: AngleUnit) -> str:
     turning = given['unit'] == 'rad'
-    return angles.value_text(wrapped(value) if turning else value, turning)
+    return angles.value_text(wrap_angle(value) if turning else value, turning)
 
 
-def _compression(found: dict[str, Any]) -> str:
+def _compression_text(found: dict[str, Any]) -> str:
     if found['name'] == 'none':
         return 'none'
     return f'{clean(found["name"])}, {found["content_bytes"]} bytes in {found["stored_bytes"]}'
 
 
-def _versions(versions: dict[str, Any]) -> Iterator[str]:
+def _version_texts(versions: dict[str, Any]) -> Iterator[str]:
     for key, name in (
         ('linkage_ros', 'linkage_ros'),
         ('python', 'Python'),
@@ -238,7 +238,7 @@ def _versions(versions: dict[str, Any]) -> Iterator[str]:
             yield f'{name} {clean(str(versions[key]))}'
 
 
-def _qos(topic: dict[str, Any]) -> str:
+def _qos_text(topic: dict[str, Any]) -> str:
     """Return a quality of service in one word; two for transient local."""
     if not topic['qos_understood']:
         return 'not understood, taken as reliable'
@@ -246,5 +246,5 @@ def _qos(topic: dict[str, Any]) -> str:
     return clean(topic['reliability']).replace('_', ' ') + latched
 
 
-def _table(title: str, facts: Iterator[tuple[str, str]]) -> Table:
-    return Table(clean(title), ('', ''), [(name, clean(value)) for name, value in facts])
+def _facts_table(title: str, facts: Iterator[tuple[str, str]]) -> TerminalTable:
+    return TerminalTable(clean(title), ('', ''), [(name, clean(value)) for name, value in facts])

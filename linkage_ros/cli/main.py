@@ -158,7 +158,7 @@ def main(arguments: list[str] | None = None) -> int:
                 if stop.is_set():
                     raise StoppedError
                 try:
-                    return _run(arguments, stop)
+                    return _run_command(arguments, stop)
                 finally:
                     sys.stdout.flush()  # here, where an error can be reported
         except (StoppedError, Exception) as error:
@@ -187,7 +187,7 @@ def _said_by(arguments: Sequence[str]) -> str:
     return ' '.join(['linkage', *(name for name in arguments[:1] if name in COMMANDS)])
 
 
-def _run(arguments: Sequence[str], stop: Event) -> int:
+def _run_command(arguments: Sequence[str], stop: Event) -> int:
     name = top_parser().parse_args(arguments[:1]).command
     try:
         with missing_packages_reported():

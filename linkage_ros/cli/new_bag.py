@@ -43,7 +43,7 @@ _TIME = 'builtin_interfaces/msg/Time'
 _CHANGES_QOS = QosProfile(depth=100, durability='transient_local')
 
 
-class Source(NamedTuple):
+class ReplaySource(NamedTuple):
     """The origin of a new bag."""
 
     bag: Bag  # The bag
@@ -52,7 +52,7 @@ class Source(NamedTuple):
     crank_topic: str  # Topic of the crank samples
 
 
-class Names(NamedTuple):
+class TopicNames(NamedTuple):
     """Names of the topics written beside the samples, as the bag's run named them."""
 
     joint_states: str
@@ -62,7 +62,7 @@ class Names(NamedTuple):
     extras: tuple[str, ...]
 
 
-def names_for(source: Source, scene: Scene, counterfactual: Counterfactual) -> Names:
+def names_for(source: ReplaySource, scene: Scene, counterfactual: Counterfactual) -> TopicNames:
     """Return the names of the topics that a scene publishes."""
     run = source.run
     known: dict[str, str] = {}
@@ -84,19 +84,19 @@ def names_for(source: Source, scene: Scene, counterfactual: Counterfactual) -> N
         if run.crank_topic != joint_states or scene.joint_names != own:
             joint_states = f'{node}/joint_states'
 
-    def resolved(key: str) -> str:
+    def resolve_key(key: str) -> str:
         return pairs.get(key) or f'{node}{key[1:]}'
 
-    return Names(
+    return TopicNames(
         joint_states,
-        resolved('~/faults'),
-        resolved('~/withheld'),
-        resolved('~/resets'),
-        tuple(resolved(extra.topic) for extra in counterfactual.extras),
+        resolve_key('~/faults'),
+        resolve_key('~/withheld'),
+        resolve_key('~/resets'),
+        tuple(resolve_key(extra.topic) for extra in counterfactual.extras),
     )
 
 
-class NewBag:
+class ReplayBag:
     """
     A bag that is being written.
 
@@ -117,10 +117,10 @@ class NewBag:
     def __init__(
         self,
         folder: Path,
-        source: Source,
+        source: ReplaySource,
         scene: Scene,
         counterfactual: Counterfactual,
-        names: Names,
+        names: TopicNames,
     ) -> None:
         bag = source.bag
         own = {topic.name: topic for topic in bag.topics}
@@ -138,9 +138,9 @@ class NewBag:
         self._numbers = {key: number for number, (key, *_) in enumerate(topics)}
         self._first_extra = len(topics)
         named = {key: name for key, name, _, _ in topics}
-        described = [_described(bag, name, kind, qos) for _, name, kind, qos in topics]
+        described = [_describe_topic(bag, name, kind, qos) for _, name, kind, qos in topics]
         described += [
-            _described(bag, name, extra.message, QosProfile())
+            _describe_topic(bag, name, extra.message, QosProfile())
             for name, extra in zip(names.extras, counterfactual.extras, strict=True)
         ]
         account = {
@@ -164,32 +164,34 @@ class NewBag:
         self._topics = described
 
     @property
-    def counts(self) -> dict[str, int]:
+    def message_counts(self) -> dict[str, int]:
         """Return the number of messages written on each topic."""
         return dict(zip((topic.name for topic in self._topics), self._written, strict=True))
 
-    def add(self, event: ReplayEvent) -> None:
+    def write_event(self, event: ReplayEvent) -> None:
         """Write an event; raise RecordingError if it cannot be written."""
         if isinstance(event, SampleEvent):
-            self._write(self._numbers['crank_topic'], *event)
+            self._write_message(self._numbers['crank_topic'], *event)
         elif isinstance(event, FaultEvent):
-            self._write(self._numbers['faults_topic'], *event)
+            self._write_message(self._numbers['faults_topic'], *event)
         elif isinstance(event, ResetEvent):
-            self._write(self._numbers['resets_topic'], *event)
+            self._write_message(self._numbers['resets_topic'], *event)
         else:
             log_time, time, _, tick = event
             if tick is None:
                 return
             if tick.message:
-                self._write(self._numbers['joint_states_topic'], log_time, time, tick.message)
+                self._write_message(
+                    self._numbers['joint_states_topic'], log_time, time, tick.message
+                )
             for number, message in enumerate(tick.extras, self._first_extra):
                 if message:
-                    self._write(number, log_time, time, message)
+                    self._write_message(number, log_time, time, message)
             if self._counterfactual.must_record(tick):
                 withheld = time_message(time)
-                self._write(self._numbers['withheld_topic'], log_time, time, withheld)
+                self._write_message(self._numbers['withheld_topic'], log_time, time, withheld)
 
-    def _write(self, number: int, log_time: int, publish_time: int, data: bytes) -> None:
+    def _write_message(self, number: int, log_time: int, publish_time: int, data: bytes) -> None:
         self._written[number] += self._writer.write(number, log_time, publish_time, data)
         self._unflushed += 1
         if self._unflushed == _FLUSHED_EVERY:
@@ -198,11 +200,11 @@ class NewBag:
 
     def close(self) -> None:
         """Finish the bag."""
-        dropped = dict.fromkeys(self.counts, 0)
+        dropped = dict.fromkeys(self.message_counts, 0)
         self._writer.close({'linkage_ros.dropped': json.dumps(dropped)})
 
 
-def _described(bag: Bag, name: str, kind: str, qos: QosProfile) -> Topic:
+def _describe_topic(bag: Bag, name: str, kind: str, qos: QosProfile) -> Topic:
     """Describe a topic as the bag does for its type, or as the installed packages do."""
     for topic in bag.topics:
         if topic.type == kind and topic.definition:

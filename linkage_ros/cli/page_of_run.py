@@ -68,10 +68,10 @@ class PageOfRun:
             text=True,
             start_new_session=True,  # Ctrl-C goes to this process only, which ends the other
         )
-        self._reading = Thread(target=self._read, name='page', daemon=True)
+        self._reading = Thread(target=self._forward_lines, name='page', daemon=True)
         self._reading.start()
 
-    def end(self) -> None:
+    def end_process(self) -> None:
         """End the process."""
         self._say = None
         self._process.terminate()
@@ -84,7 +84,7 @@ class PageOfRun:
             self._process.wait()
         self._reading.join()
 
-    def _read(self) -> None:
+    def _forward_lines(self) -> None:
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:

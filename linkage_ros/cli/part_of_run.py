@@ -19,7 +19,7 @@ from threading import Event
 from linkage_ros.bag.contents import Layout
 from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.bag_reading import add_trust, scene_of
-from linkage_ros.cli.terminal import progress
+from linkage_ros.cli.terminal import show_progress
 from linkage_ros.errors import LinkageError
 from linkage_ros.report.blocks import Progress
 from linkage_ros.report.reading import read_run
@@ -78,7 +78,7 @@ def read_part(
 
     """
     size = max(1, sum(layout.content for layout in layouts) // _MIB)
-    with progress('read [MiB]') as advance:
+    with show_progress('read [MiB]') as advance:
         found = read_run(
             bag,
             window,

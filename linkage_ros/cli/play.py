@@ -25,9 +25,9 @@ from threading import Event
 from linkage_ros.bag.order import LogTimeOrder
 from linkage_ros.bag.reader import Bag, is_in_use
 from linkage_ros.bag.topic import Topic
-from linkage_ros.cli.arguments import add_bag, add_ros_arguments, bounded
-from linkage_ros.cli.bag_reading import opened
-from linkage_ros.cli.terminal import progress, ProgressCallback
+from linkage_ros.cli.arguments import add_bag, add_ros_arguments, bounded_number
+from linkage_ros.cli.bag_reading import open_bag
+from linkage_ros.cli.terminal import ProgressCallback, show_progress
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.bag_topics import create_publishers
@@ -45,14 +45,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bag(parser)
     parser.add_argument(
         '--rate',
-        type=bounded(0.01, 1000.0),
+        type=bounded_number(0.01, 1000.0),
         default=1.0,
         metavar='FACTOR',
         help='seconds of the bag a second, 0.01 to 1000; without it 1',
     )
     parser.add_argument(
         '--clock',
-        type=bounded(0.1, 10_000.0),
+        type=bounded_number(0.1, 10_000.0),
         nargs='?',
         const=_CLOCK_RATE,
         default=0.0,
@@ -64,21 +64,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--start',
-        type=bounded(0.0, 1e9),
+        type=bounded_number(0.0, 1e9),
         default=0.0,
         metavar='SECONDS',
         help="begin so much of the bag's time after its beginning",
     )
     parser.add_argument(
         '--seconds',
-        type=bounded(1e-9, 1e9),
+        type=bounded_number(1e-9, 1e9),
         default=inf,
         help="end after so much of the bag's time; without it, at its end",
     )
     parser.add_argument('--loop', action='store_true', help='begin again at the end')
     parser.add_argument(
         '--wait',
-        type=bounded(0.0, 1e6),
+        type=bounded_number(0.0, 1e6),
         default=0.0,
         metavar='SECONDS',
         help='wait until somebody listens to one of the topics, for so long at most',
@@ -88,10 +88,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Play the bag; return 1 if it is damaged and was played only up to the damage."""
-    bag = opened(arguments.bag, stop)
+    bag = open_bag(arguments.bag, stop)
     if bag.truncated:
         _say_truncated(bag)
-    topics = _topics(bag, arguments.topics)
+    topics = _choose_topics(bag, arguments.topics)
     if arguments.clock:
         topics = _without_clock(topics)
     order = LogTimeOrder(bag)
@@ -106,8 +106,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             f'it lasts {(order.end - begin) / 1e9:g} s',
         )
     ros = ['--ros-args', *arguments.ros_args] if arguments.ros_args else []
-    with heeded(), player_node(ros) as node, progress('played [s]') as advance:
-        publishers = create_publishers(node, topics, _say)
+    with heeded(), player_node(ros) as node, show_progress('played [s]') as advance:
+        publishers = create_publishers(node, topics, _print_error)
         if not publishers:
             raise BagError(bag.path, 'has no topic that can be published', 'nothing to play')
         part = PlaybackPart(
@@ -115,15 +115,15 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         )
         options = PlaybackOptions(arguments.rate, arguments.clock, arguments.wait)
         last = min(part.last, inf if order.end is None else order.end)
-        tell = partial(_tell, advance, first, last)
+        tell = partial(_report_progress, advance, first, last)
         playback, error = play(node, publishers, order, part, options, stop, tell)
     if not any(playback.counts.values()) and not stop.is_set():
         raise error or BagError(
             bag.path, 'holds no message of these topics at these times', 'nothing to play'
         )
-    print(_summary(playback, arguments.rate))
+    print(_summary_text(playback, arguments.rate))
     if error is not None:
-        _say(error, 'ended early: ')
+        _print_error(error, 'ended early: ')
     return int(error is not None)
 
 
@@ -138,7 +138,7 @@ def _say_truncated(bag: Bag) -> None:
     )
 
 
-def _topics(bag: Bag, names: Sequence[str] | None) -> list[Topic]:
+def _choose_topics(bag: Bag, names: Sequence[str] | None) -> list[Topic]:
     """Return the topics to play."""
     if not bag.topics:
         raise BagError(bag.path, 'has no topics', 'there is nothing to play')
@@ -156,20 +156,20 @@ def _topics(bag: Bag, names: Sequence[str] | None) -> list[Topic]:
 def _without_clock(topics: Sequence[Topic]) -> list[Topic]:
     """Return the topics without the clock's: two clocks would disagree."""
     if any(topic.name == CLOCK for topic in topics):
-        _say(LinkageError(CLOCK, 'is left out', '--clock publishes its own'), '')
+        _print_error(LinkageError(CLOCK, 'is left out', '--clock publishes its own'), '')
     return [topic for topic in topics if topic.name != CLOCK]
 
 
-def _say(error: LinkageError, what: str = 'left out: ') -> None:
+def _print_error(error: LinkageError, what: str = 'left out: ') -> None:
     print(f'linkage play: {what}{clean(str(error))}', file=sys.stderr)
 
 
-def _tell(advance: ProgressCallback, first: int, last: float, now: int) -> None:
+def _report_progress(advance: ProgressCallback, first: int, last: float, now: int) -> None:
     end = now if last == inf else int(last)
     advance((now - first) // NANOSECONDS, (end - first) // NANOSECONDS)
 
 
-def _summary(playback: Playback, rate: float) -> str:
+def _summary_text(playback: Playback, rate: float) -> str:
     """Return a summary of what was played."""
     of, took = f'{playback.played / 1e9:.3f} s of the bag', f'{playback.took / 1e9:.3f} s'
     sent = sum(playback.counts.values())

@@ -21,7 +21,7 @@ from pathlib import Path
 from threading import Event
 
 from linkage_ros.cli.arguments import add_bag, add_output, output_or, PICTURES
-from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
+from linkage_ros.cli.bag_reading import add_trust, open_bag, path_beside, scene_of
 from linkage_ros.drawing.figure import joint_axes, label_joints, plot_joints
 from linkage_ros.drawing.painting import save, settings, show_lengths
 from linkage_ros.errors import BagError
@@ -61,8 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Draw the bag."""
-    picture = output_or(arguments, beside(arguments.bag, '.png'))
-    draw(
+    picture = output_or(arguments, path_beside(arguments.bag, '.png'))
+    draw_bag(
         arguments.bag,
         picture,
         stop,
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return 0
 
 
-def draw(
+def draw_bag(
     bag_path: Path,
     picture: Path,
     stop: Event,
@@ -96,7 +96,7 @@ def draw(
 
     """
     settings()  # without matplotlib, say so before the bag is read
-    bag = opened(bag_path, stop)
+    bag = open_bag(bag_path, stop)
     scene = scene_of(bag, trust_effects=trust_effects)
     # The x axis is the crank of the first linkage; its joints are drawn.
     member = scene.linkages[0]
@@ -128,12 +128,12 @@ def draw(
         recorded_joints = cranks, positions, rates
         joints, joint_rates = curves_over_time(member.linkage, seconds, *recorded_joints, gaps)
     else:
-        joints, joint_rates = curves(member.linkage, cranks, positions, rates, gaps)
+        joints, joint_rates = crank_curves(member.linkage, cranks, positions, rates, gaps)
     if not joints:
         raise BagError(bag_path, 'holds no joint but its crank', 'name another bag')
     title = f'{scene.name}: {len(positions)} joint states'
     driven = None if over_time else member.linkage.inputs[0]
-    _paint(title, driven, joints, joint_rates, picture)
+    _paint_curves(title, driven, joints, joint_rates, picture)
 
 
 def is_after_gap(times: Floats, *, steady: bool) -> Bools:
@@ -175,9 +175,9 @@ def curves_over_time(
         breaks = gaps.copy()
         if turning:  # an angle may be wrapped
             breaks[1:] |= np.abs(np.diff(values)) > pi
-        joints.append(_broken(name, turning, times, np.array(values), breaks))
+        joints.append(_break_curve(name, turning, times, np.array(values), breaks))
     joint_rates = [
-        _broken(
+        _break_curve(
             name,
             isinstance(joint, RevoluteJoint),
             times,
@@ -190,14 +190,14 @@ def curves_over_time(
     return joints, joint_rates
 
 
-def _broken(name: str, turning: bool, x: Floats, y: Floats, breaks: Bools) -> Curve:
+def _break_curve(name: str, turning: bool, x: Floats, y: Floats, breaks: Bools) -> Curve:
     """Return a curve that begins anew at the breaks."""
     at = np.flatnonzero(breaks)
     points = (tuple(np.insert(values, at, nan).tolist()) for values in (x, y))
     return Curve(name, turning, *points)
 
 
-def curves(
+def crank_curves(
     linkage: Linkage,
     cranks: Sequence[Values],
     positions: Sequence[Values],
@@ -220,10 +220,10 @@ def curves(
 
     """
     driven = linkage.inputs[0]
-    way = InputSweep(Closure(linkage), cranks[0])
-    about = (each for each in way.ranges if _is_within(cranks[0][0], each))
-    interval = next(about, way.widest_range)
-    ideal = sweep(way, interval).joints if interval else ()
+    input_sweep = InputSweep(Closure(linkage), cranks[0])
+    about = (each for each in input_sweep.ranges if _is_within(cranks[0][0], each))
+    interval = next(about, input_sweep.widest_range)
+    ideal = sweep(input_sweep, interval).joints if interval else ()
     crank = np.array([inputs[0] for inputs in cranks])
     if interval and not driven.slider:
         crank = crank + np.array([interval.shift(value) for value in crank.tolist()])
@@ -252,11 +252,11 @@ def curves(
                 known = piece[np.isfinite(values[piece])]
                 if len(known):
                     values[known] -= tau * np.round(np.median(turns[known]))
-        joints.append(_broken(name, turning, crank, values, breaks))
+        joints.append(_break_curve(name, turning, crank, values, breaks))
         if any(rates):
             # At a toggle there are no rates.
             its_rates = np.array([rates[i][place] if rates[i] else nan for i in order])
-            joint_rates.append(_broken(name, turning, crank, its_rates, breaks))
+            joint_rates.append(_break_curve(name, turning, crank, its_rates, breaks))
     return joints, joint_rates
 
 
@@ -264,7 +264,7 @@ def _is_within(value: float, interval: InputRange) -> bool:
     return interval.lowest <= value + interval.shift(value) <= interval.highest
 
 
-def _paint(
+def _paint_curves(
     title: str,
     driven: Input | None,
     joints: Sequence[Curve],

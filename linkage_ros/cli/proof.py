@@ -15,8 +15,8 @@ from pathlib import Path
 from time import monotonic
 
 from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.cli.bag_reading import gaps
-from linkage_ros.cli.terminal import progress
+from linkage_ros.cli.bag_reading import describe_gaps
+from linkage_ros.cli.terminal import show_progress
 from linkage_ros.errors import LinkageError
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import recorded_scene, ReplayedTick
@@ -38,7 +38,7 @@ def proof_of(folder: Path, ticks: int, longest: float) -> str:
     """
     worst, done = 0.0, 0
 
-    def observe(replayed: ReplayedTick) -> None:
+    def observe_tick(replayed: ReplayedTick) -> None:
         nonlocal worst, done
         done += 1
         if done % _TOLD == 0:
@@ -54,8 +54,8 @@ def proof_of(folder: Path, ticks: int, longest: float) -> str:
         pipeline = Pipeline(scene)
         closures = pipeline.closures
         sample = Beginning(bag.messages(), longest)
-        with raising(), progress('ticks replayed') as advance:
-            proof = verify_replay(bag, scene, sample, observe)
+        with raising(), show_progress('ticks replayed') as advance:
+            proof = verify_replay(bag, scene, sample, observe_tick)
     except LinkageError as error:
         return str(error)
     except StoppedError:
@@ -69,7 +69,7 @@ def proof_of(folder: Path, ticks: int, longest: float) -> str:
     )
     notes = [beginning_text(proof)] if proof.missing_start else []
     if proof.verdict == DIFFERENT:
-        notes += gaps(bag)
+        notes += describe_gaps(bag)
     notes.append(f'worst loop residual {worst:.1e} m')
     part = (
         f'a sample, its first {sample.seconds:.1f} s: --prove proves all' if sample.cut else 'all'

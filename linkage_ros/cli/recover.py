@@ -17,7 +17,7 @@ from threading import Event
 
 from linkage_ros.bag.recover import recover_bag, recovered_name, Recovery
 from linkage_ros.cli.arguments import add_bag, add_force, output_or
-from linkage_ros.cli.terminal import progress, show, Table
+from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
 from linkage_ros.errors import clean
 from linkage_ros.files.file_access import remove_bag
 from linkage_ros.signals import heeded
@@ -42,41 +42,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Recover the bag; return 0 without loss, 3 with losses, 1 if stopped."""
     # A signal within a record would cut it; `recover` asks the event.
-    with heeded(), progress('bytes') as advance:
+    with heeded(), show_progress('bytes') as advance:
         folder = output_or(arguments, recovered_name(arguments.bag))
         remove_bag(folder, force=arguments.force)
         recovery = recover_bag(arguments.bag, folder, advance, stop.is_set)
     if recovery is None:
         print('stopped; nothing was written', file=sys.stderr)
         return STOPPED
-    _say(recovery)
+    _print_recovery(recovery)
     return WHOLE if recovery.is_whole else LOSS
 
 
-def _say(recovery: Recovery) -> None:
+def _print_recovery(recovery: Recovery) -> None:
     rows = []
     for topic in recovery.topics:
         promised = '?' if topic.expected is None else f'{topic.expected:,}'
         rows.append((topic.name, f'{topic.saved:,}', promised))
     if rows:
-        show(Table('', ('topic', '>saved', '>of'), rows))
+        print_tables(TerminalTable('', ('topic', '>saved', '>of'), rows))
     if recovery.attachments:
         print(clean(f'attachments  {", ".join(recovery.attachments)}'))
-    _lines('note', list(recovery.remarks))
-    _lines('repaired', list(recovery.repaired))
+    _print_lines('note', list(recovery.remarks))
+    _print_lines('repaired', list(recovery.repaired))
     lost = []
     for file, (start, end, reason) in recovery.losses:
         size = f', {end - start:,} bytes' if end > start else ''
         lost.append(f'{file} at byte {start:,}{size}: {reason}')
     if recovery.missing_count:
         lost.append(f'{recovery.missing_count:,} messages that the bag promises')
-    _lines('LOST', lost)
+    _print_lines('LOST', lost)
     if recovery.is_whole:
         print('nothing lost')
     print(f'bag          {recovery.folder}')
 
 
-def _lines(word: str, lines: list[str]) -> None:
+def _print_lines(word: str, lines: list[str]) -> None:
     for line in lines[:_MOST_SHOWN]:
         # A name in a damaged file may contain line breaks; one loss stays one line.
         print(f'{word:<13}{clean(line)}')

@@ -20,7 +20,7 @@ import argparse
 from importlib import import_module
 from threading import Event
 
-from linkage_ros.cli.arguments import add_ros_arguments, add_set, bounded, SCENE_HELP
+from linkage_ros.cli.arguments import add_ros_arguments, add_set, bounded_number, SCENE_HELP
 from linkage_ros.errors import missing_packages_reported
 
 EXAMPLE = 'linkage relay four_bar --joint rocker_joint --branch 1 --seconds 5'
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--joint', default='', metavar='NAME', help='the joint that is commanded')
     parser.add_argument(
         '--branch',
-        type=bounded(0, 10_000, int),
+        type=bounded_number(0, 10_000, int),
         default=0,
         metavar='N',
         help='its branch, as linkage check --branches lists them; needed if there are several',
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_set(parser)
     parser.add_argument(
         '--seconds',
-        type=bounded(0.0, 1e9),
+        type=bounded_number(0.0, 1e9),
         default=0.0,
         metavar='SECONDS',
         help='how long; until a signal if not given',

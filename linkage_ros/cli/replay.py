@@ -33,17 +33,17 @@ from typing import Any
 
 from linkage_ros.bag.reader import Bag, RUN_FILE
 from linkage_ros.bag.run_events import read_run_metadata, recorded_events, RunMetadata
-from linkage_ros.cli.arguments import add_bag, add_force, add_set, finite, SCENE_HELP
+from linkage_ros.cli.arguments import add_bag, add_force, add_set, finite_or_none, SCENE_HELP
 from linkage_ros.cli.bag_reading import (
     add_trust,
     BagReading,
-    gaps,
-    opened,
+    describe_gaps,
+    open_bag,
     scene_of,
     unfinished_text,
 )
-from linkage_ros.cli.new_bag import Names, names_for, NewBag, Source
-from linkage_ros.cli.terminal import show, Table
+from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource, TopicNames
+from linkage_ros.cli.terminal import print_tables, TerminalTable
 from linkage_ros.errors import BagError, clean, LinkageError, listed
 from linkage_ros.files.file_access import remove_bag
 from linkage_ros.messages.joint_values import JOINT_STATE, Key, UNITS
@@ -94,7 +94,7 @@ def bag_account(bag: Bag, scene: Scene, reading: BagReading, begin: list[int]) -
         'begin_ns': begin[0] if begin else None,
         'truncated': bag.truncated,
         'unfinished': unfinished_text(bag) if bag.truncated else None,
-        'gaps': list(gaps(bag)),
+        'gaps': list(describe_gaps(bag)),
         'damage': reading.damage or None,
         'missing': reading.missing,
         'stopped': reading.stopped,
@@ -118,8 +118,8 @@ def _proof_account(
         'beginning_missing': beginning_text(proof) if proof.missing_start else None,
         'topics': [topic_account(topic) for topic in comparison.topics],
         'first_difference': first_account(comparison.first or proof.first_undecided, turning),
-        'last_different_tick': at_account(comparison.last) if comparison.last else None,
-        'greatest': greatest(comparison, turning),
+        'last_different_tick': tick_json(comparison.last) if comparison.last else None,
+        'greatest': greatest_differences(comparison, turning),
         'versions': {name: dict(of) for name, of in versions.items()},
     }
 
@@ -143,25 +143,27 @@ def first_account(
     """Return the first difference, and by how much the two values differ."""
     if first is None:
         return None
-    account: dict[str, Any] = {**at_account(first.at), 'topic': first.topic, 'what': first.what}
+    account: dict[str, Any] = {**tick_json(first.at), 'topic': first.topic, 'what': first.what}
     if first.recorded is not None and first.now is not None:
         account |= {
             'joint': first.joint,
             'unit': unit_of(first.joint, first.what, turning),
-            'recorded': finite(first.recorded),
-            'now': finite(first.now),
-            'difference': finite(abs(first.now - first.recorded)),
+            'recorded': finite_or_none(first.recorded),
+            'now': finite_or_none(first.now),
+            'difference': finite_or_none(abs(first.now - first.recorded)),
             'ulp': ulp_distance(first.recorded, first.now),
         }
     return account
 
 
-def at_account(at: TickPlace) -> dict[str, Any]:
+def tick_json(at: TickPlace) -> dict[str, Any]:
     """Return the place of a message: its topic, tick and time."""
     return {'tick': at.tick, 'time_ns': at.time}
 
 
-def greatest(comparison: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
+def greatest_differences(
+    comparison: Comparison, turning: Mapping[str, bool]
+) -> list[dict[str, Any]]:
     """Return the greatest difference of each quantity and unit that differs."""
     rows: dict[tuple[str, str], dict[str, Any]] = {}
     for topic in comparison.topics:
@@ -171,13 +173,18 @@ def greatest(comparison: Comparison, turning: Mapping[str, bool]) -> list[dict[s
             unit = unit_of(joint, quantity, turning)
             row = rows.setdefault((quantity, unit), {'difference': -1.0, 'ulp': -1})
             if deviation.greatest > row['difference']:
-                where = {'joint': joint, **at_account(deviation.at)}
+                where = {'joint': joint, **tick_json(deviation.at)}
                 row |= {'difference': deviation.greatest, 'difference_at': where}
             if deviation.ulps > row['ulp']:
-                where = {'joint': joint, **at_account(deviation.ulps_at)}
+                where = {'joint': joint, **tick_json(deviation.ulps_at)}
                 row |= {'ulp': deviation.ulps, 'ulp_at': where}
     return [
-        {'quantity': quantity, 'unit': unit, **row, 'difference': finite(row['difference'])}
+        {
+            'quantity': quantity,
+            'unit': unit,
+            **row,
+            'difference': finite_or_none(row['difference']),
+        }
         for (quantity, unit), row in rows.items()
     ]
 
@@ -203,9 +210,9 @@ def deviations_account(
             'unit': unit_of(joint, quantity, turning),
             'compared': deviation.compared,
             'different': deviation.differing,
-            'rms': finite(deviation.rms),
-            'greatest': finite(deviation.greatest),
-            'greatest_at': at_account(deviation.at) if deviation.differing else None,
+            'rms': finite_or_none(deviation.rms),
+            'greatest': finite_or_none(deviation.greatest),
+            'greatest_at': tick_json(deviation.at) if deviation.differing else None,
         }
         for (joint, quantity), deviation in deviations.items()
     ]
@@ -220,11 +227,11 @@ def first_text(first: Mapping[str, Any], begin: int) -> str:
     unit = first['unit']
     return text + (
         f'{first["joint"]} {first["what"]}: {first["recorded"]!r} recorded, {first["now"]!r} now, '
-        f'{_number(first["difference"])} {unit} or {first["ulp"]} ulp apart'
+        f'{_number_text(first["difference"])} {unit} or {first["ulp"]} ulp apart'
     )
 
 
-def topics_table(account: Mapping[str, Any]) -> Table:
+def topics_table(account: Mapping[str, Any]) -> TerminalTable:
     """Return the table of topics."""
     heads = ['topic', '>recorded', '>same bytes', '>different', '>not made now', '>not recorded']
     keys = ['recorded', 'same', 'different', 'not_made_now', 'not_recorded']
@@ -234,65 +241,65 @@ def topics_table(account: Mapping[str, Any]) -> Table:
     rows = [
         (clean(topic['name']), *(str(topic[key]) for key in keys)) for topic in account['topics']
     ]
-    return Table('', heads, rows)
+    return TerminalTable('', heads, rows)
 
 
-def greatest_table(account: Mapping[str, Any], begin: int) -> Table:
+def greatest_table(account: Mapping[str, Any], begin: int) -> TerminalTable:
     """Return the table of greatest differences."""
     rows = [
         (
             f'{row["quantity"]} [{row["unit"]}]',
-            _number(row['difference']),
-            _place(row['difference_at'], begin) if 'difference_at' in row else '',
+            _number_text(row['difference']),
+            _place_text(row['difference_at'], begin) if 'difference_at' in row else '',
             str(row['ulp']),
-            _place(row['ulp_at'], begin) if 'ulp_at' in row else '',
+            _place_text(row['ulp_at'], begin) if 'ulp_at' in row else '',
         )
         for row in account['greatest']
     ]
-    return Table('Greatest differences', ('', '>apart', 'where', '>ulp', 'where'), rows)
+    return TerminalTable('Greatest differences', ('', '>apart', 'where', '>ulp', 'where'), rows)
 
 
-def joints_table(account: Mapping[str, Any], begin: int) -> Table:
+def joints_table(account: Mapping[str, Any], begin: int) -> TerminalTable:
     """Return the table of differences joint by joint."""
     rows = [
         (
             clean(row['joint']),
             f'{row["quantity"]} [{row["unit"]}]',
             str(row['compared']),
-            _number(row['rms']),
-            _number(row['greatest']),
-            _tick(row['greatest_at'], begin) if row['greatest_at'] else '',
+            _number_text(row['rms']),
+            _number_text(row['greatest']),
+            _tick_text(row['greatest_at'], begin) if row['greatest_at'] else '',
         )
         for row in account['joints']
     ]
-    return Table('', ('joint', '', '>compared', '>rms', '>greatest', 'where'), rows)
+    return TerminalTable('', ('joint', '', '>compared', '>rms', '>greatest', 'where'), rows)
 
 
 def versions_text(versions: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
     """Yield the versions that wrote the bag, and those installed here if they differ."""
     then, here = versions['bag'], versions['here']
     same = dict(then) == dict(here)
-    yield f'made {"and replayed " if same else ""}by {_versions(then)}'
+    yield f'made {"and replayed " if same else ""}by {_versions_text(then)}'
     if not same:
-        yield f'replayed by {_versions(here)}'
+        yield f'replayed by {_versions_text(here)}'
 
 
-def _versions(said: Mapping[str, str]) -> str:
+def _versions_text(said: Mapping[str, str]) -> str:
     words = {'linkage_ros': 'linkage_ros', 'python': 'Python', 'machine': 'on'}
     texts = [f'{word} {clean(said[key])}' for key, word in words.items() if key in said]
     texts += [f'{clean(key)} ({clean(said[key])})' for key in said if key not in words]
     return ', '.join(texts) or 'versions that it does not tell'
 
 
-def _place(where: Mapping[str, Any], begin: int) -> str:
-    return f'{clean(where["joint"])}, {_tick(where, begin)}'
+def _place_text(where: Mapping[str, Any], begin: int) -> str:
+    return f'{clean(where["joint"])}, {_tick_text(where, begin)}'
 
 
-def _tick(where: Mapping[str, Any], begin: int) -> str:
+def _tick_text(where: Mapping[str, Any], begin: int) -> str:
     return f'tick {where["tick"]}, {(where["time_ns"] - begin) / 1e9:+.6f} s'
 
 
-def _number(value: float | None) -> str:
+def _number_text(value: float | None) -> str:
     return 'no number' if value is None else f'{value:.3g}'
 
 
@@ -311,8 +318,8 @@ def _replayed_with(
     """Run another scene over a bag's samples; return the comparison with the recorded run."""
     check_drives(scene, scene.linkages[0].content.file)
     run, recorded = _own_account(bag)
-    topic = find_crank_topic(bag, reading.glance(), scene, run, recorded, crank_topic)
-    source = Source(bag, run, recorded, topic)
+    topic = find_crank_topic(bag, reading.read_silently(), scene, run, recorded, crank_topic)
+    source = ReplaySource(bag, run, recorded, topic)
     counterfactual = Counterfactual(scene, recorded)
     names = names_for(source, scene, counterfactual)
     _check_joints(bag, scene, recorded, output)
@@ -329,12 +336,12 @@ def _replayed_with(
     with heeded(), ExitStack() as at_end:
         if output is not None:
             remove_bag(output, force=force)
-            new_bag = NewBag(output, source, scene, counterfactual, names)
+            new_bag = ReplayBag(output, source, scene, counterfactual, names)
             at_end.callback(new_bag.close)
         with reading.with_progress() as messages:
             for event in counterfactual.run(recorded_events(run, own, messages, topic)):
                 if new_bag is not None:
-                    new_bag.add(event)
+                    new_bag.write_event(event)
                 if isinstance(event, CounterfactualTick):
                     if event.tick is not None and event.tick.message:
                         published += 1
@@ -355,7 +362,7 @@ def _replayed_with(
         ],
         'joints_only_now': [name for name in scene.joint_names if name not in recorded_joints],
         'new_bag': str(output) if new_bag is not None else None,
-        'written': new_bag.counts if new_bag is not None else {},
+        'written': new_bag.message_counts if new_bag is not None else {},
     }
 
 
@@ -388,7 +395,7 @@ def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path |
 
 
 def _side_by_side(
-    event: CounterfactualTick, run: RunMetadata, names: Names, shared: list[str]
+    event: CounterfactualTick, run: RunMetadata, names: TopicNames, shared: list[str]
 ) -> tuple[list[bytes], list[bytes]]:
     """Return the messages of a tick, recorded and new, on each topic that both runs have."""
     then = dict(zip((run.joint_states_topic, *run.extras), event.recorded, strict=False))
@@ -429,10 +436,10 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     for option, value in (('-o', arguments.output), ('--crank-topic', arguments.crank_topic)):
         if value is not None and not other:
             raise LinkageError(option, 'is for another scene', 'name it with --scene or --set')
-    bag = opened(arguments.bag, stop)
+    bag = open_bag(arguments.bag, stop)
     reading = BagReading(bag, stop)
     if not other:
-        account = replayed(bag, reading, trust_effects=arguments.trust_effects)
+        account = replay_report(bag, reading, trust_effects=arguments.trust_effects)
         code = {IDENTICAL: 0, DIFFERENT: EXIT_DIFFERENT}.get(account['verdict'], EXIT_INCOMPLETE)
     else:
         scene = _other_scene(bag, arguments)
@@ -454,7 +461,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         _show_proof(account)
     else:
         _show_counterfactual(account)
-    for line in _shortcomings(account):
+    for line in _find_shortcomings(account):
         print(f'linkage replay: {line}', file=sys.stderr)
     if reading.missing:
         return EXIT_DIFFERENT
@@ -468,7 +475,7 @@ def _other_scene(bag: Bag, arguments: argparse.Namespace) -> Scene:
     return scene_of(bag, trust_effects=arguments.trust_effects, settings=arguments.set)
 
 
-def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> dict[str, Any]:
+def replay_report(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> dict[str, Any]:
     """
     Run a bag's own scene once more; return the comparison with the recorded run.
 
@@ -481,12 +488,12 @@ def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> d
         raise BagError(error.where, error.reason, 'name a scene to run with --scene') from None
     begin: list[int] = []
 
-    def observe(tick: ReplayedTick) -> None:
+    def note_begin(tick: ReplayedTick) -> None:
         if not begin:
             begin.append(tick.time)
 
     with reading.with_progress() as messages:
-        proof = verify_replay(bag, scene, messages, observe)
+        proof = verify_replay(bag, scene, messages, note_begin)
     if not begin and not reading.damage and not reading.stopped:
         raise BagError(bag.path, 'holds no joint states', 'record a run with a crank')
     run = read_run_metadata(bag)
@@ -524,10 +531,10 @@ def _show_proof(account: dict[str, Any]) -> None:
     for line in versions_text(account['versions']):
         print(line)
     print()
-    show(topics_table(account))
+    print_tables(topics_table(account))
     if account['greatest']:
         print()
-        show(greatest_table(account, begin))
+        print_tables(greatest_table(account, begin))
 
 
 def _show_counterfactual(account: dict[str, Any]) -> None:
@@ -540,17 +547,17 @@ def _show_counterfactual(account: dict[str, Any]) -> None:
             print(f'only {when}: {", ".join(account[key])}')
     if account['topics']:
         print()
-        show(topics_table(account))
+        print_tables(topics_table(account))
     if account['joints']:
         print()
-        show(joints_table(account, account['begin_ns'] or 0))
+        print_tables(joints_table(account, account['begin_ns'] or 0))
     if account['new_bag']:
         print()
         counts = ', '.join(f'{count} of {name}' for name, count in account['written'].items())
         print(f'{account["new_bag"]}: {counts}')
 
 
-def _shortcomings(account: dict[str, Any]) -> Iterator[str]:
+def _find_shortcomings(account: dict[str, Any]) -> Iterator[str]:
     """Yield the reasons why a part of the bag was not replayed."""
     if account['truncated']:
         yield f'{account["bag"]}: unfinished: {account["unfinished"]}; what it holds was replayed'

@@ -27,13 +27,13 @@ from linkage_ros.bag.contents import layout_of
 from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.arguments import add_bag, add_output, DEGREES, output_or
 from linkage_ros.cli.bag_reading import (
-    account_of,
-    beside,
-    gaps,
-    opened,
-    scene_account,
+    bag_json,
+    describe_gaps,
+    open_bag,
+    path_beside,
+    scene_json,
 )
-from linkage_ros.cli.info import tables
+from linkage_ros.cli.info import bag_tables
 from linkage_ros.cli.part_of_run import add_window, read_part, window_of
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.files.file_access import atomic_write
@@ -55,10 +55,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Write the page."""
-    file = output_or(arguments, beside(arguments.bag, '.html'))
+    file = output_or(arguments, path_beside(arguments.bag, '.html'))
     check_page(file)
     window = window_of(arguments.since, arguments.until)
-    write_page(file, report(arguments.bag, window, stop, trust_effects=arguments.trust_effects))
+    write_page(file, bag_page(arguments.bag, window, stop, trust_effects=arguments.trust_effects))
     return 0
 
 
@@ -70,50 +70,52 @@ def write_page(file: Path, page: str) -> None:
     print(f'{file}: {len(data) / 1e6:.1f} MB')
 
 
-def report(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool = False) -> str:
+def bag_page(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool = False) -> str:
     """
     Return the page of a bag, or of a window of it; memory does not grow with the bag.
 
     ``trust_effects`` lets the scene's effects be imported. A LinkageError says that the bag cannot
     be read, or that plotly is not installed; a StoppedError that the event was set.
     """
-    bag = opened(bag_path, stop)
+    bag = open_bag(bag_path, stop)
     layouts = [layout_of(path) for path in bag.files]
     found, scene, missing = read_part(bag, layouts, window, stop, trust_effects=trust_effects)
-    account = account_of(bag, layouts, found.contents)
+    account = bag_json(bag, layouts, found.contents)
     account |= {'scene': None, 'scene_missing': None, 'replay': None}
     # A page is passed on to others: it shows the bag's name, not its path.
     if account['damage']:
         where, _, damage = account['damage'].partition(': ')
         account['damage'] = f'{Path(where).name}: {damage}'
     if scene is not None:
-        account['scene'] = scene_account(scene)
+        account['scene'] = scene_json(scene)
     name = scene.name if scene is not None else bag_path.resolve().name
     page = run_html(
         found,
         ReportHeader(
             title=f'Run of {name}',
-            facts=list(_facts(account, found, scene)),
-            warnings=list(_warnings(bag, account, found, scene, missing)),
-            tables=_tables(account),
+            facts=list(_run_facts(account, found, scene)),
+            warnings=list(_find_warnings(bag, account, found, scene, missing)),
+            tables=_page_tables(account),
             wrapped=scene is not None and scene.wrapped,
         ),
     )
-    _heed(stop)
+    _raise_if_stopped(stop)
     return page
 
 
-def _heed(stop: Event) -> None:
+def _raise_if_stopped(stop: Event) -> None:
     if stop.is_set():
         raise StoppedError
 
 
-def _tables(account: dict[str, Any]) -> list[TableOf]:
-    bag, *others = (TableOf(*table) for table in tables(account, DEGREES))
+def _page_tables(account: dict[str, Any]) -> list[TableOf]:
+    bag, *others = (TableOf(*table) for table in bag_tables(account, DEGREES))
     return [bag._replace(title='Bag'), *others]
 
 
-def _facts(account: dict[str, Any], found: Run, scene: Scene | None) -> Iterator[tuple[str, str]]:
+def _run_facts(
+    account: dict[str, Any], found: Run, scene: Scene | None
+) -> Iterator[tuple[str, str]]:
     yield 'bag', Path(account['bag']).resolve().name
     if account['begin']:
         yield 'begun', account['begin']
@@ -129,7 +131,7 @@ def _facts(account: dict[str, Any], found: Run, scene: Scene | None) -> Iterator
         yield 'recorded by', f'linkage_ros {version}'
 
 
-def _warnings(
+def _find_warnings(
     bag: Bag, account: dict[str, Any], found: Run, scene: Scene | None, missing: str
 ) -> Iterator[str]:
     """Yield the missing or damaged parts of a run."""
@@ -147,7 +149,7 @@ def _warnings(
         yield f'The recording failed: {account["recording_failure"]}.'
     if account['beginning_missing']:
         yield f'Not from the beginning: {account["beginning_missing"]}.'
-    for gap in gaps(bag):
+    for gap in describe_gaps(bag):
         yield f'{gap[:1].upper()}{gap[1:]}.'
     if account['messages'] and found.window.since > found.end:
         yield f'The part begins after the end of the run, at {seconds_text(found.end)} s.'

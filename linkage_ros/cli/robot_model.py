@@ -65,12 +65,12 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Write the model."""
     write = WRITERS[arguments.command]
     if arguments.command == 'urdf' and arguments.onto:
-        write = _onto(arguments.onto)
+        write = _writer_onto(arguments.onto)
     write_or_print(model_of(arguments.file, write), arguments.output)
     return 0
 
 
-def _onto(file: Path) -> Write:
+def _writer_onto(file: Path) -> Write:
     """Return a writer that keeps a robot as it is, and adds what closes the loops."""
     data = read_urdf_file(file)
     robot = read_urdf(data, str(file))

@@ -25,12 +25,12 @@ from linkage_ros.cli.arguments import (
     add_ros_arguments,
     add_set,
     AngleUnit,
-    bounded,
+    bounded_number,
     SCENE_HELP,
 )
 from linkage_ros.cli.page_of_run import check_page, PageOfRun, view_command
 from linkage_ros.cli.proof import LONGEST_PROOF, proof_of
-from linkage_ros.cli.terminal import show, Table
+from linkage_ros.cli.terminal import print_tables, TerminalTable
 from linkage_ros.kinematics.status import Status
 from linkage_ros.node.node import LinkageNode
 from linkage_ros.node.run import run_linkage_node
@@ -50,7 +50,7 @@ _MOST_SHOWN = 24
 """Maximum number of joints that fit on a screen."""
 
 
-class Shown(NamedTuple):
+class JointRow(NamedTuple):
     """A joint as the display shows it; its rate is '' if it is unknown."""
 
     name: str
@@ -96,7 +96,7 @@ class Display:
     def close(self) -> None:
         """End display and page; calling it again does nothing."""
         if self._page is not None:
-            self._page.end()
+            self._page.end_process()
             self._page = None
         if self._entered:
             self._live.stop()
@@ -111,19 +111,19 @@ class Display:
         ticks = node.loop.counts.ticks
         rate = (ticks - self._before[0]) / (now - self._before[1])
         self._before = (ticks, now)
-        age, joints = _state(node.loop, turning_joints(node.scene), self._angles)
+        age, joints = _current_state(node.loop, turning_joints(node.scene), self._angles)
         if self._live is None:
-            print(_line(node.loop, rate, age, joints), flush=True)
+            print(_status_line(node.loop, rate, age, joints), flush=True)
             return
         if not self._entered:
             self._live.start()
             self._entered = True
-        self._live.update(_table(node.loop, rate, age, joints), refresh=True)
+        self._live.update(_status_table(node.loop, rate, age, joints), refresh=True)
 
 
-def _state(
+def _current_state(
     loop: TickLoop, turning: Mapping[str, bool], angles: AngleUnit
-) -> tuple[str, list[Shown]]:
+) -> tuple[str, list[JointRow]]:
     """Return the input's age as text, and the inputs and joints to show."""
     tick = loop.counts.last_tick
     age = 'no crank'
@@ -145,23 +145,25 @@ def _state(
         if reading is not None:
             rates = reading.rates or [None] * len(reading.joints)
             values += zip(member.joint_names, reading.joints, rates, strict=True)
-    return age, [_shown(*each, turning[each[0]], angles) for each in values[:_MOST_SHOWN]]
+    return age, [_shown_joint(*each, turning[each[0]], angles) for each in values[:_MOST_SHOWN]]
 
 
-def _shown(name: str, value: float, rate: float | None, turning: bool, angles: AngleUnit) -> Shown:
+def _shown_joint(
+    name: str, value: float, rate: float | None, turning: bool, angles: AngleUnit
+) -> JointRow:
     rate_text = ''
     if rate is not None:
-        rate_text = f'{angles.of(rate):.4f} {angles.name}/s' if turning else f'{rate:.4f} m/s'
-    return Shown(name, angles.value_text(value, turning), rate_text)
+        rate_text = f'{angles.convert(rate):.4f} {angles.name}/s' if turning else f'{rate:.4f} m/s'
+    return JointRow(name, angles.value_text(value, turning), rate_text)
 
 
-def _line(loop: TickLoop, rate: float, age: str, joints: Sequence[Shown]) -> str:
+def _status_line(loop: TickLoop, rate: float, age: str, joints: Sequence[JointRow]) -> str:
     counts = loop.counts
     shown = '  '.join(f'{joint.name} {joint.value}' for joint in joints)
     return f'{rate:7.1f} ticks/s  lost {counts.lost}  late {counts.late}  age {age}  {shown}'
 
 
-def _table(loop: TickLoop, rate: float, age: str, joints: Sequence[Shown]) -> Any:
+def _status_table(loop: TickLoop, rate: float, age: str, joints: Sequence[JointRow]) -> Any:
     counts = loop.counts
     status = Text(
         f'{rate:.1f} ticks/s   {counts.late} late   {counts.lost} lost   input age {age}   '
@@ -181,11 +183,11 @@ def _table(loop: TickLoop, rate: float, age: str, joints: Sequence[Shown]) -> An
 # The summary at the end of a run.
 
 
-def summary(node: LinkageNode, longest: float) -> Table:
+def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
     """Return the summary of a node's last run; the proof of its bag takes a time in [s]."""
     loop = node.loop
     if loop is None:
-        return Table('', ('',), [('nothing ran',)])
+        return TerminalTable('', ('',), [('nothing ran',)])
     counts = loop.counts
     per_second = counts.ticks / loop.run_seconds
     rows = [('ticks', f'{counts.ticks} in {loop.run_seconds:.2f} s, {per_second:.1f} a second')]
@@ -239,7 +241,7 @@ def summary(node: LinkageNode, longest: float) -> Table:
         ]
     if node.recording.failure:
         rows.append(('FAILED', node.recording.failure))
-    return Table('', ('', ''), rows)
+    return TerminalTable('', ('', ''), rows)
 
 
 EXAMPLE = 'linkage run worn_press --seconds 5 --set rate=500'
@@ -257,7 +259,7 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     add_set(parser)
     parser.add_argument(
         '--seconds',
-        type=bounded(1e-9, 1e9),
+        type=bounded_number(1e-9, 1e9),
         default=inf,
         help='how long; without it, until Ctrl-C',
     )
@@ -294,7 +296,7 @@ def run_scene(
 
     def at_end(node: LinkageNode) -> None:
         bags.extend(recording.folder for recording in node.recording.ended_bags)
-        show(summary(node, inf if arguments.prove else LONGEST_PROOF))
+        print_tables(summary_table(node, inf if arguments.prove else LONGEST_PROOF))
 
     if arguments.view:
         check_page()

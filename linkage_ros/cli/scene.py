@@ -26,8 +26,8 @@ import sys
 from threading import Event
 from typing import Any, NamedTuple
 
-from linkage_ros.cli.arguments import add_set, check_no_settings, finite, SCENE_HELP
-from linkage_ros.cli.terminal import show, Table
+from linkage_ros.cli.arguments import add_set, check_no_settings, finite_or_none, SCENE_HELP
+from linkage_ros.cli.terminal import print_tables, TerminalTable
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.dispatch import effects_requiring, module_of
 from linkage_ros.effects.stage import EFFECTS
@@ -65,25 +65,29 @@ _MOST_NAMES = 4
 _LONGEST = 60
 
 
-def tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
+def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[TerminalTable]:
     """Yield the tables of a scene that has been built."""
-    yield Table(title, ('', ''), [*_facts(scene), *_solvers(pipeline.linkages)])
-    for lines in _alike(pipeline.linkages):
-        names = _some([line.scene_linkage.name for line in lines if line.scene_linkage.name])
+    yield TerminalTable(title, ('', ''), [*_scene_facts(scene), *_solver_facts(pipeline.linkages)])
+    for lines in _group_alike(pipeline.linkages):
+        names = _shorten_list(
+            [line.scene_linkage.name for line in lines if line.scene_linkage.name]
+        )
         heads = ('>', 'stage', 'where', 'what it does', 'as said here', '')
-        yield Table(
+        yield TerminalTable(
             f'Stages of {names}' if names else 'Stages', heads, list(_stage_rows(lines[0]))
         )
     if scene.faults:
-        yield Table('Faults', ('name', 'kind', 'as said here', 'by itself'), list(_faults(scene)))
-    yield Table('Topics', ('', 'topic', 'message', ''), list(_topics(scene, pipeline)))
+        yield TerminalTable(
+            'Faults', ('name', 'kind', 'as said here', 'by itself'), list(_fault_rows(scene))
+        )
+    yield TerminalTable('Topics', ('', 'topic', 'message', ''), list(_topic_rows(scene, pipeline)))
 
 
-def _facts(scene: Scene) -> Iterator[tuple[str, str]]:
+def _scene_facts(scene: Scene) -> Iterator[tuple[str, str]]:
     if scene.linkages[0].name:
-        yield 'linkages', _some([member.name for member in scene.linkages])
+        yield 'linkages', _shorten_list([member.name for member in scene.linkages])
     joints = list(scene.joint_names)
-    yield 'joints', _some(joints)
+    yield 'joints', _shorten_list(joints)
     rate = f'{scene.rate:g} a second' if scene.rate else 'one for every crank sample'
     yield 'ticks', rate
     yield 'angles', 'wrapped to (−π, π]' if scene.wrapped else 'continuous'
@@ -95,9 +99,9 @@ def _facts(scene: Scene) -> Iterator[tuple[str, str]]:
     yield 'recorded', recorded
 
 
-def _solvers(lines: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
+def _solver_facts(linkages: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
     """Yield the solvers that close the loops, if the scene names any."""
-    for line in lines:
+    for line in linkages:
         name = f'{line.scene_linkage.name}: ' if line.scene_linkage.name else ''
         if line.solver_choice is not None:
             yield (
@@ -110,10 +114,10 @@ def _solvers(lines: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
             yield 'solver', f'{name}{solver}{text and ", "}{text}'
 
 
-def _alike(lines: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:
+def _group_alike(linkages: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:
     """Return the linkages; those with the same drive and effects share a row."""
     groups: dict[str, list[LinkagePipeline]] = {}
-    for line in lines:
+    for line in linkages:
         groups.setdefault(repr((line.scene_linkage.drive, line.scene_linkage.effects)), []).append(
             line
         )
@@ -129,12 +133,12 @@ class Stage(NamedTuple):
     needed_by: tuple[str, ...]
 
 
-def _stages(line: LinkagePipeline) -> Iterator[Stage]:
+def _list_stages(linkage: LinkagePipeline) -> Iterator[Stage]:
     """Yield the drive of a linkage and its effects, in the order of a tick."""
-    name, parameters = line.scene_linkage.drive
+    name, parameters = linkage.scene_linkage.drive
     yield Stage(name, 'drive', parameters, ())
-    given = line.scene_linkage.effects
-    for stage in line.effect_names:
+    given = linkage.scene_linkage.effects
+    for stage in linkage.effect_names:
         module = module_of(stage)
         where = next(
             (where for has, where in _WHERE.items() if hasattr(module, has)), 'in the forces'
@@ -146,7 +150,7 @@ def _stages(line: LinkagePipeline) -> Iterator[Stage]:
 
 
 def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
-    for number, stage in enumerate(_stages(line)):
+    for number, stage in enumerate(_list_stages(line)):
         yield (
             str(number),
             stage.name,
@@ -157,14 +161,14 @@ def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
         )
 
 
-def _faults(scene: Scene) -> Iterator[tuple[str, ...]]:
+def _fault_rows(scene: Scene) -> Iterator[tuple[str, ...]]:
     for name, fault in scene.faults.items():
         times = ', '.join(f'{time:g}' for time in fault.at)
         when = f'at {times} s, for {fault.seconds:g} s' if fault.at else 'on demand only'
         yield name, fault.kind, _parameters_text(fault.parameters), when
 
 
-def _topics(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
+def _topic_rows(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
     if pipeline.topic:
         yield 'listens to', pipeline.topic, JOINT_STATE, ''
     for wrench in pipeline.wrenches:
@@ -175,38 +179,38 @@ def _topics(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
     if scene.faults:
         yield 'publishes', '~/faults', 'std_msgs/msg/String', 'which are injected'
         services = [f'~/inject/{name}' for name in scene.faults]
-        yield 'serves', _some(services), 'std_srvs/srv/SetBool', ''
+        yield 'serves', _shorten_list(services), 'std_srvs/srv/SetBool', ''
 
 
 def _parameters_text(parameters: Any) -> str:
     """Return the parameters that differ from their defaults."""
     texts = [
-        f'{entry.name} {_shown(getattr(parameters, entry.name))}'
+        f'{entry.name} {_value_text(getattr(parameters, entry.name))}'
         + (f' {kind.unit}' if kind.unit else '')
         for entry, kind in declared_fields(type(parameters))
         if is_required(entry)
-        or _shown(getattr(parameters, entry.name)) != _shown(default_of(entry))
+        or _value_text(getattr(parameters, entry.name)) != _value_text(default_of(entry))
     ]
     text = ', '.join(texts)
     return text if len(text) <= _LONGEST else f'{text[: _LONGEST - 1]}…'
 
 
-def _shown(value: Any) -> str:
+def _value_text(value: Any) -> str:
     if isinstance(value, tuple | list):
-        return f'[{", ".join(map(_shown, value))}]'
+        return f'[{", ".join(map(_value_text, value))}]'
     if isinstance(value, dict):
-        return f'{{{", ".join(f"{key}: {_shown(one)}" for key, one in value.items())}}}'
+        return f'{{{", ".join(f"{key}: {_value_text(one)}" for key, one in value.items())}}}'
     if hasattr(value, '__dataclass_fields__'):
         return f'{{{_parameters_text(value)}}}'
     return f'{value:g}' if isinstance(value, float) else str(value)
 
 
-def account_of(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
+def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
     """Return the description of a scene that has been built, as JSON holds it."""
     # local import: the modules that read bags take time to load, and only --json needs these
-    from linkage_ros.cli.bag_reading import scene_account
+    from linkage_ros.cli.bag_reading import scene_json
 
-    account = scene_account(scene)
+    account = scene_json(scene)
     for linkage, line in zip(account['linkages'], pipeline.linkages, strict=True):
         solver = line.scene_linkage.solver
         linkage['solver'] = None if solver is None else _named_parameters(*solver)
@@ -217,7 +221,7 @@ def account_of(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
                 'where': stage.where,
                 'needed_by': list(stage.needed_by),
             }
-            for stage in _stages(line)
+            for stage in _list_stages(line)
         ]
     record = scene.record
     return account | {
@@ -235,7 +239,7 @@ def account_of(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
         ],
         'topics': [
             {'name': name, 'type': kind, 'what': what}
-            for what, name, kind, _ in _topics(scene, pipeline)
+            for what, name, kind, _ in _topic_rows(scene, pipeline)
             if what != 'serves'
         ],
         'services': [f'~/inject/{name}' for name in scene.faults],
@@ -257,11 +261,11 @@ def _as_json(value: Any) -> Any:
     if isinstance(value, tuple | list):
         return list(map(_as_json, value))
     if isinstance(value, float):
-        return finite(value)
+        return finite_or_none(value)
     return value if value is None or isinstance(value, str | int) else str(value)
 
 
-def _some(names: list[str]) -> str:
+def _shorten_list(names: list[str]) -> str:
     """Return names; of many names the first ones and the count."""
     if len(names) <= _MOST_NAMES + 1:
         return ', '.join(names)
@@ -289,12 +293,16 @@ def parameters_of(what: str, name: str) -> Any:
     return module.PARAMETERS
 
 
-def table_of(what: str, name: str) -> Table:
+def table_of(what: str, name: str) -> TerminalTable:
     """Return the table of a drive, effect, fault or solver; ``what`` is a key of `REGISTRIES`."""
     parameters = parameters_of(what, name)
     title = f'{what} {name}: {first_docstring_line(parameters)}'
     rows = list(parameter_rows(parameters))
-    return Table(title, _HEADS, rows) if rows else Table(title, ('',), [('no parameters',)])
+    return (
+        TerminalTable(title, _HEADS, rows)
+        if rows
+        else TerminalTable(title, ('',), [('no parameters',)])
+    )
 
 
 SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
@@ -331,9 +339,9 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         return 0
     if arguments.file is None:
         check_no_settings(arguments.set)
-        show(*(table_of(what, name) for what, name in _named(arguments.list)))
+        print_tables(*(table_of(what, name) for what, name in _items_to_list(arguments.list)))
         return 0
-    wrong = _violations(named_file(arguments.file, 'scenes', 'linkages'))
+    wrong = _find_violations(named_file(arguments.file, 'scenes', 'linkages'))
     for error in wrong:
         print(f'linkage scene: {error}', file=sys.stderr)
     if wrong:
@@ -343,14 +351,14 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         print(f'linkage scene: note: {note}', file=sys.stderr)
     pipeline = Pipeline(scene)
     if arguments.json:
-        account = {'file': arguments.file, **account_of(scene, pipeline)}
+        account = {'file': arguments.file, **built_scene_json(scene, pipeline)}
         print(json.dumps(account, indent=1, allow_nan=False))
     else:
-        show(*tables(scene, pipeline, arguments.file))
+        print_tables(*scene_tables(scene, pipeline, arguments.file))
     return 0
 
 
-def _named(names: list[str]) -> Iterator[tuple[str, str]]:
+def _items_to_list(names: list[str]) -> Iterator[tuple[str, str]]:
     """Yield the arguments of `table_of` for each item to list."""
     known = [(what, name) for what, registry in REGISTRIES.items() for name in registry]
     if not names:
@@ -370,7 +378,7 @@ def _named(names: list[str]) -> Iterator[tuple[str, str]]:
         yield from found
 
 
-def _violations(file: Path) -> list[FileError]:
+def _find_violations(file: Path) -> list[FileError]:
     """Return all violations of the schemas in a scene and the linkages that it names."""
     if find_spec('jsonschema') is None:
         return []
@@ -382,7 +390,7 @@ def _violations(file: Path) -> list[FileError]:
     wrong = find_violations(content, scene_schema())
     if wrong:
         return wrong
-    for linkage in dict.fromkeys(_linkages(content)):
+    for linkage in dict.fromkeys(_named_linkages(content)):
         # The reader reports a missing file, with the line that names it.
         path = linkage_of_scene(linkage, file.parent)
         if isfile(path):  # noqa: PTH113 (Path's raises where a name is too long)
@@ -390,7 +398,7 @@ def _violations(file: Path) -> list[FileError]:
     return wrong
 
 
-def _linkages(content: Section) -> list[str]:
+def _named_linkages(content: Section) -> list[str]:
     if 'linkages' in content:
         return [entry.text('linkage') for entry in content.sections('linkages')]
     return [content.text('linkage')]

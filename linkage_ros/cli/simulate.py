@@ -26,9 +26,9 @@ import sys
 from tempfile import TemporaryDirectory
 from threading import Event
 
-from linkage_ros.cli.arguments import add_force, add_set, bounded, PICTURES, SCENE_HELP
-from linkage_ros.cli.export import export
-from linkage_ros.cli.terminal import progress
+from linkage_ros.cli.arguments import add_force, add_set, bounded_number, PICTURES, SCENE_HELP
+from linkage_ros.cli.export import export_bag
+from linkage_ros.cli.terminal import show_progress
 from linkage_ros.errors import clean, LinkageError
 from linkage_ros.files.file_access import check_output_name, remove_bag
 from linkage_ros.files.tables import check_kind, KINDS, table_file
@@ -65,14 +65,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('scene', metavar='SCENE', help=SCENE_HELP)
     parser.add_argument(
         '--seconds',
-        type=bounded(0.0, 1e9),
+        type=bounded_number(0.0, 1e9),
         default=10.0,
         help='duration of a run, in the time of the scene (default: 10)',
     )
     parser.add_argument(
         '-o',
         '--output',
-        type=_output,
+        type=_read_output,
         required=True,
         metavar='FOLDER|OUTPUT',
         help='folder of a new bag; or a table of the joints, OUTPUT.csv or OUTPUT.parquet; of a '
@@ -83,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     study = parser.add_argument_group('a study')
     study.add_argument(
         '--seeds',
-        type=bounded(1, 1e12, int),
+        type=bounded_number(1, 1e12, int),
         default=1,
         metavar='N',
         help='number of seeds, each in a run',
@@ -101,14 +101,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     study.add_argument(
         '--workers',
-        type=bounded(1, 1024, int),
+        type=bounded_number(1, 1024, int),
         metavar='N',
         help='processes (default: one a processor)',
     )
     study.add_argument('--dask', metavar='ADDRESS', default='', help='scheduler whose workers run')
 
 
-def _output(text: str) -> Path:
+def _read_output(text: str) -> Path:
     """Read the name of a folder, which has no suffix, or of a table or picture."""
     file = Path(text)
     if file.suffix:
@@ -120,7 +120,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Simulate; return 1 if a signal stopped it."""
     sweeps = [sweep_of(text) for text in arguments.sweep]
     if arguments.seeds > 1 or sweeps:
-        return _study(arguments, sweeps, stop)
+        return _run_study(arguments, sweeps, stop)
     for given, option in (
         (arguments.picture, '--picture'),
         (arguments.workers, '--workers'),
@@ -132,21 +132,21 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if output.suffix:
         check_output_name(output, KINDS)
         check_kind(output)
-    scene = _loaded(arguments)
+    scene = _load_scene(arguments)
     ticks = check_simulated(scene, arguments.seconds)
     if not output.suffix:
         remove_bag(output, force=arguments.force)
-        counts = _simulated(scene, output, ticks, stop)
+        counts = _simulate_into(scene, output, ticks, stop)
         parts = ', '.join(f'{count} on {clean(name)}' for name, count in counts.items() if count)
         print(f'{output}: {parts or "no messages"}')
         return int(stop.is_set())
     with TemporaryDirectory() as folder:
         bag = Path(folder) / 'run'
-        _simulated(scene, bag, ticks, stop)
+        _simulate_into(scene, bag, ticks, stop)
         if stop.is_set():
             return 1
         try:
-            found = export(bag, output, None, stop)
+            found = export_bag(bag, output, None, stop)
         except StoppedError:
             print('linkage simulate: stopped; nothing was written', file=sys.stderr)
             return 1
@@ -154,7 +154,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return 0
 
 
-def _loaded(arguments: argparse.Namespace) -> Scene:
+def _load_scene(arguments: argparse.Namespace) -> Scene:
     """Read the scene, and show the notes on it."""
     scene = load_scene(arguments.scene, arguments.set)
     for note in scene_notes(scene):
@@ -162,11 +162,11 @@ def _loaded(arguments: argparse.Namespace) -> Scene:
     return scene
 
 
-def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str, int]:
+def _simulate_into(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str, int]:
     """Run a scene into a bag, and return its counts; say so if a signal stopped it."""
     stopped_at: int | None = None
     warnings: list[str] = []
-    with progress('ticks') as advance:
+    with show_progress('ticks') as advance:
 
         def goes_on(number: int) -> bool:
             nonlocal stopped_at
@@ -185,7 +185,9 @@ def _simulated(scene: Scene, folder: Path, ticks: int, stop: Event) -> dict[str,
     return counts
 
 
-def _study(arguments: argparse.Namespace, sweeps: Sequence[ParameterSweep], stop: Event) -> int:
+def _run_study(
+    arguments: argparse.Namespace, sweeps: Sequence[ParameterSweep], stop: Event
+) -> int:
     """Run a study; return 1 if a signal stopped it, or no run succeeded."""
     output: Path = arguments.output
     check_output_name(output, (*KINDS, *PICTURES))  # not a folder
@@ -195,7 +197,7 @@ def _study(arguments: argparse.Namespace, sweeps: Sequence[ParameterSweep], stop
         find_tool('spread').settings()  # without matplotlib, say so before the study is run
     if output.suffix in KINDS:
         check_kind(output)
-    scene = _loaded(arguments)
+    scene = _load_scene(arguments)
     ticks = check_simulated(scene, arguments.seconds)
     runs = runs_of(sweeps, arguments.seeds, scene.seed)
     instants = instants_of(len(runs), len(scene.joint_names), ticks)
@@ -203,11 +205,11 @@ def _study(arguments: argparse.Namespace, sweeps: Sequence[ParameterSweep], stop
     with closing(FinishedRuns(output, study, runs)) as finished:
         found = finished.outcomes
         if found:
-            _say(f'goes on after {len(found)} of {len(runs)} runs, of {finished.file}')
+            _print_note(f'goes on after {len(found)} of {len(runs)} runs, of {finished.file}')
         waiting = [part for part in enumerate(runs) if part[0] not in found]
         workers = max(1, min(arguments.workers or cpu_count() or 1, len(waiting)))
         try:
-            with progress('runs') as advance:
+            with show_progress('runs') as advance:
                 for number, outcome in run_outcomes(study, waiting, workers, arguments.dask):
                     finished.add_run(number, outcome)
                     advance(len(found), len(runs))
@@ -215,12 +217,12 @@ def _study(arguments: argparse.Namespace, sweeps: Sequence[ParameterSweep], stop
                         raise StoppedError
         except StoppedError:
             kept = f'{len(found)} of {len(runs)} runs are kept in {finished.file}'
-            _say(f'stopped; {kept}; the same command goes on' if found else 'stopped')
+            _print_note(f'stopped; {kept}; the same command goes on' if found else 'stopped')
             return 1
-        return _written(arguments, scene, runs, finished, pictures)
+        return _write_results(arguments, scene, runs, finished, pictures)
 
 
-def _written(
+def _write_results(
     arguments: argparse.Namespace,
     scene: Scene,
     runs: Sequence[Settings],
@@ -232,34 +234,34 @@ def _written(
     failed = [(runs[number], found[number].failure) for number in sorted(found)
               if found[number].failure]  # fmt: skip
     for given, failure in failed[:_MOST_NAMED]:
-        _say(f'{_told(given)}: {failure}')
+        _print_note(f'{_settings_text(given)}: {failure}')
     if failed:
-        _say(f'{len(failed)} of {len(runs)} runs failed')
+        _print_note(f'{len(failed)} of {len(runs)} runs failed')
     if len(failed) == len(runs):
         finished.remove_file()
         return 1
     if output.suffix in KINDS:
-        heads, rows = _table(scene, runs, found)
+        heads, rows = _runs_table(scene, runs, found)
         with table_file(output, heads, _WHOLE) as write:
             write(rows)
         print(f'{output}: {len(rows)} runs, {len(heads)} columns')
     for picture in pictures:
-        _draw(scene, arguments.seconds, found, picture)
+        _draw_runs(scene, arguments.seconds, found, picture)
         print(picture)
     finished.remove_file()
     return 0
 
 
-def _say(text: str) -> None:
+def _print_note(text: str) -> None:
     print(f'linkage simulate: {text}', file=sys.stderr)
 
 
-def _told(settings: Settings) -> str:
+def _settings_text(settings: Settings) -> str:
     return ', '.join(f'{key}={value:g}' if key != 'seed' else f'seed={value}'
                      for key, value in settings)  # fmt: skip
 
 
-def _turning(scene: Scene) -> dict[str, bool]:
+def _revolute_joints(scene: Scene) -> dict[str, bool]:
     """Return whether each joint turns, by its name in messages."""
     return {
         joint: turns
@@ -268,13 +270,13 @@ def _turning(scene: Scene) -> dict[str, bool]:
     }
 
 
-def _table(
+def _runs_table(
     scene: Scene, runs: Sequence[Settings], found: Mapping[int, Outcome]
 ) -> tuple[list[str], list[list[float | int | None]]]:
     """Return headings and rows of the table of runs; a run that failed has no numbers."""
     keys = [key for key, _ in runs[0]]
     columns = list(dict.fromkeys(key for one in found.values() for key in one.statistics))
-    heads = ['run', *keys, 'ticks', 'messages', *_headings(scene, columns)]
+    heads = ['run', *keys, 'ticks', 'messages', *_statistics_headings(scene, columns)]
     nothing = Statistics(nan, nan, nan, nan)
     rows: list[list[float | int | None]] = []
     for number, settings in enumerate(runs):
@@ -287,9 +289,9 @@ def _table(
     return heads, rows
 
 
-def _headings(scene: Scene, columns: Sequence[str]) -> Iterator[str]:
+def _statistics_headings(scene: Scene, columns: Sequence[str]) -> Iterator[str]:
     """Yield the headings of the statistics, each with its unit."""
-    turning = _turning(scene)
+    turning = _revolute_joints(scene)
     for column in columns:
         joint, _, quantity = column.partition(' ')
         kind = {'': POSITION, 'rate': RATE, 'effort': EFFORT}[quantity]
@@ -299,13 +301,13 @@ def _headings(scene: Scene, columns: Sequence[str]) -> Iterator[str]:
             yield f'{column} {name} [{unit}]'
 
 
-def _draw(scene: Scene, seconds: float, found: Mapping[int, Outcome], picture: Path) -> None:
+def _draw_runs(scene: Scene, seconds: float, found: Mapping[int, Outcome], picture: Path) -> None:
     """Draw the spread of the runs that succeeded."""
     import numpy as np  # local import: only for a picture
 
     spread = find_tool('spread')
     good = [found[number] for number in sorted(found) if not found[number].failure]
-    turning = _turning(scene)
+    turning = _revolute_joints(scene)
     joints = [
         spread.JointSpread(
             joint,

@@ -31,13 +31,13 @@ from linkage_ros.cli.arguments import (
     add_output,
     add_radians,
     AngleUnit,
-    bounded,
-    fixed,
-    inputs,
-    values,
-    wrapped,
+    bounded_number,
+    fixed_text,
+    read_inputs,
+    read_numbers,
+    wrap_angle,
 )
-from linkage_ros.cli.terminal import progress, show, Table, text
+from linkage_ros.cli.terminal import print_tables, show_progress, table_text, TerminalTable
 from linkage_ros.errors import LinkageError, listed
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import load
@@ -59,7 +59,7 @@ _ORDERS = ('', ' rate', ' acceleration')
 _PER = ('', '/s', '/s²')
 
 
-class Column(NamedTuple):
+class ResultColumn(NamedTuple):
     """A column of the result: its joint or coordinate with the quantity; a text has no unit."""
 
     name: str
@@ -92,30 +92,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--from',
         dest='first',
-        type=bounded(-_MOST, _MOST),
+        type=bounded_number(-_MOST, _MOST),
         metavar='VALUE',
         help='where a sweep begins',
     )
     parser.add_argument(
         '--to',
         dest='last',
-        type=bounded(-_MOST, _MOST),
+        type=bounded_number(-_MOST, _MOST),
         metavar='VALUE',
         help='where a sweep ends',
     )
     parser.add_argument(
         '--steps',
-        type=bounded(1, 1_000_000, int),
+        type=bounded_number(1, 1_000_000, int),
         default=_STEPS,
         metavar='N',
         help=f'steps of a sweep (default: {_STEPS})',
     )
     add_radians(parser, 'type angles, and show them in the table,')
     parser.add_argument(
-        '--rate', type=values, metavar='VALUE', help='rate of the input, per second: adds rates'
+        '--rate',
+        type=read_numbers,
+        metavar='VALUE',
+        help='rate of the input, per second: adds rates',
     )
     parser.add_argument(
-        '--acceleration', type=values, metavar='VALUE',
+        '--acceleration', type=read_numbers, metavar='VALUE',
         help='acceleration of the input, per second squared: adds rates and accelerations',
     )  # fmt: skip
     parser.add_argument(
@@ -146,15 +149,15 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     if arguments.output is not None:
         kind = FORMATS[arguments.output.suffix.lower()]
     if kind == 'table':
-        table = _table(columns, rows, arguments.angles)
+        table = _states_table(columns, rows, arguments.angles)
         if arguments.output is None:
-            show(table)
+            print_tables(table)
             return 0
-        answer = text(table) + '\n'
+        answer = table_text(table) + '\n'
     elif kind == 'csv':
-        answer = _csv(columns, rows)
+        answer = _format_csv(columns, rows)
     else:
-        answer = _json(columns, rows)
+        answer = _format_json(columns, rows)
     if arguments.output is None:
         sys.stdout.write(answer)
         return 0
@@ -165,16 +168,16 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 def _forward_table(
     closure: Closure, arguments: argparse.Namespace
-) -> tuple[list[Column], list[list[Any]]]:
-    question = _question(closure, arguments)
+) -> tuple[list[ResultColumn], list[list[Any]]]:
+    question = _read_question(closure, arguments)
     rows = []
-    with progress('states solved') as advance:
+    with show_progress('states solved') as advance:
         for number, given in enumerate(question.inputs):
             if number % _TOLD == 0:
                 advance(number, len(question.inputs))
-            rows.append(_row(closure, question, given))
+            rows.append(_state_row(closure, question, given))
     _show_reach(closure, question.inputs[: len(arguments.at)], arguments.angles)
-    return list(_columns(closure, question)), rows
+    return list(_output_columns(closure, question)), rows
 
 
 def _check_alone(arguments: argparse.Namespace) -> None:
@@ -188,7 +191,7 @@ def _check_alone(arguments: argparse.Namespace) -> None:
 
 def _exchanged_table(
     closure: Closure, arguments: argparse.Namespace
-) -> tuple[list[Column], list[list[Any]]]:
+) -> tuple[list[ResultColumn], list[list[Any]]]:
     """Return the row of the state in which as many joints as inputs have the typed values."""
     names, typed = zip(*arguments.joint, strict=True)
     inverse = closure.driven_by(*names)
@@ -202,7 +205,7 @@ def _exchanged_table(
 
 def _inverse_table(
     closure: Closure, arguments: argparse.Namespace
-) -> tuple[list[Column], list[list[Any]]]:
+) -> tuple[list[ResultColumn], list[list[Any]]]:
     """Return a row for every input at which the joint has one of the typed values."""
     name = arguments.joint[0][0]
     columns, rows = [], []
@@ -216,17 +219,17 @@ def _inverse_table(
         value = arguments.angles.read(typed) if turning else typed
         cranks = closure.cranks(joint, value)
         if not cranks:
-            raise _unreached(closure, joint, value, option, arguments.angles)
+            raise _unreached_error(closure, joint, value, option, arguments.angles)
         for number, _ in cranks:
             inverse = closure.driven_by(joint, branch=number)
-            question = _question(inverse, arguments, [(value,)])
-            (row,) = (_row(inverse, question, given) for given in question.inputs)
-            columns = list(_columns(inverse, question))
+            question = _read_question(inverse, arguments, [(value,)])
+            (row,) = (_state_row(inverse, question, given) for given in question.inputs)
+            columns = list(_output_columns(inverse, question))
             crank = inverse.position(value).joints[0]
             # The branch and its crank come first; the gap is 0.
             rows.append([number, crank, row[1], value, *row[4:]])
     own, status, _, crank_column, *others = columns
-    columns = [Column('branch', ''), crank_column, status, own, *others]
+    columns = [ResultColumn('branch', ''), crank_column, status, own, *others]
     if own in others:  # A point's coordinate, of which --points shows all.
         del columns[3]
         for row in rows:
@@ -234,7 +237,7 @@ def _inverse_table(
     return columns, rows
 
 
-def _unreached(
+def _unreached_error(
     closure: Closure, joint: str, value: float, option: str, angles: AngleUnit
 ) -> LinkageError:
     """Return the error for a value of a joint that no input within the limits reaches."""
@@ -287,7 +290,7 @@ class Question(NamedTuple):
     points: dict[str, str]  # For each traced point, a link that carries it
 
 
-def _question(
+def _read_question(
     closure: Closure,
     arguments: argparse.Namespace,
     asked: Sequence[tuple[float, ...]] = (),
@@ -295,12 +298,15 @@ def _question(
     linkage = closure.linkage
     in_degrees = arguments.angles.in_degrees
 
-    def read(typed: Sequence[float] | None, option: str) -> tuple[float, ...] | None:
+    def read_typed(typed: Sequence[float] | None, option: str) -> tuple[float, ...] | None:
         if typed is None:
             return None
-        return inputs(linkage, typed, option, in_degrees=in_degrees)
+        return read_inputs(linkage, typed, option, in_degrees=in_degrees)
 
-    asked = [*asked, *(inputs(linkage, at, '--at', in_degrees=in_degrees) for at in arguments.at)]
+    asked = [
+        *asked,
+        *(read_inputs(linkage, at, '--at', in_degrees=in_degrees) for at in arguments.at),
+    ]
     swept = arguments.sweep or arguments.first is not None or arguments.last is not None
     if swept or not asked:
         if len(linkage.inputs) > 1:
@@ -308,15 +314,15 @@ def _question(
                 '--sweep', f'there are {len(linkage.inputs)} inputs', 'name each state with --at'
             )
         in_turns = in_degrees and not linkage.inputs[0].slider
-        asked += _sweep(
+        asked += _sweep_inputs(
             InputSweep(closure),
             arguments.first,
             arguments.last,
             arguments.steps,
             in_degrees=in_turns,
         )
-    acceleration = read(arguments.acceleration, '--acceleration')
-    rate = read(arguments.rate, '--rate')
+    acceleration = read_typed(arguments.acceleration, '--acceleration')
+    rate = read_typed(arguments.rate, '--rate')
     if rate is None and acceleration is not None:
         rate = (0.0,) * len(linkage.inputs)
     carriers = traced_carriers(linkage)
@@ -327,8 +333,13 @@ def _question(
     return Question(asked, rate, acceleration, carriers if arguments.points else {})
 
 
-def _sweep(
-    way: InputSweep, first: float | None, last: float | None, steps: int, *, in_degrees: bool
+def _sweep_inputs(
+    input_sweep: InputSweep,
+    first: float | None,
+    last: float | None,
+    steps: int,
+    *,
+    in_degrees: bool,
 ) -> Iterator[tuple[float, ...]]:
     """
     Yield inputs from end to end at equal steps; without ends, over every range.
@@ -336,9 +347,9 @@ def _sweep(
     The ends of a range are solved with all their digits: by way of degrees they are rounded, and
     the rounded end may miss a toggle.
     """
-    ranges = list(way.ranges)
+    ranges = list(input_sweep.ranges)
     if first is not None or last is not None:
-        reached = way.widest_range
+        reached = input_sweep.widest_range
         assert reached is not None, 'reading the file has proved that it closes somewhere'
         ranges = [reached]
     show, read = (degrees, radians) if in_degrees else (float, float)
@@ -354,78 +365,82 @@ def _sweep(
             yield (value,)
 
 
-def _columns(closure: Closure, question: Question) -> Iterator[Column]:
+def _output_columns(closure: Closure, question: Question) -> Iterator[ResultColumn]:
     linkage = closure.linkage
     for given in linkage.inputs:
-        yield Column(given.joint, given.unit)
-    yield Column('status', '')
-    yield Column('gap', 'm')
-    for order in _orders(question):
+        yield ResultColumn(given.joint, given.unit)
+    yield ResultColumn('status', '')
+    yield ResultColumn('gap', 'm')
+    for order in _derivative_orders(question):
         for name, turning in zip(linkage.joints, closure.turning, strict=True):
             unit = 'rad' if turning else 'm'
-            yield Column(f'{name}{_ORDERS[order]}', f'{unit}{_PER[order]}')
+            yield ResultColumn(f'{name}{_ORDERS[order]}', f'{unit}{_PER[order]}')
         for point in question.points:
             for axis in 'xy':
-                yield Column(f'{point}.{axis}{_ORDERS[order]}', f'm{_PER[order]}')
+                yield ResultColumn(f'{point}.{axis}{_ORDERS[order]}', f'm{_PER[order]}')
 
 
-def _orders(question: Question) -> range:
+def _derivative_orders(question: Question) -> range:
     return range(1 + (question.rates is not None) + (question.accelerations is not None))
 
 
-def _row(closure: Closure, question: Question, given: tuple[float, ...]) -> list[Any]:
+def _state_row(closure: Closure, question: Question, given: tuple[float, ...]) -> list[Any]:
     """Return the cells of a state; empty cells where there is no value."""
     row: list[Any] = [*given]
     position = closure.position(*given)
     row += [position.status.value, position.gap]
     count = len(closure.turning) + 2 * len(question.points)
     if not position.joints:
-        return row + [None] * (count * len(_orders(question)))
+        return row + [None] * (count * len(_derivative_orders(question)))
     row += [
-        wrapped(value) if turning else value
+        wrap_angle(value) if turning else value
         for value, turning in zip(position.joints, closure.turning, strict=True)
     ]
     points = closure.points(position) if question.points else {}
     for point, link in question.points.items():
-        row += _xy(points[link, point])
+        row += _to_xy(points[link, point])
     if question.rates is None:
         return row
     if not position.status.has_rates:
-        return row + [None] * (count * (len(_orders(question)) - 1))
+        return row + [None] * (count * (len(_derivative_orders(question)) - 1))
     velocity = closure.velocity(position, *question.rates)
     # Rates of points come together with accelerations; unknown accelerations count as 0.
     changes = question.accelerations or (0.0,) * len(given)
     acceleration = closure.acceleration(position, velocity, *changes)
     motion = closure.point_motion(position, velocity, acceleration) if question.points else {}
-    rates = (velocity.joints, acceleration.joints)[: len(_orders(question)) - 1]
+    rates = (velocity.joints, acceleration.joints)[: len(_derivative_orders(question)) - 1]
     for order, joints in enumerate(rates, start=1):
         row += joints
         for point, link in question.points.items():
-            row += _xy(motion[link, point][order])
+            row += _to_xy(motion[link, point][order])
     return row
 
 
-def _xy(place: complex) -> tuple[float, float]:
+def _to_xy(place: complex) -> tuple[float, float]:
     return place.real, place.imag
 
 
-def _table(columns: Sequence[Column], rows: Sequence[Sequence[Any]], angles: AngleUnit) -> Table:
-    def cell(column: Column, value: Any) -> str:
+def _states_table(
+    columns: Sequence[ResultColumn], rows: Sequence[Sequence[Any]], angles: AngleUnit
+) -> TerminalTable:
+    def cell_text(column: ResultColumn, value: Any) -> str:
         if isinstance(value, str | int) or value is None:
             return str(value or '')
         if column.name == 'gap':
             return f'{value:.3g}'
-        return fixed(angles.of(value) if column.unit.startswith('rad') else value, _DIGITS)
+        return fixed_text(
+            angles.convert(value) if column.unit.startswith('rad') else value, _DIGITS
+        )
 
     shown = [column._replace(unit=column.unit.replace('rad', angles.name)) for column in columns]
-    return Table(
+    return TerminalTable(
         '',
         [f'>{column}' if column.unit else str(column) for column in shown],
-        [[cell(*pair) for pair in zip(columns, row, strict=True)] for row in rows],
+        [[cell_text(*pair) for pair in zip(columns, row, strict=True)] for row in rows],
     )
 
 
-def _csv(columns: Sequence[Column], rows: Sequence[Sequence[Any]]) -> str:
+def _format_csv(columns: Sequence[ResultColumn], rows: Sequence[Sequence[Any]]) -> str:
     written = io.StringIO()
     writer = csv.writer(written, lineterminator='\n')
     writer.writerow(csv_text(str(column)) for column in columns)
@@ -435,7 +450,7 @@ def _csv(columns: Sequence[Column], rows: Sequence[Sequence[Any]]) -> str:
     return written.getvalue()
 
 
-def _json(columns: Sequence[Column], rows: Sequence[Sequence[Any]]) -> str:
+def _format_json(columns: Sequence[ResultColumn], rows: Sequence[Sequence[Any]]) -> str:
     answer = {
         'units': {column.name: column.unit for column in columns if column.unit},
         'states': [

@@ -41,7 +41,7 @@ _SHIFT = 0.01
 Angles = Sequence[float]
 
 
-class Answer(NamedTuple):
+class DesignAnswer(NamedTuple):
     """A solution."""
 
     title: str  # How the design was made
@@ -53,7 +53,7 @@ class Answer(NamedTuple):
     curve: tuple[Sequence[float], Sequence[float]] | None = None
 
 
-class Search(NamedTuple):
+class DesignSearch(NamedTuple):
     """Requirements and effort of a search."""
 
     needs: Needs
@@ -63,12 +63,12 @@ class Search(NamedTuple):
     address: str
     progress: ProgressCallback
 
-    def accepts(self, design: Design) -> bool:
+    def meets_needs(self, design: Design) -> bool:
         """Return whether a design meets the requirements."""
         return not misses(assess(design), self.needs)
 
 
-def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
+def find_answers(typed: argparse.Namespace, search: DesignSearch) -> list[DesignAnswer]:
     """
     Return all solutions, the best first.
 
@@ -89,24 +89,24 @@ def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
             f'name one of {listed(tasks)}',
         )
     work = {
-        '--pair': _pairs,
-        '--function': _function,
-        '--path': _path,
-        '--pose': _motion,
+        '--pair': _solve_pairs,
+        '--function': _solve_function,
+        '--path': _solve_path,
+        '--pose': _solve_motion,
         '--swing': _dead_centres,
     }
     return work[named[0]](typed, search)
 
 
-def _pairs(typed: argparse.Namespace, search: Search) -> list[Answer]:
+def _solve_pairs(typed: argparse.Namespace, search: DesignSearch) -> list[DesignAnswer]:
     rows = typed.pair or numbers_of(typed.pairs, (2,))
     crank, rocker = ([typed.angles.read(row[i]) for row in rows] for i in (0, 1))
     return _of_pairs(crank, rocker, typed, search)
 
 
 def _of_pairs(
-    crank: Angles, rocker: Angles, typed: argparse.Namespace, search: Search
-) -> list[Answer]:
+    crank: Angles, rocker: Angles, typed: argparse.Namespace, search: DesignSearch
+) -> list[DesignAnswer]:
     ground, free = typed.ground, typed.free_zeros
     count = len(crank)
     if count < 3:
@@ -114,16 +114,18 @@ def _of_pairs(
             'pairs', f'there are {count}', 'three make a four-bar, more a nearest one'
         )
     if count == 3 and free:
-        return _searched(crank, rocker, ground, search)
+        return _search_answers(crank, rocker, ground, search)
     if count == 3:
         design, found = exact(crank, rocker, ground)
-        return [Answer('three pairs, exact', design, assess(design), list(_worth(found)))]
+        return [
+            DesignAnswer('three pairs, exact', design, assess(design), list(_pairs_facts(found)))
+        ]
     if count <= 5 and free:
         return _with_zeros(crank, rocker, ground)
-    return [_fitted(crank, rocker, ground, free)]
+    return [_fit_answer(crank, rocker, ground, free)]
 
 
-def _worth(pairs: ThreePairs) -> list[tuple[str, str]]:
+def _pairs_facts(pairs: ThreePairs) -> list[tuple[str, str]]:
     k1, k2, k3 = pairs.k
     slopes = abs(pairs.gradient).max(-1) / abs(pairs.lengths) * radians(_SHIFT)
     digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, pairs.digits, strict=True)]
@@ -139,7 +141,9 @@ def _worth(pairs: ThreePairs) -> list[tuple[str, str]]:
 _LINKS = ('crank', 'coupler', 'rocker')
 
 
-def _searched(crank: Angles, rocker: Angles, ground: float, search: Search) -> list[Answer]:
+def _search_answers(
+    crank: Angles, rocker: Angles, ground: float, search: DesignSearch
+) -> list[DesignAnswer]:
     from linkage_ros.synthesis.pairs.zero_search import search_zeros
 
     designs = search_zeros(
@@ -153,10 +157,10 @@ def _searched(crank: Angles, rocker: Angles, ground: float, search: Search) -> l
         progress=search.progress,
         address=search.address,
     )
-    return [_turned('three pairs', design) for design in designs]
+    return [_turned_answer('three pairs', design) for design in designs]
 
 
-def _turned(what: str, design: Design) -> Answer:
+def _turned_answer(what: str, design: Design) -> DesignAnswer:
     """Return a solution whose zero angles were free; its title names them."""
     four_bar = design.four_bar
     zeros = [
@@ -165,16 +169,16 @@ def _turned(what: str, design: Design) -> Answer:
         if pin.imag
     ]
     title = f'{what}, zero of {" and ".join(zeros)}' if zeros else what
-    return Answer(title, design, assess(design))
+    return DesignAnswer(title, design, assess(design))
 
 
-def _with_zeros(crank: Angles, rocker: Angles, ground: float) -> list[Answer]:
+def _with_zeros(crank: Angles, rocker: Angles, ground: float) -> list[DesignAnswer]:
     from linkage_ros.synthesis.pairs.free_zeros import five_pairs, four_pairs
 
     solve, what = (four_pairs, 'four pairs') if len(crank) == 4 else (five_pairs, 'five pairs')
     found = []
     for one in solve(crank, rocker, ground):
-        answer = _turned(what, one.design)
+        answer = _turned_answer(what, one.design)
         digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, one.digits, strict=True)]
         facts = [
             ('found', str(one.among)),
@@ -182,30 +186,30 @@ def _with_zeros(crank: Angles, rocker: Angles, ground: float) -> list[Answer]:
             ('digits to trust', ', '.join(digits)),
         ]
         found.append(answer._replace(facts=facts))
-    return sorted(found, key=_usefulness)
+    return sorted(found, key=_rank_answer)
 
 
-def _usefulness(answer: Answer) -> tuple[int, float]:
+def _rank_answer(answer: DesignAnswer) -> tuple[int, float]:
     return len(answer.assessment.defects), answer.assessment.link_ratio
 
 
-def _fitted(crank: Angles, rocker: Angles, ground: float, free: bool) -> Answer:
+def _fit_answer(crank: Angles, rocker: Angles, ground: float, free: bool) -> DesignAnswer:
     from linkage_ros.synthesis.pairs.angle_fit import nearest
 
     start = fit_equation(crank, rocker, ground)
     design = nearest(crank, rocker, ground, free_zeros=free)
-    answer = _turned(f'{len(crank)} pairs, nearest', design)
+    answer = _turned_answer(f'{len(crank)} pairs, nearest', design)
     met = answer.assessment.met
     facts = [
-        ('rocker off, by the equation', _errors(assess(start).met)),
-        ('rocker off, fitted', _errors(met)),
+        ('rocker off, by the equation', _errors_text(assess(start).met)),
+        ('rocker off, fitted', _errors_text(met)),
     ]
     return answer._replace(
         facts=facts, curve=([one.crank for one in design.wanted], [one.angle for one in met])
     )
 
 
-def _errors(met: Sequence[Met]) -> str:
+def _errors_text(met: Sequence[Met]) -> str:
     closed = [one.angle for one in met if one.closed]
     if not closed:
         return 'no position can be assembled'
@@ -215,7 +219,7 @@ def _errors(met: Sequence[Met]) -> str:
     return f'{degrees(rms):.4g}° rms, {degrees(most):.4g}° at most{beside}'
 
 
-def _function(typed: argparse.Namespace, search: Search) -> list[Answer]:
+def _solve_function(typed: argparse.Namespace, search: DesignSearch) -> list[DesignAnswer]:
     from linkage_ros.synthesis.function.expression import Expression
     from linkage_ros.synthesis.function.task import (
         chebyshev,
@@ -242,13 +246,13 @@ def _function(typed: argparse.Namespace, search: Search) -> list[Answer]:
         error = structural_error(
             answer.design, lambda angles: wanted_rocker(task, angles), *task.crank_range
         )
-        facts = list(_structural(task, error))
+        facts = list(_structural_facts(task, error))
         curve = list(error.crank), list(error.error)
         found.append(answer._replace(facts=[*answer.facts, *facts], curve=curve))
     return found
 
 
-def _structural(task: FunctionTask, error: StructuralError) -> Iterator[tuple[str, str]]:
+def _structural_facts(task: FunctionTask, error: StructuralError) -> Iterator[tuple[str, str]]:
     from linkage_ros.synthesis.function.task import on_scale
 
     if error.opens_at is not None:
@@ -263,11 +267,11 @@ def _structural(task: FunctionTask, error: StructuralError) -> Iterator[tuple[st
 
 
 def _read_range(angles: AngleUnit, typed: Sequence[float]) -> tuple[float, float]:
-    start, end = map(angles.read, typed)
+    start, end = map(angles.to_radians, typed)
     return start, end
 
 
-def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
+def _solve_path(typed: argparse.Namespace, search: DesignSearch) -> list[DesignAnswer]:
     from linkage_ros.synthesis.path.curves import PathTask
     from linkage_ros.synthesis.path.generate import generate_path
 
@@ -287,12 +291,12 @@ def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
         seed=search.seed,
         count=search.candidates,
         keep=search.keep,
-        accept=search.accepts,
+        accept=search.meets_needs,
         progress=search.progress,
         address=search.address,
     )
     return [
-        Answer(
+        DesignAnswer(
             f'{len(rows)} points of a curve',
             one.design,
             assess(one.design),
@@ -302,7 +306,7 @@ def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
     ]
 
 
-def _dead_centres(typed: argparse.Namespace, search: Search) -> list[Answer]:
+def _dead_centres(typed: argparse.Namespace, search: DesignSearch) -> list[DesignAnswer]:
     from linkage_ros.synthesis.dead_centres import crank_rockers, DeadCentreTask
 
     for name in ('swing', 'time_ratio'):
@@ -312,12 +316,12 @@ def _dead_centres(typed: argparse.Namespace, search: Search) -> list[Answer]:
     task = DeadCentreTask(typed.angles.read(typed.swing), typed.time_ratio, typed.ground)
     offset = f'{degrees(task.offset):.6g}° more than half a turn for the longer stroke'
     return [
-        Answer('dead centres', design, assess(design), [('crank', offset)])
+        DesignAnswer('dead centres', design, assess(design), [('crank', offset)])
         for design in crank_rockers(task, search.keep)
     ]
 
 
-def _motion(typed: argparse.Namespace, _search: Search) -> list[Answer]:
+def _solve_motion(typed: argparse.Namespace, _search: DesignSearch) -> list[DesignAnswer]:
     from linkage_ros.synthesis.motion import from_fixed_pivots, from_moving_pivots, Pose
 
     fixed, moving = typed.fixed_pivot, typed.moving_pivot
@@ -344,4 +348,4 @@ def _motion(typed: argparse.Namespace, _search: Search) -> list[Answer]:
         (found, f'{one} and {other} m'),
         ('digits to trust', f'{one_digits} and {other_digits}'),
     ]
-    return [Answer(f'three poses, from {kind} pivots', design, assess(design), facts)]
+    return [DesignAnswer(f'three poses, from {kind} pivots', design, assess(design), facts)]

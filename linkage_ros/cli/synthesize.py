@@ -27,13 +27,13 @@ from linkage_ros.cli.arguments import (
     add_output,
     add_radians,
     AngleUnit,
-    bounded,
+    bounded_number,
     LINKAGES,
-    output,
+    output_path,
     PICTURES,
 )
-from linkage_ros.cli.synthesis_tasks import Answer, answers, CANDIDATES, Search
-from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
+from linkage_ros.cli.synthesis_tasks import CANDIDATES, DesignAnswer, DesignSearch, find_answers
+from linkage_ros.cli.terminal import print_tables, ProgressCallback, show_progress, TerminalTable
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import check_new
 from linkage_ros.files.linkage_text import write_linkage
@@ -43,17 +43,23 @@ from linkage_ros.synthesis.design import FourBar
 # Tables of a designed four-bar: its links, its proof, its quality.
 
 
-def tables(answer: Answer, title: str, needs: Needs, angles: AngleUnit) -> Iterator[Table]:
+def solution_tables(
+    answer: DesignAnswer, title: str, needs: Needs, angles: AngleUnit
+) -> Iterator[TerminalTable]:
     """Yield the tables of a solution."""
     four_bar = answer.design.four_bar
-    yield Table(angles.told(title), ('link', '>length [m]', ''), list(_links(four_bar)))
+    yield TerminalTable(
+        angles.convert_text(title), ('link', '>length [m]', ''), list(_link_rows(four_bar))
+    )
     if answer.facts:
-        yield Table('', ('', ''), [tuple(map(angles.told, fact)) for fact in answer.facts])
-    yield _proof(answer, angles)
-    yield Table('', ('', ''), list(_worth(answer.assessment, needs, angles)))
+        yield TerminalTable(
+            '', ('', ''), [tuple(map(angles.convert_text, fact)) for fact in answer.facts]
+        )
+    yield _positions_table(answer, angles)
+    yield TerminalTable('', ('', ''), list(_assessment_facts(answer.assessment, needs, angles)))
 
 
-def _links(four_bar: FourBar) -> Iterator[tuple[str, str, str]]:
+def _link_rows(four_bar: FourBar) -> Iterator[tuple[str, str, str]]:
     names = ('crank', 'coupler', 'rocker', 'ground')
     pins = (four_bar.crank, None, four_bar.rocker, None)
     for name, length, pin in zip(names, four_bar.lengths, pins, strict=True):
@@ -63,7 +69,7 @@ def _links(four_bar: FourBar) -> Iterator[tuple[str, str, str]]:
         yield name, f'{length:.10g}', note
 
 
-def _proof(answer: Answer, angles: AngleUnit) -> Table:
+def _positions_table(answer: DesignAnswer, angles: AngleUnit) -> TerminalTable:
     """Return how each position is met; optional columns appear only if they were asked for."""
     wanted = answer.design.wanted
     columns = ['>', '>crank']
@@ -79,44 +85,46 @@ def _proof(answer: Answer, angles: AngleUnit) -> Table:
     columns += [f'>off [{angles.name}]'] if rocker or coupler else []
     rows = []
     for number, (one, met) in enumerate(zip(wanted, answer.assessment.met, strict=True), 1):
-        row = [str(number), angles.text(one.crank)]
+        row = [str(number), angles.format_angle(one.crank)]
         if place:
             at = one.place
             row += ['', ''] if at is None else [f'{at.real:.6g}', f'{at.imag:.6g}']
         for asked, angle in ((rocker, one.rocker), (coupler, one.coupler)):
             if asked:
-                row.append('' if angle is None else angles.text(angle))
+                row.append('' if angle is None else angles.format_angle(angle))
         row.append(met.side if met.closed else f'open by {met.gap:.3g} m')
         if place:
             row.append(f'{met.distance:.2e}' if met.closed else '')
         if rocker or coupler:
-            row.append(f'{angles.of(met.angle):+.2e}' if met.closed else '')
+            row.append(f'{angles.convert(met.angle):+.2e}' if met.closed else '')
         rows.append(row)
-    return Table('Proof: each position, analysed again', columns, rows)
+    return TerminalTable('Proof: each position, analysed again', columns, rows)
 
 
-def _worth(assessment: Assessment, needs: Needs, angles: AngleUnit) -> Iterator[tuple[str, str]]:
+def _assessment_facts(
+    assessment: Assessment, needs: Needs, angles: AngleUnit
+) -> Iterator[tuple[str, str]]:
     kind = assessment.kind
     turns = 'the crank turns fully' if assessment.turns else 'the crank does not turn fully'
     yield 'kind', f'{kind.name} ({kind.code}), {turns}'
     if assessment.travel is not None:
-        start, end = map(angles.text, assessment.travel)
+        start, end = map(angles.format_angle, assessment.travel)
         yield 'crank goes', f'{start} to {end}, through all positions'
     where = 'on the way' if assessment.travel is not None else 'of the positions'
-    least = angles.text(assessment.transmission, 2)
+    least = angles.format_angle(assessment.transmission, 2)
     yield (
         'transmission',
-        f'{least} at least {where}, with the crank at {angles.text(assessment.at)}',
+        f'{least} at least {where}, with the crank at {angles.format_angle(assessment.at)}',
     )
     if assessment.full_transmission is not None:
-        yield '', f'{angles.text(assessment.full_transmission, 2)} over the full turn'
+        yield '', f'{angles.format_angle(assessment.full_transmission, 2)} over the full turn'
     yield 'link ratio', f'{assessment.link_ratio:.4g}, longest to shortest'
     for defect in assessment.defects:
-        yield f'{defect.name} defect', angles.told(defect.text)
+        yield f'{defect.name} defect', angles.convert_text(defect.text)
     if not assessment.defects:
         yield 'defects', 'none: order, branch and circuit are right'
     for missed in misses(assessment, needs):
-        yield 'lacks what is needed', angles.told(missed)
+        yield 'lacks what is needed', angles.convert_text(missed)
 
 
 _NOT_MET = 1
@@ -161,7 +169,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     written.add_argument(
         '--draw',
-        type=output(PICTURES),
+        type=output_path(PICTURES),
         metavar='OUTPUT',
         help='picture of the solution at its positions, OUTPUT.png, .svg or .pdf; of several '
         'OUTPUT-1, OUTPUT-2, …',
@@ -208,7 +216,7 @@ def _add_function(parser: argparse.ArgumentParser) -> None:
         )
     function.add_argument(
         '--points',
-        type=bounded(0, 2**53 - 1, int),
+        type=bounded_number(0, 2**53 - 1, int),
         default=3,
         metavar='N',
         help='points, by Chebyshev (default: 3)',
@@ -244,7 +252,7 @@ def _add_dead_centres(parser: argparse.ArgumentParser) -> None:
     rocker.add_argument('--swing', type=float, metavar='ANGLE', help='of the rocker')
     rocker.add_argument(
         '--time-ratio',
-        type=_ratio,
+        type=_read_ratio,
         metavar='RATIO',
         help='longer stroke to shorter one, as 10/9 or 1.2',
     )
@@ -271,7 +279,7 @@ def _add_poses(parser: argparse.ArgumentParser) -> None:
         )
 
 
-def _ratio(text: str) -> float:
+def _read_ratio(text: str) -> float:
     """Read a number, or a fraction such as 10/9."""
     try:
         return float(Fraction(text))
@@ -289,21 +297,21 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
     )
     freedoms.add_argument(
         '--seed',
-        type=bounded(0, 2**53 - 1, int),
+        type=bounded_number(0, 2**53 - 1, int),
         default=0,
         metavar='N',
         help='of the search (default: 0)',
     )
     freedoms.add_argument(
         '--candidates',
-        type=bounded(1, 2**53 - 1, int),
+        type=bounded_number(1, 2**53 - 1, int),
         default=CANDIDATES,
         metavar='N',
         help=f'how many are tried in a search (default: {CANDIDATES})',
     )
     freedoms.add_argument(
         '--best',
-        type=bounded(1, 2**53 - 1, int),
+        type=bounded_number(1, 2**53 - 1, int),
         metavar='N',
         help=f'how many are listed (of a search {_LISTED}, else all)',
     )
@@ -318,7 +326,7 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Design; return 1 if no solution meets the requirements."""
     try:
-        return _design(arguments)
+        return _run_design(arguments)
     except LinkageError as error:
         if arguments.angles.in_degrees:
             raise
@@ -326,27 +334,31 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         raise LinkageError(told(error.where), told(error.reason), told(error.remedy)) from None
 
 
-def _design(arguments: argparse.Namespace) -> int:
-    with progress('candidates') as advance:
-        found, meeting = solutions(arguments, advance)
+def _run_design(arguments: argparse.Namespace) -> int:
+    with show_progress('candidates') as advance:
+        found, meeting = find_solutions(arguments, advance)
     if not meeting:
         print(f'None of {len(found)} solution(s) has what is needed. Nearest to it:\n')
     needs = needs_of(arguments)
     shown = found[: arguments.best]
-    _show(shown, needs, arguments.angles)
-    _draw(arguments.draw, shown, force=arguments.force)
+    _print_solutions(shown, needs, arguments.angles)
+    _draw_solutions(arguments.draw, shown, force=arguments.force)
     if not meeting:
         return _NOT_MET
     if arguments.output is not None:
-        _write(arguments, shown)
+        _write_solution(arguments, shown)
     return 0
 
 
-def solutions(typed: argparse.Namespace, advance: ProgressCallback) -> tuple[list[Answer], bool]:
+def find_solutions(
+    typed: argparse.Namespace, advance: ProgressCallback
+) -> tuple[list[DesignAnswer], bool]:
     """Return the solutions that meet the requirements and True; or the nearest ones and False."""
     needs = needs_of(typed)
     keep = typed.best or _LISTED
-    found = answers(typed, Search(needs, typed.seed, typed.candidates, keep, typed.dask, advance))
+    found = find_answers(
+        typed, DesignSearch(needs, typed.seed, typed.candidates, keep, typed.dask, advance)
+    )
     meeting = [one for one in found if not misses(one.assessment, needs)]
     if meeting:
         return meeting, True
@@ -360,15 +372,15 @@ def needs_of(typed: argparse.Namespace) -> Needs:
     return needs._replace(usable=typed.usable or needs != Needs())
 
 
-def _show(shown: Sequence[Answer], needs: Needs, angles: AngleUnit) -> None:
+def _print_solutions(shown: Sequence[DesignAnswer], needs: Needs, angles: AngleUnit) -> None:
     for number, answer in enumerate(shown, 1):
         title = answer.title if len(shown) == 1 else f'{number}: {answer.title}'
-        for table in tables(answer, title, needs, angles):
-            show(table)
+        for table in solution_tables(answer, title, needs, angles):
+            print_tables(table)
             print()
 
 
-def _draw(file: Path | None, shown: Sequence[Answer], *, force: bool) -> None:
+def _draw_solutions(file: Path | None, shown: Sequence[DesignAnswer], *, force: bool) -> None:
     if file is None:
         return
     from linkage_ros.drawing.design import draw_design
@@ -380,7 +392,7 @@ def _draw(file: Path | None, shown: Sequence[Answer], *, force: bool) -> None:
         print(own)
 
 
-def _write(arguments: argparse.Namespace, shown: Sequence[Answer]) -> None:
+def _write_solution(arguments: argparse.Namespace, shown: Sequence[DesignAnswer]) -> None:
     if not 1 <= arguments.pick <= len(shown):
         raise LinkageError(
             f'--pick {arguments.pick}',

@@ -33,7 +33,7 @@ _BORDER = 3
 """Characters that the frame of a table adds to each column."""
 
 
-class Table(NamedTuple):
+class TerminalTable(NamedTuple):
     """A table."""
 
     title: str  # '' for no title
@@ -43,7 +43,7 @@ class Table(NamedTuple):
     rows: Sequence[Sequence[str]]
 
 
-def show(*tables: Table) -> None:
+def print_tables(*tables: TerminalTable) -> None:
     """
     Print tables, with an empty line between two.
 
@@ -53,59 +53,62 @@ def show(*tables: Table) -> None:
     width = get_terminal_size().columns if sys.stdout.isatty() else 0
     shown = [
         part
-        for table in map(_cleaned, tables)
-        for part in (folded(table, width) if width else [table])
+        for table in map(_clean_table, tables)
+        for part in (fold_table(table, width) if width else [table])
     ]
     for number, table in enumerate(shown):
         if number:
             print()
-        _show(table, width)
+        _print_table(table, width)
 
 
-def _cleaned(table: Table) -> Table:
+def _clean_table(table: TerminalTable) -> TerminalTable:
     rows = [[shortened(clean(cell), _LONGEST_CELL) for cell in row] for row in table.rows]
-    return Table(clean(table.title), list(map(clean, table.columns)), rows)
+    return TerminalTable(clean(table.title), list(map(clean, table.columns)), rows)
 
 
-def _show(table: Table, width: int) -> None:
+def _print_table(table: TerminalTable, width: int) -> None:
     # A word that is wider than the terminal is not broken; a frame would break it.
-    if find_spec('rich') is not None and _framed(_widths(table)) <= width:
+    if find_spec('rich') is not None and _framed_width(_column_widths(table)) <= width:
         from rich.console import Console
 
-        Console(file=sys.__stdout__, width=width).print(_drawn(table))
+        Console(file=sys.__stdout__, width=width).print(_rich_table(table))
     else:
-        print(text(table))
+        print(table_text(table))
 
 
-def folded(table: Table, width: int) -> list[Table]:
+def fold_table(table: TerminalTable, width: int) -> list[TerminalTable]:
     """
     Return a table as tables that are at most ``width`` characters wide with their frames.
 
     Long cells and headings are wrapped at spaces. If that is not enough, the columns are divided
     among several tables, each of which begins with the first column. No word is broken.
     """
-    if _framed(_widths(table)) <= width:
+    if _framed_width(_column_widths(table)) <= width:
         return [table]
-    columns = list(zip(_heads(table), *table.rows, strict=True))
-    narrow = [_width(cells, _NARROWEST) for cells in columns]
+    columns = list(zip(_column_heads(table), *table.rows, strict=True))
+    narrow = [_column_width(cells, _NARROWEST) for cells in columns]
     blocks: list[list[int]] = [[0]]
     for number in range(1, len(columns)):
         block = blocks[-1]
-        if len(block) > 1 and _framed([narrow[i] for i in [*block, number]]) > width:
+        if len(block) > 1 and _framed_width([narrow[i] for i in [*block, number]]) > width:
             block = [0]
             blocks.append(block)
         block.append(number)
-    tables: list[Table] = []
+    tables: list[TerminalTable] = []
     for block in blocks:
-        most = max(_width(columns[i]) for i in block)
-        while most > _NARROWEST and _framed([_width(columns[i], most) for i in block]) > width:
+        most = max(_column_width(columns[i]) for i in block)
+        while (
+            most > _NARROWEST
+            and _framed_width([_column_width(columns[i], most) for i in block]) > width
+        ):
             most -= 1
-        wrapped = [[_wrapped(cell, most) for cell in columns[i]] for i in block]
+        wrapped = [[_wrap_cell(cell, most) for cell in columns[i]] for i in block]
         heads, *rows = zip(*wrapped, strict=True)
         marks = ('>' * table.columns[i].startswith('>') for i in block)
         tables.append(
-            Table(
-                '' if tables else _wrapped(table.title, width),
+            TerminalTable(
+                '' if tables else _wrap_cell(table.title, width),
                 [mark + head for mark, head in zip(marks, heads, strict=True)],
                 rows,
             )
@@ -113,14 +116,14 @@ def folded(table: Table, width: int) -> list[Table]:
     return tables
 
 
-def _wrapped(cell: str, most: int) -> str:
+def _wrap_cell(cell: str, most: int) -> str:
     """Return a cell with line breaks at spaces, if it is wider than ``most``."""
     if len(cell) <= most:
         return cell
     return fill(cell, most, break_long_words=False, break_on_hyphens=False)
 
 
-def _width(cells: Sequence[str], most: int = sys.maxsize) -> int:
+def _column_width(cells: Sequence[str], most: int = sys.maxsize) -> int:
     """Return the width of a column whose cells are wrapped to ``most``; a word may be wider."""
     width = max(len(line) for cell in cells for line in cell.split('\n'))
     if width <= most:
@@ -128,23 +131,23 @@ def _width(cells: Sequence[str], most: int = sys.maxsize) -> int:
     return max(most, *(len(word) for cell in cells for word in cell.split()))
 
 
-def _widths(table: Table) -> list[int]:
-    return [_width(cells) for cells in zip(_heads(table), *table.rows, strict=True)]
+def _column_widths(table: TerminalTable) -> list[int]:
+    return [_column_width(cells) for cells in zip(_column_heads(table), *table.rows, strict=True)]
 
 
-def _framed(widths: Sequence[int]) -> int:
+def _framed_width(widths: Sequence[int]) -> int:
     """Return the width of a table with its frame."""
     return sum(widths) + _BORDER * len(widths) + 1
 
 
-def _heads(table: Table) -> list[str]:
+def _column_heads(table: TerminalTable) -> list[str]:
     return [column.removeprefix('>') for column in table.columns]
 
 
-def text(table: Table) -> str:
+def table_text(table: TerminalTable) -> str:
     """Return a table as plain text."""
-    heads = _heads(table)
-    widths = _widths(table)
+    heads = _column_heads(table)
+    widths = _column_widths(table)
     right = [column.startswith('>') for column in table.columns]
     lines = [
         '  '.join(
@@ -157,12 +160,12 @@ def text(table: Table) -> str:
     return '\n'.join([table.title, *lines] if table.title else lines)
 
 
-def _drawn(table: Table) -> object:
+def _rich_table(table: TerminalTable) -> object:
     from rich import box
     from rich.table import Table as Drawn
     from rich.text import Text
 
-    heads = _heads(table)
+    heads = _column_heads(table)
     # As Text: rich would read brackets, such as those of a unit, as markup.
     drawn = Drawn(
         title=Text(table.title, style='bold') if table.title else None,
@@ -188,7 +191,7 @@ FIRST_LINE, _EVERY = 2.0, 30.0
 
 
 @contextmanager
-def progress(what: str) -> Iterator[ProgressCallback]:
+def show_progress(what: str) -> Iterator[ProgressCallback]:
     """Give a function that shows progress on standard error."""
     if sys.stderr.isatty() and find_spec('rich') is not None:
         from rich.console import Console
@@ -208,14 +211,14 @@ def progress(what: str) -> Iterator[ProgressCallback]:
     begin = monotonic()
     due, shown = begin + FIRST_LINE, False
 
-    def line(done: int, of: int) -> None:
+    def print_line(done: int, of: int) -> None:
         nonlocal due, shown
         now = monotonic()
         if now >= due and of:
             due, shown = now + _EVERY, True
             print(f'{what}: {done} of {of}', file=sys.stderr, flush=True)
 
-    yield line
+    yield print_line
     if shown:
         print(f'{what}: ended after {monotonic() - begin:.1f} s', file=sys.stderr, flush=True)
 

@@ -27,7 +27,7 @@ import webbrowser
 
 from linkage_ros.bag.other_formats import is_bag_name
 from linkage_ros.cli.arguments import add_output
-from linkage_ros.cli.report import check_page, report, write_page
+from linkage_ros.cli.report import bag_page, check_page, write_page
 from linkage_ros.errors import check_installed, clean, LinkageError, missing_packages_reported
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import read_yaml
@@ -77,15 +77,15 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         check_page(arguments.output)
     path = Path(arguments.file)
     if is_bag_name(path):
-        page = report(path, Window(), stop)
+        page = bag_page(path, Window(), stop)
         if arguments.output:
             write_page(arguments.output, page)
             return 0
-        return _serve(arguments, stop, path.resolve().name, lambda: page)
+        return _serve_page(arguments, stop, path.resolve().name, lambda: page)
     return _show_linkage(arguments, stop)
 
 
-class _Linkage(NamedTuple):
+class _NamedLinkage(NamedTuple):
     """A linkage to show: file and content, and its scene's name, files and folder, or None."""
 
     name: str
@@ -94,23 +94,23 @@ class _Linkage(NamedTuple):
     scene: tuple[str, dict[str, str], str] | None
 
 
-def _linkage(named: str) -> _Linkage:
+def _read_linkage(named: str) -> _NamedLinkage:
     """Read a linkage, or the first one of a scene; errors name the file."""
     file = named_file(named, 'linkages', 'scenes')
     content, data = read_yaml(file)
     if kind_of(content) == 'linkage':
         read_closure(content, file.stem)
-        return _Linkage(file.stem, file, data, None)
+        return _NamedLinkage(file.stem, file, data, None)
     scene = load_scene(file)
     path = Path(scene.linkages[0].linkage_content.file)
     first = next(text for name, text in scene.files.items() if name != SCENE_FILE)
     texts = {name: text.decode() for name, text in scene.files.items()}
     folder = str(Path(scene.folder).absolute())
-    return _Linkage(path.stem, path, first, (scene.name, texts, folder))
+    return _NamedLinkage(path.stem, path, first, (scene.name, texts, folder))
 
 
 def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
-    shown = _linkage(arguments.file)
+    shown = _read_linkage(arguments.file)
     from linkage_ros.view.model import model
     from linkage_ros.view.page import page
 
@@ -127,13 +127,13 @@ def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
     pages = _Pages(shown, file)
     pages()  # an error ends this command before a browser opens
     conversation = Conversation(shown.name, scene, file)
-    return _serve(arguments, stop, shown.name, pages, conversation.add)
+    return _serve_page(arguments, stop, shown.name, pages, conversation.add)
 
 
 class _Pages:
     """The page of a linkage; made anew where its file has changed."""
 
-    def __init__(self, shown: _Linkage, file: Any) -> None:
+    def __init__(self, shown: _NamedLinkage, file: Any) -> None:
         self._shown = shown
         self._file = file
         self._data = b''
@@ -173,7 +173,7 @@ def _show_node(arguments: argparse.Namespace, stop: Event) -> int:
 
     bridge = LiveBridge(arguments.node)
     try:
-        return _serve(
+        return _serve_page(
             arguments,
             stop,
             bridge.name,
@@ -184,18 +184,20 @@ def _show_node(arguments: argparse.Namespace, stop: Event) -> int:
         bridge.end()
 
 
-def _serve(arguments: argparse.Namespace, stop: Event, name: str, page: Any, *routes: Any) -> int:
+def _serve_page(
+    arguments: argparse.Namespace, stop: Event, name: str, page: Any, *routes: Any
+) -> int:
     from linkage_ros.view.server import serve
     from linkage_ros.view.worker import report as report_line
 
-    def ready(address: str) -> None:
+    def announce_address(address: str) -> None:
         print(clean(f'{name}: {address}'), flush=True)
         if not arguments.no_browser and _has_display():
             # Some browsers let whoever opens them wait.
             Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
     with heeded():
-        serve(page, routes, stop, ready, report_line, port=arguments.port)
+        serve(page, routes, stop, announce_address, report_line, port=arguments.port)
     print('linkage view: ended')
     return 0
 

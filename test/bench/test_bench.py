@@ -17,7 +17,7 @@ import sys
 
 from bench.kinematics_speed import AVAILABLE
 from bench.report import ratios, spread, Table
-from linkage_ros.cli.terminal import text
+from linkage_ros.cli.terminal import table_text
 from linkage_ros.measuring import percentile
 import pytest
 
@@ -39,7 +39,7 @@ def test_ratios_are_taken_turn_by_turn():
 
 def test_table_is_the_same_as_text_and_as_markdown():
     table = Table('t', ('', 'µs'), [('a', '1.0')])
-    assert text(table.for_terminal()) == 't\n    µs\na  1.0'
+    assert table_text(table.for_terminal()) == 't\n    µs\na  1.0'
     assert table.markdown() == '## t\n\n|  | µs |\n| --- | ---: |\n| a | 1.0 |\n'
 
 

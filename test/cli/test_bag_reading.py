@@ -14,7 +14,7 @@ from pathlib import Path
 from threading import Event
 
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli.bag_reading import beside, opened
+from linkage_ros.cli.bag_reading import open_bag, path_beside
 import pytest
 
 
@@ -28,7 +28,7 @@ import pytest
     ],
 )
 def test_a_bag_by_its_name(named: str, file: str) -> None:
-    assert beside(Path(named), '.png') == Path(file)
+    assert path_beside(Path(named), '.png') == Path(file)
 
 
 @pytest.mark.parametrize(('here', 'file'), [('.', 'runs/first.png'), ('..', 'runs.png')])
@@ -38,7 +38,7 @@ def test_a_folder_without_a_name(
     folder = tmp_path / 'runs' / 'first'
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
-    assert beside(Path(here), '.png') == tmp_path / file
+    assert path_beside(Path(here), '.png') == tmp_path / file
 
 
 def test_attachments_that_are_not_read_are_told_in_a_line(
@@ -46,7 +46,7 @@ def test_attachments_that_are_not_read_are_told_in_a_line(
 ) -> None:
     files = {'note': ('', b'a'), 'huge\n': ('', bytes(64 * 2**20)), 'scene.yaml': ('', b'b: 1')}
     BagWriter(tmp_path / 'bag', [], files).close()
-    bag = opened(tmp_path / 'bag', Event())
+    bag = open_bag(tmp_path / 'bag', Event())
     assert bag.attachments == {'note': b'a', 'scene.yaml': b'b: 1'}
     assert capsys.readouterr().err == (
         f'linkage: {tmp_path}/bag: attachments beyond 64 MiB are not read: huge\\n\n'
@@ -57,5 +57,5 @@ def test_of_a_bag_that_is_read_as_a_whole_nothing_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     BagWriter(tmp_path / 'bag', [], {'note': ('', b'a')}).close()
-    opened(tmp_path / 'bag', Event())
+    open_bag(tmp_path / 'bag', Event())
     assert capsys.readouterr().err == ''

@@ -12,7 +12,7 @@ from math import remainder, tau
 from pathlib import Path
 
 from linkage_ros.cli import plot as command
-from linkage_ros.cli.plot import curves, curves_over_time, is_after_gap
+from linkage_ros.cli.plot import crank_curves, curves_over_time, is_after_gap
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
@@ -48,7 +48,7 @@ def test_angles_are_continuous_over_a_turn_in_whichever_turn_they_were_recorded(
     positions = [closure.position(*crank).joints for crank in cranks]
     if wrapped:
         positions = [tuple(remainder(value, tau) for value in each) for each in positions]
-    joints, rates = curves(closure.linkage, cranks, positions, [()] * len(cranks))
+    joints, rates = crank_curves(closure.linkage, cranks, positions, [()] * len(cranks))
     assert [joint.name for joint in joints] == ['coupler_joint', 'rocker_joint']
     assert rates == []
     for joint in joints:
@@ -73,7 +73,7 @@ def test_a_crank_that_swings_is_drawn_over_its_range():
     cranks = [(middle + half * np.sin(0.1 * row) + tau,) for row in range(200)]
     positions = [closure.position(*crank).joints for crank in cranks]
     rates = [(1.0,) * len(positions[0])] * 199 + [()]
-    joints, joint_rates = curves(closure.linkage, cranks, positions, rates)
+    joints, joint_rates = crank_curves(closure.linkage, cranks, positions, rates)
     assert len(joint_rates) == len(joints)
     for joint in (*joints, *joint_rates):
         assert np.nanmin(joint.x) == pytest.approx(middle - half, abs=0.01)
@@ -84,7 +84,7 @@ def test_a_stuck_joint_stays_at_one_angle_within_a_turn():
     closure = closure_of('four_bar')
     cranks = [(0.01 * row,) for row in range(628)]
     positions = [(-3.0, 1.0)] * 628
-    joints, _ = curves(closure.linkage, cranks, positions, [()] * 628)
+    joints, _ = crank_curves(closure.linkage, cranks, positions, [()] * 628)
     for joint in joints:
         (values,) = (y for _, y in pieces(joint) if len(y))
         assert np.ptp(values) == 0.0
@@ -95,7 +95,7 @@ def test_a_reading_that_is_no_number_hides_itself_only():
     cranks = [(0.01 * row,) for row in range(100)]
     positions = [closure.position(*crank).joints for crank in cranks]
     positions[50] = (np.nan, np.nan)
-    joints, _ = curves(closure.linkage, cranks, positions, [()] * len(cranks))
+    joints, _ = crank_curves(closure.linkage, cranks, positions, [()] * len(cranks))
     for joint in joints:
         assert np.isfinite(joint.y).sum() == 99
 
@@ -109,7 +109,7 @@ def test_a_curve_breaks_where_ticks_were_lost(lost):
     times, no_rates = 0.001 * np.array(rows), [()] * len(rows)
     gaps = is_after_gap(times, steady=True)
     parts = 1 + len([row for row in lost if row - 1 not in lost])
-    over_crank, _ = curves(closure.linkage, cranks, positions, no_rates, gaps)
+    over_crank, _ = crank_curves(closure.linkage, cranks, positions, no_rates, gaps)
     over_time, _ = curves_over_time(closure.linkage, times, cranks, positions, no_rates, gaps)
     assert [curve.name for curve in over_time] == ['coupler_joint', 'rocker_joint', 'crank_joint']
     for curve in (*over_crank, *over_time):

@@ -21,7 +21,7 @@ from threading import Event
 
 from linkage_ros.cli import scene as command
 from linkage_ros.cli.scene import REGISTRIES, table_of
-from linkage_ros.cli.terminal import text
+from linkage_ros.cli.terminal import table_text
 from linkage_ros.errors import FileError, LinkageError
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.scene.schema import as_text
@@ -290,7 +290,7 @@ def test_every_parameter_has_a_unit_or_values_and_a_meaning():
     for what, registry in REGISTRIES.items():
         for name in registry:
             table = table_of(what, name)
-            assert text(table).startswith(f'{what} {name}: ')
+            assert table_text(table).startswith(f'{what} {name}: ')
             module = import_module(registry[name])
             declared = [field.name for field in fields(module.PARAMETERS)]
             rows = table.rows if declared else []

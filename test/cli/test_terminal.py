@@ -14,7 +14,14 @@ from pathlib import Path
 import re
 
 from linkage_ros.cli import terminal
-from linkage_ros.cli.terminal import FIRST_LINE, folded, progress, show, Table, text
+from linkage_ros.cli.terminal import (
+    FIRST_LINE,
+    fold_table,
+    print_tables,
+    show_progress,
+    table_text,
+    TerminalTable,
+)
 import pytest
 
 from .conftest import on_terminal
@@ -22,19 +29,19 @@ from .conftest import on_terminal
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 
 
-def words(tables: list[Table]) -> list[str]:
-    return sorted(' '.join(map(text, tables)).split())
+def words(tables: list[TerminalTable]) -> list[str]:
+    return sorted(' '.join(map(table_text, tables)).split())
 
 
 def test_a_table_that_fits_stays_as_it_is():
-    table = Table('title', ['a', '>b'], [['x', '1']])
-    assert folded(table, 80) == [table]
+    table = TerminalTable('title', ['a', '>b'], [['x', '1']])
+    assert fold_table(table, 80) == [table]
 
 
 def test_a_long_cell_is_wrapped_at_spaces_beside_the_other_cells_of_its_row():
-    table = Table('', ('', ''), [['one', 'some words that are too many'], ['two', 'x']])
-    (part,) = folded(table, 30)
-    assert text(part).splitlines() == [
+    table = TerminalTable('', ('', ''), [['one', 'some words that are too many'], ['two', 'x']])
+    (part,) = fold_table(table, 30)
+    assert table_text(part).splitlines() == [
         'one  some words that are',
         '     too many',
         'two  x',
@@ -44,20 +51,20 @@ def test_a_long_cell_is_wrapped_at_spaces_beside_the_other_cells_of_its_row():
 def test_many_columns_become_blocks_that_each_begin_with_the_first_column():
     heads = ['>crank [°]', *(f'>joint_{i} [°]' for i in range(8))]
     rows = [[f'{row}.5', *(f'{row}{i}.123456' for i in range(8))] for row in range(3)]
-    parts = folded(Table('title', heads, rows), 50)
+    parts = fold_table(TerminalTable('title', heads, rows), 50)
     assert len(parts) > 1
     assert [part.title for part in parts] == ['title', *[''] * (len(parts) - 1)]
     for part in parts:
         assert [row[0] for row in part.rows] == ['0.5', '1.5', '2.5']
-        assert max(map(len, text(part).splitlines())) <= 50
+        assert max(map(len, table_text(part).splitlines())) <= 50
     columns = [column for part in parts for column in part.columns[1:]]
     assert [column.replace('\n', ' ') for column in columns] == heads[1:]
 
 
 def test_no_word_is_broken():
     path = '/a/path/that/is/longer/than/the/terminal.yaml'
-    table = Table(path, ['a', '>b c'], [[path, '1 2'], ['x', path]])
-    parts = folded(table, 20)
+    table = TerminalTable(path, ['a', '>b c'], [[path, '1 2'], ['x', path]])
+    parts = fold_table(table, 20)
     assert set(words(parts)) == set(words([table]))
 
 
@@ -74,7 +81,7 @@ def test_no_line_of_a_wide_table_is_wider_than_the_terminal(tmp_path, columns):
 
 
 def test_in_a_pipe_each_row_is_one_line(capsys):
-    show(Table('', ['a', 'b'], [['x ' * 200, 'y ' * 200], ['1', '2']]))
+    print_tables(TerminalTable('', ['a', 'b'], [['x ' * 200, 'y ' * 200], ['1', '2']]))
     assert len(capsys.readouterr().out.splitlines()) == 3
 
 
@@ -96,14 +103,14 @@ def clock(monkeypatch) -> Clock:
 
 
 def test_a_short_task_tells_no_progress_in_a_pipe(capsys, clock):
-    with progress('parts') as advance:
+    with show_progress('parts') as advance:
         clock.now = 1.9
         advance(1, 2)
     assert capsys.readouterr().err == ''
 
 
 def test_a_long_task_tells_its_progress_and_its_end_in_a_pipe(capsys, clock):
-    with progress('parts') as advance:
+    with show_progress('parts') as advance:
         for clock.now in (1.0, 2.0, 3.0, 31.0, 32.0):
             advance(int(clock.now), 40)
         clock.now = 40.0

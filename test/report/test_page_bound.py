@@ -20,7 +20,7 @@ from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.bag.run_events import read_run_metadata
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli.report import report
+from linkage_ros.cli.report import bag_page
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
@@ -279,7 +279,7 @@ def test_a_bag_of_hundreds_of_topics_and_joints_with_endless_names(tmp_path):
         writer.write(number, BEGIN + number * MS, 0, message)
     writer.close()
     (file,) = writer.folder.glob('*.mcap')
-    page = report(file, Window(), Event())
+    page = bag_page(file, Window(), Event())
     assert size_of(page) < len(plotting_library()) + 3_000_000
     assert len(data_of(page)['plots']) == 2
     assert 'more rows.' in page
@@ -323,7 +323,7 @@ def bag(tmp_path_factory):
 def told(file: Path) -> str:
     """Return the line for which a bag is refused; of one that is not, ''."""
     try:
-        page = report(file, Window(), Event())
+        page = bag_page(file, Window(), Event())
     except LinkageError as error:
         return str(error) or pytest.fail('without a word')
     json.loads(page.split('id="data">')[1].split('</script>')[0], parse_constant=pytest.fail)

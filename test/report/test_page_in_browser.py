@@ -14,7 +14,7 @@ import random
 import re
 from threading import Event
 
-from linkage_ros.cli.report import report
+from linkage_ros.cli.report import bag_page
 from linkage_ros.report.run import Window
 import numpy as np
 import pytest
@@ -92,7 +92,7 @@ def folder(tmp_path_factory):
 
 def page_of(bag):
     file = bag.parent / f'{bag.name}.html'
-    file.write_text(report(bag, Window(), Event()), 'utf-8')
+    file.write_text(bag_page(bag, Window(), Event()), 'utf-8')
     return file
 
 

@@ -31,7 +31,7 @@ from urllib.parse import urlsplit
 from urllib.request import urlopen
 
 import aiohttp
-from linkage_ros.cli.report import report
+from linkage_ros.cli.report import bag_page
 from linkage_ros.errors import LinkageError
 from linkage_ros.report.run import Window
 from linkage_ros.view.conversation import Conversation, UserFile
@@ -643,7 +643,7 @@ def test_a_page_is_written_to_a_file(tmp_path: Path) -> None:
 def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
     scene = scene_file(tmp_path, 'rate: 100\n')
     Recorded(tmp_path / 'bag', scene, lambda tick: {'crank_joint': (0.01 * tick, 1.0)}).run(50)
-    expected = report(tmp_path / 'bag', Window(), Event()).encode()
+    expected = bag_page(tmp_path / 'bag', Window(), Event()).encode()
     answer = linkage(tmp_path, 'view', 'bag', '-o', 'view.html')
     assert (answer.returncode, answer.stderr) == (0, '')
     assert (tmp_path / 'view.html').read_bytes() == expected
