@@ -41,7 +41,7 @@ from linkage_ros.study.deliberate import compare_runs, leave_out
 from linkage_ros.study.measure import measure_budget, PARTS
 from linkage_ros.study.picture import budget_svg
 from linkage_ros.study.prices import price_scenes, tick_price, turn_crank
-from linkage_ros.study.solving import DISTANCES, HardCase, judge_hard_cases
+from linkage_ros.study.solving import compare_hard_cases, DISTANCES, HardCase
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'
@@ -164,7 +164,7 @@ def hard_lines() -> Iterator[str]:
         'that of another pose.'
     )
     yield ''
-    cases = [*judge_hard_cases()]
+    cases = [*compare_hard_cases()]
     places = [*dict.fromkeys(case.place for case in cases)]
     found = {(case.place, case.solver): case for case in cases}
     rows = []

@@ -34,12 +34,12 @@ from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
 from linkage_ros.scene.scene import Scene
 from linkage_ros.study.budget import JointError, Knob, Price, Setting
-from linkage_ros.study.joint_errors import distances, error_of, joints_at
+from linkage_ros.study.joint_errors import error_of, joint_distances, joints_at
 from linkage_ros.study.member_motion import (
     BEGIN,
     Crank,
     cranks_at,
-    MemberMotion,
+    LinkageMotion,
     scene_key,
     tick_times,
 )
@@ -69,7 +69,7 @@ _BEFORE = 20
 
 
 def measure_age_in_use(
-    scene: Scene, motions: Sequence[MemberMotion], horizon: float, *, quick: bool = False
+    scene: Scene, motions: Sequence[LinkageMotion], horizon: float, *, quick: bool = False
 ) -> Knob:
     """
     Return the errors of rates of ticks, for a listener who holds and one who carries forward.
@@ -93,22 +93,22 @@ def measure_age_in_use(
         changes: list[tuple[str, object]] = []
         advice = ''
         if ticks != rate:
-            changes = [] if by_sample else [('rate', _plain(ticks))]
+            changes = [] if by_sample else [('rate', _integer_if_whole(ticks))]
             advice = f'publish the crank at {ticks:g} Hz' if by_sample else ''
         held, carried = errors
-        settings.append(Setting(f'{_hertz(ticks)}, held', held, None, changes, advice))
+        settings.append(Setting(f'{_rate_label(ticks)}, held', held, None, changes, advice))
         fields: list[tuple[str, object]] = [(key, {}) for key in _rates_missing(scene)]
         advice = ', '.join(each for each in (advice, CARRY) if each)
-        label = f'{_hertz(ticks)}, carried forward'
+        label = f'{_rate_label(ticks)}, carried forward'
         settings.append(Setting(label, carried, None, [*changes, *fields], advice))
-    own = f'{_hertz(rate)}, held'
+    own = f'{_rate_label(rate)}, held'
     chosen = next(k for k, setting in enumerate(settings) if setting.label == own)
     settings[chosen] = settings[chosen]._replace(changes=())
     return Knob(IN_USE, settings, chosen)
 
 
 def errors_in_use(
-    motions: Sequence[MemberMotion],
+    motions: Sequence[LinkageMotion],
     rates: Sequence[float],
     horizon: float,
     periods: int = _PERIODS,
@@ -130,17 +130,17 @@ def errors_in_use(
     for motion in motions:
         joints, speeds = joints_at(motion.closure, cranks_at(motion, times))
         for number, (rate, block) in enumerate(zip(rates, blocks, strict=True)):
-            places = np.searchsorted(times, block)
-            exact = joints[:, places[:, 1:]]
-            first, speed = joints[:, places[:, :1]], speeds[:, places[:, :1]]
+            indices = np.searchsorted(times, block)
+            exact = joints[:, indices[:, 1:]]
+            first, speed = joints[:, indices[:, :1]], speeds[:, indices[:, :1]]
             ahead = speed * (np.array(_PARTS) / rate)
-            held[number].append(distances(motion.closure, first + 0.0 * ahead, exact))
-            carried[number].append(distances(motion.closure, first + ahead, exact))
+            held[number].append(joint_distances(motion.closure, first + 0.0 * ahead, exact))
+            carried[number].append(joint_distances(motion.closure, first + ahead, exact))
     found = []
     for one, other in zip(held, carried, strict=True):
         errors = _over_periods(one), _over_periods(other)
         if errors[0] is None or errors[1] is None:
-            raise motions[0].member.content.error(
+            raise motions[0].scene_linkage.content.error(
                 'drive',
                 'moves the linkage nowhere where its loops close',
                 'see linkage check for where they close',
@@ -168,31 +168,31 @@ def _over_periods(apart: Sequence[Any]) -> JointError | None:
 
 
 def measure_age_of_command(
-    motion: MemberMotion, scene: Scene, horizon: float, *, quick: bool = False
+    motion: LinkageMotion, scene: Scene, horizon: float, *, quick: bool = False
 ) -> Knob | None:
     """Return the errors of the samples' rate and use; None if ticks take them as they come."""
-    name, use = motion.member.drive
+    name, use = motion.scene_linkage.drive
     if not motion.sample_rate or (not scene.rate and not motion.samples):
         return None
-    key = f'{scene_key(motion.member, "drive")}.{name}'
+    key = f'{scene_key(motion.scene_linkage, "drive")}.{name}'
     if not isinstance(use, TopicParameters):
         use = TopicParameters(
             carry_forward=use.carry_forward, max_age=use.max_age, stamp=use.stamp
         )
-    joints = _Samples(motion, scene.rate or motion.sample_rate, horizon)
+    joints = _CommandSamples(motion, scene.rate or motion.sample_rate, horizon)
 
-    def measured(
+    def measure_setting(
         changes: dict[str, Any], factor: float = 1.0, advice: str = '', label: str = ''
     ) -> Setting | None:
         used = replace(use, **changes)
-        error = joints.error(used, factor)
+        error = joints.measure_error(used, factor)
         if error is None:
             return None
         rate = scene.rate or motion.sample_rate
         more = (factor - 1.0) * motion.sample_rate / rate
         price = Price(offer.scaled(more), rate) if factor and factor != 1.0 else None
         return Setting(
-            label or f'{_hertz(motion.sample_rate * factor)}, {_use_of(used)}',
+            label or f'{_rate_label(motion.sample_rate * factor)}, {_use_of(used)}',
             error,
             price,
             [(f'{key}.{one}', value) for one, value in changes.items()],
@@ -200,30 +200,32 @@ def measure_age_of_command(
         )
 
     offer = _offer_time(motion, 0.1 if quick else 0.5)
-    own = measured({})
+    own = measure_setting({})
     if own is None:
         return None
     settings: list[Setting | None] = [own]
-    settings.append(measured({'carry_forward': not use.carry_forward}))
+    settings.append(measure_setting({'carry_forward': not use.carry_forward}))
     if name == 'topic' and use.acceleration == 'zero':
         differenced = {} if use.carry_forward else {'carry_forward': True}
-        settings.append(measured({'acceleration': 'differenced', **differenced}))
+        settings.append(measure_setting({'acceleration': 'differenced', **differenced}))
     if motion.samples:
-        settings.append(measured({}, 0.0, 'bring the samples without a delay', 'without delay'))
+        settings.append(
+            measure_setting({}, 0.0, 'bring the samples without a delay', 'without delay')
+        )
     else:
         for factor in (0.5, 2.0, 5.0) if not quick else (0.5, 2.0):
             advice = f'publish the crank at {motion.sample_rate * factor:g} Hz'
-            settings.append(measured({}, factor, advice))
+            settings.append(measure_setting({}, factor, advice))
     return Knob(OF_COMMAND, [each for each in settings if each], 0, note=motion.note)
 
 
-def _offer_time(motion: MemberMotion, seconds: float) -> Spread:
+def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
     """Return how long the node takes to read and accept a sample, in [µs]."""
-    names = motion.member.sampled_joints
+    names = motion.scene_linkage.sampled_joints
     zeros = (0.0,) * len(names)
     message = JointStateWriter(names).write(BEGIN, zeros, zeros, zeros)
-    name, use = motion.member.drive
-    if name != 'topic' or motion.member.dependent_joint:
+    name, use = motion.scene_linkage.drive
+    if name != 'topic' or motion.scene_linkage.dependent_joint:
         return Spread(0.0, 0.0, 0.0)
     read, drive = topic_drive.reader(use, motion.context), TopicDrive(use, True)
 
@@ -239,44 +241,44 @@ _BLOCK = 100
 """Samples that are read together."""
 
 
-class _Samples:
+class _CommandSamples:
     """Ticks of a linkage, and the samples that come to them."""
 
-    def __init__(self, motion: MemberMotion, rate: float, horizon: float) -> None:
+    def __init__(self, motion: LinkageMotion, rate: float, horizon: float) -> None:
         self._motion = motion
         self._ticks = tick_times(rate, horizon, _TICKS)
         self._horizon = round(horizon * NANOSECONDS)
         self._exact, _ = joints_at(motion.closure, cranks_at(motion, self._ticks))
 
-    def error(self, use: TopicParameters, factor: float) -> JointError | None:
+    def measure_error(self, use: TopicParameters, factor: float) -> JointError | None:
         """Return the error of a use, with so many times the samples; 0 for samples at once."""
         cranks: list[Crank | None] = []
         if self._motion.samples:
-            cranks = self._used(use, self._recorded(factor > 0.0), self._ticks)
-            return error_of([self._apart(cranks, slice(None))])
+            cranks = self._crank_states(use, self._recorded_samples(factor > 0.0), self._ticks)
+            return error_of([self._distances_to_exact(cranks, slice(None))])
         apart = []
         for number, phase in enumerate(_PHASES):
             chosen = slice(number, None, len(_PHASES))
             ticks = self._ticks[chosen]
-            cranks = self._used(use, self._exact_samples(factor, phase, ticks), ticks)
-            apart.append(self._apart(cranks, chosen))
+            cranks = self._crank_states(use, self._exact_samples(factor, phase, ticks), ticks)
+            apart.append(self._distances_to_exact(cranks, chosen))
         return error_of([np.concatenate(apart)])
 
-    def _apart(self, cranks: Sequence[Crank | None], chosen: slice) -> Any:
+    def _distances_to_exact(self, cranks: Sequence[Crank | None], chosen: slice) -> Any:
         closure = self._motion.closure
-        return distances(closure, joints_at(closure, cranks)[0], self._exact[:, chosen])
+        return joint_distances(closure, joints_at(closure, cranks)[0], self._exact[:, chosen])
 
-    def _recorded(self, delayed: bool) -> Callable[[int], Iterator[tuple[int, int]]]:
+    def _recorded_samples(self, delayed: bool) -> Callable[[int], Iterator[tuple[int, int]]]:
         """Return for a tick the samples of a bag that have come: stamps and arrivals."""
         samples = [(stamp, come if delayed else stamp) for stamp, come in self._motion.samples]
         arrivals = [come for _, come in samples]
 
-        def before(tick: int) -> Iterator[tuple[int, int]]:
+        def samples_before(tick: int) -> Iterator[tuple[int, int]]:
             end = bisect_right(arrivals, tick)
             begin = max(0, end - _BEFORE)
             yield from samples[begin:end]
 
-        return before
+        return samples_before
 
     def _exact_samples(
         self, factor: float, phase: float, _ticks: Sequence[int]
@@ -284,18 +286,18 @@ class _Samples:
         """Return for a tick the samples before it, the newest a part of a period old."""
         period = 1e9 / (self._motion.sample_rate * factor)
 
-        def before(tick: int) -> Iterator[tuple[int, int]]:
+        def samples_before(tick: int) -> Iterator[tuple[int, int]]:
             for number in range(_BEFORE - 1, -1, -1):
                 stamp = tick - round((phase + number) * period)
                 if stamp >= 0:
                     yield stamp, stamp
 
-        return before
+        return samples_before
 
-    def _used(
+    def _crank_states(
         self,
         use: TopicParameters,
-        before: Callable[[int], Iterator[tuple[int, int]]],
+        samples_before: Callable[[int], Iterator[tuple[int, int]]],
         ticks: Sequence[int],
     ) -> list[Crank | None]:
         """Return what a drive makes of the samples at each tick."""
@@ -303,7 +305,7 @@ class _Samples:
         found: list[Crank | None] = []
         for tick in ticks:
             drive = TopicDrive(use, True, inputs)
-            for stamp, come in before(tick):
+            for stamp, come in samples_before(tick):
                 crank = cranks_at(self._motion, [stamp])[0]
                 if crank is not None:
                     drive.offer(CrankSample(BEGIN + stamp, *crank), BEGIN + come)
@@ -328,9 +330,9 @@ def _use_of(use: TopicParameters) -> str:
     return 'carried forward' + (' with its acceleration' if use.acceleration != 'zero' else '')
 
 
-def _hertz(rate: float) -> str:
+def _rate_label(rate: float) -> str:
     return f'{rate / 1000.0:.4g} kHz' if rate >= 1000.0 else f'{rate:.4g} Hz'
 
 
-def _plain(rate: float) -> float | int:
+def _integer_if_whole(rate: float) -> float | int:
     return round(rate) if float(rate).is_integer() else rate

@@ -40,7 +40,7 @@ class Price(NamedTuple):
     rate: float  # Ticks per second
 
     @property
-    def core(self) -> float:
+    def core_share(self) -> float:
         """Return the share of a processor core, 0 to 1."""
         return self.tick.middle * 1e-6 * self.rate
 
@@ -49,7 +49,7 @@ class Price(NamedTuple):
         """Return whether the time is smaller than its spread, so that it says nothing."""
         return abs(self.tick.middle) <= self.tick.high - self.tick.low
 
-    def negated(self) -> Price:
+    def negate(self) -> Price:
         """Return the price of the other way round: what is saved instead of added."""
         low, middle, high = self.tick
         return self._replace(tick=Spread(-high, -middle, -low))
@@ -70,13 +70,13 @@ class Setting(NamedTuple):
     advice: str = ''  # What a user does where no key of the scene does it: 'carry forward by …'
 
     @property
-    def line(self) -> str:
+    def instruction(self) -> str:
         """Return what a user writes, and does: 'drive.torque.step: 0.0005'."""
-        written = [_line(*each) for each in self.changes or ()]
+        written = [_setting_text(*each) for each in self.changes or ()]
         return ', '.join([*written, *([self.advice] if self.advice else [])])
 
 
-def _line(key: str, value: object) -> str:
+def _setting_text(key: str, value: object) -> str:
     if isinstance(value, bool):
         value = 'true' if value else 'false'
     elif isinstance(value, float):
@@ -98,15 +98,15 @@ class Knob(NamedTuple):
     )
 
     @property
-    def own(self) -> Setting:
+    def own_setting(self) -> Setting:
         """Return the scene's own setting."""
         return self.settings[self.chosen]
 
 
-class Loss(NamedTuple):
+class RecordingLoss(NamedTuple):
     """What recording costs, and what it may lose, with one setting."""
 
-    line: str  # What a user writes: 'record.flush_period: 0.2'
+    instruction: str  # What a user writes: 'record.flush_period: 0.2'
     seconds: float  # Longest time of a run that a crash loses, in [s]
     price: Price
     dropped: int  # Messages that found no room before the disk was ready
@@ -119,14 +119,16 @@ class Budget(NamedTuple):
     rate: float  # Ticks per second
     tick: Price  # The whole tick
     knobs: Sequence[Knob]  # Errors and deliberate differences, each sorted by size
-    recording: Sequence[Loss]  # The scene's own setting, then others; empty if it records nothing
+    recording: Sequence[
+        RecordingLoss
+    ]  # The scene's own setting, then others; empty if it records nothing
     machine: Sequence[tuple[str, str]]  # Day, machine and versions: names and values
     left_out: Sequence[str] = ()  # What `--quick` or the scene left out, a sentence each
 
     def core_of(self, knob: Knob, setting: Setting) -> float:
         """Return the share of a core that the whole scene takes with a setting, 0 to 1."""
-        if setting is knob.own or setting.price is None:
-            return self.tick.core
+        if setting is knob.own_setting or setting.price is None:
+            return self.tick.core_share
         return (self.tick.tick.middle + setting.price.tick.middle) * 1e-6 * setting.price.rate
 
 

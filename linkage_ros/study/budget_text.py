@@ -20,7 +20,7 @@ from math import floor, isfinite, log10
 from typing import Any, NamedTuple
 
 from linkage_ros.measuring import Spread
-from linkage_ros.study.budget import Budget, Knob, Loss, Price, Setting
+from linkage_ros.study.budget import Budget, Knob, Price, RecordingLoss, Setting
 
 COLUMNS = (
     'error of the published joints',
@@ -96,7 +96,7 @@ def change_text(budget: Budget, knob: Knob, setting: Setting) -> str:
     if price is None:
         return 'no cost'
     if price.rate != budget.rate:
-        change = budget.core_of(knob, setting) - budget.tick.core
+        change = budget.core_of(knob, setting) - budget.tick.core_share
         return f'{"+" if change >= 0.0 else ""}{share_text(change)} of a core'
     if price.is_noise:
         return f'{NOISE} of cost'
@@ -115,13 +115,13 @@ class Neighbours(NamedTuple):
 
 def neighbours_of(budget: Budget, knob: Knob) -> Neighbours:
     """Return the next cheaper and the next better setting of a knob."""
-    own = knob.own
-    others = [each for each in knob.settings if each is not own and each.line]
+    own = knob.own_setting
+    others = [each for each in knob.settings if each is not own and each.instruction]
     cheaper = [each for each in others if _more_core(budget, knob, each) < 0.0]
     better = [each for each in others if each.error.worst < _SAME * own.error.worst]
     return Neighbours(
         min(cheaper, key=lambda each: each.error.worst, default=None),
-        min(better, key=lambda each: _effort(budget, knob, each), default=None),
+        min(better, key=lambda each: _setting_effort(budget, knob, each), default=None),
     )
 
 
@@ -130,10 +130,10 @@ def _more_core(budget: Budget, knob: Knob, setting: Setting) -> float:
     price = setting.price
     if price is None or (price.is_noise and price.rate == budget.rate):
         return 0.0
-    return budget.core_of(knob, setting) - budget.tick.core
+    return budget.core_of(knob, setting) - budget.tick.core_share
 
 
-def _effort(budget: Budget, knob: Knob, setting: Setting) -> tuple[float, int, float]:
+def _setting_effort(budget: Budget, knob: Knob, setting: Setting) -> tuple[float, int, float]:
     """Return how much a more exact setting asks for: cost, then keys. That it saves is no gain."""
     more = max(0.0, _more_core(budget, knob, setting))
     return more, len(setting.changes or ()), setting.error.worst
@@ -142,12 +142,12 @@ def _effort(budget: Budget, knob: Knob, setting: Setting) -> tuple[float, int, f
 def error_knobs(budget: Budget) -> list[Knob]:
     """Return the knobs of what nobody has asked for, by size."""
     knobs = [knob for knob in budget.knobs if not knob.is_deliberate]
-    return sorted(knobs, key=lambda knob: knob.own.error.worst, reverse=True)
+    return sorted(knobs, key=lambda knob: knob.own_setting.error.worst, reverse=True)
 
 
 def total_error(budget: Budget) -> float:
     """Return the sum of the worst errors, in [rad]: all of them at once and in one direction."""
-    return sum(knob.own.error.worst for knob in error_knobs(budget))
+    return sum(knob.own_setting.error.worst for knob in error_knobs(budget))
 
 
 def lead_lines(budget: Budget) -> list[str]:
@@ -157,9 +157,9 @@ def lead_lines(budget: Budget) -> list[str]:
     if knobs:
         lines += [_error_line(budget, knobs), _advice_line(budget, knobs[0])]
     asked = [
-        f'{knob.name} {error_text(knob.own.error.worst)} rad'
+        f'{knob.name} {error_text(knob.own_setting.error.worst)} rad'
         for knob in budget.knobs
-        if knob.is_deliberate and knob.own.error.worst and knob.name != ALL_TOGETHER
+        if knob.is_deliberate and knob.own_setting.error.worst and knob.name != ALL_TOGETHER
     ]
     deliberate = any(knob.is_deliberate for knob in budget.knobs)
     if asked:
@@ -176,38 +176,40 @@ def _error_line(budget: Budget, knobs: Sequence[Knob]) -> str:
     total, most = total_error(budget), knobs[0]
     if not total:
         return f'{budget.scene}: exact'
-    share = most.own.error.worst / total if isfinite(total) else 1.0
+    share = most.own_setting.error.worst / total if isfinite(total) else 1.0
     if len(knobs) == 1 or share > 0.99:
-        cause = f'by {_called(most)}'
+        cause = f'by {_knob_name(most)}'
     elif share >= 0.9:
-        cause = f'nearly all by {_called(most)}'
+        cause = f'nearly all by {_knob_name(most)}'
     elif share >= 0.5:
-        cause = f'mostly by {_called(most)}'
+        cause = f'mostly by {_knob_name(most)}'
     else:
-        cause = f'by {_called(most)} and {_called(knobs[1])}'
+        cause = f'by {_knob_name(most)} and {_knob_name(knobs[1])}'
     after = f' after {most.after:g} s' if most.after is not None else ''
     return f'{budget.scene}: {error_text(total)} rad off at worst{after}, {cause}'
 
 
-def _called(knob: Knob) -> str:
+def _knob_name(knob: Knob) -> str:
     return f'the {knob.name}' if knob.name.startswith(('step', 'age')) else knob.name
 
 
 def _advice_line(budget: Budget, knob: Knob) -> str:
     """Return what to write for less of the greatest error."""
     total = total_error(budget)
-    rest = sum(each.own.error.worst for each in error_knobs(budget) if each is not knob)
-    others = [each for each in knob.settings if each is not knob.own and each.line]
+    rest = sum(each.own_setting.error.worst for each in error_knobs(budget) if each is not knob)
+    others = [each for each in knob.settings if each is not knob.own_setting and each.instruction]
     for factor, words in ((0.1, 'a tenth'), (0.2, 'a fifth'), (0.5, 'half')):
         good = [each for each in others if rest + each.error.worst <= factor * total]
         if good:
-            best = min(good, key=lambda each: _effort(budget, knob, each))
-            return f'less than {words} of it: {best.line} ({_cost_text(budget, knob, best)})'
+            best = min(good, key=lambda each: _setting_effort(budget, knob, each))
+            return (
+                f'less than {words} of it: {best.instruction} ({_cost_text(budget, knob, best)})'
+            )
     better = neighbours_of(budget, knob).better
     if better is not None:
         left = rest + better.error.worst
         cost = _cost_text(budget, knob, better)
-        return f'{error_text(left)} rad are left with: {better.line} ({cost})'
+        return f'{error_text(left)} rad are left with: {better.instruction} ({cost})'
     return 'nothing that was measured makes it less'
 
 
@@ -216,7 +218,7 @@ def _cost_text(budget: Budget, knob: Knob, setting: Setting) -> str:
     text = change_text(budget, knob, setting)
     if not text.endswith('µs'):
         return text
-    change = budget.core_of(knob, setting) - budget.tick.core
+    change = budget.core_of(knob, setting) - budget.tick.core_share
     return f'{text} a tick, {share_text(change)} of a core'
 
 
@@ -240,20 +242,22 @@ def rows_of(budget: Budget) -> list[Row]:
     if budget.recording:
         rows.append(_recording_row(budget.recording))
     whole = budget.tick
-    rows.append(Row('the whole tick', '–', '–', time_text(whole.tick), share_text(whole.core)))
+    rows.append(
+        Row('the whole tick', '–', '–', time_text(whole.tick), share_text(whole.core_share))
+    )
     return rows
 
 
 def _error_row(budget: Budget, knob: Knob) -> Row:
-    own = knob.own
+    own = knob.own_setting
     after = f', after {knob.after:g} s' if knob.after is not None else ''
     name = f'{knob.name} ({own.label}){after}'
     # A rate sets what the whole tick takes of a core.
     sets_rate = any(key == 'rate' for each in knob.settings for key, _ in each.changes or ())
-    core = budget.tick.core if sets_rate else own.price.core if own.price else None
+    core = budget.tick.core_share if sets_rate else own.price.core_share if own.price else None
     cheaper, better = (
         setting
-        and f'{setting.line} ({error_text(setting.error.worst)}, '
+        and f'{setting.instruction} ({error_text(setting.error.worst)}, '
         f'{change_text(budget, knob, setting)})'
         for setting in neighbours_of(budget, knob)
     )
@@ -269,7 +273,7 @@ def _error_row(budget: Budget, knob: Knob) -> Row:
 
 
 def _deliberate_row(knob: Knob) -> Row:
-    own = knob.own
+    own = knob.own_setting
     after = f', after {knob.after:g} s' if knob.after is not None else ''
     is_silent = not own.error.worst
     return Row(
@@ -277,17 +281,17 @@ def _deliberate_row(knob: Knob) -> Row:
         '–' if is_silent else error_text(own.error.rms),
         '–' if is_silent else error_text(own.error.worst),
         price_text(own.price),
-        _core(own.price),
+        _core_text(own.price),
         '–',
         knob.note or ('adds to the messages' if is_silent else 'what you asked for'),
     )
 
 
-def _core(price: Price | None) -> str:
-    return '–' if price is None or price.is_noise else share_text(price.core)
+def _core_text(price: Price | None) -> str:
+    return '–' if price is None or price.is_noise else share_text(price.core_share)
 
 
-def _recording_row(losses: Sequence[Loss]) -> Row:
+def _recording_row(losses: Sequence[RecordingLoss]) -> Row:
     own, *others = losses
     cheaper, better = (
         next((each for each in others if (each.seconds < own.seconds) == is_better), None)
@@ -299,9 +303,9 @@ def _recording_row(losses: Sequence[Loss]) -> Row:
         '–',
         '–',
         time_text(own.price.tick),
-        share_text(own.price.core),
+        share_text(own.price.core_share),
         *(
-            f'{each.line} ({seconds_text(each.seconds)}, {_more_text(each.price, own.price)})'
+            f'{each.instruction} ({seconds_text(each.seconds)}, {_more_text(each.price, own.price)})'
             if each
             else '–'
             for each in (cheaper, better)
@@ -357,7 +361,7 @@ def budget_json(budget: Budget) -> dict[str, Any]:
             },
             'price': _price_json(setting.price),
             'core': budget.core_of(knob, setting),
-            'write': setting.line,
+            'write': setting.instruction,
         }
 
     return {
@@ -379,7 +383,7 @@ def budget_json(budget: Budget) -> dict[str, Any]:
         ],
         'recording': [
             {
-                'write': each.line,
+                'write': each.instruction,
                 'lost_s': each.seconds,
                 'price': _price_json(each.price),
                 'dropped': each.dropped,
@@ -395,4 +399,4 @@ def _price_json(price: Price | None) -> dict[str, Any] | None:
     if price is None:
         return None
     times = dict(zip(('low_us', 'us', 'high_us'), price.tick, strict=True))
-    return {**times, 'core': price.core, 'within_noise': price.is_noise}
+    return {**times, 'core': price.core_share, 'within_noise': price.is_noise}

@@ -89,13 +89,13 @@ def compare_runs(
     sizes = {
         joint: member.closure.scale for member in scene.linkages for joint in member.joint_names
     }
-    compared = [_Compared() for _ in others]
+    compared = [_RunDifference() for _ in others]
     own, *runs = (published_states(each, feed, ticks) for each in (scene, *others))
     for tick, ((is_new, state), *found) in enumerate(zip(own, *runs, strict=True)):
         for one, (other_is_new, other) in zip(compared, found, strict=True):
             one.silent += other_is_new and not is_new
             if state and other and state != other:
-                one.add(
+                one.add_difference(
                     max(
                         abs(remainder(value - other[joint], tau))
                         if turning[joint]
@@ -112,14 +112,14 @@ def compare_runs(
     ]
 
 
-class _Compared:
+class _RunDifference:
     """What is known so far of the difference of two runs."""
 
     def __init__(self) -> None:
         self.squares = self.worst = 0.0
         self.silent = 0
 
-    def add(self, difference: float) -> None:
+    def add_difference(self, difference: float) -> None:
         self.squares += difference * difference
         self.worst = max(self.worst, difference)
 
@@ -127,14 +127,18 @@ class _Compared:
 def leave_out(scene: Scene, names: frozenset[str]) -> Scene:
     """Return a scene without these effects, and without loads where no force is left."""
     return replace(
-        scene, members=tuple(_without(member, names) for member in scene.linkages), record=None
+        scene,
+        members=tuple(_without_effects(member, names) for member in scene.linkages),
+        record=None,
     )
 
 
-def _without(member: SceneLinkage, names: frozenset[str]) -> SceneLinkage:
-    effects = {name: own for name, own in member.effects.items() if name not in names}
-    has_forces = member.drive[0] == 'torque' or not FORCES.isdisjoint(effects)
-    return replace(member, effects=effects, loads=member.loads if has_forces else None)
+def _without_effects(scene_linkage: SceneLinkage, names: frozenset[str]) -> SceneLinkage:
+    effects = {name: own for name, own in scene_linkage.effects.items() if name not in names}
+    has_forces = scene_linkage.drive[0] == 'torque' or not FORCES.isdisjoint(effects)
+    return replace(
+        scene_linkage, effects=effects, loads=scene_linkage.loads if has_forces else None
+    )
 
 
 FORCES = frozenset(FORCE_EFFECTS)
@@ -148,7 +152,7 @@ class _Variant(NamedTuple):
     note: str
 
 
-def _variants(scene: Scene) -> Iterator[_Variant]:
+def _list_variants(scene: Scene) -> Iterator[_Variant]:
     """Yield the scene without each effect, without each fault, and without all."""
     named = {name for member in scene.linkages for name in member.effects}
     for name in in_order(named):
@@ -191,7 +195,7 @@ def measure_deliberate(
 
     The compared runs are as long as the horizon, in [s], or shorter if quick.
     """
-    variants = list(_variants(scene))
+    variants = list(_list_variants(scene))
     if not variants:
         return []
     # Faults begin at set times: a shorter run would miss them.
@@ -213,22 +217,26 @@ def measure_deliberate(
         Knob(
             variant.name,
             # What the scene has more than the one without.
-            (Setting('as the scene has it', found.error, price.negated()),),
+            (Setting('as the scene has it', found.error, price.negate()),),
             0,
             after if found.error.worst else None,
             is_deliberate=True,
-            note=_note(variant, found),
+            note=_variant_note(variant, found),
         )
         for variant, found, price in zip(variants, differences, prices, strict=True)
     ]
     return sorted(
         knobs,
-        key=lambda knob: (knob.name != ALL_TOGETHER, knob.own.error.worst, knob.own.error.rms),
+        key=lambda knob: (
+            knob.name != ALL_TOGETHER,
+            knob.own_setting.error.worst,
+            knob.own_setting.error.rms,
+        ),
         reverse=True,
     )
 
 
-def _note(variant: _Variant, found: Difference) -> str:
+def _variant_note(variant: _Variant, found: Difference) -> str:
     parts = [
         variant.note,
         f'nothing is published at {found.silent:.0%} of the ticks' if found.silent else '',

@@ -32,12 +32,12 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.measuring import Contender, in_turn, Progress
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.study.budget import JointError, Knob, Price, Setting
-from linkage_ros.study.joint_errors import distances, error_of, joints_at
+from linkage_ros.study.joint_errors import error_of, joint_distances, joints_at
 from linkage_ros.study.member_motion import (
     build_drive,
     Crank,
     cranks_at,
-    MemberMotion,
+    LinkageMotion,
     refuse_horizon,
     tick_times,
 )
@@ -57,7 +57,7 @@ _UNSURE = 1e-3
 
 
 def measure_drive_step(
-    motion: MemberMotion,
+    motion: LinkageMotion,
     rate: float,
     horizon: float,
     *,
@@ -93,25 +93,27 @@ def measure_drive_step(
 
     """
     begun = process_time()
-    use: TorqueParameters = motion.member.drive[1]
+    use: TorqueParameters = motion.scene_linkage.drive[1]
     ticks = tick_times(rate, horizon, _TICKS)
     own = cranks_at(motion, ticks)
     taken = process_time() - begun
-    price = _price(motion, rate, horizon, 0.3 if quick else 2.0)
+    price = _measure_price(motion, rate, horizon, 0.3 if quick else 2.0)
     finest = next((n for n in (16, 8) if 1.5 * n * taken <= seconds), 4)
     exact, doubt = exact_cranks(motion, ticks, finest)
     joints, _ = joints_at(motion.closure, exact)
     floor = doubt or JointError(0.0, 0.0)
     settings = [
-        Setting(_label(use.method, use.step), _error(motion, own, joints, floor), price),
+        Setting(
+            _setting_label(use.method, use.step), _measure_error(motion, own, joints, floor), price
+        ),
     ]
     left_out: list[str] = []
-    wanted = list(_settings(use, quick))
+    wanted = list(_other_settings(use, quick))
     for number, (method, step) in enumerate(wanted):
         progress((number + 1) / (len(wanted) + 1))
         work = taken * _EVALUATIONS[method] / _EVALUATIONS[use.method] * use.step / step
         if process_time() - begun + work > seconds:
-            left_out.append(_label(method, step))
+            left_out.append(_setting_label(method, step))
             continue
         try:
             other = cranks_at(motion, ticks, method=method, step=step)
@@ -121,8 +123,8 @@ def measure_drive_step(
             [(f'{key}.method', method)] if method != use.method else []
         )
         changes += [(f'{key}.step', step)] if step != use.step else []
-        error = _error(motion, other, joints, floor)
-        settings.append(Setting(_label(method, step), error, None, changes))
+        error = _measure_error(motion, other, joints, floor)
+        settings.append(Setting(_setting_label(method, step), error, None, changes))
     progress(1.0)
     note = motion.note
     if _stands_in(use):
@@ -139,7 +141,7 @@ _EVALUATIONS = {'semi_implicit_euler': 1.0, 'rk4': 4.0, 'gauss_legendre': 14.0}
 """Evaluations of the equation of motion in a step, about."""
 
 
-def _price(motion: MemberMotion, rate: float, horizon: float, seconds: float) -> Price:
+def _measure_price(motion: LinkageMotion, rate: float, horizon: float, seconds: float) -> Price:
     """Return what the drive takes of a tick, with its commands."""
     period = NANOSECONDS / rate
     ticks = [round(number * period) for number in range(1, max(2, int(min(horizon, 1.0) * rate)))]
@@ -152,7 +154,7 @@ def _price(motion: MemberMotion, rate: float, horizon: float, seconds: float) ->
 
 
 def exact_cranks(
-    motion: MemberMotion, times: Sequence[int], finest: int = 16
+    motion: LinkageMotion, times: Sequence[int], finest: int = 16
 ) -> tuple[list[Crank | None], JointError | None]:
     """
     Return the exact motion at some times, in [ns], and its own error.
@@ -165,14 +167,14 @@ def exact_cranks(
         The motion ends before the last time.
 
     """
-    use: TorqueParameters = motion.member.drive[1]
+    use: TorqueParameters = motion.scene_linkage.drive[1]
     if _stands_in(use):
         one, other = (cranks_at(motion, times, step=max(_SHORTEST, use.step / n)) for n in (16, 8))
         part = 3.0
     else:
-        one, other = (_integrated(motion, times, factor) for factor in (1.0, 10.0))
+        one, other = (_integrate_exactly(motion, times, factor) for factor in (1.0, 10.0))
         part = 6.0
-    doubt = error_of([_apart(motion, other, joints_at(motion.closure, one)[0])])
+    doubt = error_of([_distances_to_exact(motion, other, joints_at(motion.closure, one)[0])])
     return one, doubt and JointError(doubt.rms / part, doubt.worst / part)
 
 
@@ -182,11 +184,13 @@ def _stands_in(use: TorqueParameters) -> bool:
     return wound or find_spec('scipy') is None
 
 
-def _integrated(motion: MemberMotion, times: Sequence[int], factor: float) -> list[Crank | None]:
+def _integrate_exactly(
+    motion: LinkageMotion, times: Sequence[int], factor: float
+) -> list[Crank | None]:
     from linkage_ros.study import exact_drive  # local import: scipy is optional
 
     drive = build_drive(motion)
-    use: TorqueParameters = motion.member.drive[1]
+    use: TorqueParameters = motion.scene_linkage.drive[1]
     delay = use.motor.delay if use.motor else 0.0
     changes: list[tuple[float, float | None]] = [(0.0, None)]
     for command in motion.commands:
@@ -196,7 +200,9 @@ def _integrated(motion: MemberMotion, times: Sequence[int], factor: float) -> li
         changes.append((at, command.effort))
     if motion.commands:
         changes.append((changes[-1][0] + use.timeout, None))
-    acting = [exact_drive.Acting(at, *drive.actuation_for(effort)) for at, effort in changes]
+    acting = [
+        exact_drive.AppliedEffort(at, *drive.actuation_for(effort)) for at, effort in changes
+    ]
     seconds = [time * 1e-9 for time in times]
     try:
         found = exact_drive.exact_motion(
@@ -207,21 +213,21 @@ def _integrated(motion: MemberMotion, times: Sequence[int], factor: float) -> li
     return [((value,), (rate,)) for value, rate in found]
 
 
-def _apart(motion: MemberMotion, cranks: Sequence[Crank | None], exact: Any) -> Any:
-    return distances(motion.closure, joints_at(motion.closure, cranks)[0], exact)
+def _distances_to_exact(motion: LinkageMotion, cranks: Sequence[Crank | None], exact: Any) -> Any:
+    return joint_distances(motion.closure, joints_at(motion.closure, cranks)[0], exact)
 
 
-def _error(
-    motion: MemberMotion, cranks: Sequence[Crank | None], exact: Any, floor: JointError
+def _measure_error(
+    motion: LinkageMotion, cranks: Sequence[Crank | None], exact: Any, floor: JointError
 ) -> JointError:
     """Return the error of a run, no less than what the exact motion is known to."""
-    error = error_of([_apart(motion, cranks, exact)])
+    error = error_of([_distances_to_exact(motion, cranks, exact)])
     if error is None:
         return JointError(np.nan, np.nan)
     return JointError(max(error.rms, floor.rms), max(error.worst, floor.worst))
 
 
-def _settings(use: TorqueParameters, quick: bool) -> Iterator[tuple[str, float]]:
+def _other_settings(use: TorqueParameters, quick: bool) -> Iterator[tuple[str, float]]:
     """Yield other methods and steps, those that tell most first."""
     own = [(use.method, use.step * factor) for factor in (0.5, 2.0)]
     others = [(method, use.step) for method in METHODS if method != use.method]
@@ -233,5 +239,5 @@ def _settings(use: TorqueParameters, quick: bool) -> Iterator[tuple[str, float]]
     yield from (s for s in rest if s not in known and _SHORTEST <= s[1] <= _LONGEST)
 
 
-def _label(method: str, step: float) -> str:
+def _setting_label(method: str, step: float) -> str:
     return f'{method}, {1e3 * step:g} ms'

@@ -78,10 +78,14 @@ def prove(
     before = ctx.prec
     try:
         for ctx.prec in _PRECISIONS:
-            equations = _Equations(linkage, [*zip(inputs, rates, accelerations, strict=True)])
-            found = _proved(equations, equations.start(Closure(linkage), inputs))
+            equations = _ExactConstraints(
+                linkage, [*zip(inputs, rates, accelerations, strict=True)]
+            )
+            found = _prove_solution(
+                equations, equations.initial_unknowns(Closure(linkage), inputs)
+            )
             if found is not None:
-                return equations.proof(found)
+                return equations.prove_joints(found)
     finally:
         ctx.prec = before
     raise SingularError(f'{tuple(inputs)}: nothing is proved')
@@ -91,16 +95,16 @@ def solve(linkage: Linkage, inputs: Sequence[float], bits: int) -> tuple[Any, ..
     """Return the joints at a precision in bits, by Newton's method and without a proof."""
     before, ctx.prec = ctx.prec, bits
     try:
-        equations = _Equations(linkage, [(value, 1.0, 0.0) for value in inputs])
-        found = _converged(equations, equations.start(Closure(linkage), inputs))
+        equations = _ExactConstraints(linkage, [(value, 1.0, 0.0) for value in inputs])
+        found = _iterate_newton(equations, equations.initial_unknowns(Closure(linkage), inputs))
         if found is None:
             raise SingularError(f'{tuple(inputs)}: nothing converges')
-        return equations.joints(found)
+        return equations.joint_values(found)
     finally:
         ctx.prec = before
 
 
-class _Equations:
+class _ExactConstraints:
     """The constraints of a linkage as sums of products of two unknowns."""
 
     def __init__(self, linkage: Linkage, driven: Sequence[tuple[float, float, float]]) -> None:
@@ -112,26 +116,30 @@ class _Equations:
         self.scale = 2.0 ** frexp(unit)[1]
         self.constraints: list[list[Term]] = []
         for k in self._links.values():
-            along = self._direction(k, 1)
-            self.constraints.append([*_dot(along, along), _still(-1, 0, 0)])
+            along = self._direction_form(k, 1)
+            self.constraints.append([*_dot_product(along, along), _constant_term(-1, 0, 0)])
         carriers: dict[str, str] = {}
         for link, points in linkage.links.items():
             for point in points:
                 if point in carriers:
-                    self._meet(self._place(link, point), self._place(carriers[point], point))
+                    self._add_pin(
+                        self._point_form(link, point), self._point_form(carriers[point], point)
+                    )
                 carriers.setdefault(point, link)
         self._slides = {}
         for name, slider in linkage.sliders.items():
-            end = self._place(slider.block or carriers[slider.point], slider.point)
-            between = _less(end, self._place(slider.along, slider.through))
+            end = self._point_form(slider.block or carriers[slider.point], slider.point)
+            between = _subtract_forms(end, self._point_form(slider.along, slider.through))
             line = acb(*slider.direction)
-            along = self._turned(slider.along, line / abs(line))
-            self._slides[name] = _dot(along, between)
-            self.constraints.append(_cross(along, between))
+            along = self._link_direction(slider.along, line / abs(line))
+            self._slides[name] = _dot_product(along, between)
+            self.constraints.append(_cross_product(along, between))
             if slider.block:
                 angle = arb(slider.angle)
-                turned = self._turned(slider.along, acb(angle.cos(), angle.sin()))
-                self.constraints.append(_cross(turned, self._turned(slider.block, acb(1))))
+                turned = self._link_direction(slider.along, acb(angle.cos(), angle.sin()))
+                self.constraints.append(
+                    _cross_product(turned, self._link_direction(slider.block, acb(1)))
+                )
         for joint, (value, rate, change) in zip(linkage.inputs, driven, strict=True):
             x, v, a = arb(value), arb(rate), arb(change)
             if joint.slider:
@@ -141,12 +149,14 @@ class _Equations:
             one = acb(x.cos(), x.sin())
             series = (one, one * acb(0, v), one * acb(-v * v, a))
             self.constraints.append(
-                _cross(
-                    self._turned(joint.parent, acb(1)), self._turned(joint.child, acb(1)), series
+                _cross_product(
+                    self._link_direction(joint.parent, acb(1)),
+                    self._link_direction(joint.child, acb(1)),
+                    series,
                 )
             )
 
-    def start(self, closure: Closure, inputs: Sequence[float]) -> list[Any]:
+    def initial_unknowns(self, closure: Closure, inputs: Sequence[float]) -> list[Any]:
         """Return the unknowns from the closure's solution; unknown 0 is 1."""
         position = closure.position(*inputs)
         if not position.joints:
@@ -160,11 +170,11 @@ class _Equations:
             unknowns += [arb(x) for x in (direction.real, direction.imag, place.real, place.imag)]
         return unknowns
 
-    def values(self, motion: Sequence[Sequence[Any]]) -> list[Any]:
+    def compute_residuals(self, motion: Sequence[Sequence[Any]]) -> list[Any]:
         """Return the residuals, differentiated as often as the motion has derivatives."""
-        return [_value(terms, motion) for terms in self.constraints]
+        return [_evaluate_terms(terms, motion) for terms in self.constraints]
 
-    def slopes(self, x: Sequence[Any]) -> Any:
+    def compute_jacobian(self, x: Sequence[Any]) -> Any:
         """Return the derivatives of the constraints with respect to the unknowns."""
         rows = [[arb(0)] * (self.count + 1) for _ in self.constraints]
         for row, terms in zip(rows, self.constraints, strict=True):
@@ -173,30 +183,30 @@ class _Equations:
                 row[j] += factor * x[i]
         return arb_mat([row[1:] for row in rows])
 
-    def proof(self, x: Sequence[Any]) -> Proof:
+    def prove_joints(self, x: Sequence[Any]) -> Proof:
         """Return the published joints and their derivatives."""
-        slopes, motion = self.slopes(x), [list(x)]
+        slopes, motion = self.compute_jacobian(x), [list(x)]
         for _ in range(2):
             motion.append([arb(0)] * len(x))
-            rest = self.values(motion)
+            rest = self.compute_residuals(motion)
             try:
                 solved = slopes.solve(arb_mat([[-value] for value in rest]))
             except ZeroDivisionError:
                 raise SingularError('the balls hold a singular matrix') from None
             motion[-1] = [arb(0), *solved.entries()]
         ends = (1, 2, 3)
-        return Proof(*(self.joints(*motion[:end]) for end in ends))
+        return Proof(*(self.joint_values(*motion[:end]) for end in ends))
 
-    def joints(self, *motion: Sequence[Any]) -> tuple[Any, ...]:
+    def joint_values(self, *motion: Sequence[Any]) -> tuple[Any, ...]:
         """Return the published joints; with derivatives of the unknowns, the last of them."""
         return tuple(
-            self._turn(joint, motion)
+            self._joint_angle(joint, motion)
             if isinstance(joint, RevoluteJoint)
-            else _value(self._slides[joint.slider], motion) * self.scale
+            else _evaluate_terms(self._slides[joint.slider], motion) * self.scale
             for joint in self._linkage.joints.values()
         )
 
-    def _turn(self, joint: RevoluteJoint, motion: Sequence[Sequence[Any]]) -> Any:
+    def _joint_angle(self, joint: RevoluteJoint, motion: Sequence[Sequence[Any]]) -> Any:
         """Return an angle; for u on the unit circle its derivatives are u × u' and u × u''."""
         units = []
         for link in (joint.child, joint.parent):
@@ -208,38 +218,42 @@ class _Equations:
         child, parent = units
         if len(motion) > 1:
             order = len(motion) - 1
-            return _across(child[0], child[order]) - _across(parent[0], parent[order])
+            return _complex_cross(child[0], child[order]) - _complex_cross(
+                parent[0], parent[order]
+            )
         between = child[0] * _conjugate(parent[0])
         if between.real < 0:
             return (-between).log().imag + arb.pi()
         return between.log().imag
 
-    def _meet(self, one: Form, other: Form) -> None:
-        between = _less(one, other)
-        self.constraints.append([_still(c.real, 0, k) for k, c in between])
-        self.constraints.append([_still(c.imag, 0, k) for k, c in between])
+    def _add_pin(self, one: Form, other: Form) -> None:
+        between = _subtract_forms(one, other)
+        self.constraints.append([_constant_term(c.real, 0, k) for k, c in between])
+        self.constraints.append([_constant_term(c.imag, 0, k) for k, c in between])
 
-    def _place(self, link: str, point: str) -> Form:
+    def _point_form(self, link: str, point: str) -> Form:
         z = acb(*self._linkage.links[link][point]) / arb(self.scale)
         if link == GROUND:
             return [(0, z)]
         k = self._links[link]
-        return [*self._direction(k, z), (k + 2, acb(1)), (k + 3, acb(0, 1))]
+        return [*self._direction_form(k, z), (k + 2, acb(1)), (k + 3, acb(0, 1))]
 
-    def _turned(self, link: str, unit: Any) -> Form:
-        return [(0, unit)] if link == GROUND else self._direction(self._links[link], unit)
+    def _link_direction(self, link: str, unit: Any) -> Form:
+        return [(0, unit)] if link == GROUND else self._direction_form(self._links[link], unit)
 
     @staticmethod
-    def _direction(k: int, z: Any) -> Form:
+    def _direction_form(k: int, z: Any) -> Form:
         return [(k, acb(z)), (k + 1, acb(0, 1) * z)]
 
 
-def _converged(equations: _Equations, start: list[Any]) -> list[Any] | None:
+def _iterate_newton(equations: _ExactConstraints, start: list[Any]) -> list[Any] | None:
     """Return the unknowns to the present precision, or None where their matrix is singular."""
     x, enough = start, max(2.0 ** (-2 * _RADIUS), 2.0 ** (8 - ctx.prec))
     try:
         for _ in range(12):
-            step = equations.slopes(x).solve(arb_mat([[v] for v in equations.values([x])]))
+            step = equations.compute_jacobian(x).solve(
+                arb_mat([[v] for v in equations.compute_residuals([x])])
+            )
             x = [arb(1), *((a - b).mid() for a, b in zip(x[1:], step.entries(), strict=True))]
             if max(float(abs(one).mid()) for one in step.entries()) < enough:
                 break
@@ -248,24 +262,26 @@ def _converged(equations: _Equations, start: list[Any]) -> list[Any] | None:
     return x
 
 
-def _proved(equations: _Equations, start: list[Any]) -> list[Any] | None:
+def _prove_solution(equations: _ExactConstraints, start: list[Any]) -> list[Any] | None:
     """Return balls that hold exactly one solution, or None."""
-    x = _converged(equations, start)
+    x = _iterate_newton(equations, start)
     if x is None:
         return None
     try:
-        inverse = equations.slopes(x).inv().mid()
+        inverse = equations.compute_jacobian(x).inv().mid()
     except ZeroDivisionError:
         return None
     radius = arb(0, arb(2) ** -_RADIUS)
     ball = [arb(1), *(one + radius for one in x[1:])]
-    constant = inverse * arb_mat([[v] for v in equations.values([x])])
+    constant = inverse * arb_mat([[v] for v in equations.compute_residuals([x])])
     one = arb_mat(
         equations.count,
         equations.count,
         [int(i == j) for i in range(equations.count) for j in range(equations.count)],
     )
-    spread = (one - inverse * equations.slopes(ball)) * arb_mat([[radius]] * equations.count)
+    spread = (one - inverse * equations.compute_jacobian(ball)) * arb_mat(
+        [[radius]] * equations.count
+    )
     image = [
         middle - c + s
         for middle, c, s in zip(x[1:], constant.entries(), spread.entries(), strict=True)
@@ -275,7 +291,7 @@ def _proved(equations: _Equations, start: list[Any]) -> list[Any] | None:
     return None
 
 
-def _value(terms: Sequence[Term], motion: Sequence[Sequence[Any]]) -> Any:
+def _evaluate_terms(terms: Sequence[Term], motion: Sequence[Sequence[Any]]) -> Any:
     """Return a sum of products; for a motion its highest derivative, by the product rule."""
     x = motion[0]
     total = arb(0)
@@ -294,28 +310,28 @@ def _value(terms: Sequence[Term], motion: Sequence[Sequence[Any]]) -> Any:
     return total
 
 
-def _dot(one: Form, other: Form) -> list[Term]:
-    return [_still((_conjugate(c) * d).real, i, j) for i, c in one for j, d in other]
+def _dot_product(one: Form, other: Form) -> list[Term]:
+    return [_constant_term((_conjugate(c) * d).real, i, j) for i, c in one for j, d in other]
 
 
-def _cross(one: Form, other: Form, turn: Sequence[Any] = ()) -> list[Term]:
+def _cross_product(one: Form, other: Form, turn: Sequence[Any] = ()) -> list[Term]:
     """Return one × other, with the first rotated by the series of a unit vector."""
     if not turn:
-        return [_still((_conjugate(c) * d).imag, i, j) for i, c in one for j, d in other]
+        return [_constant_term((_conjugate(c) * d).imag, i, j) for i, c in one for j, d in other]
     return [
         (tuple((_conjugate(c * t) * d).imag for t in turn), i, j) for i, c in one for j, d in other
     ]
 
 
-def _less(one: Form, other: Form) -> Form:
+def _subtract_forms(one: Form, other: Form) -> Form:
     return [*one, *((k, -c) for k, c in other)]
 
 
-def _still(factor: Any, i: int, j: int) -> Term:
+def _constant_term(factor: Any, i: int, j: int) -> Term:
     return (arb(factor), arb(0), arb(0)), i, j
 
 
-def _across(one: Any, other: Any) -> Any:
+def _complex_cross(one: Any, other: Any) -> Any:
     return (_conjugate(one) * other).imag
 
 

@@ -63,7 +63,7 @@ class NoMotionError(Exception):
         self.time = time
 
 
-class Acting(NamedTuple):
+class AppliedEffort(NamedTuple):
     """What acts from a time on, in [s]: a mechanism, the force on its input, and a brake."""
 
     time: float
@@ -72,7 +72,7 @@ class Acting(NamedTuple):
     brake: float
 
 
-class _Body:
+class _MovingMass:
     """A mass of one freedom, at one moment: the crank, the motor, or both as one."""
 
     def __init__(
@@ -83,16 +83,16 @@ class _Body:
         self.sense = 0.0
         self.rests = False
 
-    def settle(self, time: float) -> None:
+    def find_direction(self, time: float) -> None:
         """Find out whether it rests, and else in which direction it sets out."""
-        terms = self._terms(self.value, time)
+        terms = self._terms_at(self.value, time)
         dry = terms.coulomb + terms.breakaway + self.brake > 0.0
         jumps = dry or self.of.friction_effort is not None or bool(self.of.laws)
         if self.rate:
             self.rests, self.sense = False, copysign(1.0, self.rate) if jumps else 0.0
             return
         pushed = self.acceleration(self.value, 0.0, time)
-        self.rests, self.sense = pushed == 0.0 and self._holds(terms), 0.0
+        self.rests, self.sense = pushed == 0.0 and self._is_held(terms), 0.0
         if not self.rests and jumps and pushed:
             self.sense = copysign(1.0, pushed)
 
@@ -100,15 +100,15 @@ class _Body:
         """Return q̈ by the scene's own equation of motion, of a rate in the present direction."""
         if self.sense and rate * self.sense <= 0.0:
             rate = self.sense * _TINY
-        motion = Motion(value, rate, self._terms(value, time))
+        motion = Motion(value, rate, self._terms_at(value, time))
         return self.of.acceleration(motion, self.force, self.brake, time)
 
-    def _holds(self, terms: Any) -> bool:
+    def _is_held(self, terms: Any) -> bool:
         """Return whether something holds it, so that it does not just stand for a moment."""
         dry = terms.coulomb + terms.breakaway + self.brake > 0.0
         return dry or self.of.friction_effort is not None or self.value in self.of.stops
 
-    def _terms(self, value: float, time: float) -> Any:
+    def _terms_at(self, value: float, time: float) -> Any:
         terms = self.of.terms(value)
         if terms is None or not abs(value) < _FASTEST:
             raise NoMotionError(time)
@@ -123,7 +123,10 @@ Margin = Callable[[float, Any], float]
 
 
 def exact_motion(
-    start: Any, acting: Sequence[Acting], times: Sequence[float], tolerance: float = TOLERANCE
+    start: Any,
+    acting: Sequence[AppliedEffort],
+    times: Sequence[float],
+    tolerance: float = TOLERANCE,
 ) -> list[State]:
     """
     Return values and rates of the input at some times.
@@ -146,19 +149,19 @@ def exact_motion(
 
     """
     found: list[State] = []
-    run = _Run(start, tolerance)
+    run = _ExactRun(start, tolerance)
     ends = [*(each.time for each in acting[1:]), inf]
     for now, end in zip(acting, ends, strict=True):
         until = min(end, times[-1])
         begin = len(found)
         wanted = [time for time in times[begin:] if time < end or end == inf]
-        found += run.go(now, until, wanted)
+        found += run.advance_until(now, until, wanted)
         if end >= times[-1] and len(found) == len(times):
             break
     return found
 
 
-class _Run:
+class _ExactRun:
     """The bodies as they move from one event to the next."""
 
     def __init__(self, start: Any, tolerance: float) -> None:
@@ -173,56 +176,62 @@ class _Run:
         self._motor = (motor.value, motor.rate) if motor else None
         self._side = 0
 
-    def go(self, acting: Acting, until: float, times: Sequence[float]) -> list[State]:
+    def advance_until(
+        self, acting: AppliedEffort, until: float, times: Sequence[float]
+    ) -> list[State]:
         """Move on under what acts; return the crank at some times up to the end."""
         found: list[State] = []
         while self._time < until:
             self._pieces += 1
             if self._pieces > _MOST_PIECES:
                 raise NoMotionError(self._time)
-            bodies = self._bodies(acting)
+            bodies = self._moving_masses(acting)
             for body in bodies:
-                body.settle(self._time)
+                body.find_direction(self._time)
             begin = len(found)
-            found += self._piece(bodies, acting, until, times[begin:])
+            found += self._integrate_piece(bodies, acting, until, times[begin:])
         return found + [self._crank] * (len(times) - len(found))
 
-    def _bodies(self, acting: Acting) -> list[_Body]:
+    def _moving_masses(self, acting: AppliedEffort) -> list[_MovingMass]:
         """Return what moves: the crank, crank and motor apart, or both as one."""
         mechanism, force, brake = acting[1:]
         if self._motor is None:
-            return [_Body(mechanism, force, brake, *self._crank)]
+            return [_MovingMass(mechanism, force, brake, *self._crank)]
         if self._side:
-            joined = _Body(mechanism.joined, force, brake, *self._crank)
-            joined.settle(self._time)
-            if self._pressing(acting, joined, self._time, *self._crank) >= 0.0:
+            joined = _MovingMass(mechanism.joined, force, brake, *self._crank)
+            joined.find_direction(self._time)
+            if self._pressing_acceleration(acting, joined, self._time, *self._crank) >= 0.0:
                 return [joined]
             self._side = 0
         return [
-            _Body(mechanism.crank, 0.0, 0.0, *self._crank),
-            _Body(mechanism.motor, force, brake, *self._motor),
+            _MovingMass(mechanism.crank, 0.0, 0.0, *self._crank),
+            _MovingMass(mechanism.motor, force, brake, *self._motor),
         ]
 
-    def _pressing(
-        self, acting: Acting, joined: _Body, time: float, value: float, rate: float
+    def _pressing_acceleration(
+        self, acting: AppliedEffort, joined: _MovingMass, time: float, value: float, rate: float
     ) -> float:
         """Return how much faster the motor alone would go than the crank alone."""
         masses, force, brake = acting[1:]
-        crank = _Body(masses.crank, 0.0, 0.0, value, rate)
-        motor = _Body(masses.motor, force, brake, value + self._side * masses.half, rate)
+        crank = _MovingMass(masses.crank, 0.0, 0.0, value, rate)
+        motor = _MovingMass(masses.motor, force, brake, value + self._side * masses.half, rate)
         crank.sense = motor.sense = joined.sense
         pulled = [body.acceleration(body.value, rate, time) for body in (motor, crank)]
         return self._side * (pulled[0] - pulled[1])
 
-    def _piece(
-        self, bodies: list[_Body], acting: Acting, until: float, times: Sequence[float]
+    def _integrate_piece(
+        self,
+        bodies: list[_MovingMass],
+        acting: AppliedEffort,
+        until: float,
+        times: Sequence[float],
     ) -> list[State]:
         """Integrate up to the next event, or to the end; return the crank at the times passed."""
         if all(body.rests for body in bodies):
-            self._rest(bodies, until)
+            self._wait_at_rest(bodies, until)
             return [self._crank] * sum(time <= self._time for time in times)
 
-        def field(time: float, state: Any) -> list[float]:
+        def state_derivative(time: float, state: Any) -> list[float]:
             slopes: list[float] = []
             numbers = state.tolist()
             for k, body in enumerate(bodies):
@@ -231,11 +240,11 @@ class _Run:
                 slopes += [rate, body.acceleration(value, rate, time)] if moves else [0.0, 0.0]
             return slopes
 
-        events = [*self._events(bodies, acting)]
+        events = [*self._possible_events(bodies, acting)]
         begin = np.array([number for body in bodies for number in (body.value, body.rate)])
         first = min(self._first, until - self._time) if self._first else None
         solver = DOP853(
-            field, self._time, begin, until, rtol=self._tolerance, atol=self._tolerance,
+            state_derivative, self._time, begin, until, rtol=self._tolerance, atol=self._tolerance,
             first_step=first,
         )  # fmt: skip
         found: list[State] = []
@@ -254,13 +263,13 @@ class _Run:
                 value, rate = dense(times[len(found)])[:2]
                 found.append((float(value), float(rate)))
             if event:
-                self._take(bodies, dense(stop), stop, acting)
+                self._store_state(bodies, dense(stop), stop, acting)
                 events[event[1]][1]()
                 return found
-        self._take(bodies, solver.y, until, acting)
+        self._store_state(bodies, solver.y, until, acting)
         return found
 
-    def _rest(self, bodies: list[_Body], until: float) -> None:
+    def _wait_at_rest(self, bodies: list[_MovingMass], until: float) -> None:
         """Let the time pass while nothing moves."""
         timed = any(body.of.laws for body in bodies)
         if not timed:
@@ -270,7 +279,9 @@ class _Run:
             if any(body.acceleration(body.value, 0.0, self._time) for body in bodies):
                 break
 
-    def _take(self, bodies: list[_Body], state: Any, time: float, acting: Acting) -> None:
+    def _store_state(
+        self, bodies: list[_MovingMass], state: Any, time: float, acting: AppliedEffort
+    ) -> None:
         """Hold the state at a time."""
         self._time = time
         numbers = state.tolist()
@@ -280,44 +291,49 @@ class _Run:
         elif self._motor:
             self._motor = numbers[0] + self._side * acting.mechanism.half, numbers[1]
 
-    def _events(
-        self, bodies: list[_Body], acting: Acting
+    def _possible_events(
+        self, bodies: list[_MovingMass], acting: AppliedEffort
     ) -> Iterator[tuple[Margin, Callable[[], None]]]:
         """Yield what may happen, each with what it does."""
         for number, body in enumerate(bodies):
             if body.sense and not body.rests:
-                yield self._turning(body.sense, number)
+                yield self._reversal_event(body.sense, number)
         # Only the crank has stops, and it comes first.
         low, high = bodies[0].of.stops
         if not bodies[0].rests:
             if high < inf:
-                yield (lambda _, y: high - y[0]), self._impact(acting, high, 1.0)
+                yield (lambda _, y: high - y[0]), self._impact_effect(acting, high, 1.0)
             if low > -inf:
-                yield (lambda _, y: y[0] - low), self._impact(acting, low, -1.0)
+                yield (lambda _, y: y[0] - low), self._impact_effect(acting, low, -1.0)
         if self._motor is None:
             return
         if len(bodies) == 2:
             half = acting.mechanism.half
             yield (
                 (lambda _, y: half - abs(y[2] - y[0]) + 8.0 * ulp(abs(y[0]) + half)),
-                lambda: self._meet(acting),
+                lambda: self._collide_masses(acting),
             )
             return
         (joined,) = bodies
 
-        def part() -> None:
+        def separate_masses() -> None:
             self._side = 0
 
         yield (
-            (lambda t, y: self._pressing(acting, joined, t, float(y[0]), float(y[1])) + _PULL),
-            part,
+            (
+                lambda t, y: (
+                    self._pressing_acceleration(acting, joined, t, float(y[0]), float(y[1]))
+                    + _PULL
+                )
+            ),
+            separate_masses,
         )
 
-    def _turning(self, sense: float, number: int) -> tuple[Margin, Callable[[], None]]:
+    def _reversal_event(self, sense: float, number: int) -> tuple[Margin, Callable[[], None]]:
         """Return the margin of a rate to 0, and what happens there."""
         at = 2 * number + 1
 
-        def stand() -> None:
+        def stop_body() -> None:
             if number:
                 self._motor = self._motor[0], 0.0  # type: ignore[index]
                 return
@@ -325,13 +341,15 @@ class _Run:
             if self._side and self._motor:
                 self._motor = self._motor[0], 0.0
 
-        return (lambda _, y: sense * y[at]), stand
+        return (lambda _, y: sense * y[at]), stop_body
 
-    def _impact(self, acting: Acting, stop: float, outward: float) -> Callable[[], None]:
+    def _impact_effect(
+        self, acting: AppliedEffort, stop: float, outward: float
+    ) -> Callable[[], None]:
         """Return what an impact of the crank on a stop does."""
         of = acting.mechanism if self._motor is None else acting.mechanism.crank
 
-        def bounce() -> None:
+        def bounce_crank() -> None:
             rate = self._crank[1]
             brief = self._time - self._bounced < _BRIEF
             back = 0.0 if brief or outward * rate <= 0.0 else 0.0 - of.restitution * rate
@@ -339,11 +357,11 @@ class _Run:
             self._crank = stop, back
             side, self._side = self._side, 0
             if side and self._motor and side * (self._motor[1] - back) > 0.0:
-                self._meet(acting)
+                self._collide_masses(acting)
 
-        return bounce
+        return bounce_crank
 
-    def _meet(self, acting: Acting) -> None:
+    def _collide_masses(self, acting: AppliedEffort) -> None:
         """Let motor and crank meet."""
         masses = acting.mechanism
         assert self._motor is not None, 'only with play'

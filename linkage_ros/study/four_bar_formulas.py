@@ -61,7 +61,7 @@ class PlainFourBar(NamedTuple):
     # second, and the constant. The directions are those of ground (0), crank, coupler, rocker.
     terms: tuple[tuple[int, int, float], ...]
 
-    def joints(self, directions: Sequence[Any]) -> tuple[Any, ...]:
+    def joint_angles(self, directions: Sequence[Any]) -> tuple[Any, ...]:
         """Return the published joints for directions measured from the line of the ground."""
         return tuple(directions[i] - directions[j] + constant for i, j, constant in self.terms)
 
@@ -84,15 +84,15 @@ def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     pivot, pin = ends(crank, ground), ends(crank, coupler)
     closing, far = ends(coupler, rocker), ends(rocker, ground)
 
-    def facing(link: str, start: str, end: str) -> float:
+    def direction_angle(link: str, start: str, end: str) -> float:
         points = linkage.links[link]
         return phase(complex(*points[end]) - complex(*points[start]))
 
     arms = {
-        ground: facing(ground, pivot, far),
-        crank: facing(crank, pivot, pin),
-        coupler: facing(coupler, pin, closing),
-        rocker: facing(rocker, far, closing),
+        ground: direction_angle(ground, pivot, far),
+        crank: direction_angle(crank, pivot, pin),
+        coupler: direction_angle(coupler, pin, closing),
+        rocker: direction_angle(rocker, far, closing),
     }
     numbers = {link: k for k, link in enumerate(arms)}
     level = arms[ground]
@@ -119,7 +119,7 @@ Solve = Callable[..., Sequence[Any]]
 def solve_by_textbook(shape: PlainFourBar) -> Solve:
     """Return the textbook form of a four-bar."""
     a, b, c, d, sign, turn, offset, _ = shape
-    joints = shape.joints
+    joints = shape.joint_angles
 
     def position(angle: float) -> Sequence[Any]:
         theta = turn * angle + offset

@@ -50,7 +50,7 @@ def joints_at(closure: Closure, cranks: Sequence[Crank | None]) -> tuple[Any, An
     return batch.positions, batch.velocities
 
 
-def distances(closure: Closure, joints: Any, exact: Any) -> Any:
+def joint_distances(closure: Closure, joints: Any, exact: Any) -> Any:
     """
     Return for each state the greatest distance of a joint from the exact one.
 

@@ -22,9 +22,9 @@ from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 from linkage_ros.study.age import measure_age_in_use, measure_age_of_command
-from linkage_ros.study.budget import Budget, Knob, Loss, Setting
+from linkage_ros.study.budget import Budget, Knob, RecordingLoss, Setting
 from linkage_ros.study.deliberate import measure_deliberate
-from linkage_ros.study.member_motion import cranks_at, MemberMotion, scene_key
+from linkage_ros.study.member_motion import cranks_at, LinkageMotion, scene_key
 from linkage_ros.study.motion_feed import feed_of
 from linkage_ros.study.prices import add_prices, change_scene, Feed, tick_price, USUAL_RATE
 from linkage_ros.study.scene_motion import motions_of
@@ -83,7 +83,7 @@ def measure_budget(
     left_out: list[str] = [_QUICK_LEFT_OUT] if quick else []
     motions = motions_of(scene, like, horizon) if ERRORS in parts or like else []
     horizon = min([horizon, *(motion.length for motion in motions)])
-    if quick and ERRORS in parts and (followed := _followed(motions, horizon)) < horizon:
+    if quick and ERRORS in parts and (followed := _affordable_horizon(motions, horizon)) < horizon:
         horizon = followed
         left_out.append(f'--quick: what comes after {horizon:g} s')
     feed = feed_of(motions)
@@ -96,7 +96,7 @@ def measure_budget(
     knobs: list[Knob] = []
     if ERRORS in parts:
         found, more = _measure_errors(scene, motions, horizon, quick, feed, part_progress(ERRORS))
-        knobs += sorted(found, key=lambda knob: knob.own.error.worst, reverse=True)
+        knobs += sorted(found, key=lambda knob: knob.own_setting.error.worst, reverse=True)
         left_out += more
         done += _SHARES[ERRORS] / whole
     if EFFECTS in parts:
@@ -104,7 +104,7 @@ def measure_budget(
             scene, quick=quick, horizon=horizon, feed=feed, progress=part_progress(EFFECTS)
         )
         done += _SHARES[EFFECTS] / whole
-    losses: list[Loss] = []
+    losses: list[RecordingLoss] = []
     if RECORDING in parts:
         from linkage_ros.study.recording import (
             measure_recording,  # local import: it needs a disk
@@ -127,7 +127,7 @@ def measure_budget(
     )
 
 
-def _followed(motions: Sequence[MemberMotion], horizon: float) -> float:
+def _affordable_horizon(motions: Sequence[LinkageMotion], horizon: float) -> float:
     """Return how much of the motion a quick measurement has time to follow, in [s]."""
     sample = min(0.2, horizon)
     begun = process_time()
@@ -140,7 +140,7 @@ def _followed(motions: Sequence[MemberMotion], horizon: float) -> float:
 
 def _measure_errors(
     scene: Scene,
-    motions: Sequence[MemberMotion],
+    motions: Sequence[LinkageMotion],
     horizon: float,
     quick: bool,
     feed: Feed,
@@ -153,7 +153,7 @@ def _measure_errors(
     integrated = sum(motion.path is None for motion in motions)
     progress(0.1)
     for motion in motions:
-        if motion.member.drive[0] == 'torque':
+        if motion.scene_linkage.drive[0] == 'torque':
             from linkage_ros.study.drive_step import (
                 measure_drive_step,  # local import: few scenes have forces
             )
@@ -162,7 +162,7 @@ def _measure_errors(
                 motion,
                 rate,
                 horizon,
-                key=scene_key(motion.member, 'drive') + '.torque',
+                key=scene_key(motion.scene_linkage, 'drive') + '.torque',
                 quick=quick,
                 seconds=(6.0 if quick else 60.0) / integrated,
                 progress=lambda share: progress(0.1 + 0.4 * share),
@@ -173,7 +173,7 @@ def _measure_errors(
             if found is None:
                 continue
             knob = found
-        of = f' of {motion.member.name}' if motion.member.name else ''
+        of = f' of {motion.scene_linkage.name}' if motion.scene_linkage.name else ''
         knobs.append(knob._replace(name=knob.name + of))
     progress(0.5)
     if any(motion.closure.linkage.ratios for motion in motions):
@@ -186,20 +186,20 @@ def _measure_errors(
         seconds = 1.0 if quick else 8.0
         knobs.append(measure_solving(motions, rate, horizon, quick=quick, seconds=seconds))
     progress(0.7)
-    knobs = [_accepted(scene, knob) for knob in knobs]
+    knobs = [_accepted_settings(scene, knob) for knob in knobs]
     seconds = 3.0 if quick else 30.0
     priced = add_prices(scene, knobs, seconds, feed, lambda share: progress(0.7 + 0.3 * share))
     return priced, left_out
 
 
-def _accepted(scene: Scene, knob: Knob) -> Knob:
+def _accepted_settings(scene: Scene, knob: Knob) -> Knob:
     """Return a knob without the settings that the scene refuses."""
-    own = knob.own
-    kept = [each for each in knob.settings if each is own or _accepts(scene, each)]
+    own = knob.own_setting
+    kept = [each for each in knob.settings if each is own or _is_accepted(scene, each)]
     return knob._replace(settings=kept, chosen=kept.index(own))
 
 
-def _accepts(scene: Scene, setting: Setting) -> bool:
+def _is_accepted(scene: Scene, setting: Setting) -> bool:
     if not any(key.rpartition('.')[0].endswith('torque') for key, _ in setting.changes or ()):
         return True
     try:

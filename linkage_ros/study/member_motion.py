@@ -50,10 +50,10 @@ class Command(NamedTuple):
     effort: float
 
 
-class MemberMotion(NamedTuple):
+class LinkageMotion(NamedTuple):
     """What one linkage of a scene does."""
 
-    member: SceneLinkage
+    scene_linkage: SceneLinkage
     closure: Closure  # The closed form of its linkage, with the deviations of its parts
     context: Context
     solution: Closure  # What the scene solves it with: the same, or another solver
@@ -67,7 +67,7 @@ class MemberMotion(NamedTuple):
     note: str = ''  # What is assumed of it, in a sentence; '' for nothing
 
 
-def cranks_at(motion: MemberMotion, times: Sequence[int], **changes: Any) -> list[Crank | None]:
+def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> list[Crank | None]:
     """
     Return the crank at some times since the first tick, in [ns] and in order.
 
@@ -89,7 +89,7 @@ def cranks_at(motion: MemberMotion, times: Sequence[int], **changes: Any) -> lis
     if motion.path is not None:
         return [motion.path(time) for time in times]
     drive = build_drive(motion, **changes)
-    step = changes.get('step', motion.member.drive[1].step)
+    step = changes.get('step', motion.scene_linkage.drive[1].step)
     look = max(1, round(_LOOK / step)) * round(step * NANOSECONDS)
     commands, number = motion.commands, 0
     passed = 0
@@ -116,10 +116,10 @@ def tick_times(rate: float, horizon: float, most: int) -> list[int]:
     return [round(number * NANOSECONDS / rate) for number in chosen]
 
 
-def scene_key(member: SceneLinkage, key: str) -> str:
+def scene_key(scene_linkage: SceneLinkage, key: str) -> str:
     """Return where a key of a linkage stands in its scene: in its own entry, or for all."""
-    own = member.name and key in member.content
-    return f'linkages.{member.name}.{key}' if own else key
+    own = scene_linkage.name and key in scene_linkage.content
+    return f'linkages.{scene_linkage.name}.{key}' if own else key
 
 
 def refuse_horizon(time: float, why: str) -> LinkageError:
@@ -139,6 +139,6 @@ def _check_bounded(crank: CrankState, time: int, step: float) -> None:
         raise refuse_horizon(time * 1e-9, why)
 
 
-def build_drive(motion: MemberMotion, **changes: Any) -> torque.TorqueDrive:
+def build_drive(motion: LinkageMotion, **changes: Any) -> torque.TorqueDrive:
     """Return the torque drive at its start, with other parameters."""
-    return torque.build(replace(motion.member.drive[1], **changes), motion.context)
+    return torque.build(replace(motion.scene_linkage.drive[1], **changes), motion.context)

@@ -16,38 +16,38 @@ from linkage_ros.drives.torque import TOPIC as TORQUE_TOPIC
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
-from linkage_ros.study.member_motion import BEGIN, Crank, MemberMotion
+from linkage_ros.study.member_motion import BEGIN, Crank, LinkageMotion
 from linkage_ros.study.prices import Feed, turn_crank, USUAL_RATE
 
 
-def feed_of(motions: Sequence[MemberMotion]) -> Feed:
+def feed_of(motions: Sequence[LinkageMotion]) -> Feed:
     """Return the messages that make this motion, for a measurement of ticks."""
     if not any(motion.sample_rate or motion.commands for motion in motions):
         return turn_crank
 
-    def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
+    def feed_messages(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
         if pipeline.topic == TORQUE_TOPIC:
             return _commands_and_ticks(scene, motions)
         return (
             _samples_and_ticks(scene, motions) if pipeline.topic else turn_crank(scene, pipeline)
         )
 
-    return feed
+    return feed_messages
 
 
 def _samples_and_ticks(
-    scene: Scene, motions: Sequence[MemberMotion]
+    scene: Scene, motions: Sequence[LinkageMotion]
 ) -> Iterator[tuple[int, bytes]]:
     """Yield ticks, each with a sample; the last one again and again after the end of a bag."""
-    driven = [each for each in motions if each.member.drive[0] == 'topic']
-    if any(each.member.dependent_joint for each in driven):
+    driven = [each for each in motions if each.scene_linkage.drive[0] == 'topic']
+    if any(each.scene_linkage.dependent_joint for each in driven):
         yield from turn_crank(scene, Pipeline(scene))
         return
     write = JointStateWriter(
-        [name for each in driven for name in each.member.sampled_joints]
+        [name for each in driven for name in each.scene_linkage.sampled_joints]
     ).write
     period = 1e9 / (scene.rate or USUAL_RATE)
-    known: list[Crank] = [((0.0,) * len(e.member.sampled_joints),) * 2 for e in driven]
+    known: list[Crank] = [((0.0,) * len(e.scene_linkage.sampled_joints),) * 2 for e in driven]
     number = 0
     while True:
         now = BEGIN + round(number * period)
@@ -60,10 +60,10 @@ def _samples_and_ticks(
 
 
 def _commands_and_ticks(
-    scene: Scene, motions: Sequence[MemberMotion]
+    scene: Scene, motions: Sequence[LinkageMotion]
 ) -> Iterator[tuple[int, bytes]]:
     """Yield ticks, with the commands that have come since the last one."""
-    driven = [each for each in motions if each.member.drive[0] == 'torque']
+    driven = [each for each in motions if each.scene_linkage.drive[0] == 'torque']
     names = [name for each in driven for name in each.context.inputs_in_messages]
     write = JointStateWriter(names).write
     zeros = (0.0,) * len(names)

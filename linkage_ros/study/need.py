@@ -25,7 +25,7 @@ from linkage_ros.study.budget_text import error_text, share_text
 _ROUNDED = 1.0 + 1e-9
 
 
-class _Choice(NamedTuple):
+class _SettingChoice(NamedTuple):
     """One setting for each knob."""
 
     cost: float  # Share of a core, 0 to 1
@@ -39,8 +39,8 @@ def answer_need(budget: Budget, need: float) -> NeedAnswer:
     choices = _best_choices(budget)
     good = [choice for choice in choices if choice.error <= need * _ROUNDED]
     if good:
-        return _met(budget, min(good), f'for {error_text(need)} rad: ')
-    return _unmet(budget, choices, f'for {error_text(need)} rad: ')
+        return _met_answer(budget, min(good), f'for {error_text(need)} rad: ')
+    return _unmet_answer(budget, choices, f'for {error_text(need)} rad: ')
 
 
 def answers_of(budget: Budget) -> list[NeedAnswer]:
@@ -50,63 +50,67 @@ def answers_of(budget: Budget) -> list[NeedAnswer]:
     The last one is to a need that nothing meets.
     """
     choices = _best_choices(budget)
-    return [*(_met(budget, choice, '') for choice in choices), _unmet(budget, choices, '')]
+    return [
+        *(_met_answer(budget, choice, '') for choice in choices),
+        _unmet_answer(budget, choices, ''),
+    ]
 
 
-def _best_choices(budget: Budget) -> list[_Choice]:
+def _best_choices(budget: Budget) -> list[_SettingChoice]:
     """Return the choices that no other one beats in both error and cost, the cheapest first."""
-    knobs = _knobs(budget)
+    knobs = _error_knobs(budget)
     choices = []
-    for settings in product(*(_candidates(budget, knob) for knob in knobs)):
+    for settings in product(*(_candidate_settings(budget, knob) for knob in knobs)):
         pairs = [*zip(knobs, settings, strict=True)]
-        cost = budget.tick.core + sum(_cost(budget, *pair) for pair in pairs)
-        changed = sum(setting is not knob.own for knob, setting in pairs)
+        cost = budget.tick.core_share + sum(_added_cost(budget, *pair) for pair in pairs)
+        changed = sum(setting is not knob.own_setting for knob, setting in pairs)
         error = sum(setting.error.worst for setting in settings)
-        choices.append(_Choice(cost, changed, error, settings))
-    best: list[_Choice] = []
+        choices.append(_SettingChoice(cost, changed, error, settings))
+    best: list[_SettingChoice] = []
     for choice in sorted(choices, key=lambda one: one[:3]):
         if not best or choice.error < best[-1].error:
             best.append(choice)
     return best
 
 
-def _knobs(budget: Budget) -> list[Knob]:
+def _error_knobs(budget: Budget) -> list[Knob]:
     return [knob for knob in budget.knobs if not knob.is_deliberate]
 
 
-def _candidates(budget: Budget, knob: Knob) -> Iterator[Setting]:
+def _candidate_settings(budget: Budget, knob: Knob) -> Iterator[Setting]:
     """Yield the settings of a knob that can be asked for and that no other one beats."""
-    asked = [each for each in knob.settings if each is knob.own or each.line]
+    asked = [each for each in knob.settings if each is knob.own_setting or each.instruction]
     least = float('inf')
     ranked = sorted(
-        asked, key=lambda s: (_cost(budget, knob, s), s is not knob.own, s.error.worst)
+        asked,
+        key=lambda s: (_added_cost(budget, knob, s), s is not knob.own_setting, s.error.worst),
     )
     for setting in ranked:
-        if setting is knob.own or setting.error.worst < least:
+        if setting is knob.own_setting or setting.error.worst < least:
             least = min(least, setting.error.worst)
             yield setting
 
 
-def _cost(budget: Budget, knob: Knob, setting: Setting) -> float:
+def _added_cost(budget: Budget, knob: Knob, setting: Setting) -> float:
     """Return what a setting takes of a core more than the scene's own; 0 within noise."""
     price = setting.price
-    if setting is knob.own or price is None:
+    if setting is knob.own_setting or price is None:
         return 0.0
     if price.is_noise and price.rate == budget.rate:
         return 0.0
-    return budget.core_of(knob, setting) - budget.tick.core
+    return budget.core_of(knob, setting) - budget.tick.core_share
 
 
-def _met(budget: Budget, choice: _Choice, before: str) -> NeedAnswer:
+def _met_answer(budget: Budget, choice: _SettingChoice, before: str) -> NeedAnswer:
     """Return the answer with a choice."""
     changes: dict[str, object] = {}
     lines: list[str] = []
-    for knob, setting in zip(_knobs(budget), choice.settings, strict=True):
-        if setting is not knob.own:
+    for knob, setting in zip(_error_knobs(budget), choice.settings, strict=True):
+        if setting is not knob.own_setting:
             changes |= dict(setting.changes or ())
-            lines.append(setting.line)
+            lines.append(setting.instruction)
     write = '; '.join(dict.fromkeys(lines)) or 'nothing is to be written'
-    more = choice.cost - budget.tick.core
+    more = choice.cost - budget.tick.core_share
     cost = 'no more cost'
     if more:
         cost = f'{"+" if more > 0.0 else ""}{share_text(more)} of a core'
@@ -114,12 +118,12 @@ def _met(budget: Budget, choice: _Choice, before: str) -> NeedAnswer:
     return NeedAnswer(True, choice.error, [*changes.items()], text)
 
 
-def _unmet(budget: Budget, choices: Sequence[_Choice], before: str) -> NeedAnswer:
+def _unmet_answer(budget: Budget, choices: Sequence[_SettingChoice], before: str) -> NeedAnswer:
     """Return what stands in the way of less than what the best choice leaves."""
-    if not _knobs(budget):
+    if not _error_knobs(budget):
         return NeedAnswer(False, float('inf'), [], f'{before}no errors were measured')
     best = choices[-1]
-    pairs = zip(_knobs(budget), best.settings, strict=True)
+    pairs = zip(_error_knobs(budget), best.settings, strict=True)
     knob, setting = max(pairs, key=lambda pair: pair[1].error.worst)
     text = (
         f'{before}nothing that was measured reaches it; {knob.name} stands in the way: '

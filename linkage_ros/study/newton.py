@@ -44,7 +44,7 @@ class ConstraintEquations:
         self._ground = {name: k for k, name in enumerate(linkage.links[GROUND])}
         self._pins = [complex(*place) for place in linkage.links[GROUND].values()]
         self._slides: dict[str, OnLine] = {}
-        self._constraints = self._listed()
+        self._constraints = self._list_constraints()
 
     def start_behind(self, inputs: Sequence[float], apart: float) -> Any:
         """Return the unknowns of the closure at inputs that differ, on the side that closes."""
@@ -63,57 +63,61 @@ class ConstraintEquations:
             found += [angles[link], place.real, place.imag]
         return np.array(found)
 
-    def corrected(self, unknowns: Any, inputs: Sequence[float]) -> Any:
+    def newton_step(self, unknowns: Any, inputs: Sequence[float]) -> Any:
         """Return the unknowns after one step of Newton's method."""
         known = LinkState([0.0, *inputs], self._pins)
         errors, jacobian = evaluate_constraints(self._constraints, unknowns.tolist(), known)
         return unknowns - np.linalg.solve(jacobian, errors)
 
-    def joints(self, unknowns: Any) -> tuple[float, ...]:
+    def joint_values(self, unknowns: Any) -> tuple[float, ...]:
         """Return the published joints."""
 
-        def angle(link: str) -> float:
+        def link_angle(link: str) -> float:
             return float(unknowns[3 * self._bodies[link]]) if link != GROUND else 0.0
 
         known, values = LinkState([0.0], self._pins), unknowns.tolist()
         return tuple(
-            angle(joint.child) - angle(joint.parent)
+            link_angle(joint.child) - link_angle(joint.parent)
             if isinstance(joint, RevoluteJoint)
             else point_in_line_frame(self._slides[joint.slider], known, values).real
             for joint in self._linkage.joints.values()
         )
 
-    def _listed(self) -> tuple[Constraint, ...]:
+    def _list_constraints(self) -> tuple[Constraint, ...]:
         found: list[Constraint] = []
         carriers: dict[str, str] = {}
         for link, points in self._linkage.links.items():
             for point in points:
                 if point in carriers:
                     found.append(
-                        CoincidentPoints(self._end(link, point), self._end(carriers[point], point))
+                        CoincidentPoints(
+                            self._link_end(link, point), self._link_end(carriers[point], point)
+                        )
                     )
                 carriers.setdefault(point, link)
         for name, slider in self._linkage.sliders.items():
             line = OnLine(
-                self._end(slider.block or carriers[slider.point], slider.point),
-                self._end(slider.along, slider.through),
-                self._facing(slider.along, phase(complex(*slider.direction))),
+                self._link_end(slider.block or carriers[slider.point], slider.point),
+                self._link_end(slider.along, slider.through),
+                self._link_facing(slider.along, phase(complex(*slider.direction))),
             )
             self._slides[name] = line
             found.append(line)
             if slider.block:
-                ends = self._facing(slider.block), self._facing(slider.along)
+                ends = self._link_facing(slider.block), self._link_facing(slider.along)
                 found.append(Parallel(*ends, slider.angle))
         for k, joint in enumerate(self._linkage.inputs, 1):
             if joint.slider:
                 found.append(self._slides[joint.slider]._replace(slide=k))
             else:
                 found.append(
-                    Parallel(self._facing(joint.child), self._facing(joint.parent), 0.0, k)
+                    Parallel(
+                        self._link_facing(joint.child), self._link_facing(joint.parent), 0.0, k
+                    )
                 )
         return tuple(found)
 
-    def _end(self, link: str, point: str) -> End:
+    def _link_end(self, link: str, point: str) -> End:
         if link == GROUND:
             return End(-1, 0j, self._ground[point])
         points = self._linkage.links[link]
@@ -121,7 +125,7 @@ class ConstraintEquations:
             self._bodies[link], complex(*points[point]) - complex(*next(iter(points.values())))
         )
 
-    def _facing(self, link: str, direction: float = 0.0) -> BodyDirection:
+    def _link_facing(self, link: str, direction: float = 0.0) -> BodyDirection:
         return BodyDirection(self._bodies.get(link, -1), 0, direction)
 
 
@@ -148,12 +152,12 @@ def solve_by_newton(linkage: Linkage, tolerance: float) -> Callable[..., Sequenc
         unknowns = starts[inputs]
         for _ in range(_MOST):
             try:
-                corrected = rules.corrected(unknowns, inputs)
+                corrected = rules.newton_step(unknowns, inputs)
             except np.linalg.LinAlgError:
                 return ()
             change, unknowns = float(np.abs(corrected - unknowns).max()), corrected
             if change <= tolerance:
-                return rules.joints(unknowns)
+                return rules.joint_values(unknowns)
         return ()
 
     return position

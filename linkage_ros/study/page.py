@@ -29,7 +29,7 @@ def budget_html(budget: Budget, answers: Sequence[NeedAnswer]) -> str:
     one is to a need that nothing meets. Its field shows the first that reaches what is typed.
     """
     data = {'answers': [{'error': each.error, 'text': each.text} for each in answers]}
-    body = _body(budget, has_field=bool(answers))
+    body = _page_body(budget, has_field=bool(answers))
     return document(
         f'Accuracy of {budget.scene}',
         body,
@@ -40,7 +40,7 @@ def budget_html(budget: Budget, answers: Sequence[NeedAnswer]) -> str:
     )
 
 
-def _body(budget: Budget, *, has_field: bool) -> Iterator[str]:
+def _page_body(budget: Budget, *, has_field: bool) -> Iterator[str]:
     yield f'<header><h1>Accuracy of {escape(budget.scene)}</h1>'
     yield from (f'<p class="lead">{escape(line)}</p>' for line in lead_lines(budget))
     yield '</header><main>'

@@ -84,7 +84,7 @@ class Mark(NamedTuple):
         return Box(self.x - size, self.y - size, self.x + size, self.y + size)
 
 
-class Label(NamedTuple):
+class PlacedLabel(NamedTuple):
     """A text in the picture, with the area that it takes."""
 
     text: str
@@ -95,7 +95,7 @@ class Label(NamedTuple):
 def budget_svg(budget: Budget) -> str:
     """Return the picture of a budget as an SVG document; '' if it has no errors."""
     knobs = error_knobs(budget)
-    return _Picture(budget, knobs).document() if knobs else ''
+    return _Picture(budget, knobs).svg_document() if knobs else ''
 
 
 class _Scale(NamedTuple):
@@ -106,7 +106,7 @@ class _Scale(NamedTuple):
     begin: float
     end: float
 
-    def place(self, value: float) -> float:
+    def to_pixel(self, value: float) -> float:
         part = (log10(value) - self.low) / (self.high - self.low)
         return self.begin + part * (self.end - self.begin)
 
@@ -122,7 +122,7 @@ class _Picture:
         self.height = self.bottom + _BELOW
         settings = [(knob, setting) for knob in knobs for setting in knob.settings]
         costs = [budget.core_of(knob, setting) for knob, setting in settings]
-        errors = [_drawn(setting) for _, setting in settings]
+        errors = [_drawn_error(setting) for _, setting in settings]
         # Room beside the outermost marks, for their labels.
         low, high = log10(min(costs)), log10(max(costs))
         self.x = _Scale(low - 0.25, high + 0.45, _LEFT, WIDTH - _RIGHT)
@@ -132,41 +132,41 @@ class _Picture:
             self.bottom,
             self.top,
         )
-        self.curves = [self._marks(knob) for knob in knobs]
-        self.own = self.x.place(budget.tick.core)
+        self.curves = [self._place_marks(knob) for knob in knobs]
+        self.own_x = self.x.to_pixel(budget.tick.core_share)
 
-    def _marks(self, knob: Knob) -> list[Mark]:
+    def _place_marks(self, knob: Knob) -> list[Mark]:
         costs = [self.budget.core_of(knob, setting) for setting in knob.settings]
         errors = [setting.error.worst for setting in knob.settings]
         points = list(zip(costs, errors, strict=True))
         return [
             Mark(
-                self.x.place(cost),
-                self.y.place(_drawn(setting)),
+                self.x.to_pixel(cost),
+                self.y.to_pixel(_drawn_error(setting)),
                 setting,
                 f'{knob.name}, {setting.label}: {error_text(error)} rad; {share_text(cost)}',
-                setting is knob.own,
+                setting is knob.own_setting,
                 any(c <= cost and e <= error and (c, e) != (cost, error) for c, e in points),
             )
             for setting, (cost, error) in zip(knob.settings, points, strict=True)
         ]
 
-    def lines(self) -> list[list[Mark]]:
+    def curve_marks(self) -> list[list[Mark]]:
         """Return for each knob the marks that its line connects."""
         return [
             sorted((mark for mark in marks if not mark.is_pale), key=lambda mark: mark.x)
             for marks in self.curves
         ]
 
-    def labels(self) -> list[Label]:
+    def place_labels(self) -> list[PlacedLabel]:
         """Return the labels that have a free place; those of the scene's settings come first."""
         taken = [mark.box for marks in self.curves for mark in marks]
         segments = [
             ((one.x, one.y), (other.x, other.y))
-            for line in self.lines()
+            for line in self.curve_marks()
             for one, other in pairwise(line)
         ]
-        segments.append(((self.own, self.top), (self.own, self.bottom)))
+        segments.append(((self.own_x, self.top), (self.own_x, self.bottom)))
         named = [
             (mark, COLOURS[number % len(COLOURS)])
             for number, marks in enumerate(self.curves)
@@ -183,18 +183,18 @@ class _Picture:
                     for box in _places_beside(mark, text)
                     if _is_within(box, plot)
                     and not any(box.overlaps(other) for other in taken)
-                    and not any(_crosses(box, *segment) for segment in segments)
+                    and not any(_is_crossed(box, *segment) for segment in segments)
                 ),
                 None,
             )
             if box is not None:
                 taken.append(box)
                 found.append(
-                    Label(text, box, _FAINT if mark.is_pale and not mark.is_own else colour)
+                    PlacedLabel(text, box, _FAINT if mark.is_pale and not mark.is_own else colour)
                 )
         return found
 
-    def document(self) -> str:
+    def svg_document(self) -> str:
         """Return the SVG document."""
         head = (
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {self.height:.0f}" '
@@ -211,14 +211,14 @@ class _Picture:
                 *self._draw_axes(),
                 *self._draw_curves(),
                 *(
-                    _text(
+                    _text_svg(
                         label.box.left,
                         label.box.bottom - 3.0,
                         label.text,
                         fill=label.colour,
                         more=f' class="label" {_HALO}',
                     )
-                    for label in self.labels()
+                    for label in self.place_labels()
                 ),
                 '</svg>\n',
             ]
@@ -228,29 +228,31 @@ class _Picture:
         for number, (knob, (x, row)) in enumerate(zip(self.knobs, self.names, strict=True)):
             y = 16.0 + row * 1.5 * _TEXT
             colour = COLOURS[number % len(COLOURS)]
-            yield _shape(number, x + _MARK, y - 4.0, f'fill="{colour}"')
-            yield _text(x + 2.0 * _MARK + 5.0, y, knob.name, fill=colour)
+            yield _mark_svg(number, x + _MARK, y - 4.0, f'fill="{colour}"')
+            yield _text_svg(x + 2.0 * _MARK + 5.0, y, knob.name, fill=colour)
 
     def _draw_axes(self) -> Iterator[str]:
         right = WIDTH - _RIGHT
-        for power in _powers(self.y.low, self.y.high, 6):
-            y = self.y.place(10.0**power)
-            yield _line(_LEFT, y, right, y, GHOST)
-            yield _text(_LEFT - 6.0, y + 4.0, f'1e{power}' if power else '1', anchor='end')
-        for value in _steps(self.x):
-            x = self.x.place(value)
-            yield _line(x, self.top, x, self.bottom, GHOST)
+        for power in _powers_of_ten(self.y.low, self.y.high, 6):
+            y = self.y.to_pixel(10.0**power)
+            yield _line_svg(_LEFT, y, right, y, GHOST)
+            yield _text_svg(_LEFT - 6.0, y + 4.0, f'1e{power}' if power else '1', anchor='end')
+        for value in _axis_values(self.x):
+            x = self.x.to_pixel(value)
+            yield _line_svg(x, self.top, x, self.bottom, GHOST)
             text = f'{100.0 * value:.6g}'
             if x + 0.5 * _LETTER * len(text) < WIDTH:
-                yield _text(x, self.bottom + 17.0, text, anchor='middle')
-        yield _line(self.own, self.top, self.own, self.bottom, INK, 'stroke-dasharray="4 3"')
+                yield _text_svg(x, self.bottom + 17.0, text, anchor='middle')
+        yield _line_svg(
+            self.own_x, self.top, self.own_x, self.bottom, INK, 'stroke-dasharray="4 3"'
+        )
         yield (
             f'<rect x="{_LEFT:g}" y="{self.top:g}" width="{right - _LEFT:g}" '
             f'height="{_PLOT_HEIGHT:g}" fill="none" stroke="{_FAINT}"/>'
         )
         rate = rate_text(self.budget.rate)
         across = f'core that the scene takes [%]; dashed: as it is, at {rate}'
-        yield _text(0.5 * (_LEFT + right), self.bottom + 37.0, across, anchor='middle')
+        yield _text_svg(0.5 * (_LEFT + right), self.bottom + 37.0, across, anchor='middle')
         middle = 0.5 * (self.top + self.bottom)
         yield (
             f'<text transform="translate(13 {middle:.1f}) rotate(-90)" text-anchor="middle">'
@@ -258,7 +260,7 @@ class _Picture:
         )
 
     def _draw_curves(self) -> Iterator[str]:
-        for number, (marks, line) in enumerate(zip(self.curves, self.lines(), strict=True)):
+        for number, (marks, line) in enumerate(zip(self.curves, self.curve_marks(), strict=True)):
             colour = COLOURS[number % len(COLOURS)]
             points = ' '.join(f'{mark.x:.1f},{mark.y:.1f}' for mark in line)
             yield f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5"/>'
@@ -271,10 +273,10 @@ class _Picture:
                         f'<circle cx="{mark.x:.1f}" cy="{mark.y:.1f}" r="{_MARK + 3.5:g}" '
                         f'fill="#ffffff" stroke="{colour}" stroke-width="1.5"/>'
                     )
-                yield f'{_shape(number, mark.x, mark.y, style)}</g>'
+                yield f'{_mark_svg(number, mark.x, mark.y, style)}</g>'
 
 
-def _drawn(setting: Setting) -> float:
+def _drawn_error(setting: Setting) -> float:
     return min(max(setting.error.worst, _LEAST), _MOST)
 
 
@@ -315,7 +317,7 @@ def _is_within(box: Box, outer: Box) -> bool:
     )
 
 
-def _crosses(box: Box, begin: tuple[float, float], end: tuple[float, float]) -> bool:
+def _is_crossed(box: Box, begin: tuple[float, float], end: tuple[float, float]) -> bool:
     """Return whether a line passes through a rectangle (Liang and Barsky's clipping)."""
     (x, y), (dx, dy) = begin, (end[0] - begin[0], end[1] - begin[1])
     enters, leaves = 0.0, 1.0
@@ -332,13 +334,13 @@ def _crosses(box: Box, begin: tuple[float, float], end: tuple[float, float]) -> 
     return enters < leaves
 
 
-def _powers(low: float, high: float, most: int) -> Iterator[int]:
+def _powers_of_ten(low: float, high: float, most: int) -> Iterator[int]:
     """Yield powers of ten within a range, evenly apart."""
     step = max(1, ceil((high - low) / most))
     yield from range(step * ceil(low / step), floor(high) + 1, step)
 
 
-def _steps(scale: _Scale) -> list[float]:
+def _axis_values(scale: _Scale) -> list[float]:
     """Return round values on an axis: powers of ten, and between them 2 and 5 if there is room."""
     inner = (1.0, 2.0, 5.0) if scale.high - scale.low < 2.2 else (1.0,)
     values = [
@@ -349,7 +351,7 @@ def _steps(scale: _Scale) -> list[float]:
     return [value for value in values if scale.low <= log10(value) <= scale.high]
 
 
-def _shape(number: int, x: float, y: float, style: str) -> str:
+def _mark_svg(number: int, x: float, y: float, style: str) -> str:
     """Return a mark; each knob has its own shape, for readers who see no colours."""
     size = _MARK
     corners = (
@@ -365,14 +367,14 @@ def _shape(number: int, x: float, y: float, style: str) -> str:
     return f'<polygon points="{points}" {style}/>'
 
 
-def _line(x: float, y: float, right: float, bottom: float, colour: str, more: str = '') -> str:
+def _line_svg(x: float, y: float, right: float, bottom: float, colour: str, more: str = '') -> str:
     return (
         f'<line x1="{x:.1f}" y1="{y:.1f}" x2="{right:.1f}" y2="{bottom:.1f}" '
         f'stroke="{colour}" {more}/>'
     )
 
 
-def _text(
+def _text_svg(
     x: float, y: float, text: str, *, anchor: str = 'start', fill: str = INK, more: str = ''
 ) -> str:
     return (

@@ -88,7 +88,11 @@ def turn_crank(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
     period = 1e9 / (scene.rate or USUAL_RATE)
     names = [name for member in scene.linkages for name in member.sampled_joints]
     write = JointStateWriter(names).write
-    paths = [path for line in pipeline.linkages for path in _paths(line)] if pipeline.topic else []
+    paths = (
+        [path for line in pipeline.linkages for path in _input_paths(line)]
+        if pipeline.topic
+        else []
+    )
     count = 0
     while True:
         now = _BEGIN + round(count * period)
@@ -104,25 +108,29 @@ def turn_crank(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
 Path = Callable[[float], tuple[float, float]]
 
 
-def _paths(line: LinkagePipeline) -> list[Path]:
+def _input_paths(linkage: LinkagePipeline) -> list[Path]:
     """Return for each input its value and rate at a time in [s]: a rotation or an oscillation."""
-    closure, joint = line.closure, line.scene_linkage.dependent_joint
+    closure, joint = linkage.closure, linkage.scene_linkage.dependent_joint
     speed = tau * _CRANK_RATE
     if joint:
-        branch = sampled_inverse(closure, joint, line.scene_linkage.drive[1].branch).branch
-        return [_swing(0.5 * (branch.low + branch.high), 0.4 * (branch.high - branch.low), speed)]
+        branch = sampled_inverse(closure, joint, linkage.scene_linkage.drive[1].branch).branch
+        return [
+            _oscillation_path(
+                0.5 * (branch.low + branch.high), 0.4 * (branch.high - branch.low), speed
+            )
+        ]
     centers = usual_inputs(closure)
     if len(centers) > 1:
         sizes = [0.01 * closure.scale if i.slider else 0.01 for i in closure.linkage.inputs]
-        return [_swing(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
+        return [_oscillation_path(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
     widest = InputSweep(closure).widest_range
     if widest is None or widest.is_whole:
         return [lambda seconds: (speed * seconds, speed)]
     middle, width = 0.5 * (widest.lowest + widest.highest), widest.highest - widest.lowest
-    return [_swing(middle, 0.4 * width, speed)]
+    return [_oscillation_path(middle, 0.4 * width, speed)]
 
 
-def _swing(center: float, amplitude: float, speed: float) -> Path:
+def _oscillation_path(center: float, amplitude: float, speed: float) -> Path:
     return lambda seconds: (
         center + amplitude * sin(speed * seconds),
         amplitude * speed * cos(speed * seconds),

@@ -21,7 +21,7 @@ from linkage_ros.dynamics.motion import LARGEST
 from linkage_ros.errors import BagError, listed
 from linkage_ros.messages.joint_state import JointStateReader, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.study.member_motion import Command, Crank, MemberMotion
+from linkage_ros.study.member_motion import Command, Crank, LinkageMotion
 
 
 class _Sample(NamedTuple):
@@ -34,8 +34,8 @@ class _Sample(NamedTuple):
 
 
 def follow_samples(
-    motion: MemberMotion, bag: Bag, topic: str = '', pace: float = 0.0
-) -> MemberMotion:
+    motion: LinkageMotion, bag: Bag, topic: str = '', pace: float = 0.0
+) -> LinkageMotion:
     """
     Return the motion through the samples of a bag: cubics by their values and rates.
 
@@ -58,9 +58,9 @@ def follow_samples(
             for k, sample in enumerate(samples)
         ]
     stamps = [sample.stamp - samples[0].stamp for sample in samples]
-    gap = motion.member.drive[1].max_age
+    gap = motion.scene_linkage.drive[1].max_age
 
-    def path(time: int) -> Crank | None:
+    def path_at(time: int) -> Crank | None:
         number = bisect_right(stamps, time) - 1
         if number < 0 or number + 1 >= len(stamps):
             return None
@@ -70,15 +70,15 @@ def follow_samples(
             return None
         part = (time - stamps[number]) * 1e-9 / length
         ends = zip(one.values, one.rates, other.values, other.rates, strict=True)
-        found = [_cubic(part, length, *four) for four in ends]
+        found = [_evaluate_cubic(part, length, *four) for four in ends]
         return tuple(value for value, _ in found), tuple(rate for _, rate in found)
 
     note = f'the crank moves as recorded in {bag.path.name}'
     length = stamps[-1] * 1e-9
     if pace:
-        return motion._replace(path=path, note=note, length=length)
+        return motion._replace(path=path_at, note=note, length=length)
     return motion._replace(
-        path=path,
+        path=path_at,
         length=length,
         samples=[(sample.stamp - samples[0].stamp, sample.arrival - samples[0].stamp)
                  for sample in samples],
@@ -87,9 +87,9 @@ def follow_samples(
     )  # fmt: skip
 
 
-def _samples_of(motion: MemberMotion, bag: Bag, topic: str) -> list[_Sample]:
+def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
     """Return the good samples of the topic that has most of them."""
-    name, use = motion.member.drive
+    name, use = motion.scene_linkage.drive
     read: Any = JointStateReader(motion.context.inputs_in_messages).read
     if name == 'topic':
         read = topic_drive.reader(use, motion.context)
@@ -119,7 +119,7 @@ def _samples_of(motion: MemberMotion, bag: Bag, topic: str) -> list[_Sample]:
     return found
 
 
-def _cubic(
+def _evaluate_cubic(
     part: float, length: float, begin: float, start: float, end: float, stop: float
 ) -> tuple[float, float]:
     """Return value and rate of the cubic through two values and rates, at a part of its length."""
@@ -131,9 +131,9 @@ def _cubic(
     return value, rate
 
 
-def follow_commands(motion: MemberMotion, bag: Bag) -> MemberMotion:
+def follow_commands(motion: LinkageMotion, bag: Bag) -> LinkageMotion:
     """Return the motion of a torque drive by the commands of a bag, as they came; or by none."""
-    read = torque_drive.reader(motion.member.drive[1], motion.context)
+    read = torque_drive.reader(motion.scene_linkage.drive[1], motion.context)
     topic = read_raw_metadata(bag).get('crank_topic')
     of_type = {each.name for each in bag.topics if each.type == JOINT_STATE}
     heard: dict[str, list[Command]] = {}

@@ -38,7 +38,7 @@ from linkage_ros.measuring import alternating, Progress, spread_of
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import LEAST_FLUSH_PERIOD, Scene
-from linkage_ros.study.budget import Loss, Price
+from linkage_ros.study.budget import Price, RecordingLoss
 from linkage_ros.study.prices import Feed, turn_crank, USUAL_RATE
 
 _SWITCH_INTERVAL = 1e-4  # as in the node, in [s]
@@ -60,7 +60,7 @@ def measure_recording(
     quick: bool = False,
     feed: Feed = turn_crank,
     progress: Progress = lambda _: None,
-) -> list[Loss]:
+) -> list[RecordingLoss]:
     """
     Record a scene with its own flush period and two others; if quick, with its own only, once.
 
@@ -71,9 +71,9 @@ def measure_recording(
     if scene.record is None or scene.record.storage.snapshot_seconds:
         return []
     own = scene.record.storage
-    rounds, settings = (1, [own]) if quick else (_ROUNDS, [own, *_others(own)])
+    rounds, settings = (1, [own]) if quick else (_ROUNDS, [own, *_other_periods(own)])
     closures = Pipeline(scene).closures
-    runs: list[list[_Run]] = [[] for _ in settings]
+    runs: list[list[_RecordedRun]] = [[] for _ in settings]
     lengths = [max(_SHORTEST, _LONGER * each.flush_period) for each in settings]
     done, whole = 0.0, rounds * sum(lengths)
     with tempfile.TemporaryDirectory(prefix='recording_', dir=folder) as temporary:
@@ -82,13 +82,13 @@ def measure_recording(
             bag = Path(temporary, f'{index}_{len(runs[index])}')
             pipeline = Pipeline(scene, closures)
             runs[index].append(
-                _record(scene, pipeline, bag, settings[index], lengths[index], feed)
+                _record_run(scene, pipeline, bag, settings[index], lengths[index], feed)
             )
             done += lengths[index]
     progress(1.0)
     rate = scene.rate or USUAL_RATE
     return [
-        Loss(
+        RecordingLoss(
             f'record.flush_period: {setting.flush_period:g}',
             max(run.stake for run in found),
             Price(spread_of([run.per_tick for run in found]), rate),
@@ -98,7 +98,7 @@ def measure_recording(
     ]
 
 
-def _others(own: Storage) -> Iterator[Storage]:
+def _other_periods(own: Storage) -> Iterator[Storage]:
     """Yield settings that flush more and less often."""
     for factor in (0.2, 2.0):
         period = float(f'{factor * own.flush_period:.2g}')
@@ -106,7 +106,7 @@ def _others(own: Storage) -> Iterator[Storage]:
             yield replace(own, flush_period=period)
 
 
-class _Run(NamedTuple):
+class _RecordedRun(NamedTuple):
     """What was measured of a run."""
 
     per_tick: float  # Processor time for recording a tick, in [µs]
@@ -114,16 +114,16 @@ class _Run(NamedTuple):
     dropped: int
 
 
-def _record(
+def _record_run(
     scene: Scene, pipeline: Pipeline, folder: Path, storage: Storage, seconds: float, feed: Feed
-) -> _Run:
+) -> _RecordedRun:
     """Tick in real time, at the scene's rate up to 1 kHz, and record it as the node does."""
     period = 1e9 / min(scene.rate or USUAL_RATE, USUAL_RATE)
     crank = 1 if pipeline.topic else 0
     passing = []
     with _as_in_the_node():
         files = {name: ('application/yaml', data) for name, data in scene.files.items()}
-        writer = _WatchedWriter(folder, _topics(pipeline), files, storage)
+        writer = _WatchedWriter(folder, _recorded_topics(pipeline), files, storage)
         recorder = Recorder(writer, flush_period=storage.flush_period)
         offer = recorder.offer
         begin = monotonic_ns()
@@ -156,14 +156,14 @@ def _record(
     between = FLUSH_AFTER * storage.flush_period * 1e9 / period
     writing = (writer.cpu - flushing) / len(passing)
     per_tick = writing + flushing / len(writer.flushes) / between + median(passing)
-    return _Run(
+    return _RecordedRun(
         per_tick * 1e-3,
         max(flush.stake for flush in writer.flushes) * 1e-9,
         sum(topic.dropped for topic in summary.topics),
     )
 
 
-def _topics(pipeline: Pipeline) -> list[Topic]:
+def _recorded_topics(pipeline: Pipeline) -> list[Topic]:
     """Return the topics the node would record, without diagnostics and message definitions."""
     names = [(pipeline.topic, JOINT_STATE)] if pipeline.topic else []
     names.append(('/joint_states', JOINT_STATE))

@@ -31,7 +31,7 @@ from linkage_ros.study.member_motion import (
     build_drive,
     Command,
     Crank,
-    MemberMotion,
+    LinkageMotion,
     Path,
 )
 from linkage_ros.study.prices import USUAL_RATE
@@ -57,7 +57,7 @@ _STANDS = 1e-9
 """Motions smaller than this, in [rad] or [m], are none."""
 
 
-def motions_of(scene: Scene, like: str | None, horizon: float) -> list[MemberMotion]:
+def motions_of(scene: Scene, like: str | None, horizon: float) -> list[LinkageMotion]:
     """
     Return what the linkages of a scene do.
 
@@ -79,7 +79,7 @@ def motions_of(scene: Scene, like: str | None, horizon: float) -> list[MemberMot
     scene = without_deliberate(scene)
     pipeline = Pipeline(scene)
     bag = None if like in (None, SINE) else read_bag(str(like))
-    return [_motion(scene, line, like, bag, horizon) for line in pipeline.linkages]
+    return [_linkage_motion(scene, line, like, bag, horizon) for line in pipeline.linkages]
 
 
 def without_deliberate(scene: Scene) -> Scene:
@@ -94,23 +94,23 @@ def without_deliberate(scene: Scene) -> Scene:
     return replace(scene, members=tuple(members), faults={}, record=None)
 
 
-def _motion(
-    scene: Scene, line: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
-) -> MemberMotion:
-    member, context = line.scene_linkage, line.context
-    closure = line.closure
+def _linkage_motion(
+    scene: Scene, linkage: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
+) -> LinkageMotion:
+    member, context = linkage.scene_linkage, linkage.context
+    closure = linkage.closure
     if type(closure) is not Closure:
         closure = Closure(closure.linkage)
-    motion = MemberMotion(member, closure, context, line.closure, None)
+    motion = LinkageMotion(member, closure, context, linkage.closure, None)
     drive, parameters = member.drive
     if drive == 'torque':
-        return _commanded(motion, like, bag, horizon)
+        return _commanded_motion(motion, like, bag, horizon)
     if drive == 'bag':
         opened = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
         fast = scene.rate if parameters.pace == 'fast' else 0.0
         return follow_samples(motion, opened, parameters.topic, fast)
     if drive != 'topic':
-        return motion._replace(path=_path_of(line))
+        return motion._replace(path=_path_of(linkage))
     if bag is not None:
         return follow_samples(motion, bag)
     if like is None:
@@ -120,25 +120,25 @@ def _motion(
             'say what its crank does: --like sine, or --like BAG with its samples',
         )
     return motion._replace(
-        path=_sines(closure),
+        path=_sine_path(closure),
         sample_rate=scene.rate or USUAL_RATE,
         note=f'the crank moves by a sine of {_FREQUENCY:g} Hz',
     )
 
 
-def _path_of(line: LinkagePipeline) -> Path:
+def _path_of(linkage: LinkagePipeline) -> Path:
     """Return the path of a drive that computes its crank as a function of the time."""
-    drive = line.drive
+    drive = linkage.drive
     drive.state(BEGIN)
 
-    def path(time: int) -> Crank | None:
+    def crank_at(time: int) -> Crank | None:
         crank: CrankState | None = drive.state(BEGIN + time)
         return None if crank is None else (crank.angles, crank.rates)
 
-    return path
+    return crank_at
 
 
-def _sines(closure: Closure) -> Path:
+def _sine_path(closure: Closure) -> Path:
     """Return sines of all inputs, within the range where the loops close."""
     speed = tau * _FREQUENCY
     centers = usual_inputs(closure)
@@ -151,30 +151,30 @@ def _sines(closure: Closure) -> Path:
             centers = (0.5 * (widest.lowest + widest.highest),)
             sizes = [min(_AMPLITUDE, _PART * (widest.highest - widest.lowest))]
 
-    def path(time: int) -> Crank:
+    def crank_at(time: int) -> Crank:
         s, c = sin(speed * time * 1e-9), cos(speed * time * 1e-9)
         values = tuple(at + size * s for at, size in zip(centers, sizes, strict=True))
         return values, tuple(size * speed * c for size in sizes)
 
-    return path
+    return crank_at
 
 
-def _commanded(
-    motion: MemberMotion, like: str | None, bag: Bag | None, horizon: float
-) -> MemberMotion:
+def _commanded_motion(
+    motion: LinkageMotion, like: str | None, bag: Bag | None, horizon: float
+) -> LinkageMotion:
     """Return the motion of a torque drive, with the commands that come to it."""
     if bag is not None:
         return follow_commands(motion, bag)
-    if like is None and moves(motion, horizon):
+    if like is None and moves_without_commands(motion, horizon):
         return motion._replace(note='no command comes')
     effort = _usual_effort(motion)
-    timeout = motion.member.drive[1].timeout
+    timeout = motion.scene_linkage.drive[1].timeout
     period = round(min(COMMAND_PERIOD, 0.5 * timeout) * NANOSECONDS)
     commands = [
         Command(time, effort * sin(0.5 * tau * time * 1e-9))
         for time in range(period, round(horizon * NANOSECONDS), period)
     ]
-    motor = motion.member.drive[1].motor
+    motor = motion.scene_linkage.drive[1].motor
     slides = motion.closure.linkage.inputs[0].slider
     units = {'effort': 'N' if slides else 'N·m', 'current': 'A', 'voltage': 'V'}
     unit = units[motor.command if motor else 'effort']
@@ -184,7 +184,7 @@ def _commanded(
     return motion._replace(commands=commands, note=note)
 
 
-def moves(motion: MemberMotion, horizon: float) -> bool:
+def moves_without_commands(motion: LinkageMotion, horizon: float) -> bool:
     """Return whether a torque drive moves without commands."""
     drive = build_drive(motion)
     begin = drive.state(BEGIN).angles[0]
@@ -195,21 +195,21 @@ def moves(motion: MemberMotion, horizon: float) -> bool:
     return False
 
 
-def _usual_effort(motion: MemberMotion) -> float:
+def _usual_effort(motion: LinkageMotion) -> float:
     """Return the amplitude of the commands: they pass friction and a fifth of the weight."""
     equation = motion.context.mechanics.motion_equation
     drive = build_drive(motion)
-    start = motion.member.drive[1].start
+    start = motion.scene_linkage.drive[1].start
     low, high = (
         min(max(end, start - tau), start + tau) for end in drive.actuation_for(None)[0].stops
     )
     found = [terms for k in range(90) if (terms := equation(low + (high - low) * k / 90.0))]
     least = min(terms.inertia for terms in found)
-    rubbing = max(terms.coulomb + terms.breakaway for terms in found)
+    friction = max(terms.coulomb + terms.breakaway for terms in found)
     weight = max(abs(terms.potential_slope) for terms in found)
     unit = motion.closure.scale if motion.closure.linkage.inputs[0].slider else 1.0
-    effort = rubbing + 0.2 * weight + 2.0 * unit * least
-    motor = motion.member.drive[1].motor
+    effort = friction + 0.2 * weight + 2.0 * unit * least
+    motor = motion.scene_linkage.drive[1].motor
     if motor is None or motor.command == 'effort':
         return effort
     current: float = effort / (motor.torque_constant * motor.ratio * motor.efficiency)

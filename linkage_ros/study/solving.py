@@ -41,7 +41,7 @@ from linkage_ros.study.four_bar_formulas import (
     solve_in_single_precision,
 )
 from linkage_ros.study.joint_errors import size_of
-from linkage_ros.study.member_motion import cranks_at, MemberMotion, tick_times
+from linkage_ros.study.member_motion import cranks_at, LinkageMotion, tick_times
 from linkage_ros.study.newton import solve_by_newton
 import numpy as np
 
@@ -62,7 +62,7 @@ DISTANCES = tuple(10.0 ** (-k / 2.0) for k in range(4, 19))
 """Distances of hard cases from a toggle or change point: 1e-2 to 1e-9."""
 
 
-class Solver(NamedTuple):
+class SolvingMethod(NamedTuple):
     """A way to solve a linkage."""
 
     label: str
@@ -70,7 +70,7 @@ class Solver(NamedTuple):
 
 
 def measure_solving(
-    motions: Sequence[MemberMotion],
+    motions: Sequence[LinkageMotion],
     rate: float,
     horizon: float,
     *,
@@ -106,7 +106,7 @@ def measure_solving(
     count = _QUICK_STATES if quick else _STATES
     times = tick_times(rate, horizon, count)
     errors: list[JointError] = []
-    contenders: list[tuple[str, JointError, Contender]] = []
+    candidates: list[tuple[str, JointError, Contender]] = []
     unproved = 0
     for number, motion in enumerate(motions):
         linkage = motion.closure.linkage
@@ -119,17 +119,17 @@ def measure_solving(
         unproved += len(states) - len(known)
         if not known:
             continue
-        own = _own(motion.solution)
-        errors.append(judge(linkage, own.solve, known, exact)[0])
+        own = _scene_solver(motion.solution)
+        errors.append(compare_solver(linkage, own.solve, known, exact)[0])
         progress(0.2)
         if number:
             continue
-        contenders.append((own.label, errors[0], _looped(own.solve, known)))
-        for solver in comparisons(motion.closure):
-            error, failed = judge(linkage, solver.solve, known, exact)
+        candidates.append((own.label, errors[0], _timed_candidate(own.solve, known)))
+        for solver in comparison_solvers(motion.closure):
+            error, failed = compare_solver(linkage, solver.solve, known, exact)
             if not failed:
-                contenders.append((solver.label, error, _looped(solver.solve, known)))
-    if not contenders:
+                candidates.append((solver.label, error, _timed_candidate(solver.solve, known)))
+    if not candidates:
         raise LinkageError(
             'solving',
             'nothing can be proved along the motion: it stays at a toggle or a change point',
@@ -138,10 +138,10 @@ def measure_solving(
     worst = JointError(
         sqrt(sum(e.rms**2 for e in errors) / len(errors)), max(e.worst for e in errors)
     )
-    times_of = in_turn([one for _, _, one in contenders], seconds, progress)
+    times_of = in_turn([one for _, _, one in candidates], seconds, progress)
     settings = [
         Setting(label, error, Price(spread.scaled(1e6), rate), None)
-        for (label, error, _), spread in zip(contenders, times_of, strict=True)
+        for (label, error, _), spread in zip(candidates, times_of, strict=True)
     ]
     settings[0] = settings[0]._replace(error=worst, changes=())
     note = f'{unproved} states too near a toggle or change point to be proved' if unproved else ''
@@ -169,7 +169,7 @@ def exact_joints(
     return known, exact
 
 
-def judge(
+def compare_solver(
     linkage: Linkage,
     solve: Solve,
     states: Sequence[Sequence[float]],
@@ -181,7 +181,7 @@ def judge(
     found: list[float] = []
     for state, balls, limit in zip(states, exact, limits, strict=True):
         joints = solve(*state)
-        error = off(linkage, joints, balls) if len(joints) else inf
+        error = largest_distance(linkage, joints, balls) if len(joints) else inf
         if error <= limit:
             found.append(error)
     if not found:
@@ -190,7 +190,7 @@ def judge(
     return JointError(rms, max(found)), len(states) - len(found)
 
 
-def off(linkage: Linkage, joints: Sequence[Any], balls: Sequence[Any]) -> float:
+def largest_distance(linkage: Linkage, joints: Sequence[Any], balls: Sequence[Any]) -> float:
     """Return the greatest distance of joints from balls, slides in parts of the size."""
     from flint import arb, ctx  # local import: an optional dependency
 
@@ -210,11 +210,11 @@ def off(linkage: Linkage, joints: Sequence[Any], balls: Sequence[Any]) -> float:
     return worst
 
 
-def _own(closure: Closure) -> Solver:
+def _scene_solver(closure: Closure) -> SolvingMethod:
     """Return what a scene solves with, as a tick does."""
     if type(closure) is not Closure:
         kind = type(closure).__name__.removesuffix('Closure').lower()
-        return Solver(kind, lambda *inputs: closure.position(*inputs).joints)
+        return SolvingMethod(kind, lambda *inputs: closure.position(*inputs).joints)
     compiled = closure.compile_linkage(0)
     fast, plain = compiled.fast, compiled.run_interpreted
 
@@ -222,24 +222,26 @@ def _own(closure: Closure) -> Solver:
         (joints,) = fast(*inputs) or plain(*inputs).values or ((),)
         return joints
 
-    return Solver(CLOSED_FORM if closure.by_steps else ITERATED, position)
+    return SolvingMethod(CLOSED_FORM if closure.by_steps else ITERATED, position)
 
 
-def comparisons(closure: Closure) -> Iterator[Solver]:
+def comparison_solvers(closure: Closure) -> Iterator[SolvingMethod]:
     """Yield ways to solve a linkage which no scene can ask for."""
     linkage = closure.linkage
     shape = plain_four_bar(linkage)
     if shape is not None:
-        yield Solver('float32', solve_in_single_precision(shape))
-        yield Solver('textbook form', solve_by_textbook(shape))
+        yield SolvingMethod('float32', solve_in_single_precision(shape))
+        yield SolvingMethod('textbook form', solve_by_textbook(shape))
     for tolerance in _TOLERANCES:
-        yield Solver(f'Newton to {error_text(tolerance)}', solve_by_newton(linkage, tolerance))
+        yield SolvingMethod(
+            f'Newton to {error_text(tolerance)}', solve_by_newton(linkage, tolerance)
+        )
     if len(linkage.inputs) == 1 and find_spec('scipy') is not None:
         for knots in _KNOTS:
             spline = _solve_by_spline(closure, knots)
             if spline is not None:
-                yield Solver(f'spline, {knots:,} knots', spline)
-    yield Solver('30 digits', _solve_to_digits(linkage))
+                yield SolvingMethod(f'spline, {knots:,} knots', spline)
+    yield SolvingMethod('30 digits', _solve_to_digits(linkage))
 
 
 def _solve_to_digits(linkage: Linkage) -> Solve:
@@ -285,15 +287,15 @@ def _solve_by_spline(closure: Closure, knots: int) -> Solve | None:
     return position
 
 
-def _looped(solve: Solve, states: Sequence[Sequence[float]]) -> Contender:
+def _timed_candidate(solve: Solve, states: Sequence[Sequence[float]]) -> Contender:
     # In an order that ends next to the first, so that a method finds its start near by.
-    there_and_back = [*states[::2], *states[1::2][::-1]]
+    forward_and_backward = [*states[::2], *states[1::2][::-1]]
 
     def run() -> None:
-        for state in there_and_back:
+        for state in forward_and_backward:
             solve(*state)
 
-    return Contender(run, len(there_and_back))
+    return Contender(run, len(forward_and_backward))
 
 
 class HardCase(NamedTuple):
@@ -306,7 +308,7 @@ class HardCase(NamedTuple):
     states: int  # All states, `DISTANCES` from the singular pose
 
 
-def judge_hard_cases() -> Iterator[HardCase]:
+def compare_hard_cases() -> Iterator[HardCase]:
     """Yield who fails next to a toggle and at a change point, on linkages of the package."""
     check_installed('flint')
     for name, place, near in (
@@ -320,8 +322,8 @@ def judge_hard_cases() -> Iterator[HardCase]:
         # Next to a change point the other assembly is as near as the change point itself.
         limits = [0.1 * distances[states.index(tuple(state))] for state in known]
         far = limits if place == 'change point' else None
-        for solver in (_own(closure), *comparisons(closure)):
-            error, failed = judge(linkage, solver.solve, known, exact, far)
+        for solver in (_scene_solver(closure), *comparison_solvers(closure)):
+            error, failed = compare_solver(linkage, solver.solve, known, exact, far)
             yield HardCase(f'{place} of {name}', solver.label, error.worst, failed, len(known))
 
 
@@ -332,16 +334,16 @@ def _near_toggle(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]
     interval = InputSweep(closure).widest_range
     assert interval is not None, 'it has one'
     unit = 1.0 if interval.turning else slide_bound(closure)
-    return _closed(closure, interval.highest, [-unit * distance for distance in DISTANCES])
+    return _closing_states(closure, interval.highest, [-unit * distance for distance in DISTANCES])
 
 
 def _near_change_point(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]]:
     places = [x.value for x in closure.singular_inputs if x.status is Status.CHANGE_POINT]
     offsets = [*(-distance for distance in DISTANCES), *reversed(DISTANCES)]
-    return _closed(closure, min(places, key=abs), offsets)
+    return _closing_states(closure, min(places, key=abs), offsets)
 
 
-def _closed(
+def _closing_states(
     closure: Closure, place: float, offsets: Sequence[float]
 ) -> tuple[list[tuple[float, ...]], list[float]]:
     kept = [o for o in offsets if closure.position(place + o).status is Status.CLOSED]

@@ -39,7 +39,7 @@ def tuned_scene(
     if kind_of(read_yaml(file)[0]) == 'linkage':
         scene_mapping['linkage'] = _path_from(folder, file)
     else:
-        for within, key in _paths(scene_mapping):
+        for within, key in _path_entries(scene_mapping):
             path = file.parent / within[key]
             if key == 'linkage':
                 path = linkage_of_scene(within[key], file.parent)
@@ -47,7 +47,7 @@ def tuned_scene(
     return apply_settings(content, settings_of(changes))
 
 
-def _paths(scene: Any) -> Iterator[tuple[Any, str]]:
+def _path_entries(scene: Any) -> Iterator[tuple[Any, str]]:
     """Yield the mappings of a scene that hold the path of a file, with its key."""
     entries = scene.get('linkages') or []
     for entry in (scene, *(entries if isinstance(entries, list) else entries.values())):

@@ -16,7 +16,7 @@ import os
 from random import Random
 
 from linkage_ros.measuring import Spread
-from linkage_ros.study.budget import Budget, JointError, Knob, Loss, Price, Setting
+from linkage_ros.study.budget import Budget, JointError, Knob, Price, RecordingLoss, Setting
 
 COUNT = int(os.environ.get('LINKAGE_STATES', '300'))
 
@@ -58,7 +58,7 @@ def _budget(random: Random) -> Budget:
             )
         )
     tick = Price(_spread(random, random.uniform(1000.0, 2000.0)), rate)
-    losses = [Loss('record.flush_period: 1', 0.9, Price(Spread(7.0, 7.5, 8.0), rate), 0)]
+    losses = [RecordingLoss('record.flush_period: 1', 0.9, Price(Spread(7.0, 7.5, 8.0), rate), 0)]
     return Budget('scene', rate, tick, knobs, losses, [('day', 'today')])
 
 

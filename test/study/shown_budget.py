@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from linkage_ros.measuring import Spread
-from linkage_ros.study.budget import Budget, JointError, Knob, Loss, Price, Setting
+from linkage_ros.study.budget import Budget, JointError, Knob, Price, RecordingLoss, Setting
 
 
 def price(middle: float, half: float = 0.1, rate: float = 1000.0) -> Price:
@@ -101,8 +101,8 @@ BUDGET = Budget(
     price(61.0, 0.9),
     (STEP, AGE, SOLVING, ENCODER, EFFORT),
     (
-        Loss('record.flush_period: 1', 0.9, price(7.5, 0.4), 0),
-        Loss('record.flush_period: 0.2', 0.19, price(9.1, 0.4), 0),
+        RecordingLoss('record.flush_period: 1', 0.9, price(7.5, 0.4), 0),
+        RecordingLoss('record.flush_period: 0.2', 0.19, price(9.1, 0.4), 0),
     ),
     (('day', '2026-01-01'), ('processor', 'made by hand')),
     ('all but one period of the recorder',),

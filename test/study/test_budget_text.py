@@ -110,7 +110,7 @@ def test_a_price_within_its_spread_is_no_number(
 def test_the_first_lines_answer() -> None:
     assert lead_lines(BUDGET) == [
         'hil: 0.023 rad off at worst after 10 s, mostly by the step of the drive',
-        f'less than a fifth of it: {STEP.settings[2].line} (+6.1 µs a tick, 0.6 % of a core)',
+        f'less than a fifth of it: {STEP.settings[2].instruction} (+6.1 µs a tick, 0.6 % of a core)',
         'on purpose: encoder 1.8e-3 rad',
     ]
 
@@ -162,7 +162,7 @@ def _check_advice(budget: Budget) -> None:
             assert price is not None
             assert (budget.tick.tick.middle + price.tick.middle) * 1e-6 * price.rate < own_core
         if better is not None:
-            assert better.error.worst < knob.own.error.worst
+            assert better.error.worst < knob.own_setting.error.worst
 
 
 def test_rows_are_sorted_complete_and_print_no_noise() -> None:
@@ -174,12 +174,12 @@ def _check_rows(budget: Budget) -> None:
     rows = rows_of(budget)
     assert len(rows) == len(budget.knobs) + 2
     assert all(len(row) == len(COLUMNS) == len(heads_of(budget)) for row in rows)
-    worst = [knob.own.error.worst for knob in error_knobs(budget)]
+    worst = [knob.own_setting.error.worst for knob in error_knobs(budget)]
     assert worst == sorted(worst, reverse=True)
     noisy = {
         knob.name
         for knob in budget.knobs
-        if (price := knob.own.price) is not None
+        if (price := knob.own_setting.price) is not None
         and abs(price.tick.middle) <= price.tick.high - price.tick.low
     }
     for row in rows[: len(budget.knobs)]:
@@ -203,10 +203,12 @@ def _check_json(budget: Budget) -> None:
     assert [each['name'] for each in said['sources']] == [knob.name for knob in budget.knobs]
     for each, knob in zip(said['sources'], budget.knobs, strict=True):
         own = each['settings'][each['chosen']]
-        assert own['worst'] == (knob.own.error.worst if knob.own.error.worst < inf else None)
+        assert own['worst'] == (
+            knob.own_setting.error.worst if knob.own_setting.error.worst < inf else None
+        )
         assert own['core'] == pytest.approx(said['tick']['core'])
 
 
 def test_a_line_is_yaml() -> None:
     setting = Setting('x', JointError(0.0, 0.0), None, [('a.b', 1e-5), ('c', 500.0), ('d', False)])
-    assert setting.line == 'a.b: 0.00001, c: 500, d: false'
+    assert setting.instruction == 'a.b: 0.00001, c: 500, d: false'

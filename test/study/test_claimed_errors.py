@@ -146,7 +146,7 @@ def compared(scene, motion, horizon, name, truth):
     for (_, joints, _), theta in zip(runs[1:], exact, strict=True):
         expected = joints_of(name, theta)
         apart.append(max(abs(remainder(joints[j] - expected[j], tau)) for j in expected))
-    return max(apart), np.sqrt(np.mean(np.square(apart))), claimed.own.error
+    return max(apart), np.sqrt(np.mean(np.square(apart))), claimed.own_setting.error
 
 
 SAMPLE = int(os.environ.get('LINKAGE_STATES', '3'))
@@ -196,7 +196,7 @@ def test_the_age_of_a_command_is_that_of_samples_at_100_hz(tmp_path, carried):
     )
     scene = load_scene(tmp_path / 'scene.yaml')
     (motion,) = motions_of(scene, 'sine', HORIZON)
-    claimed = measure_age_of_command(motion, scene, HORIZON).own.error
+    claimed = measure_age_of_command(motion, scene, HORIZON).own_setting.error
     apart = []
     for phase in np.random.default_rng(1).uniform(size=12):
         samples = samples_of(motion, 'crank_joint', 100.0, phase, HORIZON)

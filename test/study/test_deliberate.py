@@ -147,10 +147,10 @@ def test_rows_of_a_scene() -> None:
     names = {knob.name for knob in knobs}
     assert names == {'encoder', 'velocity', 'effort', 'fault f', ALL_TOGETHER}
     assert knobs[0].name == 'encoder'
-    assert all(knob.is_deliberate and knob.own.price is not None for knob in knobs)
+    assert all(knob.is_deliberate and knob.own_setting.price is not None for knob in knobs)
     assert knobs[-1].name == ALL_TOGETHER
     by_name = {knob.name: knob for knob in knobs}
-    assert by_name['effort'].own.error.worst == 0.0
+    assert by_name['effort'].own_setting.error.worst == 0.0
     assert 'only when it is called for' in by_name['fault f'].note
     assert 'computed for effort' in by_name['velocity'].note
     assert by_name['encoder'].after is None
@@ -163,7 +163,7 @@ def test_a_torque_scene_says_after_which_time() -> None:
     )
     (friction,) = measure_deliberate(scene, quick=True, horizon=0.3)
     assert friction.after == pytest.approx(0.3)
-    assert friction.own.error.worst > 0.0
+    assert friction.own_setting.error.worst > 0.0
 
 
 def test_a_scene_without_any_has_no_rows() -> None:

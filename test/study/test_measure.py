@@ -27,7 +27,7 @@ from linkage_ros.study.drive_step import measure_drive_step
 from linkage_ros.study.drive_step import NAME as STEP
 from linkage_ros.study.measure import ERRORS, measure_budget
 from linkage_ros.study.scene_motion import motions_of
-from linkage_ros.study.solving import judge_hard_cases, measure_solving
+from linkage_ros.study.solving import compare_hard_cases, measure_solving
 import pytest
 
 from ..support.scenes import PENDULUM
@@ -70,7 +70,7 @@ def test_a_remedy_of_a_runaway_works(tmp_path):
         measure_drive_step(motion, scene.rate, 10.0, quick=True)
     horizon = float(str(raised.value).rpartition('--horizon ')[2])
     knob, _ = measure_drive_step(motion, scene.rate, horizon, quick=True)
-    assert 0.0 < knob.own.error.worst < 0.1
+    assert 0.0 < knob.own_setting.error.worst < 0.1
 
 
 def test_a_topic_scene_has_its_knobs_sorted(tmp_path):
@@ -81,14 +81,14 @@ def test_a_topic_scene_has_its_knobs_sorted(tmp_path):
         scene, like='sine', quick=True, parts=[ERRORS], horizon=2.0, progress=shares.append
     )
     assert [knob.name for knob in budget.knobs] == [IN_USE, OF_COMMAND, 'solving']
-    assert all(not (knob.own.changes or knob.own.advice) for knob in budget.knobs)
+    assert all(not (knob.own_setting.changes or knob.own_setting.advice) for knob in budget.knobs)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     for knob in budget.knobs[:2]:
         for setting in knob.settings:
-            assert setting is knob.own or setting.line
+            assert setting is knob.own_setting or setting.instruction
             assert setting.price is not None or not setting.changes
-    assert budget.knobs[2].own.error.worst < 1e-14
+    assert budget.knobs[2].own_setting.error.worst < 1e-14
 
 
 def test_of_twice_the_rate_half_the_error_is_left_and_a_quarter_where_it_is_carried():
@@ -135,11 +135,11 @@ def test_comparisons_stand_in_their_order():
     errors = {each.label: each.error.worst for each in knob.settings}
     assert errors['30 digits'] < 1e-28 < errors['closed form'] < 1e-14 < errors['float32'] < 1e-5
     assert errors['spline, 64 knots'] > errors['spline, 1,024 knots'] > errors['closed form']
-    assert all(each.changes is None for each in knob.settings if each is not knob.own)
+    assert all(each.changes is None for each in knob.settings if each is not knob.own_setting)
 
 
 def test_in_hard_cases_the_closed_form_never_fails_and_the_textbook_does():
-    cases = list(judge_hard_cases())
+    cases = list(compare_hard_cases())
     failed = {(case.place, case.solver): case.failed for case in cases}
     places = {place for place, _ in failed}
     assert len(places) == 2
@@ -176,7 +176,7 @@ def test_a_bag_gives_motion_rate_and_delay(tmp_path):
         assert values[0] == pytest.approx(1.5 * sin(3.0 * time), abs=1e-7)
         assert rates[0] == pytest.approx(4.5 * cos(3.0 * time), abs=1e-4)
     knob = measure_age_of_command(motion, scene, 1.9)
-    assert knob.own.error.worst == pytest.approx(0.5 * 9.0 * 1.5 * 0.024**2, rel=0.03)
+    assert knob.own_setting.error.worst == pytest.approx(0.5 * 9.0 * 1.5 * 0.024**2, rel=0.03)
     (least,) = (each for each in knob.settings if each.label == 'without delay')
     assert least.error.worst == pytest.approx(0.5 * 9.0 * 1.5 * 0.004**2, rel=0.03)
     (held,) = (each for each in knob.settings if 'held' in each.label)
@@ -193,6 +193,6 @@ def test_a_table_is_as_far_off_as_it_may_be(tmp_path, tolerance):
         f'{TOPIC}\nsolver: {{table: {{tolerance: {tolerance:.7f}}}}}\n'
     )
     motions = motions_of(load_scene(tmp_path / 'scene.yaml'), 'sine', 10.0)
-    own = measure_solving(motions, 1000.0, 10.0, quick=True, seconds=0.1).own
+    own = measure_solving(motions, 1000.0, 10.0, quick=True, seconds=0.1).own_setting
     assert own.label == 'table'
     assert 1e-3 * tolerance < own.error.worst <= tolerance

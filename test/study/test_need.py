@@ -146,9 +146,9 @@ def test_a_need_is_met_when_it_is_run(tmp_path, text):
         texts.append(answer.text.partition(': ')[2])
         total = 0.0
         for knob in errors_of(change_scene(scene, answer.changes)):
-            error = knob.own.error.worst
+            error = knob.own_setting.error.worst
             if CARRY in answer.text and knob.name == IN_USE:
-                label = knob.own.label.replace('held', 'carried forward')
+                label = knob.own_setting.label.replace('held', 'carried forward')
                 (error,) = (s.error.worst for s in knob.settings if s.label == label)
             total += error
         assert total <= 1.05 * need, answer.text

@@ -85,7 +85,7 @@ def test_every_setting_has_a_mark_and_each_of_the_scene_a_ring() -> None:
 def test_what_another_setting_beats_in_both_is_pale() -> None:
     for budget, drawn in PICTURES:
         marks = iter(marks_of(drawn))
-        for knob in sorted(errors_of(budget), key=lambda knob: -knob.own.error.worst):
+        for knob in sorted(errors_of(budget), key=lambda knob: -knob.own_setting.error.worst):
             at = [(budget.core_of(knob, each), each.error.worst) for each in knob.settings]
             for own in at:
                 beaten = any(a <= own[0] and b <= own[1] and (a, b) != own for a, b in at)

@@ -24,7 +24,7 @@ SCENE = load_scene('demo', ['record={directory: runs, flush_period: 0.1}'])
 
 def test_a_crash_loses_about_the_flush_period(tmp_path: Path) -> None:
     (own,) = measure_recording(SCENE, tmp_path, quick=True)
-    assert own.line == 'record.flush_period: 0.1'
+    assert own.instruction == 'record.flush_period: 0.1'
     assert 0.08 < own.seconds < 2.0
     assert own.price.tick.middle > 0.0
     assert own.price.rate == 1000.0
@@ -36,7 +36,7 @@ def test_other_flush_periods_stand_beside_it(tmp_path: Path, monkeypatch: Any) -
     shares: list[float] = []
     own, *others = measure_recording(SCENE, tmp_path, progress=shares.append)
     # A fifth of it would be less than a scene may ask for.
-    assert [each.line for each in others] == ['record.flush_period: 0.2']
+    assert [each.instruction for each in others] == ['record.flush_period: 0.2']
     assert others[0].seconds > own.seconds
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
