@@ -33,7 +33,7 @@ from linkage_ros.messages.joint_values import JOINT_STATE, Key, MessageValues, P
 from linkage_ros.replay.compare import Deviation, TickPlace
 from linkage_ros.replay.replay import recorded_scene
 from linkage_ros.replay.verify import turning_joints
-from linkage_ros.report.decimation import MinMaxCurve
+from linkage_ros.report.decimation import DecimatedCurves
 import numpy as np
 
 EXAMPLE = 'linkage compare my_bag other_bag -o difference.png'
@@ -63,7 +63,7 @@ class BagDifferences:
         self.positions: list[str] = []
         """The joints of `curves`, once a state was compared."""
         self._turning, self._wrapped = turning, wrapped
-        self._curves: MinMaxCurve | None = None
+        self._curves: DecimatedCurves | None = None
         self._rows: list[tuple[int, list[float]]] = []
 
     def add_states(
@@ -86,7 +86,7 @@ class BagDifferences:
             self.positions = [
                 name for name, what in first if what == POSITION and (name, what) in second
             ]
-            self._curves = MinMaxCurve(len(self.positions), _INTERVALS)
+            self._curves = DecimatedCurves(len(self.positions), _INTERVALS)
         row = []
         for name in self.positions:
             key = (name, POSITION)
@@ -100,7 +100,7 @@ class BagDifferences:
         """Return times in [s], and the least and greatest difference in each interval."""
         self._flush_rows()
         assert self._curves is not None
-        found = self._curves.intervals()
+        found = self._curves.build_intervals()
         lows, highs = np.fmin(found.first, found.second), np.fmax(found.first, found.second)
         return found.begins * 1e-9, lows, highs
 

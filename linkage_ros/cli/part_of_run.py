@@ -23,7 +23,7 @@ from linkage_ros.cli.terminal import show_progress
 from linkage_ros.errors import LinkageError
 from linkage_ros.report.blocks import Progress
 from linkage_ros.report.reading import read_run
-from linkage_ros.report.run import Run, Window
+from linkage_ros.report.run import ReportedRun, Window
 from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
 
@@ -65,7 +65,7 @@ def read_part(
     stop: Event,
     *,
     trust_effects: bool = False,
-) -> tuple[Run, Scene | None, str]:
+) -> tuple[ReportedRun, Scene | None, str]:
     """
     Read a part of a run; see `read_run`. The layouts of its files say how much there is to read.
 

@@ -39,7 +39,7 @@ from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.report.html import ReportHeader, run_html, TableOf
 from linkage_ros.report.labels import seconds_text
-from linkage_ros.report.run import Run, Window
+from linkage_ros.report.run import ReportedRun, Window
 from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
 
@@ -114,7 +114,7 @@ def _page_tables(account: dict[str, Any]) -> list[TableOf]:
 
 
 def _run_facts(
-    account: dict[str, Any], found: Run, scene: Scene | None
+    account: dict[str, Any], found: ReportedRun, scene: Scene | None
 ) -> Iterator[tuple[str, str]]:
     yield 'bag', Path(account['bag']).resolve().name
     if account['begin']:
@@ -132,7 +132,7 @@ def _run_facts(
 
 
 def _find_warnings(
-    bag: Bag, account: dict[str, Any], found: Run, scene: Scene | None, missing: str
+    bag: Bag, account: dict[str, Any], found: ReportedRun, scene: Scene | None, missing: str
 ) -> Iterator[str]:
     """Yield the missing or damaged parts of a run."""
     if missing and scene is None:

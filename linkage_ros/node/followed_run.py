@@ -27,7 +27,7 @@ from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.messages.joint_state import CrankSample
 from linkage_ros.messages.layout import MalformedError
 from linkage_ros.replay.replay import read_announced, recorded_scene
-from linkage_ros.report.data import poses
+from linkage_ros.report.data import link_poses
 from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.view.model import model_of
 import numpy as np
@@ -108,7 +108,7 @@ class FollowedRun(NamedTuple):
     def _link_frames(self, known: Mapping[str, float]) -> list[float] | None:
         """Return place and angle of the frame of each link; None if they are unknown."""
         values = {name: np.array([value]) for name, value in known.items()}
-        found = poses(
+        found = link_poses(
             self.closure, self.drawn_linkage.prefix, values, self.drawn_linkage.input_names
         )
         if not set(self.model['links']) <= set(found.links):

@@ -60,7 +60,7 @@ class RunClock:
         if self.begin is None:
             self.begin = self._last = logged
 
-    def passed(self, logged: Times) -> Times:
+    def run_times(self, logged: Times) -> Times:
         """Return the run times of consecutive messages from their log times, in [ns]."""
         before = self._last, self._now
         times = logged
@@ -79,7 +79,7 @@ class RunClock:
         self._times = np.concatenate([[before[1]], times])
         return times
 
-    def beside(self, logged: Times, behind: Times) -> Times:
+    def other_thread_times(self, logged: Times, behind: Times) -> Times:
         """
         Return the run times of messages that another thread has recorded, in [ns].
 
@@ -97,7 +97,7 @@ class RunClock:
         self.end = max(self.end, int(times.max(initial=0)))
         return times
 
-    def jumps(self) -> Iterator[tuple[int, int]]:
+    def pop_jumps(self) -> Iterator[tuple[int, int]]:
         """Yield time and size of the clock's jumps since the last call, in [ns]."""
         found, self._jumps = self._jumps, []
         yield from found
@@ -149,10 +149,10 @@ class Blocks:
         found: dict[str, list[Entry]] = {}
         others: dict[str, list[tuple[int, int]]] = {}
         count = size = last = 0
-        for topic, logged, published, data in self._whole(self._bag.messages()):
+        for topic, logged, published, data in self._whole_blocks(self._bag.messages()):
             filled = max(count / _MOST_MESSAGES, size / _MOST_BYTES)
             if filled >= (1 if logged != last else _FARTHEST):
-                yield self._counted(found, others)
+                yield self._count_block(found, others)
                 found, others, count, size = {}, {}, 0, 0
                 if self._progress.stopped():
                     self._stopped = True
@@ -168,32 +168,32 @@ class Blocks:
                 others.setdefault(topic, []).append((logged, len(data)))
             count += 1
         if found or others:
-            yield self._counted(found, others)
+            yield self._count_block(found, others)
 
-    def contents(self) -> Contents:
+    def count_contents(self) -> Contents:
         """Return the counts of what has been read."""
         return self._tallies.to_contents(self._damage, self._stopped)
 
-    def _whole(self, messages: Iterable[BagMessage]) -> Iterator[BagMessage]:
+    def _whole_blocks(self, messages: Iterable[BagMessage]) -> Iterator[BagMessage]:
         try:
             yield from messages
         except BagError as error:
             self._damage = f'{error.where}: {error.reason}'
 
-    def _counted(
+    def _count_block(
         self,
         found: Mapping[str, list[Entry]],
         others: Mapping[str, list[tuple[int, int]]],
     ) -> Mapping[str, list[Entry]]:
         """Count a block, report progress, and return the entries of wanted topics."""
         for name, entries in found.items():
-            self._count(name, [(logged, len(data)) for _, logged, _, data in entries])
+            self._count_entries(name, [(logged, len(data)) for _, logged, _, data in entries])
         for name, sizes in others.items():
-            self._count(name, sizes)
+            self._count_entries(name, sizes)
         self._progress.report(self._read)
         return found
 
-    def _count(self, name: str, entries: list[tuple[int, int]]) -> None:
+    def _count_entries(self, name: str, entries: list[tuple[int, int]]) -> None:
         logs, sizes = zip(*entries, strict=True)
         self._tallies[name].add_messages(len(entries), sum(sizes), min(logs), max(logs))
         self._read += sum(sizes) + RECORD_SIZE * len(entries)
@@ -204,7 +204,7 @@ _OTHER_RECORDER = 'health'
 """Topics recorded by another thread; run time does not follow them."""
 
 
-class Rows(NamedTuple):
+class MessageRows(NamedTuple):
     """Messages of one kind in a block, by their numbers; all times are in [ns]."""
 
     numbers: Times
@@ -219,7 +219,7 @@ def rows_of(
     topics: Mapping[str, str],
     own: Callable[[bytes], bool] | None,
     clock: RunClock,
-) -> dict[str, Rows]:
+) -> dict[str, MessageRows]:
     """
     Return the messages of a block by kind.
 
@@ -251,14 +251,14 @@ def rows_of(
     in_turn = len(numbers) - len(kinds[_OTHER_RECORDER])
     order = np.argsort(numbers[:in_turn])
     passed = np.empty_like(logged)
-    passed[order] = clock.passed(logged[order])
+    passed[order] = clock.run_times(logged[order])
     behind = np.searchsorted(numbers[order], numbers[in_turn:])
-    passed[in_turn:] = clock.beside(logged[in_turn:], behind)
+    passed[in_turn:] = clock.other_thread_times(logged[in_turn:], behind)
     rows, at = {}, 0
     for kind, entries in kinds.items():
         part = slice(at, at + len(entries))
         at += len(entries)
         published = times_of([entry[2] for entry in entries])
         data = [entry[3] for entry in entries]
-        rows[kind] = Rows(numbers[part], logged[part], published, passed[part], data)
+        rows[kind] = MessageRows(numbers[part], logged[part], published, passed[part], data)
     return rows

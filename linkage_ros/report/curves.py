@@ -33,14 +33,14 @@ from linkage_ros.messages.joint_values import MessageContent, MessageValues, WRE
 from linkage_ros.messages.wrench import read_wrench
 from linkage_ros.replay.verify import turning_joints
 from linkage_ros.report.decimation import (
-    capacity,
+    DecimatedCurves,
     Decimation,
     DURATION_BYTES,
     Flags,
     FORCE_BYTES,
     FRAME_BYTES,
     Histogram,
-    MinMaxCurve,
+    interval_capacity,
     most_columns,
     MOST_FRAMES,
     Numbers,
@@ -49,8 +49,8 @@ from linkage_ros.report.decimation import (
     Times,
 )
 from linkage_ros.report.joint_states import MOST_JOINTS
-from linkage_ros.report.labels import short
-from linkage_ros.report.run import Column, Curves, Frames, Window
+from linkage_ros.report.labels import shorten_text
+from linkage_ros.report.run import CurveColumn, Curves, Frames, Window
 from linkage_ros.scene.scene import Scene
 import numpy as np
 
@@ -82,7 +82,7 @@ class Lateness:
     def add(self, times: Times) -> tuple[Times, Times]:
         """Add tick times, in [ns]; return the times with known lateness so far, and that."""
         if not len(times):
-            return self._found(0)
+            return self._lateness_found(0)
         if self._begin is None:
             self._begin = int(times[0])
         numbers = np.arange(self._number, self._number + len(times))
@@ -92,25 +92,25 @@ class Lateness:
         due = numbers * int(whole) + np.rint(numbers * part).astype(np.int64)
         self._times = np.concatenate([self._times, times])
         self._off = np.concatenate([self._off, times - self._begin - due])
-        return self._found(max(0, len(self._off) - self._window - self._done))
+        return self._lateness_found(max(0, len(self._off) - self._window - self._done))
 
-    def end(self) -> tuple[Times, Times]:
+    def finish_lateness(self) -> tuple[Times, Times]:
         """Return the rest; nothing may be added after it."""
         self._ended = True
-        return self._found(len(self._off) - self._done)
+        return self._lateness_found(len(self._off) - self._done)
 
-    def _found(self, count: int) -> tuple[Times, Times]:
+    def _lateness_found(self, count: int) -> tuple[Times, Times]:
         first, end = self._done, self._done + count
         if not count:
             return np.empty(0, np.int64), np.empty(0, np.int64)
-        due = self._due()
+        due = self._due_times()
         late = self._off[first:end] - due[first:end]
         times = self._times[first:end]
         kept = max(0, end - self._window)
         self._times, self._off, self._done = self._times[kept:], self._off[kept:], end - kept
         return times, late
 
-    def _due(self) -> Times:
+    def _due_times(self) -> Times:
         """Return the even row of each tick."""
         before, after = _least_around(self._off, self._window)
         few, n = self._window // 4, len(self._off)
@@ -149,7 +149,7 @@ UNITS = {'position': ('rad', 'm'), 'rate': ('rad/s', 'm/s'), 'effort': ('N·m', 
 
 NO_ROOM = 'curves for which there is no room'
 
-LATENESS, AGE = Column('tick', 'lateness', 'ms'), Column('input', 'age', 'ms')
+LATENESS, AGE = CurveColumn('tick', 'lateness', 'ms'), CurveColumn('input', 'age', 'ms')
 
 
 class BoundedCurves:
@@ -159,12 +159,18 @@ class BoundedCurves:
     The columns ``left_out`` are beyond it: the last ones.
     """
 
-    def __init__(self, title: str, columns: Sequence[Column], space: int, window: Window) -> None:
+    def __init__(
+        self, title: str, columns: Sequence[CurveColumn], space: int, window: Window
+    ) -> None:
         most = most_columns(space)
-        self._title, self._columns, self._window = short(title), tuple(columns[:most]), window
+        self._title, self._columns, self._window = (
+            shorten_text(title),
+            tuple(columns[:most]),
+            window,
+        )
         self.left_out = max(0, len(columns) - most)
         n = len(self._columns)
-        self._kept = MinMaxCurve(n, capacity(n, space))
+        self._kept = DecimatedCurves(n, interval_capacity(n, space))
         self._rows = 0
 
     def add(self, times: Times, values: Numbers) -> None:
@@ -174,9 +180,9 @@ class BoundedCurves:
         self._rows += int(within.sum())
         self._kept.add(times[within], values[within, : len(self._columns)])
 
-    def curves(self) -> Curves | None:
+    def build_curves(self) -> Curves | None:
         """Return the curves; None without rows."""
-        found = self._kept.intervals()
+        found = self._kept.build_intervals()
         filled = [not np.isnan(column).all() for column in found.first.T]
         if not any(filled):
             return None
@@ -185,10 +191,10 @@ class BoundedCurves:
         return Curves(self._title, columns, self._rows, found)
 
 
-def joint_columns(names: Sequence[str], turning: Mapping[str, bool]) -> list[Column]:
+def joint_columns(names: Sequence[str], turning: Mapping[str, bool]) -> list[CurveColumn]:
     """Return the columns of joints: positions, rates and efforts, in the order of a message."""
     return [
-        Column(name, quantity, units[not turning[name]])
+        CurveColumn(name, quantity, units[not turning[name]])
         for quantity, units in UNITS.items()
         for name in names
     ]
@@ -235,7 +241,7 @@ class SceneCurves:
         there = ~np.isnan(positions)
         under = values[:, self._joints]
         values[:, self._joints] = np.where(there, positions, under)
-        within = self._within(times)
+        within = self._is_within(times)
         self._frames.add(times[within], values[within])
 
     def add_samples(self, times: Times, numbers: Numbers) -> None:
@@ -249,15 +255,15 @@ class SceneCurves:
 
     def add_ages(self, times: Times, ages: Times) -> None:
         """Add the ages of the input at ticks, in [ns]."""
-        self._ages.add(times, _milliseconds(ages))
-        self.age.add(ages[self._within(times)])
+        self._ages.add(times, _millisecond_column(ages))
+        self.age.add(ages[self._is_within(times)])
 
-    def end(self) -> tuple[list[Curves], Frames]:
+    def finish_curves(self) -> tuple[list[Curves], Frames]:
         """Return the curves and frames; nothing may be added after it."""
         if self._lateness is not None:
-            self._add_late(*self._lateness.end())
+            self._add_late(*self._lateness.finish_lateness())
         kept = (self._states, self._samples, self._lates, self._ages)
-        found = [curves for each in kept if (curves := each.curves()) is not None]
+        found = [curves for each in kept if (curves := each.build_curves()) is not None]
         values = dict(zip(self._places, self._frames.values.T, strict=True))
         return found, Frames(self._frames.step, self._frames.times, values)
 
@@ -271,15 +277,15 @@ class SceneCurves:
         }
 
     def _add_late(self, times: Times, late: Times) -> None:
-        self._lates.add(times, _milliseconds(late))
-        self.late.add(late[self._within(times)])
+        self._lates.add(times, _millisecond_column(late))
+        self.late.add(late[self._is_within(times)])
 
-    def _within(self, times: Times) -> Flags:
+    def _is_within(self, times: Times) -> Flags:
         since, until = self._window
         return (times >= since) & (times <= until)
 
 
-def _milliseconds(durations: Times) -> Numbers:
+def _millisecond_column(durations: Times) -> Numbers:
     """Return durations in [ns] as a column in [ms]."""
     return (durations * 1e-6).astype(np.float64)[:, None]
 
@@ -294,8 +300,11 @@ class LinkWrenches:
     def __init__(self, topics: Sequence[str], window: Window) -> None:
         self._kept = {}
         for topic in topics:
-            name = short(topic.rpartition('/')[2])
-            columns = [Column(name, 'load', 'N'), Column(name, 'moment of a load', 'N·m')]
+            name = shorten_text(topic.rpartition('/')[2])
+            columns = [
+                CurveColumn(name, 'load', 'N'),
+                CurveColumn(name, 'moment of a load', 'N·m'),
+            ]
             space = FORCE_BYTES // len(topics)
             self._kept[topic] = BoundedCurves(topic, columns, space, window)
         self.left_out: Counter[str] = Counter()
@@ -311,7 +320,7 @@ class LinkWrenches:
                 numbers[row] = np.hypot(wrench.fx, wrench.fy), wrench.moment
         self._kept[topic].add(times, numbers)
 
-    def curves(self) -> list[Curves]:
+    def build_curves(self) -> list[Curves]:
         """Return the curves of each topic with messages."""
         found = (kept.curves() for kept in self._kept.values())
         return [each for each in found if each is not None]
@@ -346,7 +355,7 @@ class PinForces:
             names = list(dict.fromkeys(name for _, values in good for name in values.names))
             self._places = {name: place for place, name in enumerate(names[:MOST_JOINTS])}
             columns = [
-                Column(short(name), quantity, unit)
+                CurveColumn(shorten_text(name), quantity, unit)
                 for quantity, unit in (('force', 'N'), ('moment', 'N·m'))
                 for name in self._places
             ]
@@ -362,9 +371,9 @@ class PinForces:
                     self.left_out[LATER_PINS] += 1
         self._kept.add(np.array([*rows]), numbers.reshape(len(rows), -1))
 
-    def curves(self) -> Curves | None:
+    def build_curves(self) -> Curves | None:
         """Return the curves, without moments that are zero, as in pins; None without messages."""
-        found = None if self._kept is None else self._kept.curves()
+        found = None if self._kept is None else self._kept.build_curves()
         if found is None:
             return None
         first, second = found.intervals.first, found.intervals.second

@@ -37,8 +37,8 @@ from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.shapes import COLOURS, FACES, INK, link_frames
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
-from linkage_ros.report.labels import LANES, QUANTITIES, short, size_in_json
-from linkage_ros.report.run import APART, Curves, Frames, Lane, LinkageRun, Run
+from linkage_ros.report.labels import EVENT_TRACKS, QUANTITIES, shorten_text, size_in_json
+from linkage_ros.report.run import APART, Curves, EventTrack, Frames, LinkageRun, ReportedRun
 from linkage_ros.robot_models.part import prefixed
 from linkage_ros.robot_models.tree import grow, Tree
 import numpy as np
@@ -67,7 +67,7 @@ _Found = dict[str, tuple[Places, Places]]
 """For each link the position of its frame, and its direction."""
 
 
-def poses(
+def link_poses(
     closure: Closure, prefix: str, values: Mapping[str, Numbers], inputs: Sequence[str]
 ) -> Poses:
     """
@@ -96,7 +96,7 @@ def poses(
     except DefinitionError as error:
         found, reason = _by_closing(closure, [known[name] for name in inputs]), error.reason
     for block in separate_blocks(linkage, closure.structure):
-        place = _at(found, block.link, linkage.links[block.link][block.point])
+        place = _place_of(found, block.link, linkage.links[block.link][block.point])
         found.setdefault(block.name, (place, found[block.along][1]))
     links = tuple(link for link in found if link != GROUND)
     count = len(next(iter(values.values()), np.empty(0)))
@@ -108,7 +108,7 @@ def poses(
         frames[:, number, 2] = np.angle(way)
     # If one link of a linkage is unknown, none is drawn.
     frames[np.isnan(frames).any(axis=(1, 2))] = np.nan
-    apart = _apart(closure, found, count)
+    apart = _loop_gaps(closure, found, count)
     apart[np.isnan(frames).any(axis=(1, 2))] = np.nan
     return Poses(links, frames, apart, reason)
 
@@ -156,12 +156,12 @@ def _by_closing(closure: Closure, inputs: Sequence[Numbers]) -> _Found:
     return found
 
 
-def _at(found: _Found, link: str, point: tuple[float, float]) -> Places:
+def _place_of(found: _Found, link: str, point: tuple[float, float]) -> Places:
     place, way = found[link]
     return place + complex(*point) * way
 
 
-def _apart(closure: Closure, found: _Found, count: int) -> Numbers:
+def _loop_gaps(closure: Closure, found: _Found, count: int) -> Numbers:
     linkage = closure.linkage
     worst = np.zeros(count)
     carriers: dict[str, list[str]] = {}
@@ -169,14 +169,16 @@ def _apart(closure: Closure, found: _Found, count: int) -> Numbers:
         for point in named:
             carriers.setdefault(point, []).append(link)
     for point, (first, *others) in carriers.items():
-        place = _at(found, first, linkage.links[first][point])
+        place = _place_of(found, first, linkage.links[first][point])
         for link in others:
-            worst = np.maximum(worst, np.abs(_at(found, link, linkage.links[link][point]) - place))
+            worst = np.maximum(
+                worst, np.abs(_place_of(found, link, linkage.links[link][point]) - place)
+            )
     for slider in linkage.sliders.values():
         unit = complex(*slider.direction) / abs(complex(*slider.direction))
-        through = _at(found, slider.along, linkage.links[slider.along][slider.through])
+        through = _place_of(found, slider.along, linkage.links[slider.along][slider.through])
         carrier = carriers[slider.point][0]
-        between = _at(found, carrier, linkage.links[carrier][slider.point]) - through
+        between = _place_of(found, carrier, linkage.links[carrier][slider.point]) - through
         across = between / (unit * found[slider.along][1])
         worst = np.maximum(worst, np.abs(across.imag))
     return worst
@@ -185,7 +187,7 @@ def _apart(closure: Closure, found: _Found, count: int) -> Numbers:
 Plot = dict[str, Any]
 
 
-def page_data(run: Run, wrapped: bool) -> dict[str, Any]:
+def page_data(run: ReportedRun, wrapped: bool) -> dict[str, Any]:
     """Return the data of a page, as JSON holds them; wrapped angles jump from π to −π."""
     since = max(0, run.window.since)
     until = max(since, min(run.end, run.window.until))
@@ -196,29 +198,29 @@ def page_data(run: Run, wrapped: bool) -> dict[str, Any]:
         'wrapped': wrapped,
         'colours': COLOURS,
         'faces': {**FACES, 'edge': INK},
-        'curves': [_curves(curves) for curves in run.curves],
-        'plots': plots(run),
-        'frames': _frames(frames) if frames is not None else None,
-        'linkages': _linkages(run.linkages, frames) if frames is not None else [],
+        'curves': [_curves_json(curves) for curves in run.curves],
+        'plots': time_plots(run),
+        'frames': _frames_json(frames) if frames is not None else None,
+        'linkages': _linkages_json(run.linkages, frames) if frames is not None else [],
         'lanes': [
-            {'key': key, 'title': LANES[key][0], 'spans': _spans(lane)}
-            for key, lane in lanes(run).items()
+            {'key': key, 'title': EVENT_TRACKS[key][0], 'spans': _spans_json(lane)}
+            for key, lane in event_tracks(run).items()
         ],
         'histograms': {
-            key: _histogram(found)
+            key: _histogram_json(found)
             for key, found in (('lateness', run.lateness), ('age', run.age))
             if found is not None
         },
     }
 
 
-def lanes(run: Run) -> dict[str, Lane]:
+def event_tracks(run: ReportedRun) -> dict[str, EventTrack]:
     """Return the lanes that have events, in the order of the page."""
-    shown = dict(run.lanes)
+    shown = dict(run.event_tracks)
     silent = [each.silent for each in run.linkages]
     if silent:
         # Each linkage has its own silences; one lane shows those of all.
-        merged = Lane(APART)
+        merged = EventTrack(APART)
         spans = [
             (s.begin, s.end, each.name, s.count)
             for each in run.linkages
@@ -228,23 +230,23 @@ def lanes(run: Run) -> dict[str, Lane]:
             merged.add(*span)
         merged.count = sum(lane.count for lane in silent)
         shown['silent'] = merged
-    return {key: shown[key] for key in LANES if key in shown and shown[key].count}
+    return {key: shown[key] for key in EVENT_TRACKS if key in shown and shown[key].count}
 
 
 _NOT_PLOTTED_IF_ZERO = ('rate', 'effort', 'force')
 
 
-def plots(run: Run) -> list[Plot]:
+def time_plots(run: ReportedRun) -> list[Plot]:
     """Return the plots over time: for each its curves, by number and column, and its unit."""
     return [plot for plot in _all_plots(run) if not _is_zero(plot, run)]
 
 
-def zero_plots(run: Run) -> list[str]:
+def zero_plots(run: ReportedRun) -> list[str]:
     """Return the titles of the plots that are left out because all their values are zero."""
     return [plot['title'] for plot in _all_plots(run) if _is_zero(plot, run)]
 
 
-def _all_plots(run: Run) -> list[Plot]:
+def _all_plots(run: ReportedRun) -> list[Plot]:
     found: dict[str, Plot] = {}
     # The crank comes first: everything else depends on it.
     driven = {name for linkage in run.linkages for name in linkage.inputs}
@@ -272,7 +274,7 @@ def _all_plots(run: Run) -> list[Plot]:
     return [found[key] for key, _ in QUANTITIES.values() if key in found]
 
 
-def _is_zero(plot: Plot, run: Run) -> bool:
+def _is_zero(plot: Plot, run: ReportedRun) -> bool:
     """Return whether a plot has only zeros; angles and times are plotted even so."""
     for curve in plot['curves']:
         curves = run.curves[curve['of']]
@@ -285,51 +287,53 @@ def _is_zero(plot: Plot, run: Run) -> bool:
     return True
 
 
-def _curves(curves: Curves) -> dict[str, Any]:
+def _curves_json(curves: Curves) -> dict[str, Any]:
     intervals = curves.intervals
     single = intervals.rows == 1
     return {
         'title': curves.title,
         'rows': intervals.rows,
         'of': curves.rows,
-        'begins': _seconds(intervals.begins),
-        'ends': None if single else _seconds(intervals.ends),
-        'first': [_packed(column, '<f8') for column in intervals.first.T],
-        'second': None if single else [_packed(column, '<f8') for column in intervals.second.T],
+        'begins': _pack_seconds(intervals.begins),
+        'ends': None if single else _pack_seconds(intervals.ends),
+        'first': [_pack_values(column, '<f8') for column in intervals.first.T],
+        'second': None
+        if single
+        else [_pack_values(column, '<f8') for column in intervals.second.T],
     }
 
 
-def _frames(frames: Frames) -> dict[str, Any]:
+def _frames_json(frames: Frames) -> dict[str, Any]:
     return {
         'step': frames.step,
-        'times': _seconds(frames.times),
-        'values': {name: _packed(values, '<f8') for name, values in frames.values.items()},
+        'times': _pack_seconds(frames.times),
+        'values': {name: _pack_values(values, '<f8') for name, values in frames.values.items()},
     }
 
 
-def _linkages(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[str, Any]]:
+def _linkages_json(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[str, Any]]:
     found, space = [], SHAPE_BYTES
     for linkage in linkages:
-        drawn, size, undrawn = _drawn(linkage.closure, space)
+        drawn, size, undrawn = _drawing_of(linkage.closure, space)
         space -= size
-        found.append({**_linkage(linkage, frames), 'drawn': drawn, 'undrawn': undrawn})
+        found.append({**_linkage_json(linkage, frames), 'drawn': drawn, 'undrawn': undrawn})
     return found
 
 
-def _drawn(closure: Closure, space: int) -> tuple[dict[str, Any] | None, int, str]:
+def _drawing_of(closure: Closure, space: int) -> tuple[dict[str, Any] | None, int, str]:
     """Return the drawing of a linkage and its size in [bytes], or why there is none."""
     try:
         drawn = drawn_in_frames(view(closure, usual_inputs(closure)))
         size = size_in_json(drawn)
     except LinkageError as error:
-        return None, 0, short(str(error), 200)
+        return None, 0, shorten_text(str(error), 200)
     except (ValueError, OverflowError, ZeroDivisionError):
         return None, 0, 'too large or too small for a picture'
     return (drawn, size, '') if size <= space else (None, 0, 'no room on the page')
 
 
-def _linkage(linkage: LinkageRun, frames: Frames) -> dict[str, Any]:
-    found = poses(linkage.closure, linkage.prefix, frames.values, linkage.inputs)
+def _linkage_json(linkage: LinkageRun, frames: Frames) -> dict[str, Any]:
+    found = link_poses(linkage.closure, linkage.prefix, frames.values, linkage.inputs)
     return {
         'name': linkage.name,
         'inputs': linkage.inputs,
@@ -337,18 +341,18 @@ def _linkage(linkage: LinkageRun, frames: Frames) -> dict[str, Any]:
         'joints': linkage.joints,
         'units': ['rad' if turning else 'm' for turning in linkage.closure.turning],
         'links': found.links,
-        'poses': _packed(found.frames, '<f4'),
-        'apart': _packed(found.apart, '<f4'),
-        'untold': short(found.reason, 200),
+        'poses': _pack_values(found.frames, '<f4'),
+        'apart': _pack_values(found.apart, '<f4'),
+        'untold': shorten_text(found.reason, 200),
         'silent': [[span.begin / 1e9, span.end / 1e9] for span in linkage.silent.in_order],
     }
 
 
-def _spans(lane: Lane) -> list[list[Any]]:
-    return [[s.begin / 1e9, s.end / 1e9, s.count, s.text] for s in lane.in_order]
+def _spans_json(track: EventTrack) -> list[list[Any]]:
+    return [[s.begin / 1e9, s.end / 1e9, s.count, s.text] for s in track.in_order]
 
 
-def _histogram(histogram: Histogram) -> dict[str, Any]:
+def _histogram_json(histogram: Histogram) -> dict[str, Any]:
     """Return the bins that are not empty, and their edges in [s]."""
     counts = histogram.counts
     (places,) = np.nonzero(counts)
@@ -363,15 +367,15 @@ def _histogram(histogram: Histogram) -> dict[str, Any]:
     }
 
 
-def _seconds(times: Any) -> str:
-    return _packed(times / 1e9, '<f8')
+def _pack_seconds(times: Any) -> str:
+    return _pack_values(times / 1e9, '<f8')
 
 
-def _packed(values: ArrayLike, kind: str) -> str:
+def _pack_values(values: ArrayLike, kind: str) -> str:
     return b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()
 
 
-def facts_of_thinning(run: Run) -> Iterator[str]:
+def facts_of_thinning(run: ReportedRun) -> Iterator[str]:
     """Yield the decimation of the curves, in words."""
     whole = [curves for curves in run.curves if curves.intervals.rows == 1]
     for curves in run.curves:

@@ -73,14 +73,14 @@ def most_columns(space: int) -> int:
     return space // (16 * _FEWEST_INTERVALS) - 1
 
 
-def capacity(columns: int, space: int) -> int:
+def interval_capacity(columns: int, space: int) -> int:
     """Return the number of intervals of so many curves for a size limit, in [bytes]."""
     # Per interval two times, and per curve two values, of 8 bytes each.
     most = space // (16 * columns + 16)
     return 1 << (most.bit_length() - 1)
 
 
-class MinMaxCurve:
+class DecimatedCurves:
     """Curves that grow row by row, over a power of two of intervals, or twice as many rows."""
 
     def __init__(self, columns: int, most: int) -> None:
@@ -102,32 +102,32 @@ class MinMaxCurve:
         while at < len(times):
             if self._open:
                 end = at + self._rows - self._open
-                self._go_on(times[at:end], values[at:end])
+                self._extend_interval(times[at:end], values[at:end])
                 at = end
                 continue
             space = (2 * self._most if self._rows == 1 else self._most) - self._count
             if not space:
-                self._merge()
+                self._merge_pairs()
                 continue
             whole = min(space, (len(times) - at) // self._rows)
             end = at + whole * self._rows
             if whole:
-                self._take(times[at:end], values[at:end], whole)
+                self._add_intervals(times[at:end], values[at:end], whole)
             else:
                 end = len(times)
-                self._go_on(times[at:end], values[at:end])
+                self._extend_interval(times[at:end], values[at:end])
             at = end
 
-    def intervals(self) -> Intervals:
+    def build_intervals(self) -> Intervals:
         """Return the curves; nothing may be added after it."""
         if self._open:
-            self._close()
+            self._close_interval()
         n = self._count
         return Intervals(
             self._rows, self._begins[:n], self._ends[:n], self._first[:n], self._second[:n]
         )
 
-    def _go_on(self, times: Times, values: Numbers) -> None:
+    def _extend_interval(self, times: Times, values: Numbers) -> None:
         """Add rows to the open interval, or begin one; close it when it is full."""
         if self._open:
             values = np.concatenate([self._pair, values])
@@ -138,16 +138,16 @@ class MinMaxCurve:
         self._ends_of_open[1] = int(times[-1])
         self._open += len(times)
         if self._open == self._rows:
-            self._close()
+            self._close_interval()
 
-    def _close(self) -> None:
+    def _close_interval(self) -> None:
         n = self._count
         self._begins[n], self._ends[n] = self._ends_of_open
         self._first[n], self._second[n] = self._pair
         self._count += 1
         self._open = 0
 
-    def _take(self, times: Times, values: Numbers, count: int) -> None:
+    def _add_intervals(self, times: Times, values: Numbers, count: int) -> None:
         start, end = self._count, self._count + count
         times = times.reshape(count, -1)
         self._begins[start:end], self._ends[start:end] = times[:, 0], times[:, -1]
@@ -158,7 +158,7 @@ class MinMaxCurve:
             self._first[start:end], self._second[start:end] = extremes
         self._count = end
 
-    def _merge(self) -> None:
+    def _merge_pairs(self) -> None:
         """Merge intervals in pairs."""
         n = self._count
         half = n // 2
@@ -210,7 +210,7 @@ class Decimation:
             if at >= len(times):
                 break
             if self._count == self._most:
-                self._halve()
+                self._halve_rows()
         self._seen += len(times)
 
     @property
@@ -223,7 +223,7 @@ class Decimation:
         """Return the kept rows."""
         return self._values[: self._count]
 
-    def _halve(self) -> None:
+    def _halve_rows(self) -> None:
         n = self._count
         half = n // 2
         self._times[:half] = self._times[0:n:2]

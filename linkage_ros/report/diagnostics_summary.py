@@ -19,8 +19,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from linkage_ros.messages.layout import MalformedError, parse_declaration, parse_message
-from linkage_ros.report.labels import short
-from linkage_ros.report.run import Lane
+from linkage_ros.report.labels import shorten_text
+from linkage_ros.report.run import EventTrack
 
 DIAGNOSTIC_ARRAY = parse_declaration(
     'Time stamp, string frame_id, DiagnosticStatus[] status',
@@ -34,7 +34,7 @@ _MOST_ITEMS = 10_000
 """Maximum number of statuses of a message, and of values of a status; more means damage."""
 
 
-class Status(NamedTuple):
+class DiagnosticStatus(NamedTuple):
     """The status of one task, with texts by key; level 0 is OK, 1 WARN, 2 ERROR, 3 STALE."""
 
     level: int
@@ -43,24 +43,27 @@ class Status(NamedTuple):
     values: Mapping[str, str]
 
 
-def statuses(data: bytes) -> list[Status]:
+def read_statuses(data: bytes) -> list[DiagnosticStatus]:
     """Return the statuses of a message; none if it is damaged."""
     try:
         found = parse_message(data, DIAGNOSTIC_ARRAY, _MOST_ITEMS)['status']
     except MalformedError:
         return []
     return [
-        Status(
+        DiagnosticStatus(
             data[status['level'].first],
-            _text(status['name']),
-            _text(status['message']),
-            {_text(value['key']): _text(value['value']) for value in status['values']},
+            _decode_text(status['name']),
+            _decode_text(status['message']),
+            {
+                _decode_text(value['key']): _decode_text(value['value'])
+                for value in status['values']
+            },
         )
         for status in found
     ]
 
 
-def _text(text: bytes) -> str:
+def _decode_text(text: bytes) -> str:
     return text.decode('utf-8', 'backslashreplace')
 
 
@@ -82,7 +85,7 @@ MOST_VALUES = 500
 """Maximum number of values kept; our node reports some sixty."""
 
 
-class DiagnosticsSummary:
+class RecordedDiagnostics:
     """
     Collects the diagnostics.
 
@@ -96,43 +99,47 @@ class DiagnosticsSummary:
 
     """
 
-    def __init__(self, lanes: Mapping[str, Lane], from_beginning: bool = True) -> None:
+    def __init__(
+        self, event_tracks: Mapping[str, EventTrack], from_beginning: bool = True
+    ) -> None:
         # The last values, by task and key; at most `MOST_VALUES`.
         self.last_values: dict[tuple[str, str], str] = {}
-        self._lanes, self._from_beginning = lanes, from_beginning
+        self._lanes, self._from_beginning = event_tracks, from_beginning
         self._before = 0
         self._counts: dict[tuple[str, str], int] = {}
 
-    def take(self, message: bytes, time: int) -> None:
+    def add_message(self, message: bytes, time: int) -> None:
         """Add a message at a run time in [ns]."""
         ours = [
             (task, status)
-            for status in statuses(message)
+            for status in read_statuses(message)
             for task in _TASKS
             if status.name.endswith(f': {task}')
         ]
         for task, status in ours:
-            self._take(task, status, time)
+            self._add_status(task, status, time)
         if ours:
             self._before = time
 
-    def _take(self, task: str, status: Status, time: int) -> None:
+    def _add_status(self, task: str, status: DiagnosticStatus, time: int) -> None:
         if status.level in _LEVELS:
             text = f'{_LEVELS[status.level]}, {task}: {status.message}'
             self._lanes['health'].add(self._before, time, text)
         for key, value in status.values.items():
-            named = task, short(key)
+            named = task, shorten_text(key)
             if named not in self.last_values and len(self.last_values) >= MOST_VALUES:
                 continue
-            self.last_values[named] = short(value)
+            self.last_values[named] = shorten_text(value)
             if key in _COUNTED:
                 lane, what = _COUNTED[key]
-                self._count(lane, what, named, value, time)
+                self._add_count(lane, what, named, value, time)
             elif key.startswith(_DROPPED):
                 topic = key.removeprefix(_DROPPED)
-                self._count('dropped', f'messages of {topic}', named, value, time)
+                self._add_count('dropped', f'messages of {topic}', named, value, time)
 
-    def _count(self, lane: str, what: str, of: tuple[str, str], value: str, time: int) -> None:
+    def _add_count(
+        self, track: str, what: str, of: tuple[str, str], value: str, time: int
+    ) -> None:
         if not value.isdecimal() or len(value) > 18:
             return
         count = int(value)
@@ -141,4 +148,4 @@ class DiagnosticsSummary:
         # A counter of a restarted node begins at 0 again.
         more = count - known if count >= known else count
         if more:
-            self._lanes[lane].add(self._before, time, what, more)
+            self._lanes[track].add(self._before, time, what, more)

@@ -20,20 +20,26 @@ from typing import NamedTuple
 
 from linkage_ros.errors import LinkageError
 from linkage_ros.pages.document import document, facts_html, table_html
-from linkage_ros.report.data import facts_of_thinning, lanes, page_data, plots, zero_plots
+from linkage_ros.report.data import (
+    event_tracks,
+    facts_of_thinning,
+    page_data,
+    time_plots,
+    zero_plots,
+)
 from linkage_ros.report.decimation import Histogram, PAGE_BYTES, TABLE_BYTES
 from linkage_ros.report.labels import (
     AGE_NOTE,
     CLOSED_NOTE,
     duration_text,
+    EVENT_TRACKS,
     FORCE_NOTE,
-    LANES,
     LATENESS_NOTE,
     POSE_NOTE,
     seconds_text,
-    short,
+    shorten_text,
 )
-from linkage_ros.report.run import Curves, LinkageRun, Run
+from linkage_ros.report.run import Curves, LinkageRun, ReportedRun
 import numpy as np
 
 _LONGEST = 200
@@ -58,28 +64,28 @@ def tables_html(tables: Sequence[TableOf]) -> Iterator[str]:
     for number, table in enumerate(tables):
         if not table.rows:
             continue
-        space -= _BESIDE_TABLE + _size([short(table.title), *table.columns])
+        space -= _BESIDE_TABLE + _row_size([shorten_text(table.title), *table.columns])
         if space < 0:
             yield f'<p class="note">No room for {len(tables) - number} more tables.</p>'
             return
         rows = []
         for row in table.rows:
-            cells = [short(cell, _LONGEST) for cell in row]
-            space -= _size(cells)
+            cells = [shorten_text(cell, _LONGEST) for cell in row]
+            space -= _row_size(cells)
             if space < 0:
                 break
             rows.append(cells)
-        yield from _table(table._replace(title=short(table.title), rows=rows))
+        yield from _run_table_html(table._replace(title=shorten_text(table.title), rows=rows))
         if len(rows) < len(table.rows):
             yield f'<p class="note">No room for {len(table.rows) - len(rows)} more rows.</p>'
 
 
-def _size(cells: Sequence[str]) -> int:
+def _row_size(cells: Sequence[str]) -> int:
     written = (escape(cell).encode('utf-8', 'backslashreplace') for cell in cells)
     return _BESIDE_ROW + sum(_BESIDE_CELL + len(each) for each in written)
 
 
-def _table(table: TableOf) -> Iterator[str]:
+def _run_table_html(table: TableOf) -> Iterator[str]:
     columns = [column.lstrip('>') for column in table.columns]
     numbers = [column.startswith('>') for column in table.columns]
     if table.folded:
@@ -91,24 +97,24 @@ def _table(table: TableOf) -> Iterator[str]:
         yield '</figure>'
 
 
-def run_tables(run: Run) -> Iterator[TableOf]:
+def run_tables(run: ReportedRun) -> Iterator[TableOf]:
     """Yield the tables of a run."""
     yield TableOf(
         'Curves',
         ('joint', 'quantity', '>least', '>greatest', 'unit', 'on'),
-        [row for curves in run.curves for row in _ranges(curves)],
+        [row for curves in run.curves for row in _curve_ranges(curves)],
     )
     yield TableOf(
         'Events',
         ('kind', '>count', '>first at [s]', 'what it is'),
         [
             (
-                LANES[key][0],
+                EVENT_TRACKS[key][0],
                 f'{lane.count:,}',
                 seconds_text(lane.in_order[0].begin),
-                LANES[key][1],
+                EVENT_TRACKS[key][1],
             )
-            for key, lane in lanes(run).items()
+            for key, lane in event_tracks(run).items()
         ],
     )
     yield TableOf(
@@ -129,7 +135,7 @@ def run_tables(run: Run) -> Iterator[TableOf]:
     )
 
 
-def _ranges(curves: Curves) -> Iterator[tuple[str, ...]]:
+def _curve_ranges(curves: Curves) -> Iterator[tuple[str, ...]]:
     found = curves.intervals
     for number, (name, quantity, unit) in enumerate(curves.columns):
         least = np.nanmin(np.fmin(found.first[:, number], found.second[:, number]))
@@ -164,7 +170,7 @@ class ReportHeader(NamedTuple):
     wrapped: bool = False
 
 
-def run_html(run: Run, header: ReportHeader) -> str:
+def run_html(run: ReportedRun, header: ReportHeader) -> str:
     """
     Return the page of a run.
 
@@ -172,8 +178,8 @@ def run_html(run: Run, header: ReportHeader) -> str:
     `PAGE_BYTES`.
     """
     data = page_data(run, header.wrapped)
-    title = short(header.title)
-    page = document(title, _body(run, header, data), data, _STYLES, _SCRIPTS)
+    title = shorten_text(header.title)
+    page = document(title, _page_body(run, header, data), data, _STYLES, _SCRIPTS)
     # The limits of the parts add up to less, but names in a scene have no limit.
     if len(page.encode('utf-8', 'backslashreplace')) > PAGE_BYTES:
         bound = f'{PAGE_BYTES // 1_000_000} MB'
@@ -181,13 +187,16 @@ def run_html(run: Run, header: ReportHeader) -> str:
     return page
 
 
-def _body(run: Run, header: ReportHeader, data: dict[str, object]) -> Iterator[str]:
-    yield f'<header><h1>{escape(short(header.title))}</h1>'
-    yield from facts_html([(name, short(value, _LONGEST_FACT)) for name, value in header.facts])
+def _page_body(run: ReportedRun, header: ReportHeader, data: dict[str, object]) -> Iterator[str]:
+    yield f'<header><h1>{escape(shorten_text(header.title))}</h1>'
+    yield from facts_html(
+        [(name, shorten_text(value, _LONGEST_FACT)) for name, value in header.facts]
+    )
     if header.warnings:
         yield '<ul class="warnings" role="alert">'
         yield from (
-            f'<li>{escape(short(warning, _LONGEST_FACT))}</li>' for warning in header.warnings
+            f'<li>{escape(shorten_text(warning, _LONGEST_FACT))}</li>'
+            for warning in header.warnings
         )
         yield '</ul>'
     yield '<noscript><p class="warnings">Pictures and plots need JavaScript.</p></noscript>'
@@ -195,18 +204,18 @@ def _body(run: Run, header: ReportHeader, data: dict[str, object]) -> Iterator[s
     moving = run.frames is not None and len(run.frames.times) > 0 and bool(run.linkages)
     yield f'<main{" class=moving" if moving else ""}>'
     if moving:
-        yield from _player(run.linkages, data)
+        yield from _player_html(run.linkages, data)
     yield '<div class="plots">'
-    yield from _events(run)
-    yield from _plots(run)
-    yield from _histograms(run)
+    yield from _events_html(run)
+    yield from _plots_html(run)
+    yield from _histograms_html(run)
     yield '</div>'
     yield '<section class="tables"><h2>In numbers</h2>'
     yield from tables_html([*header.tables, *run_tables(run)])
     yield '</section></main>'
 
 
-def _player(linkages: Sequence[LinkageRun], data: dict[str, object]) -> Iterator[str]:
+def _player_html(linkages: Sequence[LinkageRun], data: dict[str, object]) -> Iterator[str]:
     drawn = data['linkages']
     assert isinstance(drawn, list)
     yield '<section class="player" aria-label="The linkage, moving"><div class="pictures">'
@@ -237,16 +246,16 @@ def _player(linkages: Sequence[LinkageRun], data: dict[str, object]) -> Iterator
     yield '</section>'
 
 
-def _events(run: Run) -> Iterator[str]:
+def _events_html(run: ReportedRun) -> Iterator[str]:
     yield '<section id="events"><h2>What happened</h2>'
-    there = lanes(run)
+    there = event_tracks(run)
     if there:
-        yield _plot('events', 'Events')
+        yield _plot_html('events', 'Events')
     # An event from the diagnostics alone may also be visible in the messages.
     missing = [
         title
-        for key, (title, _) in LANES.items()
-        if key in run.lanes and key not in there and not key.startswith('told_')
+        for key, (title, _) in EVENT_TRACKS.items()
+        if key in run.event_tracks and key not in there and not key.startswith('told_')
     ]
     if missing:
         yield f'<p class="note">None of these: {escape("; ".join(missing))}.</p>'
@@ -261,8 +270,8 @@ _ANGLE_CONTROLS = (
 )
 
 
-def _plots(run: Run) -> Iterator[str]:
-    found = plots(run)
+def _plots_html(run: ReportedRun) -> Iterator[str]:
+    found = time_plots(run)
     if not run.curves:
         yield '<section><h2>Over time</h2><p>No joint states are in this bag.</p></section>'
         return
@@ -294,7 +303,9 @@ def _plots(run: Run) -> Iterator[str]:
         'loads': FORCE_NOTE,
     }
     for plot in found:
-        yield _plot(plot['key'], f'{plot["title"]} [{plot["unit"]}]', notes.get(plot['key'], ''))
+        yield _plot_html(
+            plot['key'], f'{plot["title"]} [{plot["unit"]}]', notes.get(plot['key'], '')
+        )
     yield '</section>'
     crossed = [each for each in run.linkages if run.frames is not None and len(run.frames.times)]
     if crossed:
@@ -302,11 +313,11 @@ def _plots(run: Run) -> Iterator[str]:
         yield '<p class="note">The instants of the moving picture that are within the zoom.</p>'
         for number, linkage in enumerate(run.linkages):
             over = f'Joints over {linkage.inputs[0]}'
-            yield _plot(f'crossed_{number}', over)
+            yield _plot_html(f'crossed_{number}', over)
         yield '</section>'
 
 
-def _histograms(run: Run) -> Iterator[str]:
+def _histograms_html(run: ReportedRun) -> Iterator[str]:
     spread = (
         ('lateness', 'How late ticks were, all', run.lateness),
         ('age', 'How old the input was, all', run.age),
@@ -316,16 +327,16 @@ def _histograms(run: Run) -> Iterator[str]:
     yield '<section><h2>How durations are spread</h2>'
     for key, title, found in spread:
         if found is not None:
-            yield _plot(f'spread_{key}', title, _spread(found))
+            yield _plot_html(f'spread_{key}', title, _spread_note(found))
     yield '</section>'
 
 
-def _spread(found: Histogram) -> str:
+def _spread_note(found: Histogram) -> str:
     parts = [f'p{p} ≤ {duration_text(found.percentile(p) / 1e9)}' for p in (50, 90, 99)]
     return f'{found.count:,} ticks: {", ".join(parts)}, max {duration_text(found.greatest / 1e9)}.'
 
 
-def _plot(key: str, title: str, note: str = '') -> str:
+def _plot_html(key: str, title: str, note: str = '') -> str:
     below = f'<p class="note">{escape(note)}</p>' if note else ''
     return (
         f'<figure data-plot="{escape(key)}"><figcaption>{escape(title)}</figcaption>'

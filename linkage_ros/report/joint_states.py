@@ -86,7 +86,7 @@ class JointStates:
             for _ in range(_MOST_LAYOUTS):
                 if not len(left):
                     break
-                taken, columns, found, stamp = self._alike(table, messages[left[0]])
+                taken, columns, found, stamp = self._read_alike(table, messages[left[0]])
                 which = left[taken]
                 if found:
                     good[which] = True
@@ -104,14 +104,14 @@ class JointStates:
                 numbers[which[:, None], quantity, under] = values[:, kept]
         return JointBlock(good, stamps, numbers)
 
-    def _alike(
+    def _read_alike(
         self, table: NDArray[np.uint8], first: bytes
     ) -> tuple[Flags, list[int], list[tuple[int, Numbers]], Times]:
         """Return the rows with the layout of the first, their joints' columns and numbers."""
         none = np.zeros(len(table), bool)
         none[0] = True
         found = arrays_of(first)
-        reason = found.value if isinstance(found, Rejection) else _unequal(found)
+        reason = found.value if isinstance(found, Rejection) else _mismatch_reason(found)
         if isinstance(found, Rejection) or reason:
             self.left_out[reason] += 1
             return none, [], [], np.empty(0, np.int64)
@@ -137,9 +137,9 @@ class JointStates:
                 end = begin + 8 * n
                 values = rows[:, begin:end].copy().view(f'{order}f8').astype(float)
                 numbers.append((quantity, values))
-        return alike, [self._column(name) for name in names], numbers, stamps
+        return alike, [self._joint_column(name) for name in names], numbers, stamps
 
-    def _column(self, encoded: bytes) -> int:
+    def _joint_column(self, encoded: bytes) -> int:
         """Return the column of a joint; −1 beyond the size limit."""
         name = encoded.decode('utf-8', 'backslashreplace')
         if name in self.joints:
@@ -150,7 +150,7 @@ class JointStates:
         return len(self.joints) - 1
 
 
-def _unequal(found: tuple[str, list[bytes], Sequence[tuple[int, int, int]]]) -> str:
+def _mismatch_reason(found: tuple[str, list[bytes], Sequence[tuple[int, int, int]]]) -> str:
     """Return why a message whose arrays do not fit its names is left out; '' if they fit."""
     _, names, arrays = found
     counts = {n for _, n, _ in arrays} - {0}

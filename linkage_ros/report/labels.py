@@ -16,7 +16,7 @@ from typing import Any
 LONGEST_NAME = 80
 """Maximum length of names from outside: topics and joints of bags, keys of diagnostics."""
 
-LANES = {
+EVENT_TRACKS = {
     'fault': ('fault injected', 'from its begin to its end, as its topic and the diagnostics say'),
     'open': ('loop open', 'a good sample at which the loop does not close; nothing is published'),
     'told_open': ('no pose, by diagnostics', 'as the diagnostics count, once a period'),
@@ -72,7 +72,7 @@ CLOSED_NOTE = (
 )
 
 
-def short(text: str, most: int = LONGEST_NAME) -> str:
+def shorten_text(text: str, most: int = LONGEST_NAME) -> str:
     """Return a text of at most so many characters."""
     return text if len(text) <= most else f'{text[: most - 1]}…'
 

@@ -31,7 +31,15 @@ from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_values import JOINT_STATE, WRENCHES
 from linkage_ros.replay.replay import own_joint_states, recorded_scene
-from linkage_ros.report.blocks import Blocks, Entry, Progress, Rows, rows_of, RunClock, times_of
+from linkage_ros.report.blocks import (
+    Blocks,
+    Entry,
+    MessageRows,
+    Progress,
+    rows_of,
+    RunClock,
+    times_of,
+)
 from linkage_ros.report.curves import (
     BoundedCurves,
     LinkWrenches,
@@ -42,11 +50,19 @@ from linkage_ros.report.curves import (
     UNITS,
 )
 from linkage_ros.report.decimation import Flags, Numbers, STATE_BYTES, Times
-from linkage_ros.report.diagnostics_summary import DiagnosticsSummary
+from linkage_ros.report.diagnostics_summary import RecordedDiagnostics
 from linkage_ros.report.joint_states import JointBlock, JointStates
-from linkage_ros.report.labels import LANES, short
-from linkage_ros.report.run import APART, Column, Lane, LinkageRun, Run, Silences, Window
-from linkage_ros.report.samples import Crank, SampleJudge
+from linkage_ros.report.labels import EVENT_TRACKS, shorten_text
+from linkage_ros.report.run import (
+    APART,
+    CurveColumn,
+    EventTrack,
+    LinkageRun,
+    ReportedRun,
+    Silences,
+    Window,
+)
+from linkage_ros.report.samples import CrankHistory, SampleClassifier
 from linkage_ros.scene.scene import Scene
 import numpy as np
 
@@ -69,21 +85,21 @@ class ForeignRun:
         self._readers = {topic: JointStates() for topic in found[:_MOST_TOPICS]}
         self._kept: dict[str, BoundedCurves] = {}
         self._widths: dict[str, int] = {}
-        self._lanes = {'jump': Lane(window=window)}
+        self._event_tracks = {'jump': EventTrack(window=window)}
         # Among several topics, none is known to publish all the time.
         if len(self._readers) == 1:
-            self._lanes['silent'] = Lane(APART, window=window)
-            self._silences = Silences(self._lanes['silent'], 0)
+            self._event_tracks['silent'] = EventTrack(APART, window=window)
+            self._silences = Silences(self._event_tracks['silent'], 0)
         self._later: dict[str, int] = {}
 
-    def take(self, block: Mapping[str, list[Entry]]) -> None:
+    def add_block(self, block: Mapping[str, list[Entry]]) -> None:
         """Add the messages of a block."""
         entries = sorted(
             (*entry, topic) for topic in self.topics for entry in block.get(topic, ())
         )
-        passed = self._clock.passed(times_of([entry[1] for entry in entries]))
-        for time, by in self._clock.jumps():
-            self._lanes['jump'].add(time, time, f'by {by / 1e9:.6g} s')
+        passed = self._clock.run_times(times_of([entry[1] for entry in entries]))
+        for time, by in self._clock.pop_jumps():
+            self._event_tracks['jump'].add(time, time, f'by {by / 1e9:.6g} s')
         for topic, reader in self._readers.items():
             own = [i for i, entry in enumerate(entries) if entry[4] == topic]
             if not own:
@@ -95,7 +111,7 @@ class ForeignRun:
             if topic not in self._kept:
                 # The message has no unit; the joint may be revolute or prismatic.
                 columns = [
-                    Column(short(name), quantity, ' or '.join(units))
+                    CurveColumn(shorten_text(name), quantity, ' or '.join(units))
                     for quantity, units in UNITS.items()
                     for name in reader.joints
                 ]
@@ -110,11 +126,13 @@ class ForeignRun:
             if len(self._readers) == 1:
                 self._silences.add(times)
 
-    def end(self, contents: Contents) -> Run:
+    def finish_run(self, contents: Contents) -> ReportedRun:
         """Return the run, with the counts of all messages."""
         if len(self._readers) == 1:
-            self._silences.end(self._clock.end)
-        found = [curves for kept in self._kept.values() if (curves := kept.curves()) is not None]
+            self._silences.end_run(self._clock.end)
+        found = [
+            curves for kept in self._kept.values() if (curves := kept.build_curves()) is not None
+        ]
         left_out = {
             (topic, reason): count
             for topic, reader in self._readers.items()
@@ -129,13 +147,13 @@ class ForeignRun:
         }
         counts = {topic.topic.name: topic.messages for topic in contents.topics}
         left_out |= {(topic, _MORE_TOPICS): counts.get(topic, 0) for topic in self._more}
-        return Run(
+        return ReportedRun(
             begin=self._clock.begin,
             end=self._clock.end,
             window=self._window,
             contents=contents,
             curves=found,
-            lanes=self._lanes,
+            event_tracks=self._event_tracks,
             left_out=left_out,
         )
 
@@ -145,7 +163,7 @@ def read_run(
     window: Window,
     progress: Progress,
     scene_of: Callable[[Bag], Scene] = recorded_scene,
-) -> tuple[Run, Scene | None, str]:
+) -> tuple[ReportedRun, Scene | None, str]:
     """
     Read a bag for its page.
 
@@ -181,11 +199,13 @@ def read_run(
         reader = ForeignRun(bag, window)
     blocks = Blocks(bag, reader.topics, progress)
     for block in blocks:
-        reader.take(block)
-    return reader.end(blocks.contents()), scene, missing
+        reader.add_block(block)
+    return reader.finish_run(blocks.count_contents()), scene, missing
 
 
-def _find_open_loop_spans(linkage: LinkageRun, times: Times, angles: Numbers, lane: Lane) -> None:
+def _find_open_loop_spans(
+    linkage: LinkageRun, times: Times, angles: Numbers, track: EventTrack
+) -> None:
     """Add the samples at which a linkage does not close to a lane; times in [ns]."""
     if not len(times):
         return
@@ -194,10 +214,10 @@ def _find_open_loop_spans(linkage: LinkageRun, times: Times, angles: Numbers, la
     for time, given in zip(times[is_open].tolist(), angles[is_open].tolist(), strict=True):
         text = ''
         # The first of the joined events gives the text.
-        if not lane.spans or time - lane.spans[-1].end > lane.near:
+        if not track.spans or time - track.spans[-1].end > track.near:
             position = linkage.closure.position(*given)
             text = f'{position.status.value}, the links miss by {position.gap:.3g} m'
-        lane.add(time, time, f'{linkage.name} {text}'.strip())
+        track.add(time, time, f'{linkage.name} {text}'.strip())
 
 
 _TOGETHER = 20_000_000
@@ -213,11 +233,12 @@ class SceneRun:
 
     def __init__(self, bag: Bag, run: RunMetadata, scene: Scene, window: Window) -> None:
         from_beginning = not missing_start_reason(bag, run)
-        self._judge = SampleJudge(bag, scene, from_beginning)
-        pipeline = self._judge.pipeline
+        self._classifier = SampleClassifier(bag, scene, from_beginning)
+        pipeline = self._classifier.pipeline
         self._rate, self._window, self._clock = scene.rate, window, RunClock()
-        self._lanes = {
-            name: Lane(_TOGETHER, alike=name in _ALIKE, window=window) for name in LANES
+        self._event_tracks = {
+            name: EventTrack(_TOGETHER, alike=name in _ALIKE, window=window)
+            for name in EVENT_TRACKS
         }
         topic = read_raw_metadata(bag).get('diagnostics_topic')
         self._topics = {
@@ -247,7 +268,7 @@ class SceneRun:
                 member.input_names,
                 member.joint_names,
                 tuple(given.unit for given in member.linkage.inputs),
-                Lane(APART, longest=True, most=_MOST_SILENCES, window=window),
+                EventTrack(APART, longest=True, most=_MOST_SILENCES, window=window),
             )
             for member, line in zip(scene.linkages, pipeline.linkages, strict=True)
         ]
@@ -255,7 +276,9 @@ class SceneRun:
         self._states = JointStates(scene.joint_names, others=False)
         self._samples = JointStates(inputs, others=False)
         self._cranks = {
-            number: Crank(line, [inputs.index(name) for name in line.scene_linkage.sampled_joints])
+            number: CrankHistory(
+                line, [inputs.index(name) for name in line.scene_linkage.sampled_joints]
+            )
             for number, line in enumerate(pipeline.linkages)
             if line.scene_linkage.drive[0] == 'topic'
         }
@@ -264,65 +287,65 @@ class SceneRun:
         ]
         self._has_limits = any(member.linkage.limits for member in scene.linkages)
         self._tells_toggles = len(scene.linkages) == 1 and 'velocity' in scene.linkages[0].effects
-        self._health = DiagnosticsSummary(self._lanes, from_beginning)
+        self._health = RecordedDiagnostics(self._event_tracks, from_beginning)
         bodies = sum(len(each.closure.structure.links) for each in self._linkages[:MOST_LINKAGES])
         topics = run.joint_states_topic, run.crank_topic
         self._curves = SceneCurves(scene, topics, bodies, window)
         period = round(1e9 / scene.rate) if scene.rate else 0
         self._silences = [Silences(each.silent, period) for each in self._linkages]
-        self._stale = Silences(self._lanes['stale'], 0, pipeline.max_age)
+        self._stale = Silences(self._event_tracks['stale'], 0, pipeline.max_age)
 
     @property
     def topics(self) -> set[str]:
         """Return the topics whose messages are needed."""
         return {*self._topics}
 
-    def take(self, block: Mapping[str, list[Entry]]) -> None:
+    def add_block(self, block: Mapping[str, list[Entry]]) -> None:
         """Add the messages of a block."""
         rows = rows_of(block, self._topics, self._own, self._clock)
-        for time, by in self._clock.jumps():
-            self._lanes['jump'].add(time, time, f'by {by / 1e9:.6g} s')
+        for time, by in self._clock.pop_jumps():
+            self._event_tracks['jump'].add(time, time, f'by {by / 1e9:.6g} s')
         states, withheld, health = rows['states'], rows['withheld'], rows['health']
         read = self._states.read(states.data)
-        good = self._judge.take(rows, self._lanes)
-        if self._judge.listens:
-            self._look_at_samples(rows['samples'], good, states, read)
+        good = self._classifier.classify_block(rows, self._event_tracks)
+        if self._classifier.listens:
+            self._examine_samples(rows['samples'], good, states, read)
         for time in withheld.passed.tolist():
-            self._lanes['withheld'].add(time, time)
-        self._look_at_states(states, read)
+            self._event_tracks['withheld'].add(time, time)
+        self._examine_states(states, read)
         self._forces.add(rows['forces'].passed, rows['forces'].data)
         for topic, kind in self._loaded.items():
             if kind in rows:  # unless its name is that of another topic of the run
                 self._loads.add(topic, rows[kind].passed, rows[kind].data)
         self._curves.add_ticks(np.union1d(states.passed[read.good], withheld.passed))
         for time, message in zip(health.passed.tolist(), health.data, strict=True):
-            self._health.take(message, time)
-            self._judge.learn(self._health.last_values)
+            self._health.add_message(message, time)
+            self._classifier.learn_faults(self._health.last_values)
 
-    def end(self, contents: Contents) -> Run:
+    def finish_run(self, contents: Contents) -> ReportedRun:
         """Return the run, with the counts of all messages."""
         end = self._clock.end
-        self._judge.end(end, self._lanes['fault'])
+        self._classifier.finish_faults(end, self._event_tracks['fault'])
         for silences in self._silences:
-            silences.end(end)
-        if self._judge.listens and self._stale.limit:
-            self._stale.end(end)
-        curves, frames = self._curves.end()
-        forces = self._forces.curves()
+            silences.end_run(end)
+        if self._classifier.listens and self._stale.limit:
+            self._stale.end_run(end)
+        curves, frames = self._curves.finish_curves()
+        forces = self._forces.build_curves()
         if forces is not None:
             curves.append(forces)
-        curves += self._loads.curves()
+        curves += self._loads.build_curves()
         left_out = self._curves.left_out
         left_out |= {('pin forces', reason): n for reason, n in self._forces.left_out.items()}
         left_out |= {('wrenches', reason): n for reason, n in self._loads.left_out.items()}
         for what, reader in (('joint states', self._states), ('samples', self._samples)):
             left_out |= {(what, reason): n for reason, n in reader.left_out.items() if n}
-        if self._judge.ignored:
-            left_out['samples', 'of other joints'] = self._judge.ignored
+        if self._classifier.ignored:
+            left_out['samples', 'of other joints'] = self._classifier.ignored
         if len(self._linkages) > MOST_LINKAGES:
             left_out['the scene', _NOT_MOVING] = len(self._linkages) - MOST_LINKAGES
         kinds = {*self._known_kinds()}
-        return Run(
+        return ReportedRun(
             begin=self._clock.begin,
             end=end,
             window=self._window,
@@ -330,10 +353,12 @@ class SceneRun:
             curves=curves,
             frames=frames,
             linkages=self._linkages[:MOST_LINKAGES],
-            lanes={key: lane for key, lane in self._lanes.items() if key in kinds or lane.count},
+            event_tracks={
+                key: lane for key, lane in self._event_tracks.items() if key in kinds or lane.count
+            },
             lateness=self._curves.late if self._curves.late.count else None,
             age=self._curves.age if self._curves.age.count else None,
-            rejected=self._judge.rejected,
+            rejected=self._classifier.rejected,
             left_out=left_out,
             last_values=self._health.last_values,
         )
@@ -345,7 +370,7 @@ class SceneRun:
         for kind, lane in (('faults', 'fault'), ('withheld', 'withheld'), ('resets', 'reset')):
             if kind in kinds:
                 yield lane
-        if self._judge.listens:
+        if self._classifier.listens:
             yield 'rejected'
             if self._cranks:
                 yield 'open'
@@ -358,32 +383,34 @@ class SceneRun:
             if self._has_limits:
                 yield 'told_limited'
 
-    def _look_at_samples(self, samples: Rows, good: Flags, states: Rows, read: JointBlock) -> None:
+    def _examine_samples(
+        self, samples: MessageRows, good: Flags, states: MessageRows, read: JointBlock
+    ) -> None:
         """Add the crank's curve, and find samples at which a loop does not close."""
         decoded = self._samples.read(samples.data)
         self._curves.add_samples(samples.passed[decoded.good], decoded.numbers[decoded.good])
         if self._stale.limit:
             self._stale.add(samples.passed[good])
         for number, crank in self._cranks.items():
-            own = crank.take(samples.numbers, decoded.stamps, good, decoded.numbers)
+            own = crank.add_samples(samples.numbers, decoded.stamps, good, decoded.numbers)
             there = read.good & self._is_there(read.numbers, number)
             alone = own & ~np.isin(samples.logged, states.logged[there])
             at = samples.logged if self._rate else decoded.stamps
-            angles, _ = crank.at(samples.numbers[alone] + 1, at[alone])
+            angles, _ = crank.position_at(samples.numbers[alone] + 1, at[alone])
             _find_open_loop_spans(
-                self._linkages[number], samples.passed[alone], angles, self._lanes['open']
+                self._linkages[number], samples.passed[alone], angles, self._event_tracks['open']
             )
 
-    def _look_at_states(self, states: Rows, read: JointBlock) -> None:
+    def _examine_states(self, states: MessageRows, read: JointBlock) -> None:
         good = read.good
         numbers, passed = read.numbers[good], states.passed[good]
         if self._tells_toggles:
             for time in passed[np.isnan(numbers[:, 1]).all(axis=1)].tolist():
-                self._lanes['toggle'].add(time, time)
+                self._event_tracks['toggle'].add(time, time)
         places = states.numbers[good]
         inputs, stamps = [], []
         for number, crank in self._cranks.items():
-            angles, newest = crank.at(places, states.published[good])
+            angles, newest = crank.position_at(places, states.published[good])
             inputs.append((self._linkages[number].inputs, angles))
             stamps.append(newest)
         self._curves.add_states(passed, numbers, inputs)

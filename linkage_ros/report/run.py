@@ -24,7 +24,7 @@ from typing import NamedTuple
 from linkage_ros.bag.contents import Contents
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.report.decimation import Histogram, Intervals, Numbers, Times
-from linkage_ros.report.labels import short, size_in_json
+from linkage_ros.report.labels import shorten_text, size_in_json
 import numpy as np
 
 MOST_SPANS = 1000
@@ -39,7 +39,7 @@ _MORE = ', and others'
 
 
 @dataclass(slots=True)
-class Span:
+class EventSpan:
     """Consecutive events between two run times in [ns], and the description of the first one."""
 
     begin: int
@@ -48,7 +48,7 @@ class Span:
     text: str
 
 
-class Lane:
+class EventTrack:
     """
     Events of one kind.
 
@@ -80,11 +80,11 @@ class Lane:
         self._alike, self._longest, self._most = alike, longest, most
         self._since, self._until = window
         self.count = 0  # Number of events
-        self.spans: list[Span] = []  # The spans, in the order in which they were added
+        self.spans: list[EventSpan] = []  # The spans, in the order in which they were added
         self._text = 0
 
     @property
-    def in_order(self) -> list[Span]:
+    def in_order(self) -> list[EventSpan]:
         """Return the spans in the order of their begins; a span is added when it ends."""
         return sorted(self.spans, key=attrgetter('begin'))
 
@@ -93,23 +93,23 @@ class Lane:
         if end < self._since or begin > self._until:
             return
         begin, end = max(begin, self._since), min(end, self._until)
-        text = short(text, _LONGEST_TEXT)
+        text = shorten_text(text, _LONGEST_TEXT)
         self.count += count
-        if self.spans and self._joins(self.spans[-1], begin, text):
-            _join(self.spans[-1], end, count)
+        if self.spans and self._can_join(self.spans[-1], begin, text):
+            _extend_span(self.spans[-1], end, count)
             return
-        self.spans.append(Span(begin, end, count, text))
+        self.spans.append(EventSpan(begin, end, count, text))
         self._text += size_in_json(text)
         while len(self.spans) > self._most or self._text > MOST_TEXT:
-            self.spans = self._half()
+            self.spans = self._halve_spans()
             self._text = sum(size_in_json(span.text) for span in self.spans)
 
-    def _joins(self, last: Span, begin: int, text: str) -> bool:
+    def _can_join(self, last: EventSpan, begin: int, text: str) -> bool:
         # Events with different texts stay apart, unless there are too many spans.
         same = self._alike or text == last.text or last.text.endswith(_MORE)
         return same and last.begin <= begin and begin - last.end <= self.near
 
-    def _half(self) -> list[Span]:
+    def _halve_spans(self) -> list[EventSpan]:
         """Return at most half of the spans."""
         spans = self.in_order
         half = len(spans) // 2
@@ -124,13 +124,13 @@ class Lane:
             if span.begin - last.end <= self.near:
                 if span.text != last.text and not last.text.endswith(_MORE):
                     last.text += _MORE
-                _join(last, span.end, span.count)
+                _extend_span(last, span.end, span.count)
             else:
                 kept.append(span)
         return kept
 
 
-def _join(last: Span, end: int, count: int) -> None:
+def _extend_span(last: EventSpan, end: int, count: int) -> None:
     last.end = max(last.end, end)
     last.count += count
 
@@ -159,8 +159,8 @@ class Silences:
 
     """
 
-    def __init__(self, lane: Lane, period: int, limit: int = 0) -> None:
-        self._lane, self._period, self.limit = lane, period, limit
+    def __init__(self, track: EventTrack, period: int, limit: int = 0) -> None:
+        self._lane, self._period, self.limit = track, period, limit
         self._usual = 0
         self._last: int | None = None
 
@@ -179,7 +179,7 @@ class Silences:
             self._lane.add(int(times[i] - apart[i]), int(times[i]))
         self._last = int(times[-1])
 
-    def end(self, time: int) -> None:
+    def end_run(self, time: int) -> None:
         """Add the end of the run."""
         last = 0 if self._last is None else self._last
         if self._last is None or time - last > self._longest:
@@ -199,7 +199,7 @@ class Window(NamedTuple):
     until: int = 2**63 - 1
 
 
-class Column(NamedTuple):
+class CurveColumn(NamedTuple):
     """
     A column of a group of curves.
 
@@ -215,7 +215,7 @@ class Curves(NamedTuple):
     """Curves of a topic with common times, and their number of rows."""
 
     title: str
-    columns: Sequence[Column]
+    columns: Sequence[CurveColumn]
     rows: int
     intervals: Intervals
 
@@ -234,7 +234,7 @@ class LinkageRun(NamedTuple):
     inputs: tuple[str, ...]
     joints: tuple[str, ...]
     input_units: tuple[str, ...]
-    silent: Lane
+    silent: EventTrack
 
 
 class Frames(NamedTuple):
@@ -247,7 +247,7 @@ class Frames(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class ReportedRun:
     """The contents of a bag, as a run."""
 
     begin: int | None  # Log time at run time 0, in [ns]; None without messages
@@ -257,7 +257,7 @@ class Run:
     curves: Sequence[Curves]  # Joints, cranks, lateness and age over time
     frames: Frames | None = None  # Frames of the animation; None without a scene
     linkages: Sequence[LinkageRun] = ()  # Linkages of the scene; empty without a scene
-    lanes: Mapping[str, Lane] = field(default_factory=dict)  # The events, by kind
+    event_tracks: Mapping[str, EventTrack] = field(default_factory=dict)  # The events, by kind
     # Histograms; None if unknown.
     lateness: Histogram | None = None
     age: Histogram | None = None

@@ -15,16 +15,16 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.curves import continuous, Curve
 from linkage_ros.kinematics.pose_view import view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.report.data import poses
+from linkage_ros.report.data import link_poses
 from linkage_ros.report.decimation import Numbers
-from linkage_ros.report.run import Run
+from linkage_ros.report.run import ReportedRun
 import numpy as np
 
 _SECONDS = 10.0
 """A longer part of a run is shown faster, in this time, if no other is named."""
 
 
-def run_motion(run: Run, name: str, seconds: float | None) -> Motion:
+def run_motion(run: ReportedRun, name: str, seconds: float | None) -> Motion:
     """
     Return the motion of the first linkage of a run.
 
@@ -61,7 +61,7 @@ def run_motion(run: Run, name: str, seconds: float | None) -> Motion:
     unknown = np.zeros(count, bool)
     for begin, end in gaps:
         unknown |= (instants > begin) & (instants < end)
-    found = poses(linkage.closure, linkage.prefix, frames.values, linkage.inputs)
+    found = link_poses(linkage.closure, linkage.prefix, frames.values, linkage.inputs)
     moved = np.where(unknown[:, None, None], np.nan, found.frames[chosen])
     speed = lasts / seconds
     title = name if abs(speed - 1.0) < 0.01 else f'{name}, {speed:.2g} times as fast'
@@ -71,7 +71,7 @@ def run_motion(run: Run, name: str, seconds: float | None) -> Motion:
     x = np.insert(frames.times[part], breaks, begins) / 1e9
     joints, values = [], []
     for joint, turns in turning.items():
-        column = _continuous(frames.values[joint]) if turns else frames.values[joint]
+        column = _unwrap_known(frames.values[joint]) if turns else frames.values[joint]
         y = np.insert(column[part], breaks, np.nan)
         joints.append(Curve(joint, turns, tuple(x.tolist()), tuple(y.tolist())))
         values.append(np.where(unknown, np.nan, column[chosen]))
@@ -90,7 +90,7 @@ def run_motion(run: Run, name: str, seconds: float | None) -> Motion:
     )
 
 
-def _continuous(angles: Numbers) -> Numbers:
+def _unwrap_known(angles: Numbers) -> Numbers:
     """Return angles without jumps; unknown ones stay unknown."""
     known = np.isfinite(angles)
     result = np.full(len(angles), np.nan)

@@ -24,15 +24,15 @@ from linkage_ros.errors import BagError
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
 from linkage_ros.replay.replay import read_change, turn_fault
-from linkage_ros.report.blocks import Rows
+from linkage_ros.report.blocks import MessageRows
 from linkage_ros.report.decimation import Flags, Numbers, Times
-from linkage_ros.report.labels import short
-from linkage_ros.report.run import Lane
+from linkage_ros.report.labels import shorten_text
+from linkage_ros.report.run import EventTrack
 from linkage_ros.scene.scene import Scene
 import numpy as np
 
 
-class Crank:
+class CrankHistory:
     """
     Driven joints of a linkage, by the last accepted sample.
 
@@ -45,19 +45,19 @@ class Crank:
 
     """
 
-    def __init__(self, line: LinkagePipeline, columns: Sequence[int]) -> None:
+    def __init__(self, linkage: LinkagePipeline, columns: Sequence[int]) -> None:
         self._columns = list(columns)
-        of = line.scene_linkage.drive[1]
+        of = linkage.scene_linkage.drive[1]
         self._carried = bool(of.carry_forward)
         self._branch = None
         if of.joint:
-            self._branch = sampled_inverse(line.closure, of.joint, of.branch).branch
+            self._branch = sampled_inverse(linkage.closure, of.joint, of.branch).branch
         width = len(columns)
         self._number = np.array([-1])
         self._stamp = np.zeros(1, np.int64)
         self._angles, self._rates = np.full((1, width), np.nan), np.zeros((1, width))
 
-    def take(self, numbers: Times, stamps: Times, good: Flags, values: Numbers) -> Flags:
+    def add_samples(self, numbers: Times, stamps: Times, good: Flags, values: Numbers) -> Flags:
         """
         Add samples; return which were for this linkage.
 
@@ -76,7 +76,7 @@ class Crank:
         self._rates = np.concatenate([self._rates[-1:], np.nan_to_num(rates[own])])
         return own
 
-    def at(self, numbers: Times, times: Times) -> tuple[Numbers, Times]:
+    def position_at(self, numbers: Times, times: Times) -> tuple[Numbers, Times]:
         """
         Return the crank's position in [rad] or [m], and its stamp, at messages of the block.
 
@@ -90,7 +90,7 @@ class Crank:
         return angles, stamps
 
 
-class SampleJudge:
+class SampleClassifier:
     """
     Separates accepted samples from rejected ones, which it counts by reason.
 
@@ -113,7 +113,9 @@ class SampleJudge:
         """Return the pipeline of the scene, as it was built last."""
         return self._pipeline
 
-    def take(self, rows: Mapping[str, Rows], lanes: Mapping[str, Lane]) -> Flags:
+    def classify_block(
+        self, rows: Mapping[str, MessageRows], event_tracks: Mapping[str, EventTrack]
+    ) -> Flags:
         """
         Return which samples of a block were accepted; apply faults and resets between them.
 
@@ -130,32 +132,32 @@ class SampleJudge:
         for _, kind, place in events:
             message, time = rows[kind].data[place], int(rows[kind].passed[place])
             if kind == 'faults':
-                self._turn(message, time, lanes['fault'])
+                self._switch_fault(message, time, event_tracks['fault'])
             elif kind == 'resets':
                 self._reset()
-                lanes['reset'].add(time, time)
+                event_tracks['reset'].add(time, time)
             else:
-                rejection = self._offer(message, int(samples.logged[place]))
+                rejection = self._offer_sample(message, int(samples.logged[place]))
                 good[place] = rejection is None
                 if rejection not in (None, Rejection.MISSING):
-                    lanes['rejected'].add(time, time, rejection.value)
+                    event_tracks['rejected'].add(time, time, rejection.value)
         return good
 
-    def learn(self, last_values: Mapping[tuple[str, str], str]) -> None:
+    def learn_faults(self, last_values: Mapping[tuple[str, str], str]) -> None:
         """Learn from the diagnostics, by task and key, which faults were on before."""
         for name in [name for name in self._scene.faults if name not in self._known]:
-            state = last_values.get(('faults', short(self._fault(name))))
+            state = last_values.get(('faults', shorten_text(self._fault_text(name))))
             if state:
                 self._known.add(name)
             if state == 'injected':
                 self._faults[name] = 0
 
-    def end(self, time: int, lane: Lane) -> None:
+    def finish_faults(self, time: int, track: EventTrack) -> None:
         """Add the faults that are still on to their lane, to the end of the run."""
         for name, begun in self._faults.items():
-            lane.add(begun, time, self._fault(name))
+            track.add(begun, time, self._fault_text(name))
 
-    def _offer(self, message: bytes, logged: int) -> Rejection | None:
+    def _offer_sample(self, message: bytes, logged: int) -> Rejection | None:
         """Offer a sample to the pipeline; return why it is rejected, or None."""
         if logged < self._last:
             self._reset()
@@ -171,7 +173,7 @@ class SampleJudge:
         """Reset all state, as the run did."""
         self._pipeline = Pipeline(self._scene, self._pipeline.closures, self._pipeline.injection)
 
-    def _turn(self, message: bytes, time: int, lane: Lane) -> None:
+    def _switch_fault(self, message: bytes, time: int, track: EventTrack) -> None:
         """Switch a fault at a run time in [ns]; a fault that ends is added to its lane."""
         injection = self._pipeline.injection
         try:
@@ -184,10 +186,10 @@ class SampleJudge:
         if on:
             self._faults.setdefault(name, time)
         elif name in self._faults:
-            lane.add(self._faults.pop(name), time, self._fault(name))
+            track.add(self._faults.pop(name), time, self._fault_text(name))
         elif name not in self._known:
-            lane.add(0, time, self._fault(name))
+            track.add(0, time, self._fault_text(name))
         self._known.add(name)
 
-    def _fault(self, name: str) -> str:
+    def _fault_text(self, name: str) -> str:
         return f'{name} ({self._scene.faults[name].kind})'

@@ -24,7 +24,7 @@ from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.effects.stage import FORCE_EFFECTS, SensorReading
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline.pipeline import LinkagePipeline
-from linkage_ros.report.data import poses
+from linkage_ros.report.data import link_poses
 from linkage_ros.scene.load import parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import SceneLinkage
 import numpy as np
@@ -123,7 +123,7 @@ class Sensors:
         read = dict(zip(member.joint_names, self._reading.joints, strict=True))
         values = dict(zip(member.input_names, inputs, strict=True)) | read
         arrays = {name: np.array([value]) for name, value in values.items()}
-        frames = poses(member.closure, member.prefix, arrays, member.input_names).frames[0]
+        frames = link_poses(member.closure, member.prefix, arrays, member.input_names).frames[0]
         finite = bool(np.isfinite(frames).all())
         # A fault of a sensor may publish NaN, which JSON does not hold.
         read = {name: value for name, value in read.items() if np.isfinite(value)}

@@ -16,9 +16,9 @@ from linkage_ros.bag.reader import Bag, BagMessage, read_bag
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.report.blocks import Progress
-from linkage_ros.report.data import lanes
+from linkage_ros.report.data import event_tracks
 from linkage_ros.report.reading import read_run
-from linkage_ros.report.run import Run, Window
+from linkage_ros.report.run import ReportedRun, Window
 import numpy as np
 
 from ..node.ticked import Moment, run
@@ -116,22 +116,22 @@ def from_then_on(bag: Bag, folder: Path, begin: float) -> Bag:
     return read_bag(writer.folder)
 
 
-def read(bag: Bag, window: Window | None = None) -> Run:
+def read(bag: Bag, window: Window | None = None) -> ReportedRun:
     """Return what a report reads of a bag of a scene."""
     found, scene, missing = read_run(bag, window or Window(), Progress())
     assert scene is not None, missing
     return found
 
 
-def on_lanes(found: Run) -> dict[str, list[tuple[float, float, int, str]]]:
+def on_lanes(found: ReportedRun) -> dict[str, list[tuple[float, float, int, str]]]:
     """Return what happened, lane by lane: begin and end in [ms], how often, and what."""
     return {
         key: [(s.begin / MS, s.end / MS, s.count, s.text) for s in lane.in_order]
-        for key, lane in lanes(found).items()
+        for key, lane in event_tracks(found).items()
     }
 
 
-def curve(found: Run, name: str, quantity: str) -> tuple[list[float], list[float]]:
+def curve(found: ReportedRun, name: str, quantity: str) -> tuple[list[float], list[float]]:
     """Return times, in [ms], and values of a curve of which every row is there."""
     for curves in found.curves:
         for place, column in enumerate(curves.columns):

@@ -17,14 +17,14 @@ from hypothesis import strategies as st
 from linkage_ros.report.blocks import RunClock, times_of
 from linkage_ros.report.curves import Lateness
 from linkage_ros.report.decimation import (
-    capacity,
+    DecimatedCurves,
     Decimation,
     Histogram,
-    MinMaxCurve,
+    interval_capacity,
     most_columns,
 )
 from linkage_ros.report.labels import size_in_json
-from linkage_ros.report.run import Lane, Silences
+from linkage_ros.report.run import EventTrack, Silences
 import numpy as np
 import pytest
 
@@ -42,7 +42,7 @@ def pieces_of(rows, size):
 def lateness(rate, times, piece=700):
     found = Lateness(rate)
     parts = [found.add(part) for part in pieces_of(times, piece)]
-    parts.append(found.end())
+    parts.append(found.finish_lateness())
     stamps = np.concatenate([part[0] for part in parts])
     assert np.array_equal(stamps, times)
     return np.concatenate([part[1] for part in parts])
@@ -115,57 +115,57 @@ def test_the_time_of_a_run_never_goes_back(name, piece):
     logged, disorder, expected, jumps = CLOCKS[name]
     clock = RunClock(disorder)
     pieces = pieces_of(logged, piece)
-    assert [t for p in pieces for t in clock.passed(times_of(p)).tolist()] == expected
-    assert [*clock.jumps()] == jumps
-    assert not [*clock.jumps()]
+    assert [t for p in pieces for t in clock.run_times(times_of(p)).tolist()] == expected
+    assert [*clock.pop_jumps()] == jumps
+    assert not [*clock.pop_jumps()]
 
 
 def test_what_is_recorded_by_another_hand_goes_by_the_same_clock():
     clock = RunClock()
-    clock.passed(times_of([100, 200, 150, 250]))
+    clock.run_times(times_of([100, 200, 150, 250]))
     # What stands behind so many of them, its log time, and the time of the run.
     table = [
         (0, 50, 0), (0, 130, 0), (1, 130, 30), (1, 230, 100), (2, 190, 100), (3, 240, 190),
         (4, 240, 200), (4, 900, 850),
     ]  # fmt: skip
     behind, logged, expected = zip(*table, strict=True)
-    assert clock.beside(times_of(logged), np.array(behind)).tolist() == [*expected]
+    assert clock.other_thread_times(times_of(logged), np.array(behind)).tolist() == [*expected]
     assert clock.end == 850
     # What follows is not put off by it.
-    assert clock.passed(times_of([260])).tolist() == [210]
+    assert clock.run_times(times_of([260])).tolist() == [210]
     assert clock.end == 850
 
 
 def test_a_run_may_begin_with_what_another_hand_has_recorded():
     clock = RunClock()
     clock.start(100)
-    clock.passed(times_of([]))
-    assert clock.beside(times_of([100, 140]), np.array([0, 0])).tolist() == [0, 40]
-    assert clock.passed(times_of([190, 200])).tolist() == [90, 100]
-    assert not [*clock.jumps()]
+    clock.run_times(times_of([]))
+    assert clock.other_thread_times(times_of([100, 140]), np.array([0, 0])).tolist() == [0, 40]
+    assert clock.run_times(times_of([190, 200])).tolist() == [90, 100]
+    assert not [*clock.pop_jumps()]
 
 
 @given(st.lists(st.integers(0, 2**64 - 1), max_size=30))
 def test_no_log_time_breaks_the_clock(logged):
-    passed = RunClock().passed(times_of(logged))
+    passed = RunClock().run_times(times_of(logged))
     assert (np.diff(passed) >= 0).all()
     assert not len(passed) or passed[0] == 0
 
 
 def test_a_silence_is_longer_than_messages_are_otherwise_apart():
-    lane = Lane()
+    lane = EventTrack()
     silences = Silences(lane, MS)
     times = np.array([*range(100), *range(104, 200), *range(206, 300)]) * MS
     for part in pieces_of(times, 64):
         silences.add(part)
-    silences.end(340 * MS)
+    silences.end_run(340 * MS)
     # Of 5 ms nobody would speak.
     assert [(s.begin // MS, s.end // MS) for s in lane.spans] == [(199, 206), (299, 340)]
 
 
 def test_where_nothing_ever_comes_all_is_silence():
-    lane = Lane()
-    Silences(lane, MS).end(500)
+    lane = EventTrack()
+    Silences(lane, MS).end_run(500)
     assert [(s.begin, s.end) for s in lane.spans] == [(0, 500)]
 
 
@@ -195,11 +195,11 @@ def kept(rows, cuts, most):
     """Give rows in pieces; return the intervals."""
     values = np.array(rows, float).reshape(-1, 2)
     times = 7 * np.arange(len(values))
-    curves = MinMaxCurve(2, most)
+    curves = DecimatedCurves(2, most)
     edges = [0, *sorted(min(cut, len(values)) for cut in cuts), len(values)]
     for start, end in pairwise(edges):
         curves.add(times[start:end], values[start:end])
-    return values, curves.intervals()
+    return values, curves.build_intervals()
 
 
 @given(ROWS, CUTS, st.sampled_from([2, 4, 16, 64]))
@@ -247,7 +247,7 @@ def test_pieces_make_no_difference(rows, cuts, others):
 
 @pytest.mark.parametrize('columns', [1, 2, 6, 40, 200, most_columns(4_000_000)])
 def test_the_room_is_kept_and_used(columns):
-    most = capacity(columns, 4_000_000)
+    most = interval_capacity(columns, 4_000_000)
     assert most & (most - 1) == 0
     # Of each interval begin and end, and two values of each curve, of 8 bytes each.
     assert most * (16 * columns + 16) <= 4_000_000 < 2 * most * (16 * columns + 16)
@@ -255,8 +255,8 @@ def test_the_room_is_kept_and_used(columns):
 
 def test_no_more_curves_share_a_room_than_have_a_shape_left():
     most = most_columns(4_000_000)
-    assert capacity(most, 4_000_000) == 256
-    assert capacity(most + 1, 4_000_000) < 256
+    assert interval_capacity(most, 4_000_000) == 256
+    assert interval_capacity(most + 1, 4_000_000) < 256
 
 
 def held(curves):
@@ -264,14 +264,14 @@ def held(curves):
 
 
 def test_what_is_held_does_not_grow_with_the_rows():
-    curves = MinMaxCurve(6, 256)
+    curves = DecimatedCurves(6, 256)
     rows = np.random.default_rng(3).normal(size=(8192, 6))
     sizes = []
     for block in range(200):
         curves.add(np.arange(8192) + 8192 * block, rows)
         sizes.append(held(curves))
     assert max(sizes) == sizes[0] < 10**6
-    found = curves.intervals()
+    found = curves.build_intervals()
     assert len(found.begins) <= 256 < 2 * len(found.begins)
     assert np.array_equal(np.fmin(found.first, found.second).min(axis=0), rows.min(axis=0))
     assert np.array_equal(np.fmax(found.first, found.second).max(axis=0), rows.max(axis=0))
@@ -292,7 +292,7 @@ def test_rows_at_equal_steps(count, cuts, most):
 
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 50)), max_size=50))
 def test_no_event_is_lost_from_the_count_and_spans_are_apart(events):
-    lane = Lane(near=100)
+    lane = EventTrack(near=100)
     time = 0
     for wait, lasting in events:
         lane.add(time + wait, time + wait + lasting)
@@ -303,7 +303,7 @@ def test_no_event_is_lost_from_the_count_and_spans_are_apart(events):
 
 
 def test_a_million_events_are_a_bounded_number_of_spans():
-    lane = Lane()
+    lane = EventTrack()
     for number in range(1_000_000):
         lane.add(number * 1000 + number * number % 997, number * 1000 + 997, f'kind {number % 3}')
     assert lane.count == sum(span.count for span in lane.spans) == 1_000_000
@@ -312,7 +312,7 @@ def test_a_million_events_are_a_bounded_number_of_spans():
 
 
 def test_what_says_something_else_is_something_else():
-    lane = Lane(near=10)
+    lane = EventTrack(near=10)
     for time, text in ((0, 'a'), (5, 'a'), (8, 'b'), (30, 'b')):
         lane.add(time, time, text)
     assert [(s.begin, s.end, s.count, s.text) for s in lane.spans] == [
@@ -323,7 +323,7 @@ def test_what_says_something_else_is_something_else():
 
 
 def test_a_window_cuts_spans():
-    lane = Lane(window=(100, 200))
+    lane = EventTrack(window=(100, 200))
     for begin, end in ((0, 99), (50, 120), (150, 150), (190, 300), (201, 202)):
         lane.add(begin, end)
     assert [(s.begin, s.end) for s in lane.spans] == [(100, 120), (150, 150), (190, 200)]
@@ -331,7 +331,7 @@ def test_a_window_cuts_spans():
 
 
 def test_what_lasts_is_told_at_its_end_and_stands_where_it_began():
-    lane = Lane(near=10)
+    lane = EventTrack(near=10)
     lane.add(30, 50, 'short')
     lane.add(10, 70, 'long')
     lane.add(72, 80, 'long')
@@ -343,7 +343,7 @@ def test_what_lasts_is_told_at_its_end_and_stands_where_it_began():
 
 @given(st.lists(st.text(max_size=400), max_size=60))
 def test_texts_have_a_bound(texts):
-    lane = Lane()
+    lane = EventTrack()
     for time, text in enumerate(texts):
         lane.add(10 * time, 10 * time, text)
     assert lane.count == len(texts)
@@ -351,7 +351,7 @@ def test_texts_have_a_bound(texts):
 
 
 def test_ever_new_texts_take_no_more_room_than_there_is():
-    lane = Lane()
+    lane = EventTrack()
     for time in range(20_000):
         lane.add(1000 * time, 1000 * time, f'{time}<\0\udc80' * 50)
         assert sum(size_in_json(span.text) for span in lane.spans) <= 60_000
@@ -359,7 +359,7 @@ def test_ever_new_texts_take_no_more_room_than_there_is():
 
 
 def test_where_the_longest_stay_the_others_are_still_counted():
-    lane = Lane(longest=True, most=10)
+    lane = EventTrack(longest=True, most=10)
     for time in range(100):
         lane.add(1000 * time, 1000 * time + (900 if time in (3, 50, 51) else time % 7))
     assert lane.count == 100

@@ -19,7 +19,7 @@ from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.bag.topic import Topic
 from linkage_ros.report import blocks as blocks_module
 from linkage_ros.report.blocks import Blocks, Progress
-from linkage_ros.report.diagnostics_summary import statuses
+from linkage_ros.report.diagnostics_summary import read_statuses
 from linkage_ros.report.joint_states import JointStates, MOST_JOINTS
 import numpy as np
 import pytest
@@ -170,7 +170,7 @@ def test_diagnostics_are_read_as_rosbags_writes_them(told, little):
          {k.replace('\0', ''): v.replace('\0', '') for k, v in values.items()})
         for level, name, message, values in told
     ]  # fmt: skip
-    found = statuses(encoded(array(*clean), little))
+    found = read_statuses(encoded(array(*clean), little))
     assert [tuple(each) for each in found] == clean
 
 
@@ -188,7 +188,7 @@ def test_diagnostics_are_read_as_the_node_writes_them():
         pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
         status = DiagnosticStatus(level=bytes([level]), name=name, message=text, values=pairs)
         message.status.append(status)
-    assert [tuple(each) for each in statuses(serialize_message(message))] == [
+    assert [tuple(each) for each in read_statuses(serialize_message(message))] == [
         (1, 'linkage: tick', 'spät', {'Lost ticks': '3', '': ''}),
         (0, 'linkage: crank', '', {}),
     ]
@@ -196,18 +196,18 @@ def test_diagnostics_are_read_as_the_node_writes_them():
 
 def test_what_says_to_hold_more_than_any_is_damaged():
     whole = encoded(array(*[(0, '', '', {})] * 10_001))
-    assert statuses(whole) == []
+    assert read_statuses(whole) == []
 
 
 def test_damaged_diagnostics_say_nothing():
     whole = encoded(array((2, 'tick', 'late', {'a': 'b'}), (0, 'crank', '', {})))
-    assert len(statuses(whole)) == 2
+    assert len(read_statuses(whole)) == 2
     for cut in range(len(whole)):
-        assert statuses(whole[:cut]) == []
+        assert read_statuses(whole[:cut]) == []
     for at in range(12, len(whole)):
         data = bytearray(whole)
         data[at] = 0xFF
-        statuses(bytes(data))
+        read_statuses(bytes(data))
 
 
 # A bag in blocks: nothing is lost, ticks stay whole, and counts are those of ``linkage info``.
@@ -250,7 +250,7 @@ def test_every_wanted_message_is_in_one_block_in_its_place(messages, wanted):
         found += [(name, *entry) for _, *entry, name in entries]
     assert found == [tuple(each) for each in messages if each.topic in wanted]
     assert counts == sorted(counts)
-    assert reader.contents() == contents_of(bag_of(messages))
+    assert reader.count_contents() == contents_of(bag_of(messages))
 
 
 @given(BLOCK_MESSAGES)
@@ -286,14 +286,16 @@ def test_counts_are_those_of_info_for_a_harmed_bag_too(tmp_path, harm):
     bag = read_bag(folder, allow_truncated=True)
     reader = Blocks(bag, ['/joint_states'], Progress())
     assert sum(len(own) for block in reader for own in block.values()) == next(
-        each.messages for each in reader.contents().topics if each.topic.name == '/joint_states'
+        each.messages
+        for each in reader.count_contents().topics
+        if each.topic.name == '/joint_states'
     )
-    assert reader.contents() == contents_of(bag)
-    assert bool(reader.contents().damage) == (harm == 'a damaged chunk')
+    assert reader.count_contents() == contents_of(bag)
+    assert bool(reader.count_contents().damage) == (harm == 'a damaged chunk')
 
 
 def test_a_wish_to_stop_ends_the_reading_at_the_next_block():
     messages = [BagMessage('/a', number, 0, b'') for number in range(100)]
     reader = Blocks(bag_of(messages), ['/a'], Progress(stopped=lambda: True))
     assert sum(len(block['/a']) for block in reader) == 8
-    assert reader.contents().stopped
+    assert reader.count_contents().stopped

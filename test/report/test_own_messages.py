@@ -196,7 +196,7 @@ def test_the_counts_that_are_followed_are_those_that_the_node_tells():
 
 
 def test_what_could_not_be_known_is_not_said_to_be_none(tmp_path):
-    assert {*read(recorded(tmp_path)).lanes} == {
+    assert {*read(recorded(tmp_path)).event_tracks} == {
         'silent',
         'jump',
         'rejected',

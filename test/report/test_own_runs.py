@@ -330,7 +330,7 @@ def test_joints_of_several_topics_are_told_apart(tmp_path):
     assert hand.intervals.first[:, 0].tolist() == [2 * ms for ms in range(100)]
     assert found.linkages == ()
     # Nobody knows which of them ought not to be silent.
-    assert 'silent' not in found.lanes
+    assert 'silent' not in found.event_tracks
     pytest.importorskip('plotly')
     page = run_html(found, ReportHeader('t', [], [], []))
     assert '"name":"a on /arm"' in page

@@ -43,19 +43,19 @@ from linkage_ros.report.decimation import (  # fmt: skip
     STATE_BYTES,
     TABLE_BYTES,
 )
-from linkage_ros.report.diagnostics_summary import statuses
+from linkage_ros.report.diagnostics_summary import read_statuses
 from linkage_ros.report.html import ReportHeader, run_html, TableOf
 from linkage_ros.report.joint_states import JointStates
-from linkage_ros.report.labels import LANES
+from linkage_ros.report.labels import EVENT_TRACKS
 from linkage_ros.report.reading import SceneRun
 from linkage_ros.report.run import (
-    Column,
+    CurveColumn,
+    EventTrack,
     Frames,
-    Lane,
     LinkageRun,
     MOST_SPANS,
     MOST_TEXT,
-    Run,
+    ReportedRun,
     Window,
 )
 from linkage_ros.resources import shipped
@@ -118,9 +118,9 @@ def long(tmp_path_factory):
     reader = SceneRun(bag, read_run_metadata(bag), recorded_scene(bag), Window())
     blocks, sizes = Blocks(bag, reader.topics, Progress()), []
     for block in blocks:
-        reader.take(block)
+        reader.add_block(block)
         sizes.append(held(reader, set()))
-    return reader.end(blocks.contents()), sizes
+    return reader.finish_run(blocks.count_contents()), sizes
 
 
 def test_what_is_held_does_not_grow_with_the_run(long):
@@ -156,15 +156,15 @@ def test_its_page_is_below_the_bound_and_says_how_much_it_holds(long):
 
 def filled(room, names, quantity='position'):
     """Return curves that take all the room that they may."""
-    columns = [Column(name, quantity, 'rad') for name in names]
+    columns = [CurveColumn(name, quantity, 'rad') for name in names]
     kept = BoundedCurves(WORST, columns, room, Window())
     most = kept._kept._most
     kept.add(np.arange(2 * most), np.random.default_rng(1).normal(size=(2 * most, len(columns))))
-    return kept.curves()
+    return kept.build_curves()
 
 
 def full_lane(**options):
-    lane = Lane(**options)
+    lane = EventTrack(**options)
     for number in range(5000):
         time = (number * number % 9973 + 10_000 * number) * 1_000_003 // 7
         lane.add(time, time + 1, f'{number}{WORST[:200]}')
@@ -207,7 +207,7 @@ def worst_run():
     most = FRAME_BYTES // (8 * (1 + len(values)) + 12 * bodies + 4 * len(linkages))
     durations = Histogram()
     durations.add(10 ** np.arange(16))
-    return Run(
+    return ReportedRun(
         begin=BEGIN,
         end=2**62,
         window=Window(),
@@ -216,18 +216,18 @@ def worst_run():
             filled(STATE_BYTES, values),
             filled(SAMPLE_BYTES, [*values][:60]),
             filled(FORCE_BYTES, [*values][:60], 'force')._replace(
-                columns=[Column(name, 'force', 'N') for name in [*values][:60]]
+                columns=[CurveColumn(name, 'force', 'N') for name in [*values][:60]]
             ),
             filled(DURATION_BYTES, ['tick'], 'lateness')._replace(
-                columns=[Column('tick', 'lateness', 'ms')]
+                columns=[CurveColumn('tick', 'lateness', 'ms')]
             ),
             filled(DURATION_BYTES, ['input'], 'age')._replace(
-                columns=[Column('input', 'age', 'ms')]
+                columns=[CurveColumn('input', 'age', 'ms')]
             ),
         ],
         frames=Frames(1, np.arange(most), {name: np.linspace(0, 9, most) for name in values}),
         linkages=linkages,
-        lanes={key: full_lane() for key in LANES},
+        event_tracks={key: full_lane() for key in EVENT_TRACKS},
         lateness=durations,
         age=durations,
         last_values={(f'task {n}', WORST[:80]): WORST[:80] for n in range(500)},
@@ -247,7 +247,7 @@ def test_the_page_of_the_worst_run_is_below_the_bound():
     # It is the worst indeed; intervals are a power of two, so half of a room may be left.
     assert size > 0.7 * PAGE_BYTES
     data = data_of(page)
-    assert len(data['lanes']) == len(LANES)
+    assert len(data['lanes']) == len(EVENT_TRACKS)
     assert 'more rows.' in page
     for lane in data['lanes']:
         assert len(lane['spans']) <= MOST_SPANS
@@ -255,7 +255,7 @@ def test_the_page_of_the_worst_run_is_below_the_bound():
 
 def test_the_rooms_come_to_less_than_the_bound():
     library = len(plotting_library()) + 100_000  # with what is ours of script and style
-    texts = len(LANES) * (MOST_TEXT + 60 * MOST_SPANS) + MOST_LINKAGES * 400 * 45
+    texts = len(EVENT_TRACKS) * (MOST_TEXT + 60 * MOST_SPANS) + MOST_LINKAGES * 400 * 45
     numbers = STATE_BYTES + SAMPLE_BYTES + FORCE_BYTES + 2 * DURATION_BYTES + FRAME_BYTES
     assert library + numbers * 4 / 3 + texts + SHAPE_BYTES + TABLE_BYTES < 0.98 * PAGE_BYTES
     assert MOST_FRAMES * 16 < FRAME_BYTES
@@ -292,8 +292,8 @@ def test_the_same_bag_makes_the_same_page(tmp_path):
         reader = SceneRun(bag, read_run_metadata(bag), recorded_scene(bag), Window())
         blocks = Blocks(bag, reader.topics, Progress())
         for block in blocks:
-            reader.take(block)
-        return run_html(reader.end(blocks.contents()), ReportHeader('t', [], [], []))
+            reader.add_block(block)
+        return run_html(reader.finish_run(blocks.count_contents()), ReportHeader('t', [], [], []))
 
     assert made() == made()
 
@@ -396,7 +396,7 @@ def changed(data, random):
 @given(st.binary(max_size=300))
 def test_no_bytes_break_the_reader_of_diagnostics(data):
     for head in (b'', b'\0\1\0\0' + bytes(8) + b'\1\0\0\0\0\0\0\0'):
-        for status in statuses(head + data):
+        for status in read_statuses(head + data):
             assert status.level in range(256)
 
 
@@ -410,7 +410,7 @@ def test_no_change_of_bytes_breaks_it(changes):
     data = bytearray(WHOLE)
     for at, value in changes:
         data[at] = value
-    for status in statuses(bytes(data)):
+    for status in read_statuses(bytes(data)):
         assert sum(map(len, status.values)) <= 10 * len(WHOLE)
 
 

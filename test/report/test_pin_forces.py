@@ -11,7 +11,7 @@
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.messages.joint_values import MessageValues, PlanarWrenchWriter, WRENCHES
 from linkage_ros.report.curves import LATER_PINS, PinForces
-from linkage_ros.report.data import plots, zero_plots
+from linkage_ros.report.data import time_plots, zero_plots
 from linkage_ros.report.html import ReportHeader, run_html
 from linkage_ros.report.run import Window
 from linkage_ros.resources import shipped
@@ -47,7 +47,7 @@ def test_the_magnitude_of_each_recorded_force_is_plotted(press):
     for place, name in enumerate(PINS):
         _, told = curve(found, name, 'force')
         assert told == pytest.approx(np.hypot(wrenches[:, place, 0], wrenches[:, place, 1]))
-    (plot,) = (each for each in plots(found) if each['key'] == 'pin_forces')
+    (plot,) = (each for each in time_plots(found) if each['key'] == 'pin_forces')
     assert [each['name'] for each in plot['curves']] == [*PINS]
     assert plot['unit'] == 'N'
 
@@ -56,8 +56,8 @@ def test_plots_of_zeros_are_named_instead(press):
     found = read(press)
     # Only the crank is driven: the effort of the sliding joint is zero.
     assert zero_plots(found) == ['Forces']
-    assert 'efforts_m' not in [each['key'] for each in plots(found)]
-    assert 'efforts_rad' in [each['key'] for each in plots(found)]
+    assert 'efforts_m' not in [each['key'] for each in time_plots(found)]
+    assert 'efforts_rad' in [each['key'] for each in time_plots(found)]
     page = run_html(found, ReportHeader('t', [], [], []))
     assert 'Zero throughout, so not plotted: Forces.' in page
 
@@ -79,7 +79,7 @@ linkages:
     linkage = shipped('linkages/slider_crank.yaml').read_text()
     moments = but(20, lambda _tick, moment: moment._replace(messages=()))
     found = read(recorded(tmp_path, scene, moments, linkage))
-    (plot,) = (each for each in plots(found) if each['key'] == 'pin_forces')
+    (plot,) = (each for each in time_plots(found) if each['key'] == 'pin_forces')
     assert [each['name'] for each in plot['curves']] == [
         f'{side}_{pin}' for side in ('left', 'right') for pin in PINS
     ]
@@ -89,7 +89,7 @@ linkages:
 def test_moments_have_a_curve_where_there_are_any():
     write = PlanarWrenchWriter(['pin', 'slider']).write
     curves = collected(*((time, write(BEGIN, [(3.0, 4.0, 0.0), (0.0, 1.0, -2.0)]))
-                         for time in range(5))).curves()  # fmt: skip
+                         for time in range(5))).build_curves()  # fmt: skip
     assert [(column.name, column.quantity, column.unit) for column in curves.columns] == [
         ('pin', 'force', 'N'), ('slider', 'force', 'N'), ('slider', 'moment', 'N·m'),
     ]  # fmt: skip
@@ -100,7 +100,7 @@ def test_messages_of_two_linkages_at_one_time_are_one_row():
     left, right = (PlanarWrenchWriter([name]).write(BEGIN, [(1.0, 0.0, 0.0)]) for name in 'ab')
     forces = PinForces(FORCES, Window())
     forces.add(np.array([5, 9, 3, 5]), [left, left, right, right])
-    curves = forces.curves()
+    curves = forces.build_curves()
     assert curves.intervals.begins.tolist() == [3, 5, 9]
     np.testing.assert_equal(curves.intervals.first, [[np.nan, 1.0], [1.0, 1.0], [1.0, np.nan]])
 
@@ -110,7 +110,7 @@ def test_other_messages_are_counted_and_left_out():
     other = PlanarWrenchWriter(['b']).write(BEGIN, [(1.0, 0.0, 0.0)])
     forces = collected((1, b'no message'), (2, good), (3, other))
     assert forces.left_out == {'malformed message': 1, LATER_PINS: 1}
-    assert forces.curves().rows == 2
+    assert forces.build_curves().rows == 2
 
 
 def test_wrenches_on_links_are_plotted_as_they_were_recorded(tmp_path):
@@ -121,7 +121,7 @@ def test_wrenches_on_links_are_plotted_as_they_were_recorded(tmp_path):
     assert np.diff(times) == pytest.approx(times[1] - times[0])
     moment = np.array(curve(found, 'rocker', 'moment of a load')[1], float)
     assert moment[np.isfinite(moment)] == pytest.approx(0.1 * np.arange(0, 100, 5))
-    titles = {each['key']: [one['name'] for one in each['curves']] for each in plots(found)}
+    titles = {each['key']: [one['name'] for one in each['curves']] for each in time_plots(found)}
     assert titles['loads'] == ['coupler', 'rocker']
     assert 'rocker' in titles['load_moments']
     assert found.left_out['wrenches', 'malformed message'] == 1

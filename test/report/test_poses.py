@@ -23,7 +23,7 @@ from linkage_ros.kinematics.shapes import carried_shapes, Circle, link_frames, s
 from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.report.data import page_data, poses
+from linkage_ros.report.data import link_poses, page_data
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 import numpy as np
@@ -67,7 +67,7 @@ def test_points_are_where_the_closure_has_them(file):
     closure = closure_of(file)
     inputs, positions = some(closure)
     names = [f'p_{given.joint}' for given in closure.linkage.inputs]
-    found = poses(closure, 'p_', published(closure, positions, inputs, 'p_'), names)
+    found = link_poses(closure, 'p_', published(closure, positions, inputs, 'p_'), names)
     assert found.reason == ''
     assert len(inputs) > 1
     size = max(abs(place) for position in positions for place in closure.points(position).values())
@@ -114,7 +114,7 @@ def test_a_wrong_sensor_lets_links_come_apart_by_what_it_is_wrong():
     position = closure.position(1.0)
     values = published(closure, [position] * 2, [(1.0,)] * 2)
     values['rocker_joint'] = values['rocker_joint'] + np.array([0.0, 0.3])
-    found = poses(closure, '', values, ['crank_joint'])
+    found = link_poses(closure, '', values, ['crank_joint'])
     rocker = abs(complex(*closure.linkage.links['rocker']['B']))
     # The chord of the angle.
     assert found.apart == pytest.approx([0.0, 2 * rocker * np.sin(0.15)], abs=1e-12)
@@ -125,7 +125,7 @@ def test_where_a_joint_is_not_told_there_is_no_pose():
     position = closure.position(1.0)
     values = published(closure, [position] * 2, [(1.0,)] * 2)
     values['coupler_joint'] = values['coupler_joint'] + np.array([0.0, np.nan])
-    found = poses(closure, '', values, ['crank_joint'])
+    found = link_poses(closure, '', values, ['crank_joint'])
     assert np.isfinite(found.frames[0]).all()
     assert np.isnan(found.frames[1]).all()
     assert np.isnan(found.apart[1])
@@ -137,7 +137,7 @@ def test_where_joints_do_not_tell_of_a_link_the_loops_are_closed_at_the_input():
     closure = Closure(replace(whole.linkage, joints=joints))
     inputs = [(1.0,), (np.nan,), (2.0,)]
     values = {'crank_joint': np.array([1.0, np.nan, 2.0]), 'rocker_joint': np.zeros(3)}
-    found = poses(closure, '', values, ['crank_joint'])
+    found = link_poses(closure, '', values, ['crank_joint'])
     assert 'coupler' in found.reason
     assert np.isnan(found.frames[1]).all()
     for i in (0, 2):
