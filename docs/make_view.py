@@ -23,8 +23,8 @@ from typing import Any
 
 from linkage_ros.resources import shipped
 from linkage_ros.view.conversation import Conversation, UserFile
-from linkage_ros.view.model import model
-from linkage_ros.view.page import page as page_of
+from linkage_ros.view.model import build_model
+from linkage_ros.view.page import page_html as page_of
 from linkage_ros.view.server import serve
 from PIL import Image
 
@@ -47,7 +47,7 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         file = Path(folder, f'{NAME}.yaml')
         file.write_text(shipped(f'linkages/{NAME}.yaml').read_text('utf-8'), 'utf-8')
-        found = model(file.read_text('utf-8'), NAME)
+        found = build_model(file.read_text('utf-8'), NAME)
         shown = page_of(found, mode='edit', can_save=True)
         stop, address, known = Event(), [], Event()
 
@@ -55,7 +55,7 @@ def main() -> None:
             address.append(at)
             known.set()
 
-        routes = [Conversation(NAME, None, UserFile(file)).add]
+        routes = [Conversation(NAME, None, UserFile(file)).add_routes]
         server = Thread(target=serve, args=(lambda: shown, routes, stop, ready, print))
         server.start()
         try:

@@ -111,12 +111,12 @@ def _read_linkage(named: str) -> _NamedLinkage:
 
 def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
     shown = _read_linkage(arguments.file)
-    from linkage_ros.view.model import model
-    from linkage_ros.view.page import page
+    from linkage_ros.view.model import build_model
+    from linkage_ros.view.page import page_html
 
     if arguments.output:
-        found = model(shown.data.decode(), shown.name)
-        write_page(arguments.output, page(found, mode='still'))
+        found = build_model(shown.data.decode(), shown.name)
+        write_page(arguments.output, page_html(found, mode='still'))
         return 0
     from linkage_ros.view.conversation import Conversation, UserFile
     from linkage_ros.view.sensors import SceneFiles
@@ -127,7 +127,7 @@ def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
     pages = _Pages(shown, file)
     pages()  # an error ends this command before a browser opens
     conversation = Conversation(shown.name, scene, file)
-    return _serve_page(arguments, stop, shown.name, pages, conversation.add)
+    return _serve_page(arguments, stop, shown.name, pages, conversation.add_routes)
 
 
 class _Pages:
@@ -141,8 +141,8 @@ class _Pages:
 
     def __call__(self) -> str:
         """Return the page."""
-        from linkage_ros.view.model import model
-        from linkage_ros.view.page import page
+        from linkage_ros.view.model import build_model
+        from linkage_ros.view.page import page_html
 
         data = self._shown.data
         if self._page and self._file is not None:
@@ -154,10 +154,10 @@ class _Pages:
                 print(f'linkage view: {error}; the page shows it as it was', file=sys.stderr)
                 return self._page
         if data != self._data:
-            found = model(data.decode(), self._shown.name)
+            found = build_model(data.decode(), self._shown.name)
             scene = self._shown.scene[0] if self._shown.scene else None
             can_save = self._file is not None and self._file.writable
-            self._page = page(found, mode='edit', can_save=can_save, scene=scene)
+            self._page = page_html(found, mode='edit', can_save=can_save, scene=scene)
             self._data = data
         return self._page
 
@@ -188,7 +188,7 @@ def _serve_page(
     arguments: argparse.Namespace, stop: Event, name: str, page: Any, *routes: Any
 ) -> int:
     from linkage_ros.view.server import serve
-    from linkage_ros.view.worker import report as report_line
+    from linkage_ros.view.worker import report_line as report_line
 
     def announce_address(address: str) -> None:
         print(clean(f'{name}: {address}'), flush=True)

@@ -505,7 +505,7 @@ class LiveBridge:
             at = list(self._cranks.angles)
         else:
             at[number] = target
-        self._hand.turn(number, target, at, monotonic())
+        self._hand.set_target(number, target, at, monotonic())
         self._start_hand(run)
         return f'{listed(run.topic_driven.sampled_joints)} on {run.crank_topic}, by hand'
 
@@ -541,7 +541,7 @@ class LiveBridge:
         assert self._run is not None
         assert self._run.topic_driven is not None
         now, stamp = monotonic(), time_ns()
-        if (followed := self._hand.follow(now)) is not None:
+        if (followed := self._hand.advance_to(now)) is not None:
             message = self._write_crank(stamp, *followed)
             self._hand_publisher.handle.publish_raw(message)
         elif now - self._effort[1] <= HELD:

@@ -26,7 +26,13 @@ from aiohttp import web, WSMsgType
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import atomic_write, read_regular
 from linkage_ros.files.yaml_file import LARGEST_FILE
-from linkage_ros.view.requests import encoded, failed, read_request, Request, RequestError
+from linkage_ros.view.requests import (
+    encode_text,
+    failure_answer,
+    read_request,
+    Request,
+    RequestError,
+)
 from linkage_ros.view.sensors import SceneFiles
 from linkage_ros.view.server import Server, SERVER_KEY
 from linkage_ros.view.worker import Worker
@@ -55,7 +61,7 @@ class Conversation:
         self._slow = Worker(name, scene, _LONGEST_EXPORT)
         self._numbers = count(1)
 
-    def add(self, app: web.Application) -> None:
+    def add_routes(self, app: web.Application) -> None:
         """Add the WebSocket ``ws`` to the application of a server."""
         server = app[SERVER_KEY]
 
@@ -75,9 +81,9 @@ class Conversation:
         app.on_startup.append(start)
         app.on_cleanup.append(end)
 
-    def state(self) -> str:
+    def file_state(self) -> str:
         """Return the state of the user's file, as a page that is opened now sees it."""
-        return '' if self._file is None else self._file.state()
+        return '' if self._file is None else self._file.content_state()
 
     async def answer(self, page: _Page, request: Request, message: str) -> str:
         """Return the answer to a request, as JSON."""
@@ -85,18 +91,18 @@ class Conversation:
         try:
             if request.do == 'save':
                 return await self._save(page, request, message)
-            return await worker.ask(page.number, request.do, message)
+            return await worker.send_request(page.number, request.do, message)
         except LinkageError as error:
-            return failed(request.number, error)
+            return failure_answer(request.number, error)
 
     async def _save(self, page: _Page, request: Request, message: str) -> str:
         if self._file is None:
             raise LinkageError('save', 'no file of yours is open', 'download the linkage')
-        answer = await self._quick.ask(page.number, request.do, message)
+        answer = await self._quick.send_request(page.number, request.do, message)
         if 'ok' not in json.loads(answer):
             return answer
         name = self._file.path.name
-        data = encoded(request.content['text'], name)
+        data = encode_text(request.content['text'], name)
         page.state = await asyncio.to_thread(self._file.save, data, page.state)
         return json.dumps({'id': request.number, 'ok': {'file': name}})
 
@@ -108,7 +114,7 @@ class _Page:
         self, number: int, socket: web.WebSocketResponse, of: Conversation, server: Server
     ) -> None:
         self.number = number
-        self.state = of.state()
+        self.state = of.file_state()
         self._socket = socket
         self._server = server
         self._quick = _Queue(self, of, socket)
@@ -122,10 +128,10 @@ class _Page:
                     raise RequestError('is not text', 'send JSON')
                 request = read_request(message.data)
                 queue = self._slow if request.do in _SLOW else self._quick
-                dropped = queue.put(request, message.data)
+                dropped = queue.add_request(request, message.data)
             except RequestError as error:
-                self._server.refuse('a message that is no request')
-                await self._socket.send_str(failed(error.number, error))
+                self._server.count_refusal('a message that is no request')
+                await self._socket.send_str(failure_answer(error.number, error))
                 continue
             for number in dropped:
                 await self._socket.send_str(json.dumps({'id': number, 'dropped': True}))
@@ -141,7 +147,7 @@ class _Queue:
         self._waiting: deque[tuple[Request, str]] = deque()
         self._task: asyncio.Task[None] | None = None
 
-    def put(self, request: Request, message: str) -> list[float]:
+    def add_request(self, request: Request, message: str) -> list[float]:
         """
         Put a request at the end; return the numbers of those that it replaces.
 
@@ -175,14 +181,14 @@ class UserFile:
         self.path = path.absolute()
 
     @property
-    def writable(self) -> bool:
+    def is_writable(self) -> bool:
         """Return whether the user may write it."""
         return os.access(self.path, os.W_OK)
 
-    def state(self) -> str:
+    def content_state(self) -> str:
         """Return what tells its content from another one; '' if it cannot be read."""
         try:
-            return digest(read_regular(self.path, LARGEST_FILE))
+            return content_digest(read_regular(self.path, LARGEST_FILE))
         except (OSError, ValueError):
             return ''
 
@@ -192,12 +198,12 @@ class UserFile:
 
         A LinkageError says that the content is another, or that it cannot be written.
         """
-        if self.state() != known:
+        if self.content_state() != known:
             raise LinkageError(self.path.name, 'has changed since this page read it', _REMEDY)
         atomic_write(self.path, data)
-        return digest(data)
+        return content_digest(data)
 
 
-def digest(data: bytes) -> str:
+def content_digest(data: bytes) -> str:
     """Return a digest of the content of a file."""
     return sha256(data).hexdigest()

@@ -52,14 +52,14 @@ _MOST_ASSEMBLIES = 64
 """Most assemblies among which the one of the pose is sought."""
 
 
-class Edited(NamedTuple):
+class EditResult(NamedTuple):
     """The text after an edit, and the inputs at which the linkage is as it was shown."""
 
     text: str
     inputs: tuple[float, ...]
 
 
-class _Shown(NamedTuple):
+class _ShownLinkage(NamedTuple):
     """The linkage before the edit, in the pose that the page shows."""
 
     closure: Closure
@@ -68,7 +68,7 @@ class _Shown(NamedTuple):
     pins: dict[str, complex]
 
 
-class _Change(NamedTuple):
+class _LinkageChange(NamedTuple):
     """A changed linkage, and where its pins and inputs are now; pins as before if None."""
 
     linkage: Linkage
@@ -76,7 +76,7 @@ class _Change(NamedTuple):
     inputs: tuple[float, ...] | None = None
 
 
-def edited(text: str, edit: Mapping[str, Any], name: str = _NAME) -> Edited:
+def edit_text(text: str, edit: Mapping[str, Any], name: str = _NAME) -> EditResult:
     """
     Return the text of a linkage file after an edit; whether it still closes, its model tells.
 
@@ -103,13 +103,13 @@ def edited(text: str, edit: Mapping[str, Any], name: str = _NAME) -> Edited:
         raise LinkageError('edit', f'{quoted(dict(edit))} is no edit', f'send {listed(_KINDS)}')
     written, _ = written_linkage(parse_yaml(text.encode(), name))
     closure = Closure(written)
-    shown = _shown(closure, edit.get('inputs'))
+    shown = _shown_linkage(closure, edit.get('inputs'))
     change = _KINDS[kind](shown, edit)
     pins, inputs = change.pins or shown.pins, change.inputs or shown.inputs
     linkage = change.linkage
     if kind in ('pin', 'input'):
         linkage = _in_pose(linkage, inputs, pins, closure.scale)
-    return Edited(rewrite_linkage(text, name, linkage), inputs)
+    return EditResult(rewrite_linkage(text, name, linkage), inputs)
 
 
 def pin_of(error: LinkageError, text: str) -> str | None:
@@ -123,43 +123,45 @@ def pin_of(error: LinkageError, text: str) -> str | None:
     return next((part for part in reversed(str(where).split('.')) if part in names), None)
 
 
-def _shown(closure: Closure, given: Any) -> _Shown:
+def _shown_linkage(closure: Closure, given: Any) -> _ShownLinkage:
     count = len(closure.linkage.inputs)
-    inputs = _usual(closure) if given is None else _numbers('inputs', given, count)
+    inputs = _default_inputs(closure) if given is None else _read_numbers('inputs', given, count)
     position = closure.position(*inputs)
     if not position.status.has_pose:
-        inputs = _usual(closure)
+        inputs = _default_inputs(closure)
         position = closure.position(*inputs)
         if not position.status.has_pose:  # several inputs
-            raise _open()
+            raise _open_error()
     frames: dict[str, tuple[complex, float]] = {GROUND: (0j, 0.0)}
     found = closure.link_frames
     frames |= dict(zip(found.links, found.frames_at(position), strict=True))
     points = closure.points(position)
-    return _Shown(closure, inputs, frames, {point: place for (_, point), place in points.items()})
+    return _ShownLinkage(
+        closure, inputs, frames, {point: place for (_, point), place in points.items()}
+    )
 
 
-def _usual(closure: Closure) -> tuple[float, ...]:
+def _default_inputs(closure: Closure) -> tuple[float, ...]:
     if len(closure.linkage.inputs) == 1 and not closure.closing_ranges:
-        raise _open()
+        raise _open_error()
     return usual_inputs(closure)
 
 
-def _open() -> LinkageError:
+def _open_error() -> LinkageError:
     return LinkageError('links', 'close nowhere, so no pose can be changed', 'undo')
 
 
-def _move_pin(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+def _move_pin(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
     """Move a pin in the world; all others stay where they are."""
     linkage = shown.closure.linkage
-    pin = _named('pin', edit['pin'], shown.pins)
-    to = complex(*_numbers('to', edit.get('to'), 2))
+    pin = _checked_name('pin', edit['pin'], shown.pins)
+    to = complex(*_read_numbers('to', edit.get('to'), 2))
     snap = edit.get('snap') or 0.0
     if snap:
-        (snap,) = _numbers('snap', [snap], 1)
+        (snap,) = _read_numbers('snap', [snap], 1)
         to = complex(*(snap * round(part / snap) for part in (to.real, to.imag)))
     for name, slider in linkage.sliders.items():
-        if slider.point == pin and _stands(linkage, name):
+        if slider.point == pin and _is_line_fixed(linkage, name):
             to = _on_line(shown, name, to)
     pins = {**shown.pins, pin: to}
     links, masses = dict(linkage.links), dict(linkage.masses)
@@ -181,17 +183,17 @@ def _move_pin(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
             if link in masses:
                 longer = abs(other - one) / points[frame[1]][0]
                 x, y = masses[link].center
-                centre = (_rounded(shown, x * longer), y)
+                centre = (_rounded_value(shown, x * longer), y)
                 masses[link] = replace(masses[link], center=centre)
             place, angle = one, new
         links[link] = {
             name: at
             if not frame and name != pin
-            else _on_axis(_local(shown, pins[name], place, angle), name, frame)
+            else _on_axis(_local_point(shown, pins[name], place, angle), name, frame)
             for name, at in points.items()
         }
     inputs = [
-        _slide(shown, given.slider, pins, value)
+        _updated_slide(shown, given.slider, pins, value)
         if given.slider
         else value + turned.get(given.child, 0.0) - turned.get(given.parent, 0.0)
         for given, value in zip(linkage.inputs, shown.inputs, strict=True)
@@ -201,7 +203,7 @@ def _move_pin(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
         changed = replace(changed, pose=replace(linkage.pose, inputs=tuple(inputs), points={
             name: (pins[name].real, pins[name].imag) for name in linkage.pose.points
         }))  # fmt: skip
-    return _Change(changed, pins, tuple(inputs))
+    return _LinkageChange(changed, pins, tuple(inputs))
 
 
 def _own_frame(linkage: Linkage, link: str, pin: str) -> tuple[str, str] | None:
@@ -225,90 +227,96 @@ def _on_axis(
     return (0.0, 0.0) if name == frame[0] else (at[0], 0.0)
 
 
-def _local(shown: _Shown, to: complex, place: complex, angle: float) -> tuple[float, float]:
+def _local_point(
+    shown: _ShownLinkage, to: complex, place: complex, angle: float
+) -> tuple[float, float]:
     """Return a place in the frame of a link, rounded."""
     at = (to - place) * rect(1.0, -angle)
-    return _rounded(shown, at.real), _rounded(shown, at.imag)
+    return _rounded_value(shown, at.real), _rounded_value(shown, at.imag)
 
 
-def _rounded(shown: _Shown, value: float) -> float:
+def _rounded_value(shown: _ShownLinkage, value: float) -> float:
     return round(value, -floor(log10(shown.closure.scale * _ROUNDED)))
 
 
-def _stands(linkage: Linkage, name: str) -> bool:
+def _is_line_fixed(linkage: Linkage, name: str) -> bool:
     """Return whether the line of a slider stands where it is, whatever its point does."""
     along = linkage.sliders[name].along
     pins = links_by_point(linkage.links)
     return along == GROUND or sum(len(pins[point]) > 1 for point in linkage.links[along]) > 1
 
 
-def _on_line(shown: _Shown, name: str, to: complex) -> complex:
+def _on_line(shown: _ShownLinkage, name: str, to: complex) -> complex:
     """Return the nearest place on the line of a slider."""
     slider = shown.closure.linkage.sliders[name]
-    way = slider.unit * rect(1.0, shown.frames[slider.along][1])
+    line_direction = slider.unit * rect(1.0, shown.frames[slider.along][1])
     through = shown.pins[slider.through]
-    return through + way * ((to - through) * way.conjugate()).real
+    return through + line_direction * ((to - through) * line_direction.conjugate()).real
 
 
-def _slide(shown: _Shown, name: str, pins: Mapping[str, complex], before: float) -> float:
+def _updated_slide(
+    shown: _ShownLinkage, name: str, pins: Mapping[str, complex], before: float
+) -> float:
     """Return the slide of a driven slider, of which an end may have moved."""
     slider = shown.closure.linkage.sliders[name]
     between = pins[slider.point] - pins[slider.through]
-    if not _stands(shown.closure.linkage, name):
+    if not _is_line_fixed(shown.closure.linkage, name):
         return copysign(abs(between), before)  # the line follows its point
-    way = slider.unit * rect(1.0, shown.frames[slider.along][1])
-    return (between * way.conjugate()).real
+    line_direction = slider.unit * rect(1.0, shown.frames[slider.along][1])
+    return (between * line_direction.conjugate()).real
 
 
-def _length(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+def _set_length(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
     """Move a point of a link along the line to another one, so that they are so far apart."""
-    given = _mapping('length', edit)
+    given = _read_mapping('length', edit)
     linkage = shown.closure.linkage
-    link, points = _link(linkage, given)
-    one, other = (_named(key, given.get(key), points) for key in ('from', 'to'))
-    (length,) = _numbers('value', [given.get('value')], 1)
+    link, points = _read_link(linkage, given)
+    one, other = (_checked_name(key, given.get(key), points) for key in ('from', 'to'))
+    (length,) = _read_numbers('value', [given.get('value')], 1)
     start, end = complex(*points[one]), complex(*points[other])
     if length <= 0.0 or start == end:
         raise LinkageError(
             f'links.{link}.{other}', f'{length:g} m is no length', 'type one above 0'
         )
     to = start + (end - start) * (length / abs(end - start))
-    return _placed(shown, link, other, (to.real, to.imag))
+    return _place_point(shown, link, other, (to.real, to.imag))
 
 
-def _place(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
-    given = _mapping('place', edit)
-    link, points = _link(shown.closure.linkage, given)
-    point = _named('point', given.get('point'), points)
-    x, y = _numbers('at', given.get('at'), 2)
-    return _placed(shown, link, point, (x, y))
+def _edit_place(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
+    given = _read_mapping('place', edit)
+    link, points = _read_link(shown.closure.linkage, given)
+    point = _checked_name('point', given.get('point'), points)
+    x, y = _read_numbers('at', given.get('at'), 2)
+    return _place_point(shown, link, point, (x, y))
 
 
-def _placed(shown: _Shown, link: str, point: str, at: tuple[float, float]) -> _Change:
+def _place_point(
+    shown: _ShownLinkage, link: str, point: str, at: tuple[float, float]
+) -> _LinkageChange:
     linkage = shown.closure.linkage
     links = {**linkage.links, link: {**linkage.links[link], point: at}}
-    return _Change(replace(linkage, links=links))
+    return _LinkageChange(replace(linkage, links=links))
 
 
-def _trace(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
-    given = _mapping('trace', edit)
+def _trace_point(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
+    given = _read_mapping('trace', edit)
     linkage = shown.closure.linkage
-    link, points = _link(linkage, given)
-    x, y = _numbers('at', given.get('at'), 2)
+    link, points = _read_link(linkage, given)
+    x, y = _read_numbers('at', given.get('at'), 2)
     taken = {*links_by_point(linkage.links), *linkage.sliders, *linkage.links}
     free = (f'P{number or ""}' for number in range(len(taken) + 1))
     name = given.get('name', next(name for name in free if name not in taken))
     if not isinstance(name, str) or name in taken:
         raise LinkageError('name', f'{quoted(name)} is taken, or no name', 'send another name')
-    points = {**points, name: (_rounded(shown, x), _rounded(shown, y))}
+    points = {**points, name: (_rounded_value(shown, x), _rounded_value(shown, y))}
     links = {**linkage.links, link: points}
-    return _Change(replace(linkage, links=links, traced=(*linkage.traced, name)))
+    return _LinkageChange(replace(linkage, links=links, traced=(*linkage.traced, name)))
 
 
-def _untrace(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+def _untrace_point(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
     """Trace a point no more; one that nothing else needs goes."""
     linkage = shown.closure.linkage
-    name = _named('untrace', edit['untrace'], linkage.traced)
+    name = _checked_name('untrace', edit['untrace'], linkage.traced)
     carried = links_by_point(linkage.links)[name]
     links = dict(linkage.links)
     needed = {end for s in linkage.sliders.values() for end in (s.point, s.through)}
@@ -316,14 +324,14 @@ def _untrace(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
         (link,) = carried
         links[link] = {point: at for point, at in links[link].items() if point != name}
     traced = tuple(point for point in linkage.traced if point != name)
-    return _Change(replace(linkage, links=links, traced=traced))
+    return _LinkageChange(replace(linkage, links=links, traced=traced))
 
 
-def _input(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+def _choose_input(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
     """Drive another link on the ground; the joint that it had is published no more."""
-    given = _mapping('input', edit)
+    given = _read_mapping('input', edit)
     linkage = shown.closure.linkage
-    link, points = _link(linkage, given)
+    link, points = _read_link(linkage, given)
     if len(linkage.inputs) != 1:
         raise LinkageError('input', 'this linkage has several', 'change them in the file')
     (old,) = linkage.inputs
@@ -332,7 +340,7 @@ def _input(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
     if old.slider or old.parent != GROUND:
         raise LinkageError('input', f'{old.joint} is no crank on the ground', 'change the file')
     if link == old.child:
-        return _Change(linkage)
+        return _LinkageChange(linkage)
     joints = {
         name: joint
         for name, joint in linkage.joints.items()
@@ -348,30 +356,32 @@ def _input(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
     changed = replace(linkage, inputs=(driven,), joints=joints)
     if linkage.pose is not None:
         changed = replace(changed, pose=replace(linkage.pose, inputs=inputs))
-    return _Change(changed, inputs=inputs)
+    return _LinkageChange(changed, inputs=inputs)
 
 
-def _side(shown: _Shown, edit: Mapping[str, Any]) -> _Change:
+def _choose_side(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
     linkage = shown.closure.linkage
     possible = assembly_sides(shown.closure.structure)
-    given = _mapping('side', edit)
+    given = _read_mapping('side', edit)
     for key, side in given.items():
-        _named('side', key, possible)
+        _checked_name('side', key, possible)
         if side not in possible[key]:
             remedy = f'choose {" or ".join(possible[key])}'
             raise LinkageError(f'assembly.{key}', f'{quoted(side)} is no side of it', remedy)
     sides: Any = {**written_sides(shown.closure), **given}
-    return _Change(replace(without_drawn_pose(linkage, shown.closure.structure), assembly=sides))
+    return _LinkageChange(
+        replace(without_drawn_pose(linkage, shown.closure.structure), assembly=sides)
+    )
 
 
-_KINDS: dict[str, Callable[[_Shown, Mapping[str, Any]], _Change]] = {
+_KINDS: dict[str, Callable[[_ShownLinkage, Mapping[str, Any]], _LinkageChange]] = {
     'pin': _move_pin,
-    'length': _length,
-    'place': _place,
-    'trace': _trace,
-    'untrace': _untrace,
-    'input': _input,
-    'side': _side,
+    'length': _set_length,
+    'place': _edit_place,
+    'trace': _trace_point,
+    'untrace': _untrace_point,
+    'input': _choose_input,
+    'side': _choose_side,
 }
 
 
@@ -411,21 +421,21 @@ def _in_pose(
     return best
 
 
-def _mapping(key: str, edit: Mapping[str, Any]) -> Mapping[str, Any]:
+def _read_mapping(key: str, edit: Mapping[str, Any]) -> Mapping[str, Any]:
     given = edit[key]
     if not isinstance(given, dict):
         raise LinkageError(key, f'{quoted(given)} is no object', 'send an object')
     return given
 
 
-def _link(
+def _read_link(
     linkage: Linkage, given: Mapping[str, Any]
 ) -> tuple[str, Mapping[str, tuple[float, float]]]:
-    link = _named('link', given.get('link'), linkage.links)
+    link = _checked_name('link', given.get('link'), linkage.links)
     return link, linkage.links[link]
 
 
-def _named(key: str, name: Any, names: Any) -> str:
+def _checked_name(key: str, name: Any, names: Any) -> str:
     if not isinstance(name, str) or name not in names:
         raise LinkageError(
             key,
@@ -435,7 +445,7 @@ def _named(key: str, name: Any, names: Any) -> str:
     return name
 
 
-def _numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
+def _read_numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
     if (
         not isinstance(values, list | tuple)
         or len(values) != count

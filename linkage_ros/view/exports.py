@@ -38,7 +38,7 @@ class Export(NamedTuple):
     data: bytes
 
 
-class _Linkage(NamedTuple):
+class _ExportedLinkage(NamedTuple):
     closure: Closure
     text: str
     name: str
@@ -49,7 +49,7 @@ class _Linkage(NamedTuple):
         return view(self.closure, self.inputs)
 
 
-def export(
+def export_linkage(
     kind: str, closure: Closure, text: str, name: str, inputs: Sequence[float] | None = None
 ) -> Export:
     """
@@ -78,41 +78,41 @@ def export(
         raise LinkageError('kind', f'{quoted(kind)} cannot be written', remedy)
     media_type, write = KINDS[kind]
     shown = usual_inputs(closure) if inputs is None else tuple(inputs)
-    data = write(_Linkage(closure, text, name, shown))
+    data = write(_ExportedLinkage(closure, text, name, shown))
     return Export(f'{name}.{kind}', media_type, data)
 
 
-def _yaml(linkage: _Linkage) -> bytes:
+def _to_yaml(linkage: _ExportedLinkage) -> bytes:
     return linkage.text.encode()
 
 
-def _svg(linkage: _Linkage) -> bytes:
-    return _written('svg', lambda file: picture(linkage.view, linkage.name, file))
+def _to_svg(linkage: _ExportedLinkage) -> bytes:
+    return _written_bytes('svg', lambda file: picture(linkage.view, linkage.name, file))
 
 
-def _gif(linkage: _Linkage) -> bytes:
+def _to_gif(linkage: _ExportedLinkage) -> bytes:
     motion = range_motion(linkage.view, linkage.name, _SECONDS)
-    return _written('gif', lambda file: animate(motion, file))
+    return _written_bytes('gif', lambda file: animate(motion, file))
 
 
-def _dxf(linkage: _Linkage) -> bytes:
+def _to_dxf(linkage: _ExportedLinkage) -> bytes:
     from linkage_ros.drawing.dxf import links_dxf  # local import: ezdxf is slow to load
 
     return links_dxf(linkage.closure)
 
 
-def _compiled(suffix: str) -> Callable[[_Linkage], bytes]:
-    def write(linkage: _Linkage) -> bytes:
+def _compile_for(suffix: str) -> Callable[[_ExportedLinkage], bytes]:
+    def write_source(linkage: _ExportedLinkage) -> bytes:
         closure, name = linkage.closure, linkage.name
         in_c = (c_name(name) or 'linkage') if suffix in ('.c', '.h') else name
         joints = tuple(closure.linkage.joints)
         subject = Subject(closure, in_c, f'{name}.yaml', _DERIVATIVES, joints)
         return write_source(subject, LANGUAGES[suffix](subject)).encode()
 
-    return write
+    return write_source
 
 
-def _written(kind: str, write: Callable[[Path], None]) -> bytes:
+def _written_bytes(kind: str, write: Callable[[Path], None]) -> bytes:
     """Return what is written to a file."""
     with TemporaryDirectory() as folder:
         file = Path(folder) / f'picture.{kind}'
@@ -120,14 +120,14 @@ def _written(kind: str, write: Callable[[Path], None]) -> bytes:
         return file.read_bytes()
 
 
-KINDS: dict[str, tuple[str, Callable[[_Linkage], bytes]]] = {
-    'yaml': ('application/yaml', _yaml),
-    'svg': ('image/svg+xml', _svg),
-    'gif': ('image/gif', _gif),
-    'dxf': ('image/vnd.dxf', _dxf),
-    'c': ('text/x-c', _compiled('.c')),
-    'h': ('text/x-c', _compiled('.h')),
-    'js': ('text/javascript', _compiled('.js')),
-    'py': ('text/x-python', _compiled('.py')),
+KINDS: dict[str, tuple[str, Callable[[_ExportedLinkage], bytes]]] = {
+    'yaml': ('application/yaml', _to_yaml),
+    'svg': ('image/svg+xml', _to_svg),
+    'gif': ('image/gif', _to_gif),
+    'dxf': ('image/vnd.dxf', _to_dxf),
+    'c': ('text/x-c', _compile_for('.c')),
+    'h': ('text/x-c', _compile_for('.h')),
+    'js': ('text/javascript', _compile_for('.js')),
+    'py': ('text/x-python', _compile_for('.py')),
 }
 """Media type and writer of each kind of file, which is also the file's suffix."""

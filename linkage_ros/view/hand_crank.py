@@ -48,7 +48,7 @@ class HandCrank:
         self._rates: list[float] = []
         self._turned = self._time = 0.0
 
-    def turn(self, number: int, target: float, at: Sequence[float], now: float) -> None:
+    def set_target(self, number: int, target: float, at: Sequence[float], now: float) -> None:
         """
         Turn an input to a target in [rad] or [m], at a time in [s].
 
@@ -68,7 +68,7 @@ class HandCrank:
         """Return whether a hand has held an input within the last second."""
         return bool(self._targets) and now - self._turned <= HELD
 
-    def follow(self, now: float) -> tuple[list[float], list[float]] | None:
+    def advance_to(self, now: float) -> tuple[list[float], list[float]] | None:
         """Return values and rates of the inputs at a time, in [s]; None if no hand holds them."""
         if not self.is_held(now):
             self._targets = []

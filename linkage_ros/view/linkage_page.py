@@ -14,7 +14,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from linkage_ros.view.model import model_of
-from linkage_ros.view.page import page
+from linkage_ros.view.page import page_html
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure
@@ -42,7 +42,7 @@ class LinkagePage:
     """
 
     def __init__(self, closure: Closure) -> None:
-        self.text = page(model_of(closure, closure.name or 'linkage'), mode='still')
+        self.text = page_html(model_of(closure, closure.name or 'linkage'), mode='still')
         """The page, as a browser opens it from a file."""
 
     def _repr_html_(self) -> str:

@@ -47,13 +47,13 @@ class Bridge(Protocol):
 
     name: str
 
-    def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
+    def add_listener(self, heard: Callable[[], None]) -> Callable[[], None]:
         """Call a function, on any thread, whenever there is news; return one that ends this."""
 
-    def newest(self, kind: str) -> tuple[int, str]:
+    def newest_message(self, kind: str) -> tuple[int, str]:
         """Return the number and the JSON of the newest message of a kind; 0 and '' for none."""
 
-    def ask(self, content: Mapping[str, Any]) -> Future[str]:
+    def send_request(self, content: Mapping[str, Any]) -> Future[str]:
         """Ask for something; return what the answer says, one line."""
 
 
@@ -69,10 +69,14 @@ def add_live(app: web.Application, bridge: Bridge) -> None:
             waiting: set[asyncio.Task[None]] = set()
             try:
                 async for message in socket:
-                    content = _read(message.data if message.type is WSMsgType.TEXT else None)
+                    content = _parse_request(
+                        message.data if message.type is WSMsgType.TEXT else None
+                    )
                     if content is None or len(waiting) >= _MOST_WAITING:
                         refused = content is None
-                        server.refuse('a message that is no request' if refused else 'a haste')
+                        server.count_refusal(
+                            'a message that is no request' if refused else 'a haste'
+                        )
                         continue
                     task = asyncio.create_task(_answer(socket, bridge, content))
                     waiting.add(task)
@@ -86,7 +90,7 @@ def add_live(app: web.Application, bridge: Bridge) -> None:
     app.router.add_get('/live', handle)
 
 
-def _read(text: str | None) -> dict[str, Any] | None:
+def _parse_request(text: str | None) -> dict[str, Any] | None:
     """Return a request; None if the message is none."""
     try:
         content = json.loads(text or '')
@@ -100,7 +104,7 @@ async def _answer(
     socket: web.WebSocketResponse, bridge: Bridge, content: Mapping[str, Any]
 ) -> None:
     try:
-        said = await asyncio.wait_for(asyncio.wrap_future(bridge.ask(content)), _PATIENCE)
+        said = await asyncio.wait_for(asyncio.wrap_future(bridge.send_request(content)), _PATIENCE)
     except TimeoutError:
         said = f'{bridge.name} does not answer'
     await socket.send_str(json.dumps({'said': said, 'do': content['do']}))
@@ -109,10 +113,10 @@ async def _answer(
 async def _send_news(socket: web.WebSocketResponse, bridge: Bridge) -> None:
     """Send what is new, at most 60 times a second; of each kind only the newest message."""
     sent = dict.fromkeys(KINDS, 0)
-    with _news(bridge) as news:
+    with _news_event(bridge) as news:
         while not socket.closed:
             for kind in KINDS:
-                number, text = bridge.newest(kind)
+                number, text = bridge.newest_message(kind)
                 if number != sent[kind]:
                     sent[kind] = number
                     await socket.send_str(text)
@@ -122,17 +126,17 @@ async def _send_news(socket: web.WebSocketResponse, bridge: Bridge) -> None:
 
 
 @contextmanager
-def _news(bridge: Bridge) -> Iterator[asyncio.Event]:
+def _news_event(bridge: Bridge) -> Iterator[asyncio.Event]:
     """Return an event that is set whenever there is news."""
     news = asyncio.Event()
     news.set()
     loop = asyncio.get_running_loop()
 
-    def heard() -> None:
+    def wake() -> None:
         with suppress(RuntimeError):  # the loop has ended
             loop.call_soon_threadsafe(news.set)
 
-    end = bridge.listen(heard)
+    end = bridge.add_listener(wake)
     try:
         yield news
     finally:

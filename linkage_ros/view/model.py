@@ -52,15 +52,15 @@ _POOR = radians(30.0)
 """Transmission angle below which a page warns; textbooks ask for 30 to 45°."""
 
 
-class Shown(NamedTuple):
+class ViewState(NamedTuple):
     """How a page shows a linkage: at which inputs, and half the width of its bars, in [m]."""
 
     inputs: tuple[float, ...]
     size: float
 
 
-def model(
-    text: str, name: str, *, whole: bool = True, shown: Shown | None = None
+def build_model(
+    text: str, name: str, *, whole: bool = True, shown: ViewState | None = None
 ) -> dict[str, Any]:
     """
     Return the model of a linkage file.
@@ -86,7 +86,9 @@ def model(
     content = parse_yaml(text.encode(), name)
     written, shorthand = written_linkage(content)
     try:
-        quick = None if whole or shown is None else _quick(written, name, text, content, shown)
+        quick = (
+            None if whole or shown is None else _quick_model(written, name, text, content, shown)
+        )
     except DefinitionError:  # which the checks tell with its place
         quick = None
     if quick:
@@ -95,10 +97,10 @@ def model(
     try:
         inputs = usual_inputs(closure)
         drawn = drawn_in_frames(view(closure, inputs))
-        found = _model(closure, name, text, content.units, inputs, drawn)
+        found = _model_json(closure, name, text, content.units, inputs, drawn)
         if whole:
-            found['others'] = _others(closure, content)
-            found |= _analysis(closure, content.units)
+            found['others'] = _other_assemblies(closure, content)
+            found |= _analyse_linkage(closure, content.units)
     except DefinitionError as error:
         raise content.locate_error(error) from None
     return found
@@ -108,14 +110,14 @@ def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
     """Return the model of a linkage without a file, whose other assemblies are not told."""
     inputs = usual_inputs(closure)
     drawn = drawn_in_frames(view(closure, inputs))
-    return _model(closure, name or closure.name, '', Units(), inputs, drawn) | {
+    return _model_json(closure, name or closure.name, '', Units(), inputs, drawn) | {
         'others': [],
-        **_analysis(closure, Units()),
+        **_analyse_linkage(closure, Units()),
     }
 
 
-def _quick(
-    written: Linkage, name: str, text: str, content: Section, shown: Shown
+def _quick_model(
+    written: Linkage, name: str, text: str, content: Section, shown: ViewState
 ) -> dict[str, Any] | None:
     """Return the model of a linkage as it is shown; None if it does not close, or slides."""
     closure = Closure(written, name)
@@ -125,10 +127,10 @@ def _quick(
     if not position.joints or is_iterated(closure):
         return None
     drawn = pose_in_frames(closure, position, shown.size)
-    return _model(closure, name, text, content.units, shown.inputs, drawn)
+    return _model_json(closure, name, text, content.units, shown.inputs, drawn)
 
 
-def _model(
+def _model_json(
     closure: Closure, name: str, text: str, units: Units, inputs: tuple[float, ...],
     drawn: dict[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
@@ -143,8 +145,8 @@ def _model(
             {
                 'name': given.joint,
                 'unit': given.unit,
-                'low': _finite(given.limits.low),
-                'high': _finite(given.limits.high),
+                'low': _finite_or_none(given.limits.low),
+                'high': _finite_or_none(given.limits.high),
                 'value': value,
             }
             for given, value in zip(linkage.inputs, inputs, strict=True)
@@ -156,7 +158,7 @@ def _model(
         'links': list(closure.link_frames.links),
         'driven': sorted(driven_links(closure)),
         'program': program,
-        'poses': [] if program else _poses(closure, inputs),
+        'poses': [] if program else _range_poses(closure, inputs),
         'drawn': drawn,
         'pins': [
             {
@@ -178,7 +180,7 @@ def _model(
             }
             for slider, its in linkage.sliders.items()
         ],
-        'lengths': list(_lengths(closure)),
+        'lengths': list(_point_distances(closure)),
         'unit': {'length': units.length, 'factor': units.to_si(1.0, 'm')},
         'choices': {key: {'now': now.get(key), 'sides': list(of)} for key, of in sides.items()},
         'inputs_possible': [
@@ -198,18 +200,18 @@ def program_of(closure: Closure) -> str | None:
         return None
 
 
-def _poses(closure: Closure, inputs: tuple[float, ...]) -> list[dict[str, Any]]:
+def _range_poses(closure: Closure, inputs: tuple[float, ...]) -> list[dict[str, Any]]:
     """Return poses over the range of the first input, the others held."""
-    way = InputSweep(closure, inputs)
+    sweep = InputSweep(closure, inputs)
     values = {inputs[0]}
-    for interval in way.ranges:
+    for interval in sweep.ranges:
         step = (interval.highest - interval.lowest) / _SAMPLES
         values |= {interval.lowest + step * i for i in range(_SAMPLES + 1)}
     states = [(value, *inputs[1:]) for value in sorted(values)]
-    return [{'inputs': list(state), **pose(closure, state)} for state in states]
+    return [{'inputs': list(state), **compute_pose(closure, state)} for state in states]
 
 
-def _lengths(closure: Closure) -> Iterator[dict[str, Any]]:
+def _point_distances(closure: Closure) -> Iterator[dict[str, Any]]:
     """Yield the distances of points of a link, those that a file gives by coordinates."""
     for link, points in closure.linkage.links.items():
         pairs = list(combinations(points, 2))
@@ -225,7 +227,7 @@ def _lengths(closure: Closure) -> Iterator[dict[str, Any]]:
             }
 
 
-def _others(closure: Closure, content: Section) -> list[dict[str, Any]]:
+def _other_assemblies(closure: Closure, content: Section) -> list[dict[str, Any]]:
     """Return the other assemblies in which the linkage closes."""
     try:
         found = find_closures(content, closure.name)
@@ -236,30 +238,32 @@ def _others(closure: Closure, content: Section) -> list[dict[str, Any]]:
     return [{'text': text, 'program': program_of(other)} for text, other in others[:_MOST_GHOSTS]]
 
 
-def _analysis(closure: Closure, units: Units) -> dict[str, Any]:
+def _analyse_linkage(closure: Closure, units: Units) -> dict[str, Any]:
     """Return ranges, toggles, quality over the first input, and warnings."""
-    way = InputSweep(closure, usual_inputs(closure))
+    sweep = InputSweep(closure, usual_inputs(closure))
     values: list[float] = []
-    for interval in way.ranges:
+    for interval in sweep.ranges:
         # Its ends are toggles as a rule, where a curve is steepest.
-        count = max(2, _SAMPLES // len(way.ranges))
+        count = max(2, _SAMPLES // len(sweep.ranges))
         step = (interval.highest - interval.lowest) / (count - 1)
         values += [interval.lowest + step * i for i in range(count - 1)] + [interval.highest]
-    margins = [_margin(closure, way, value) for value in values]
-    angles, conditioning = ([_finite(each[i]) for each in margins] for i in (0, 1))
+    margins = [_quality_at(closure, sweep, value) for value in values]
+    angles, conditioning = ([_finite_or_none(each[i]) for each in margins] for i in (0, 1))
     return {
-        'ranges': [[interval.lowest, interval.highest] for interval in way.ranges],
+        'ranges': [[interval.lowest, interval.highest] for interval in sweep.ranges],
         'toggles': [
             each.value for each in closure.singular_inputs if each.status is Status.TOGGLE
         ],
         'quality': {'input': values, 'transmission_angle': angles, 'margin': conditioning},
-        'warnings': list(_warnings(closure, units, [each for each in angles if each is not None])),
+        'warnings': list(
+            _linkage_warnings(closure, units, [each for each in angles if each is not None])
+        ),
     }
 
 
-def _margin(closure: Closure, way: InputSweep, value: float) -> tuple[float, float]:
+def _quality_at(closure: Closure, sweep: InputSweep, value: float) -> tuple[float, float]:
     """Return transmission angle and conditioning at an input; infinite if they are unknown."""
-    position = way.position_at(value)
+    position = sweep.position_at(value)
     if not position.joints:
         return inf, inf
     margin = closure.singularity_margin(position)
@@ -268,7 +272,7 @@ def _margin(closure: Closure, way: InputSweep, value: float) -> tuple[float, flo
     return margin.transmission_angle, margin.conditioning
 
 
-def _warnings(closure: Closure, units: Units, angles: list[float]) -> Iterator[str]:
+def _linkage_warnings(closure: Closure, units: Units, angles: list[float]) -> Iterator[str]:
     for note in linkage_notes(closure.linkage, units):
         yield str(note)
     if angles and min(angles) < _POOR:
@@ -279,12 +283,12 @@ def _warnings(closure: Closure, units: Units, angles: list[float]) -> Iterator[s
         yield f'{kinds} at {len(passed)} input{"s" if len(passed) > 1 else ""}'
 
 
-def _finite(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     """Return a number that JSON can hold; None for one that is not finite."""
     return value if isfinite(value) else None
 
 
-def pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
+def compute_pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
     """Return a pose as the program would, if a linkage has none; rates at a first input of 1."""
     position = closure.position(*inputs)
     found: dict[str, Any] = {
@@ -298,7 +302,7 @@ def pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
     if not position.joints:
         return found
     frames = closure.link_frames
-    found['frames'] = _flat(frames.frames_at(position))
+    found['frames'] = _flatten_frames(frames.frames_at(position))
     if position.status.has_rates:
         rest = [0.0] * (len(inputs) - 1)
         velocity = closure.velocity(position, 1.0, *rest)
@@ -306,7 +310,7 @@ def pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
         motion = {
             'rates': list(velocity.joints),
             'accelerations': list(acceleration.joints),
-            'frameRates': _flat(frames.frame_rates(position, velocity)),
+            'frameRates': _flatten_frames(frames.frame_rates(position, velocity)),
         }
         # Beside a toggle they may be larger than a number can be.
         if all(map(isfinite, chain(*motion.values()))):
@@ -314,5 +318,5 @@ def pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
     return found
 
 
-def _flat(frames: Sequence[tuple[complex, float]]) -> list[float]:
+def _flatten_frames(frames: Sequence[tuple[complex, float]]) -> list[float]:
     return [value for place, angle in frames for value in (place.real, place.imag, angle)]

@@ -55,7 +55,7 @@ _CURVES = {
 }
 
 
-def page(
+def page_html(
     model: Mapping[str, Any],
     *,
     mode: str,
@@ -97,11 +97,11 @@ def page(
     scripts = [('linkage_ros.pages', f'{name}.js') for name in _SHARED]
     scripts += [(_PACKAGE, f'{name}.js') for name in _SCRIPTS]
     styles = [(_PACKAGE, 'view.css')]
-    body = _body(title, mode, can_save)
+    body = _page_body(title, mode, can_save)
     return document(title, body, data, styles, scripts, policy=SERVED_POLICY)
 
 
-def _body(title: str, mode: str, can_save: bool) -> Iterator[str]:
+def _page_body(title: str, mode: str, can_save: bool) -> Iterator[str]:
     editing = mode == 'edit'
     yield from _header(title, editing, can_save)
     yield '<p id="lost" role="status" hidden>Not connected: <span id="lost-why"></span>. '

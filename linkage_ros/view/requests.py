@@ -35,9 +35,9 @@ from linkage_ros.files.linkage_file import FARTHEST, read_closure
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.resources import linkage_names, shipped
-from linkage_ros.view.edit import edited, pin_of
-from linkage_ros.view.exports import export
-from linkage_ros.view.model import model, pose, Shown
+from linkage_ros.view.edit import edit_text, pin_of
+from linkage_ros.view.exports import export_linkage
+from linkage_ros.view.model import build_model, compute_pose, ViewState
 from linkage_ros.view.sensors import SceneFiles, Sensors
 
 LARGEST = 1_000_000
@@ -89,8 +89,8 @@ def read_request(message: str) -> Request:
     if type(number) not in (int, float) or not abs(number) <= 2**53:
         raise RequestError('has no id', 'send a number as id')
     do = content.get('do')
-    if not isinstance(do, str) or do not in _ANSWERS:
-        raise RequestError(f'asks for {quoted(do)}', f'ask for {listed(_ANSWERS)}', number)
+    if not isinstance(do, str) or do not in _HANDLERS:
+        raise RequestError(f'asks for {quoted(do)}', f'ask for {listed(_HANDLERS)}', number)
     return Request(number, do, content)
 
 
@@ -98,7 +98,7 @@ def _not_a_number(text: str) -> NoReturn:
     raise ValueError(f'{text} is not JSON')
 
 
-class Answers:
+class RequestHandler:
     """
     Answers the requests of all pages of a server.
 
@@ -119,7 +119,7 @@ class Answers:
         self._report = report
         self._sensors: OrderedDict[int, Sensors] = OrderedDict()
 
-    def answer(self, page: int, request: Request) -> str:
+    def answer_request(self, page: int, request: Request) -> str:
         """
         Return the answer to a request, as JSON.
 
@@ -137,15 +137,15 @@ class Answers:
             the link that it concerns. A defect of this package is such an error too.
 
         """
-        asked = _Asked(request.content, self._name, partial(self._sensors_of, page))
+        fields = _RequestFields(request.content, self._name, partial(self._sensors_of, page))
         try:
-            return _json({'id': request.number, 'ok': _ANSWERS[request.do](asked)})
+            return _compact_json({'id': request.number, 'ok': _HANDLERS[request.do](fields)})
         except LinkageError as error:
-            return failed(request.number, error, request.content)
+            return failure_answer(request.number, error, request.content)
         except Exception as error:  # noqa: BLE001 (a request must not end its server)
-            found = defect(request.do, error)
+            found = defect_error(request.do, error)
             self._report(str(found))
-            return failed(request.number, found)
+            return failure_answer(request.number, found)
 
     def _sensors_of(self, page: int, text: str | None) -> Sensors:
         """Return the sensors of a page; new ones if it has changed the linkage."""
@@ -160,7 +160,7 @@ class Answers:
         return sensors
 
 
-class _Asked(NamedTuple):
+class _RequestFields(NamedTuple):
     """
     What a request holds: the message, and the name of the linkage that the server opened.
 
@@ -176,8 +176,8 @@ class _Asked(NamedTuple):
         """Return the text of the linkage."""
         text = self.content.get('text')
         if not isinstance(text, str):
-            raise _wrong('text', text, 'the text of a linkage file')
-        encoded(text, self.name)
+            raise _invalid_value('text', text, 'the text of a linkage file')
+        encode_text(text, self.name)
         return text
 
     @property
@@ -185,21 +185,21 @@ class _Asked(NamedTuple):
         """Return the name of the linkage: it names files, and the place of errors."""
         name = self.content.get('name', self.opened)
         if not isinstance(name, str) or not 0 < len(name) <= _LONGEST_NAME or '/' in name:
-            raise _wrong('name', name, f'a name of at most {_LONGEST_NAME} letters')
+            raise _invalid_value('name', name, f'a name of at most {_LONGEST_NAME} letters')
         return clean(name)
 
     @property
-    def whole(self) -> bool:
+    def is_whole(self) -> bool:
         """Return whether the slower parts of a model are asked for."""
         whole = self.content.get('whole', False)
         if not isinstance(whole, bool):
-            raise _wrong('whole', whole, 'true or false')
+            raise _invalid_value('whole', whole, 'true or false')
         return whole
 
     @property
     def size(self) -> float:
         """Return half the width of the bars that are shown, in [m]; 0 if it is not told."""
-        (size,) = _numbers('size', [self.content.get('size', 0.0)], 1)
+        (size,) = _read_numbers('size', [self.content.get('size', 0.0)], 1)
         return max(0.0, size)
 
     @property
@@ -207,81 +207,89 @@ class _Asked(NamedTuple):
         """Return the linkage."""
         return closure_of(self.text, self.name)
 
-    def numbers(self, key: str, count: int) -> tuple[float, ...]:
+    def read_numbers(self, key: str, count: int) -> tuple[float, ...]:
         """Return a list of so many numbers."""
-        return _numbers(key, self.content.get(key), count)
+        return _read_numbers(key, self.content.get(key), count)
 
 
-def _model(asked: _Asked) -> dict[str, Any]:
-    return model(asked.text, asked.name, whole=asked.whole)
+def _answer_model(fields: _RequestFields) -> dict[str, Any]:
+    return build_model(fields.text, fields.name, whole=fields.is_whole)
 
 
-def _edit(asked: _Asked) -> dict[str, Any]:
-    edit = asked.content.get('edit')
+def _answer_edit(fields: _RequestFields) -> dict[str, Any]:
+    edit = fields.content.get('edit')
     if not isinstance(edit, dict):
-        raise _wrong('edit', edit, 'an object')
-    text, inputs = edited(asked.text, edit, asked.name)
-    shown = Shown(tuple(inputs), asked.size) if asked.size else None
-    found = model(text, asked.name, whole=asked.whole, shown=shown)
+        raise _invalid_value('edit', edit, 'an object')
+    text, inputs = edit_text(fields.text, edit, fields.name)
+    shown = ViewState(tuple(inputs), fields.size) if fields.size else None
+    found = build_model(text, fields.name, whole=fields.is_whole, shown=shown)
     for given, value in zip(found['inputs'], inputs, strict=False):
         given['value'] = value
     return found
 
 
-def _open(asked: _Asked) -> dict[str, Any]:
-    name, names = asked.content.get('name'), linkage_names()
+def _answer_open(fields: _RequestFields) -> dict[str, Any]:
+    name, names = fields.content.get('name'), linkage_names()
     if not isinstance(name, str) or name not in names:
         remedy = did_you_mean(str(name), names, f'name one of {listed(names)}')
         raise LinkageError('name', f'{quoted(name)} is no shipped linkage', remedy)
-    return model(shipped(f'linkages/{name}.yaml').read_text('utf-8'), name, whole=True)
+    return build_model(shipped(f'linkages/{name}.yaml').read_text('utf-8'), name, whole=True)
 
 
-def _names(_asked: _Asked) -> dict[str, Any]:
+def _answer_names(_fields: _RequestFields) -> dict[str, Any]:
     return {'linkages': linkage_names()}
 
 
-def _save(asked: _Asked) -> dict[str, Any]:
+def _answer_save(fields: _RequestFields) -> dict[str, Any]:
     """Check that a text is a linkage; the server then saves it."""
-    if asked.name != asked.opened:
-        reason = f'{quoted(asked.name)} is not the file with which this page was opened'
+    if fields.name != fields.opened:
+        reason = f'{quoted(fields.name)} is not the file with which this page was opened'
         raise LinkageError('save', reason, 'download the linkage')
-    read_closure(parse_yaml(encoded(asked.text, asked.name), asked.name), asked.name)
+    read_closure(parse_yaml(encode_text(fields.text, fields.name), fields.name), fields.name)
     return {}
 
 
-def _export(asked: _Asked) -> dict[str, Any]:
-    closure = asked.closure
-    given = asked.content.get('inputs')
-    inputs = None if given is None else asked.numbers('inputs', len(closure.linkage.inputs))
-    found = export(str(asked.content.get('kind')), closure, asked.text, asked.name, inputs)
+def _answer_export(fields: _RequestFields) -> dict[str, Any]:
+    closure = fields.closure
+    given = fields.content.get('inputs')
+    inputs = None if given is None else fields.read_numbers('inputs', len(closure.linkage.inputs))
+    found = export_linkage(
+        str(fields.content.get('kind')), closure, fields.text, fields.name, inputs
+    )
     return {'name': found.name, 'type': found.media_type, 'data': b64encode(found.data).decode()}
 
 
-def _poses(asked: _Asked) -> dict[str, Any]:
-    closure, poses = asked.closure, asked.content.get('inputs')
+def _answer_poses(fields: _RequestFields) -> dict[str, Any]:
+    closure, poses = fields.closure, fields.content.get('inputs')
     if not isinstance(poses, list) or len(poses) > _MOST_POSES:
-        raise _wrong('inputs', poses, f'a list of at most {_MOST_POSES} lists of numbers')
+        raise _invalid_value('inputs', poses, f'a list of at most {_MOST_POSES} lists of numbers')
     count = len(closure.linkage.inputs)
-    return {'poses': [pose(closure, _numbers('inputs', inputs, count)) for inputs in poses]}
+    return {
+        'poses': [
+            compute_pose(closure, _read_numbers('inputs', inputs, count)) for inputs in poses
+        ]
+    }
 
 
-def _read(asked: _Asked) -> dict[str, Any]:
-    sensors = asked.sensors(asked.text if 'text' in asked.content else None)
-    (t,) = _numbers('t', [asked.content.get('t')], 1)
+def _answer_read(fields: _RequestFields) -> dict[str, Any]:
+    sensors = fields.sensors(fields.text if 'text' in fields.content else None)
+    (t,) = _read_numbers('t', [fields.content.get('t')], 1)
     return sensors.read(
-        t, asked.numbers('inputs', sensors.count), asked.numbers('rates', sensors.count)
+        t,
+        fields.read_numbers('inputs', sensors.count),
+        fields.read_numbers('rates', sensors.count),
     )
 
 
-_ANSWERS: dict[str, Callable[[_Asked], dict[str, Any]]] = {
-    'model': _model,
-    'edit': _edit,
-    'open': _open,
-    'names': _names,
-    'save': _save,
-    'export': _export,
-    'poses': _poses,
-    'read': _read,
+_HANDLERS: dict[str, Callable[[_RequestFields], dict[str, Any]]] = {
+    'model': _answer_model,
+    'edit': _answer_edit,
+    'open': _answer_open,
+    'names': _answer_names,
+    'save': _answer_save,
+    'export': _answer_export,
+    'poses': _answer_poses,
+    'read': _answer_read,
 }
 """What a page can ask for."""
 
@@ -289,10 +297,10 @@ _ANSWERS: dict[str, Callable[[_Asked], dict[str, Any]]] = {
 @lru_cache(maxsize=4)
 def closure_of(text: str, name: str) -> Closure:
     """Return the closure of a linkage file's text; errors are those of `linkage_ros.load`."""
-    return read_closure(parse_yaml(encoded(text, name), name), name)
+    return read_closure(parse_yaml(encode_text(text, name), name), name)
 
 
-def encoded(text: str, name: str) -> bytes:
+def encode_text(text: str, name: str) -> bytes:
     """
     Return the bytes of a file's text.
 
@@ -309,13 +317,13 @@ def encoded(text: str, name: str) -> bytes:
         raise FileError(name, '', reason, 'remove the character') from None
 
 
-def defect(where: str, error: BaseException) -> LinkageError:
+def defect_error(where: str, error: BaseException) -> LinkageError:
     """Return a defect of this package as an error of one line."""
     reason = f'failed by {type(error).__name__} ({shortened(str(error), 300)})'
     return LinkageError(where, reason, 'please report it with the linkage file')
 
 
-def failed(
+def failure_answer(
     number: float | None, error: LinkageError, content: Mapping[str, Any] | None = None
 ) -> str:
     """
@@ -332,11 +340,11 @@ def failed(
 
     """
     where = error.key if isinstance(error, FileError) else error.where
-    pin = None if content is None else _pin(error, content)
-    return _json({'id': number, 'error': {'text': str(error), 'where': where, 'pin': pin}})
+    pin = None if content is None else _find_pin(error, content)
+    return _compact_json({'id': number, 'error': {'text': str(error), 'where': where, 'pin': pin}})
 
 
-def _pin(error: LinkageError, content: Mapping[str, Any]) -> str | None:
+def _find_pin(error: LinkageError, content: Mapping[str, Any]) -> str | None:
     """Return the pin or the link that an error concerns: one that it names, or the edited one."""
     text = content.get('text')
     # A text may hold half of a surrogate pair, which may be the error.
@@ -349,19 +357,19 @@ def _pin(error: LinkageError, content: Mapping[str, Any]) -> str | None:
     return next((pin for pin in found if isinstance(pin, str)), None)
 
 
-def _json(answer: Any) -> str:
+def _compact_json(answer: Any) -> str:
     return json.dumps(answer, allow_nan=False, separators=(',', ':'))
 
 
-def _numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
+def _read_numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
     if (
         not isinstance(values, list)
         or len(values) != count
         or not all(type(value) in (int, float) and abs(value) <= FARTHEST for value in values)
     ):
-        raise _wrong(key, values, 'a number' if count == 1 else f'{count} numbers')
+        raise _invalid_value(key, values, 'a number' if count == 1 else f'{count} numbers')
     return tuple(map(float, values))
 
 
-def _wrong(key: str, value: Any, expected: str) -> LinkageError:
+def _invalid_value(key: str, value: Any, expected: str) -> LinkageError:
     return LinkageError(key, f'{quoted(value)} is not valid', f'send {expected}')

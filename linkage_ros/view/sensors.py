@@ -60,12 +60,12 @@ class Sensors:
         # The user names this scene to be shown: its own effects are imported, as in a run of it.
         scene = parse_scene(files.name, files.name, data, files.folder, trust_effects=True)
         self.text = text
-        self._member = _by_hand(scene.linkages[0])
-        self._scene = replace(scene, members=(self._member,), faults={})
+        self._scene_linkage = _driven_by_hand(scene.linkages[0])
+        self._scene = replace(scene, members=(self._scene_linkage,), faults={})
         self._rate = min(scene.rate, _FASTEST)
-        self.count = len(self._member.linkage.inputs)
+        self.count = len(self._scene_linkage.linkage.inputs)
         self._closure: Closure | None = None
-        self._line: LinkagePipeline | None = None
+        self._linkage: LinkagePipeline | None = None
         self._last: tuple[float, Sequence[float]] = 0.0, ()
         self._reading: SensorReading | None = None
 
@@ -89,15 +89,17 @@ class Sensors:
 
         """
         since, before = self._last
-        line = self._line
+        line = self._linkage
         if line is None or not since <= t <= since + _LONGEST:
-            line = self._line = LinkagePipeline(self._scene, self._member, self._closure, None)
+            line = self._linkage = LinkagePipeline(
+                self._scene, self._scene_linkage, self._closure, None
+            )
             self._closure = line.closure
             self._reading = None
             since, before = t, inputs
             times: Sequence[float] = [t]
         else:
-            times = list(self._ticks(since, t))
+            times = list(self._tick_times(since, t))
         self._last = t, inputs
         for time in times:
             share = (time - since) / (t - since) if t > since else 1.0
@@ -106,9 +108,9 @@ class Sensors:
             assert isinstance(line.drive, TopicDrive)
             line.drive.sample = now, angles, tuple(rates), (0.0,) * self.count
             self._reading = line.complete_state(line.compute_state(now)).reading
-        return self._told(inputs)
+        return self._readings_content(inputs)
 
-    def _ticks(self, since: float, until: float) -> Iterator[float]:
+    def _tick_times(self, since: float, until: float) -> Iterator[float]:
         """Yield the times of the ticks after one time and up to another, in [s]."""
         if self._rate == 0.0:  # a tick for each sample
             yield until
@@ -116,10 +118,10 @@ class Sensors:
         for number in range(floor(since * self._rate) + 1, floor(until * self._rate) + 1):
             yield number / self._rate
 
-    def _told(self, inputs: Sequence[float]) -> dict[str, Any]:
+    def _readings_content(self, inputs: Sequence[float]) -> dict[str, Any]:
         if self._reading is None:
             return {'read': {}, 'frames': []}
-        member = self._member
+        member = self._scene_linkage
         read = dict(zip(member.joint_names, self._reading.joints, strict=True))
         values = dict(zip(member.input_names, inputs, strict=True)) | read
         arrays = {name: np.array([value]) for name, value in values.items()}
@@ -130,12 +132,12 @@ class Sensors:
         return {'read': read, 'frames': frames.ravel().tolist() if finite else []}
 
 
-def _by_hand(member: SceneLinkage) -> SceneLinkage:
+def _driven_by_hand(scene_linkage: SceneLinkage) -> SceneLinkage:
     """Return a linkage whose crank is moved from outside."""
-    effects, loads = member.effects, member.loads
+    effects, loads = scene_linkage.effects, scene_linkage.loads
     if not any(name in effects for name in FORCE_EFFECTS):
         # They acted on the drive alone.
         effects = {name: given for name, given in effects.items() if name != 'friction'}
         loads = None
     drive = 'topic', TopicParameters()
-    return replace(member, drive=drive, effects=effects, loads=loads)
+    return replace(scene_linkage, drive=drive, effects=effects, loads=loads)

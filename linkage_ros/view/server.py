@@ -29,7 +29,7 @@ from typing import Any
 
 from aiohttp import web
 from linkage_ros.errors import LinkageError
-from linkage_ros.view.requests import defect, LARGEST
+from linkage_ros.view.requests import defect_error, LARGEST
 
 HOST = '127.0.0.1'
 
@@ -68,7 +68,7 @@ def serve(
 
 
 async def _serve(server: Server, stop: Event, ready: Callable[[str], Any], port: int) -> None:
-    asyncio.get_running_loop().set_exception_handler(server.failed)
+    asyncio.get_running_loop().set_exception_handler(server.report_failure)
     await server.start(port)
     try:
         ready(server.address)
@@ -150,19 +150,19 @@ class Server:
         if self._runner is not None:
             await self._runner.cleanup()
 
-    def refuse(self, what: str) -> None:
+    def count_refusal(self, what: str) -> None:
         """Count something that is refused; say so the first time."""
         self.refused[what] += 1
         if self.refused[what] == 1:
             self._report(f'refused {what}')
 
-    def failed(self, _loop: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
+    def report_failure(self, _loop: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
         """Report in one line what fails beside a request; asyncio would print a traceback."""
         error = context.get('exception')
         if isinstance(error, OSError):
-            self.refuse(f'a connection ({error.strerror})')
+            self.count_refusal(f'a connection ({error.strerror})')
         elif error is not None:
-            self._report(str(defect('linkage view', error)))
+            self._report(str(defect_error('linkage view', error)))
 
     @asynccontextmanager
     async def socket(self, request: web.Request) -> AsyncIterator[web.WebSocketResponse]:
@@ -174,7 +174,7 @@ class Server:
         if await self._has_place(request.path):
             self._sockets[socket] = request.path
         else:
-            self.refuse('a page too many')
+            self.count_refusal('a page too many')
             message = f'{MOST_PAGES} pages are open; close one'.encode()
             await socket.close(code=TRY_LATER, message=message)
         try:
@@ -184,7 +184,7 @@ class Server:
         finally:
             self._sockets.pop(socket, None)
             if socket.exception() is not None:
-                self.refuse('what is no WebSocket message')
+                self.count_refusal('what is no WebSocket message')
 
     async def _has_place(self, path: str) -> bool:
         """Return whether one more page may be open, if need be after one that is being closed."""
@@ -201,30 +201,30 @@ class Server:
         # Browsers name the origin of every WebSocket, but not that of every page.
         unnamed: list[list[str]] = [] if 'Upgrade' in request.headers else [[]]
         if request.headers.getall('Host', []) not in [[host] for host in self._hosts]:
-            return self._refused(403, 'a request that names another host')
+            return self._refuse(403, 'a request that names another host')
         if request.headers.getall('Origin', []) not in own + unnamed:
-            return self._refused(403, 'a request of another origin')
+            return self._refuse(403, 'a request of another origin')
         token = request.rel_url.raw_path.lstrip('/').partition('/')[0]
         if not compare_digest(token.encode('utf-8', 'replace'), self._token.encode()):
-            return self._refused(404, 'a request without the token')
+            return self._refuse(404, 'a request without the token')
         if request.method not in ('GET', 'HEAD'):
-            return self._refused(405, 'a request that is no GET')
+            return self._refuse(405, 'a request that is no GET')
         try:
             response: web.StreamResponse = await handler(request)
         except web.HTTPException:
-            return self._refused(404, 'a request for something that is not here')
+            return self._refuse(404, 'a request for something that is not here')
         except LinkageError as error:
             return web.Response(status=500, text=f'{error}\n')
         except ConnectionError:  # the page has gone
             raise
         except Exception as error:  # noqa: BLE001 (a page must not end its server)
-            found = defect('linkage view', error)
+            found = defect_error('linkage view', error)
             self._report(str(found))
             return web.Response(status=500, text=f'{found}\n')
         return response
 
-    def _refused(self, status: int, what: str) -> web.Response:
-        self.refuse(what)
+    def _refuse(self, status: int, what: str) -> web.Response:
+        self.count_refusal(what)
         remedy = 'open the address that linkage view has printed'
         return web.Response(status=status, text=f'linkage view refuses {what}; {remedy}\n')
 

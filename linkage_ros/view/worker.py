@@ -30,7 +30,7 @@ from typing import BinaryIO
 import warnings
 
 from linkage_ros.errors import clean, LinkageError
-from linkage_ros.view.requests import Answers, read_request
+from linkage_ros.view.requests import read_request, RequestHandler
 from linkage_ros.view.sensors import SceneFiles
 
 _ASKED, _ANSWERED = struct.Struct('>II'), struct.Struct('>I')
@@ -61,9 +61,9 @@ class Worker:
     async def start(self) -> None:
         """Start the process before it is needed."""
         async with self._one:
-            await asyncio.to_thread(self._started)
+            await asyncio.to_thread(self._start_process)
 
-    async def ask(self, page: int, do: str, message: str) -> str:
+    async def send_request(self, page: int, do: str, message: str) -> str:
         """
         Return the answer to a page's request, as JSON.
 
@@ -72,7 +72,7 @@ class Worker:
         async with self._one:
             answered = False
             try:
-                exchange = asyncio.to_thread(self._exchange, page, message.encode())
+                exchange = asyncio.to_thread(self._exchange_frames, page, message.encode())
                 answer = await asyncio.wait_for(exchange, self.longest)
                 answered = True
             except asyncio.TimeoutError:
@@ -83,7 +83,7 @@ class Worker:
                 raise LinkageError(do, reason, remedy) from None
             finally:
                 if not answered:
-                    await asyncio.to_thread(self._end)
+                    await asyncio.to_thread(self._end_process)
             return answer
 
     async def end(self) -> None:
@@ -92,9 +92,9 @@ class Worker:
         if self._process is not None:
             self._process.kill()  # a request that waits for it then ends
         async with self._one:
-            await asyncio.to_thread(self._end)
+            await asyncio.to_thread(self._end_process)
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _start_process(self) -> subprocess.Popen[bytes]:
         if self._ended:
             raise LinkageError('linkage view', 'has ended', 'start it again')
         if self._process is None:
@@ -108,13 +108,13 @@ class Worker:
                 # Ctrl-C is for the server, which then ends this process.
                 start_new_session=True,
             )
-            self._write(0, self._opening)
+            self._write_request(0, self._opening)
         return self._process
 
-    def _exchange(self, page: int, message: bytes) -> str:
-        process = self._started()
+    def _exchange_frames(self, page: int, message: bytes) -> str:
+        process = self._start_process()
         assert process.stdout is not None
-        self._write(page, message)
+        self._write_request(page, message)
         head = process.stdout.read(_ANSWERED.size)
         if len(head) < _ANSWERED.size:
             raise EOFError
@@ -124,13 +124,13 @@ class Worker:
             raise EOFError
         return answer.decode()
 
-    def _write(self, page: int, message: bytes) -> None:
+    def _write_request(self, page: int, message: bytes) -> None:
         assert self._process is not None
         assert self._process.stdin is not None
         self._process.stdin.write(_ASKED.pack(page, len(message)) + message)
         self._process.stdin.flush()
 
-    def _end(self) -> None:
+    def _end_process(self) -> None:
         process, self._process = self._process, None
         if process is not None:
             process.kill()
@@ -145,16 +145,16 @@ def main() -> None:
     warnings.simplefilter('ignore')  # the page shows what matters
     asked, answers = sys.stdin.buffer, os.fdopen(os.dup(1), 'wb')
     os.dup2(2, 1)  # nothing that a library prints gets between the frames
-    opening = _frame(asked)
+    opening = _read_frame(asked)
     if opening is None:
         return
     name, scene, longest = json.loads(opening[1])
-    given = Answers(name, None if scene is None else SceneFiles(*scene), report)
-    while (frame := _frame(asked)) is not None:
+    given = RequestHandler(name, None if scene is None else SceneFiles(*scene), report_line)
+    while (frame := _read_frame(asked)) is not None:
         # The alarm ends this process, if nobody else does.
         signal.setitimer(signal.ITIMER_REAL, longest + _SPARE)
         page, message = frame
-        answer = given.answer(page, read_request(message)).encode()
+        answer = given.answer_request(page, read_request(message)).encode()
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         try:
             answers.write(_ANSWERED.pack(len(answer)) + answer)
@@ -163,13 +163,13 @@ def main() -> None:
             return
 
 
-def report(line: str) -> None:
+def report_line(line: str) -> None:
     """Write a line to the terminal of the server."""
     sys.stderr.write(f'linkage view: {clean(line)}\n')
     sys.stderr.flush()
 
 
-def _frame(stream: BinaryIO) -> tuple[int, str] | None:
+def _read_frame(stream: BinaryIO) -> tuple[int, str] | None:
     """Return the number of a page and its message; None where the server has gone."""
     head = stream.read(_ASKED.size)
     if len(head) < _ASKED.size:

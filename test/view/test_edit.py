@@ -20,8 +20,8 @@ from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.resources import linkage_names, shipped
-from linkage_ros.view.edit import Edited, edited, pin_of
-from linkage_ros.view.model import model
+from linkage_ros.view.edit import edit_text, EditResult, pin_of
+from linkage_ros.view.model import build_model
 import pytest
 
 SEED = 20261123
@@ -59,7 +59,7 @@ def changed_lines(before: str, after: str) -> list[str]:
 def test_a_dragged_pin_is_at_its_new_place_and_all_others_at_theirs(name: str) -> None:
     text = text_of(name)
     closure = closure_of(text)
-    start = tuple(given['value'] for given in model(text, name, whole=False)['inputs'])
+    start = tuple(given['value'] for given in build_model(text, name, whole=False)['inputs'])
     places = pins_of(closure, start)
     slides = {slider.point for slider in closure.linkage.sliders.values()}
     rng, moved = random.Random(f'{SEED} {name}'), 0
@@ -68,7 +68,7 @@ def test_a_dragged_pin_is_at_its_new_place_and_all_others_at_theirs(name: str) -
         pin = rng.choice([pin for pin in places if pin not in slides | through])
         way = complex(rng.gauss(0.0, 1.0), rng.gauss(0.0, 1.0)) * 0.05 * closure.scale
         to = places[pin] + way
-        found = edited(text, {'pin': pin, 'to': [to.real, to.imag], 'inputs': list(start)})
+        found = edit_text(text, {'pin': pin, 'to': [to.real, to.imag], 'inputs': list(start)})
         try:
             after = closure_of(found.text)
         except FileError:  # a length that cannot close, which the model tells
@@ -80,7 +80,7 @@ def test_a_dragged_pin_is_at_its_new_place_and_all_others_at_theirs(name: str) -
 
 
 def test_a_dragged_pin_changes_lengths_and_keeps_the_form_of_the_file() -> None:
-    found = edited(FOUR_BAR, {'pin': 'B', 'to': [0.13, 0.07], 'inputs': [0.7]})
+    found = edit_text(FOUR_BAR, {'pin': 'B', 'to': [0.13, 0.07], 'inputs': [0.7]})
     lines = changed_lines(FOUR_BAR, found.text)
     assert lines[:2] == [
         '  coupler: {A: [0, 0], B: [0.10880267554, 0], P: [0.06181391099, 0.02605840378]}',
@@ -92,34 +92,38 @@ def test_a_dragged_pin_changes_lengths_and_keeps_the_form_of_the_file() -> None:
 
 
 def test_a_crank_that_is_dragged_turns() -> None:
-    found = edited(FOUR_BAR, {'pin': 'A', 'to': [0.03, 0.03], 'inputs': [0.7 + 6.283185307179586]})
+    found = edit_text(
+        FOUR_BAR, {'pin': 'A', 'to': [0.03, 0.03], 'inputs': [0.7 + 6.283185307179586]}
+    )
     assert found.inputs == pytest.approx((0.7853981633974483 + 6.283185307179586,))
     assert '  crank: {O2: [0, 0], A: [0.04242640687, 0]}' in found.text
 
 
 def test_a_pin_that_is_dragged_through_changes_the_assembly() -> None:
-    found = edited(FOUR_BAR, {'pin': 'B', 'to': [0.13, -0.07], 'inputs': [0.7]})
+    found = edit_text(FOUR_BAR, {'pin': 'B', 'to': [0.13, -0.07], 'inputs': [0.7]})
     # The comment stays.
     assert 'assembly: {B: right}              # the side of A→O4 on which B lies' in found.text
 
 
 def test_a_pin_in_a_slot_stays_in_it() -> None:
     text = text_of('slider_crank')
-    found = edited(text, {'pin': 'B', 'to': [0.2, 0.3], 'inputs': [0.5]})
+    found = edit_text(text, {'pin': 'B', 'to': [0.2, 0.3], 'inputs': [0.5]})
     pins = pins_of(closure_of(found.text), found.inputs)
     assert pins['B'] == pytest.approx(0.2 + 0.01j, abs=1e-9)
 
 
 def test_the_pin_of_a_cylinder_changes_its_stroke() -> None:
     text = text_of('excavator_bucket')
-    found = edited(text, {'pin': 'C', 'to': [0.2, 0.4], 'inputs': [1.0]})
+    found = edit_text(text, {'pin': 'C', 'to': [0.2, 0.4], 'inputs': [1.0]})
     # K is at (1.18, 0.3) in the ground.
     assert found.inputs == pytest.approx((abs(1.18 - 0.2 + (0.3 - 0.4) * 1j),))
     assert pins_of(closure_of(found.text), found.inputs)['C'] == pytest.approx(0.2 + 0.4j)
 
 
 def test_snapped_places_are_on_the_grid() -> None:
-    found = edited(FOUR_BAR, {'pin': 'O4', 'to': [0.1234, 0.0061], 'inputs': [0.7], 'snap': 0.005})
+    found = edit_text(
+        FOUR_BAR, {'pin': 'O4', 'to': [0.1234, 0.0061], 'inputs': [0.7], 'snap': 0.005}
+    )
     assert 'ground: {O2: [0, 0], O4: [0.125, 0.005]}' in found.text
 
 
@@ -148,20 +152,20 @@ EDITS: dict[str, tuple[dict[str, Any], list[str]]] = {
 @pytest.mark.parametrize('name', EDITS)
 def test_only_the_lines_that_an_edit_concerns_change(name: str) -> None:
     edit, lines = EDITS[name]
-    found = edited(FOUR_BAR, edit)
+    found = edit_text(FOUR_BAR, edit)
     assert changed_lines(FOUR_BAR, found.text) == lines
     closure_of(found.text)
 
 
 def test_a_point_that_is_traced_no_more_goes() -> None:
-    found = edited(FOUR_BAR, {'untrace': 'P'})
+    found = edit_text(FOUR_BAR, {'untrace': 'P'})
     assert 'P:' not in found.text
     assert 'traced' not in found.text
 
 
 def test_another_input_keeps_the_pose() -> None:
     before = closure_of(FOUR_BAR)
-    found = edited(FOUR_BAR, {'input': {'link': 'rocker'}, 'inputs': [0.7]})
+    found = edit_text(FOUR_BAR, {'input': {'link': 'rocker'}, 'inputs': [0.7]})
     after = closure_of(found.text)
     assert after.input_names == ('rocker_joint',)
     assert after.joint_names == ('crank_joint', 'coupler_joint')
@@ -169,9 +173,11 @@ def test_another_input_keeps_the_pose() -> None:
 
 
 def test_a_shorthand_stays_one_as_long_as_it_can_say_it() -> None:
-    longer = edited(SHORT, {'length': {'link': 'coupler', 'from': 'A', 'to': 'B', 'value': 0.13}})
+    longer = edit_text(
+        SHORT, {'length': {'link': 'coupler', 'from': 'A', 'to': 'B', 'value': 0.13}}
+    )
     assert longer.text == SHORT.replace('b: 120', 'b: 130')
-    found = edited(SHORT, {'trace': {'link': 'coupler', 'at': [0.05, 0.02], 'name': 'P'}})
+    found = edit_text(SHORT, {'trace': {'link': 'coupler', 'at': [0.05, 0.02], 'name': 'P'}})
     assert found.text.startswith('# my press')
     assert closure_of(found.text).linkage.traced == ('P',)
 
@@ -180,7 +186,9 @@ def test_numbers_are_written_in_the_units_of_the_file() -> None:
     text = FOUR_BAR.partition('masses:')[0] + 'units: mm\n'
     text = text.replace('0.100', '100').replace('0.040', '40').replace('0.120', '120')
     text = text.replace('0.080', '80').replace('0.060, 0.030', '60, 30')
-    found = edited(text, {'length': {'link': 'rocker', 'from': 'O4', 'to': 'B', 'value': 0.0815}})
+    found = edit_text(
+        text, {'length': {'link': 'rocker', 'from': 'O4', 'to': 'B', 'value': 0.0815}}
+    )
     assert changed_lines(text, found.text) == ['  rocker: {O4: [0, 0], B: [81.5, 0]}']
 
 
@@ -189,7 +197,7 @@ def test_what_changes_nothing_leaves_the_text_to_the_last_letter() -> None:
         link, points = next(iter(closure_of(text_of(name)).linkage.links.items()))
         point, at = next(iter(points.items()))
         edit = {'place': {'link': link, 'point': point, 'at': list(at)}}
-        assert edited(text_of(name), edit).text == text_of(name)
+        assert edit_text(text_of(name), edit).text == text_of(name)
 
 
 # What is wrong.
@@ -233,7 +241,7 @@ REFUSED = {
 def test_a_wrong_edit_is_refused_in_one_line(name: str) -> None:
     edit, message = REFUSED[name]
     with pytest.raises(LinkageError, match=message) as caught:
-        edited(FOUR_BAR, edit)
+        edit_text(FOUR_BAR, edit)
     assert '\n' not in str(caught.value)
 
 
@@ -248,7 +256,7 @@ def test_random_edits_are_done_or_refused_in_one_line() -> None:
     for _ in range(400):
         edit = {key: rng.choice(values) for key in rng.sample(keys, rng.randint(1, 4))}
         try:
-            done += isinstance(edited(FOUR_BAR, edit), Edited)
+            done += isinstance(edit_text(FOUR_BAR, edit), EditResult)
         except LinkageError as error:
             assert '\n' not in str(error)  # noqa: PT017
     assert done > 5
@@ -257,7 +265,7 @@ def test_random_edits_are_done_or_refused_in_one_line() -> None:
 def test_an_error_is_told_at_the_pin_or_link_that_it_concerns() -> None:
     text = FOUR_BAR.replace('B: left', 'B: ahead')
     with pytest.raises(FileError) as caught:
-        model(text, 'x')
+        build_model(text, 'x')
     assert pin_of(caught.value, FOUR_BAR) == 'B'
     assert pin_of(LinkageError('links.crank.A', 'is wrong', 'mend it'), FOUR_BAR) == 'A'
     assert pin_of(LinkageError('links.crank', 'is wrong', 'mend it'), FOUR_BAR) == 'crank'
@@ -266,9 +274,9 @@ def test_an_error_is_told_at_the_pin_or_link_that_it_concerns() -> None:
 
 
 def test_a_drag_and_the_way_back_close_as_before() -> None:
-    found = edited(FOUR_BAR, {'pin': 'B', 'to': [0.13, 0.07], 'inputs': [0.7]})
+    found = edit_text(FOUR_BAR, {'pin': 'B', 'to': [0.13, 0.07], 'inputs': [0.7]})
     first = pins_of(closure_of(FOUR_BAR), (0.7,))['B']
-    back = edited(found.text, {'pin': 'B', 'to': [first.real, first.imag], 'inputs': [0.7]})
+    back = edit_text(found.text, {'pin': 'B', 'to': [first.real, first.imag], 'inputs': [0.7]})
     position = closure_of(back.text).position(0.7)
     assert position.status is Status.CLOSED
     assert position.joints == pytest.approx(closure_of(FOUR_BAR).position(0.7).joints, abs=1e-8)

@@ -24,8 +24,8 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.resources import shipped
 from linkage_ros.view import exports
-from linkage_ros.view.exports import export, KINDS
-from linkage_ros.view.requests import Answers, read_request
+from linkage_ros.view.exports import export_linkage, KINDS
+from linkage_ros.view.requests import read_request, RequestHandler
 from PIL import Image
 import pytest
 
@@ -37,7 +37,7 @@ def exported(kind: str, name: str, inputs: list[float] | None = None) -> bytes:
     text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
     content = {'id': 1, 'do': 'export', 'kind': kind, 'text': text, 'name': name}
     request = read_request(json.dumps(content | ({'inputs': inputs} if inputs else {})))
-    answer = json.loads(Answers('mine', None, pytest.fail).answer(1, request))
+    answer = json.loads(RequestHandler('mine', None, pytest.fail).answer_request(1, request))
     assert answer['ok']['name'] == f'{name}.{kind}'
     assert answer['ok']['type'] == KINDS[kind][0]
     return b64decode(answer['ok']['data'])
@@ -118,12 +118,12 @@ def test_javascript_gives_the_joints_of_the_closure(name: str, tmp_path: Path) -
 )
 def test_other_kinds_are_refused(kind: str, inputs: Any, line: str) -> None:
     with pytest.raises(LinkageError) as refused:
-        export(kind, lr.load('four_bar'), '', 'four_bar', inputs)
+        export_linkage(kind, lr.load('four_bar'), '', 'four_bar', inputs)
     assert str(refused.value).startswith(line)
 
 
 def test_a_linkage_that_is_iterated_has_no_source_and_the_error_says_so() -> None:
     text = shipped('linkages/class_3.yaml').read_text('utf-8')
     request = read_request(json.dumps({'id': 1, 'do': 'export', 'kind': 'c', 'text': text}))
-    answer = json.loads(Answers('class_3', None, pytest.fail).answer(1, request))
+    answer = json.loads(RequestHandler('class_3', None, pytest.fail).answer_request(1, request))
     assert 'compile' in answer['error']['text']

@@ -19,7 +19,7 @@ STEP = 1e-4
 
 
 def followed(crank: HandCrank, now: float) -> tuple[float, float]:
-    found = crank.follow(now)
+    found = crank.advance_to(now)
     assert found is not None
     (value,), (rate,) = found
     return value, rate
@@ -27,7 +27,7 @@ def followed(crank: HandCrank, now: float) -> tuple[float, float]:
 
 def test_the_rate_is_the_derivative_of_the_angle() -> None:
     crank = HandCrank([True])
-    crank.turn(0, 1.0, [0.2], 0.0)
+    crank.set_target(0, 1.0, [0.2], 0.0)
     states = [followed(crank, STEP * k) for k in range(3000)]
     for (before, _), (_, rate), (after, _) in zip(states, states[1:], states[2:], strict=False):
         assert rate == pytest.approx((after - before) / (2 * STEP), abs=5e-4)
@@ -35,7 +35,7 @@ def test_the_rate_is_the_derivative_of_the_angle() -> None:
 
 def test_it_comes_to_rest_where_the_hand_is_and_does_not_pass_it() -> None:
     crank = HandCrank([True])
-    crank.turn(0, 1.0, [0.2], 0.0)
+    crank.set_target(0, 1.0, [0.2], 0.0)
     values = [followed(crank, 0.01 * k)[0] for k in range(100)]
     assert values == sorted(values)
     assert values[0] == pytest.approx(0.2)
@@ -45,7 +45,7 @@ def test_it_comes_to_rest_where_the_hand_is_and_does_not_pass_it() -> None:
 def test_steps_of_any_length_give_the_same_motion() -> None:
     one, other = HandCrank([True]), HandCrank([True])
     for crank in (one, other):
-        crank.turn(0, 1.0, [0.0], 0.0)
+        crank.set_target(0, 1.0, [0.0], 0.0)
     for k in range(31):
         last = followed(one, 0.001 * k)
     assert followed(other, 0.03) == pytest.approx(last, rel=1e-12)
@@ -56,23 +56,23 @@ def test_an_angle_goes_on_across_whole_turns_and_a_bounded_one_does_not() -> Non
     for whole, end in ((True, hand[-1]), (False, hand[-1] % tau)):
         crank = HandCrank([whole])
         for k, angle in enumerate(hand):
-            crank.turn(0, angle % tau, [0.0], 0.01 * k)
-            crank.follow(0.01 * k)
+            crank.set_target(0, angle % tau, [0.0], 0.01 * k)
+            crank.advance_to(0.01 * k)
         value, _ = followed(crank, 0.59 + 0.9)
         assert value == pytest.approx(end, abs=1e-9)
 
 
 def test_it_begins_where_the_crank_is_after_many_turns() -> None:
     crank = HandCrank([True])
-    crank.turn(0, pi / 2, [100 * tau], 0.0)
+    crank.set_target(0, pi / 2, [100 * tau], 0.0)
     assert followed(crank, 0.9)[0] == pytest.approx(100 * tau + pi / 2, abs=1e-9)
 
 
 def test_it_is_let_go_a_second_after_the_last_word() -> None:
     crank = HandCrank([True, False])
-    assert crank.follow(0.0) is None
-    crank.turn(1, 0.3, [1.0, 0.0], 5.0)
-    assert crank.follow(5.0 + HELD) is not None
-    assert crank.follow(5.0 + HELD + 0.01) is None
-    crank.turn(0, 2.0, [2.0, 0.1], 60.0)  # held again: from where it is now
-    assert crank.follow(60.0) == ([2.0, 0.1], [0.0, 0.0])
+    assert crank.advance_to(0.0) is None
+    crank.set_target(1, 0.3, [1.0, 0.0], 5.0)
+    assert crank.advance_to(5.0 + HELD) is not None
+    assert crank.advance_to(5.0 + HELD + 0.01) is None
+    crank.set_target(0, 2.0, [2.0, 0.1], 60.0)  # held again: from where it is now
+    assert crank.advance_to(60.0) == ([2.0, 0.1], [0.0, 0.0])

@@ -24,7 +24,7 @@ from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.resources import linkage_names, shipped
-from linkage_ros.view.model import model, model_of, Shown
+from linkage_ros.view.model import build_model, model_of, ViewState
 import pytest
 
 needs_node = pytest.mark.skipif(shutil.which('node') is None, reason='needs node')
@@ -71,7 +71,7 @@ def states_of(closure: Closure, found: dict[str, Any]) -> list[list[list[float]]
 @needs_node
 @pytest.mark.parametrize('name', sorted({*linkage_names()} - ITERATED))
 def test_the_program_moves_every_link_as_the_closure_does(name: str, tmp_path: Path) -> None:
-    found = model(text_of(name), name)
+    found = build_model(text_of(name), name)
     closure = load(name)
     states = states_of(closure, found)
     for state, told in zip(states, run(found['program'], states, tmp_path), strict=True):
@@ -101,7 +101,7 @@ def test_the_program_moves_every_link_as_the_closure_does(name: str, tmp_path: P
 
 @needs_node
 def test_rates_of_frames_are_those_of_the_frames(tmp_path: Path) -> None:
-    found = model(text_of('jansen_leg'), 'jansen_leg')
+    found = build_model(text_of('jansen_leg'), 'jansen_leg')
     step = 1e-6
     states = [[[0.7 + shift], [1.0], [0.0]] for shift in (-step, 0.0, step)]
     before, now, after = run(found['program'], states, tmp_path)
@@ -113,7 +113,7 @@ def test_rates_of_frames_are_those_of_the_frames(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('name', linkage_names())
 def test_the_model_is_json_and_names_what_the_file_names(name: str) -> None:
-    found = model(text_of(name), name)
+    found = build_model(text_of(name), name)
     json.dumps(found, allow_nan=False)
     closure = load(name)
     linkage = closure.linkage
@@ -136,23 +136,23 @@ def test_the_model_is_json_and_names_what_the_file_names(name: str) -> None:
 
 
 def test_the_other_assemblies_are_those_of_the_other_sides() -> None:
-    found = model(text_of('four_bar'), 'four_bar')
+    found = build_model(text_of('four_bar'), 'four_bar')
     assert found['choices'] == {'B': {'now': 'left', 'sides': ['left', 'right']}}
     assert [other['text'] for other in found['others']] == ['assembly: {B: right}']
-    assert len(model(text_of('jansen_leg'), 'jansen_leg')['others']) == 7
+    assert len(build_model(text_of('jansen_leg'), 'jansen_leg')['others']) == 7
 
 
 def test_what_takes_longer_is_left_out_during_a_drag() -> None:
-    found = model(text_of('four_bar'), 'four_bar', whole=False)
+    found = build_model(text_of('four_bar'), 'four_bar', whole=False)
     assert {'others', 'ranges', 'quality', 'warnings'}.isdisjoint(found)
 
 
 @pytest.mark.parametrize('name', linkage_names())
 def test_during_a_drag_it_is_the_same_but_for_where_the_links_go(name: str) -> None:
-    found = model(text_of(name), name)
+    found = build_model(text_of(name), name)
     start = tuple(given['value'] for given in found['inputs'])
-    shown = Shown(start, found['drawn']['size'])
-    quick = model(text_of(name), name, whole=False, shown=shown)
+    shown = ViewState(start, found['drawn']['size'])
+    quick = build_model(text_of(name), name, whole=False, shown=shown)
     drawn, wanted = quick.pop('drawn'), found['drawn']
     assert quick == {key: found[key] for key in quick}
     assert drawn['traced'] == wanted['traced']
@@ -166,18 +166,18 @@ def test_during_a_drag_it_is_the_same_but_for_where_the_links_go(name: str) -> N
 def test_a_drag_to_where_nothing_closes_is_refused_as_the_file_would_be() -> None:
     text = text_of('four_bar').replace('B: [0.120, 0]', 'B: [1.2, 0]')
     with pytest.raises(FileError, match='the loops close at no value of the input'):
-        model(text, 'x', whole=False, shown=Shown((0.7,), 0.005))
+        build_model(text, 'x', whole=False, shown=ViewState((0.7,), 0.005))
 
 
 def test_a_closure_without_a_file_has_the_same_model() -> None:
-    found = model(text_of('four_bar'), 'four_bar')
+    found = build_model(text_of('four_bar'), 'four_bar')
     bare = model_of(load('four_bar'))
     assert bare == {**found, 'text': '', 'others': []}
 
 
 def test_units_of_the_file_are_told() -> None:
     text = 'units: mm\nfour_bar: {a: 40, b: 120, c: 80, d: 100}\n'
-    found = model(text, 'mine')
+    found = build_model(text, 'mine')
     assert found['unit'] == {'length': 'mm', 'factor': 0.001}
     assert {length['key']: length['value'] for length in found['lengths']} == pytest.approx(
         {'ground O2–O4': 0.1, 'crank O2–A': 0.04, 'coupler A–B': 0.12, 'rocker O4–B': 0.08}
@@ -186,10 +186,12 @@ def test_units_of_the_file_are_told() -> None:
 
 def test_a_poor_transmission_angle_is_warned_of() -> None:
     # From the law of cosines at the crank angle 0: cos µ = (b² + c² - (d - a)²) / 2bc.
-    assert model(text_of('four_bar'), 'x')['warnings'] == ['transmission angle down to 26.38°']
-    assert 'change point at 2 inputs' in model(text_of('parallelogram'), 'x')['warnings']
+    assert build_model(text_of('four_bar'), 'x')['warnings'] == [
+        'transmission angle down to 26.38°'
+    ]
+    assert 'change point at 2 inputs' in build_model(text_of('parallelogram'), 'x')['warnings']
 
 
 def test_a_text_that_is_no_linkage_is_refused() -> None:
     with pytest.raises(FileError, match=r'^mine:1: '):
-        model('links: 3\n', 'mine')
+        build_model('links: 3\n', 'mine')

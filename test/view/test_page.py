@@ -22,8 +22,8 @@ from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.resources import linkage_names, shipped
 from linkage_ros.view.conversation import Conversation, UserFile
-from linkage_ros.view.model import model
-from linkage_ros.view.page import page as page_of
+from linkage_ros.view.model import build_model
+from linkage_ros.view.page import page_html as page_of
 import pytest
 
 from .served import Served, served
@@ -44,7 +44,7 @@ def stills(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
         file = folder / f'{name}.html'
         if not file.exists():
             text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
-            file.write_text(page_of(model(text, name), mode='still'), 'utf-8')
+            file.write_text(page_of(build_model(text, name), mode='still'), 'utf-8')
         return file
 
     return written
@@ -58,9 +58,9 @@ def edited(browser: Any, folder: Path, **settings: Any) -> Iterator[tuple[Any, P
     user = UserFile(file)
 
     def page() -> str:
-        return page_of(model(file.read_text('utf-8'), 'mine'), mode='edit', can_save=True)
+        return page_of(build_model(file.read_text('utf-8'), 'mine'), mode='edit', can_save=True)
 
-    with served([Conversation('mine', None, user).add], page) as server:
+    with served([Conversation('mine', None, user).add_routes], page) as server:
         shown = browser.new_page(**settings)
         said: list[str] = []
         shown.on('console', lambda one: said.append(one.text) if one.type == 'error' else None)
@@ -267,7 +267,7 @@ def test_lengths_are_in_the_unit_of_the_file_and_traced_points_have_coordinates(
     browser: Any, tmp_path: Path
 ) -> None:
     file = tmp_path / 'mm.html'
-    file.write_text(page_of(model(SLIDER_CRANK_IN_MM, 'mm'), mode='still'), 'utf-8')
+    file.write_text(page_of(build_model(SLIDER_CRANK_IN_MM, 'mm'), mode='still'), 'utf-8')
     closure = closure_of(SLIDER_CRANK_IN_MM)
     with opened(browser, file) as shown:
         told = readouts(shown.page)
@@ -485,8 +485,8 @@ def test_a_lost_connection_is_said_and_comes_back_while_the_linkage_moves(
 
     page = browser.new_page()
     page.route_web_socket(lambda address: address.endswith('/ws'), through)
-    text = page_of(model(FOUR_BAR, 'mine'), mode='edit', can_save=True)
-    with served([Conversation('mine', None, UserFile(file)).add], lambda: text) as server:
+    text = page_of(build_model(FOUR_BAR, 'mine'), mode='edit', can_save=True)
+    with served([Conversation('mine', None, UserFile(file)).add_routes], lambda: text) as server:
         page.goto(server.address)
         page.wait_for_function(QUIET)
         sockets[0].close(code=4000, reason='the network has gone')

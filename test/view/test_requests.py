@@ -19,17 +19,17 @@ from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.shapes import link_frames
 from linkage_ros.resources import shipped
 from linkage_ros.view import requests
-from linkage_ros.view.requests import Answers, LARGEST, read_request, RequestError
+from linkage_ros.view.requests import LARGEST, read_request, RequestError, RequestHandler
 import pytest
 
 from .test_server import FOUR_BAR, LONGER
 
 
-def asked(do: str, answers: Answers | None = None, **content: Any) -> dict[str, Any]:
+def asked(do: str, answers: RequestHandler | None = None, **content: Any) -> dict[str, Any]:
     """Return the answer to a request."""
     reported: list[str] = []
     request = read_request(json.dumps({'id': 7, 'do': do, **content}))
-    answer = (answers or Answers('mine', None, reported.append)).answer(1, request)
+    answer = (answers or RequestHandler('mine', None, reported.append)).answer_request(1, request)
     assert not reported
     found: dict[str, Any] = json.loads(answer, parse_constant=pytest.fail)
     assert found.pop('id') == 7
@@ -234,9 +234,9 @@ def test_a_defect_is_one_line_on_the_page_and_one_in_the_report(
 
     monkeypatch.setattr(requests, 'model', fails)
     reported: list[str] = []
-    answers = Answers('mine', None, reported.append)
+    answers = RequestHandler('mine', None, reported.append)
     request = read_request(json.dumps({'id': 7, 'do': 'model', 'text': FOUR_BAR}))
-    found = json.loads(answers.answer(1, request))
+    found = json.loads(answers.answer_request(1, request))
     line = (
         'model: failed by ZeroDivisionError (float division); '
         'please report it with the linkage file'

@@ -70,7 +70,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def one_server(file: Path) -> Iterator[Served]:
     """Give one server to all tests: what one of them does must not harm the next."""
     file.write_text(FOUR_BAR)
-    with served([Conversation('mine', None, UserFile(file)).add]) as found:
+    with served([Conversation('mine', None, UserFile(file)).add_routes]) as found:
         yield found
 
 
@@ -389,9 +389,11 @@ def test_a_request_that_takes_too_long_ends_with_one_line_and_the_next_is_answer
     async def run() -> None:
         worker = Worker('mine', None, 0.001)
         with pytest.raises(LinkageError, match=r'^names: took longer than 0\.001 s; '):
-            await worker.ask(1, 'names', '{"id": 1, "do": "names"}')
+            await worker.send_request(1, 'names', '{"id": 1, "do": "names"}')
         worker.longest = 60.0
-        assert 'ok' in json.loads(await worker.ask(1, 'names', '{"id": 1, "do": "names"}'))
+        assert 'ok' in json.loads(
+            await worker.send_request(1, 'names', '{"id": 1, "do": "names"}')
+        )
         await worker.end()
 
     asyncio.run(run())
@@ -403,8 +405,10 @@ def test_a_process_that_dies_is_said_and_replaced() -> None:
         await worker.start()
         os.kill(worker.pid, signal.SIGKILL)
         with pytest.raises(LinkageError, match=r'^names: ended the process that computes it; '):
-            await worker.ask(1, 'names', '{"id": 1, "do": "names"}')
-        assert 'ok' in json.loads(await worker.ask(1, 'names', '{"id": 1, "do": "names"}'))
+            await worker.send_request(1, 'names', '{"id": 1, "do": "names"}')
+        assert 'ok' in json.loads(
+            await worker.send_request(1, 'names', '{"id": 1, "do": "names"}')
+        )
         await worker.end()
 
     asyncio.run(run())
@@ -492,7 +496,7 @@ def test_a_shipped_linkage_is_not_saved_and_the_error_says_what_to_do() -> None:
             error = (await page.ask('save', text=FOUR_BAR))['error']['text']
             assert error == 'save: no file of yours is open; download the linkage'
 
-    with served([Conversation('four_bar', None, None).add]) as found:
+    with served([Conversation('four_bar', None, None).add_routes]) as found:
         asyncio.run(run(found.address))
 
 

@@ -51,7 +51,7 @@ document.body.append(frame);
 
 @pytest.fixture(scope='module')
 def server() -> Iterator[Served]:
-    with served([Conversation('four_bar', None, None).add], lambda: OWN) as found:
+    with served([Conversation('four_bar', None, None).add_routes], lambda: OWN) as found:
         yield found
 
 
