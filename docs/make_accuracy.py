@@ -24,7 +24,7 @@ from typing import NamedTuple
 from linkage_ros.effects.stage import NEEDS, PUBLISHED_WITH
 from linkage_ros.errors import listed
 from linkage_ros.measuring import describe_machine, Progress
-from linkage_ros.pages.markdown import filled, table_lines
+from linkage_ros.pages.markdown import fill_marks, table_lines
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
@@ -134,7 +134,7 @@ def _progress(name: str) -> Progress:
 
 def fill(page: Path, lines: Sequence[str]) -> None:
     """Write lines between the marks of a page."""
-    page.write_text(filled(page.read_text('utf-8'), _MARK, '\n'.join(lines)), 'utf-8')
+    page.write_text(fill_marks(page.read_text('utf-8'), _MARK, '\n'.join(lines)), 'utf-8')
 
 
 def _section(shown: Shown, budget: Budget, picture: str) -> Iterator[str]:

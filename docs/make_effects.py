@@ -136,12 +136,12 @@ def filled(page: str) -> str:
     for section in sections(page):
         text = section.text
         for mark, made in _MADE.items():
-            if markdown.marks(mark)[0] in text:
-                text = markdown.filled(text, mark, made())
+            if markdown.part_marks(mark)[0] in text:
+                text = markdown.fill_marks(text, mark, made())
         if section.name in kinds:
             kind = kinds[section.name]
-            text = markdown.filled(text, 'place', place(kind, section.name))
-            text = markdown.filled(text, 'parameters', parameters(kind, section.name))
+            text = markdown.fill_marks(text, 'place', place(kind, section.name))
+            text = markdown.fill_marks(text, 'parameters', parameters(kind, section.name))
         parts.append(text)
     return ''.join(parts)
 

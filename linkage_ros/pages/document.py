@@ -34,7 +34,7 @@ Parts = Sequence[tuple[str, str]]
 """Files of one page: each with its package and its name."""
 
 
-def document(
+def html_document(
     title: str,
     body: Iterable[str],
     data: Any,
@@ -81,14 +81,14 @@ def document(
             # Without an icon, a browser asks the server for one.
             '<link rel="icon" href="data:,">',
             f'<title>{escape(clean(title))}</title>',
-            f'<style>\n{_joined("page.css", styles)}</style>',
+            f'<style>\n{_join_files("page.css", styles)}</style>',
             '</head>',
             '<body>',
             '<button type="button" id="scheme" class="no-print" hidden></button>',
             _clean_lines('\n'.join(body)),
-            f'<script type="application/json" id="data">{_json(data)}</script>',
+            f'<script type="application/json" id="data">{_script_json(data)}</script>',
             *plotting,
-            f'<script>\n{_joined("page.js", scripts)}</script>',
+            f'<script>\n{_join_files("page.js", scripts)}</script>',
             '</body>',
             '</html>',
             '',
@@ -96,7 +96,7 @@ def document(
     )
 
 
-def picture(svg: bytes) -> str:
+def svg_data_url(svg: bytes) -> str:
     """Return an SVG as a data URL."""
     return f'data:image/svg+xml;base64,{b64encode(svg).decode()}'
 
@@ -109,25 +109,29 @@ def plotting_library() -> str:
     return str(get_plotlyjs())
 
 
-def _joined(name: str, parts: Parts) -> str:
+def _join_files(name: str, parts: Parts) -> str:
     """Return the file that all pages share, followed by those of this page."""
     texts = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
     return '\n'.join(file.read_text('utf-8') for file in texts)
 
 
-def _json(data: Any) -> str:
+def _script_json(data: Any) -> str:
     # No text may end the script element or open a comment.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
     text = text.replace('<', r'\u003c')
     # Names that the script shows are cleaned here, too; json has escaped the rest.
-    return _without({letter for letter in set(text) if not letter.isprintable()}, text, '\\')
+    return _escape_letters(
+        {letter for letter in set(text) if not letter.isprintable()}, text, '\\'
+    )
 
 
 def _clean_lines(text: str) -> str:
-    return _without({letter for letter in set(text) - {'\n'} if not letter.isprintable()}, text)
+    return _escape_letters(
+        {letter for letter in set(text) - {'\n'} if not letter.isprintable()}, text
+    )
 
 
-def _without(letters: set[str], text: str, before: str = '') -> str:
+def _escape_letters(letters: set[str], text: str, before: str = '') -> str:
     for letter in letters:
         text = text.replace(letter, before + clean(letter))
     return text
@@ -152,10 +156,10 @@ def table_html(
     yield f'<figure><figcaption>{escape(title)}</figcaption>'
     yield '<div class="scroll" tabindex="0"><table>'
     if any(columns):
-        yield f'<thead><tr>{"".join(map(_head, columns, numbers))}</tr></thead>'
+        yield f'<thead><tr>{"".join(map(_head_cell, columns, numbers))}</tr></thead>'
     yield '<tbody>'
     for row in rows:
-        yield f'<tr>{"".join(map(_cell, row, numbers))}</tr>'
+        yield f'<tr>{"".join(map(_body_cell, row, numbers))}</tr>'
     yield '</tbody></table></div>'
 
 
@@ -167,10 +171,10 @@ def facts_html(facts: Iterable[tuple[str, str]]) -> Iterator[str]:
     yield '</dl>'
 
 
-def _head(column: str, number: bool) -> str:
+def _head_cell(column: str, number: bool) -> str:
     return f'<th{" class=number" if number else ""}>{escape(column)}</th>'
 
 
-def _cell(text: str, number: bool) -> str:
+def _body_cell(text: str, number: bool) -> str:
     kind = ' class=number' if number else ' class=long' if len(text) >= _LONG else ''
     return f'<td{kind}>{escape(text)}</td>'

@@ -31,14 +31,14 @@ def table_lines(
     return [f'| {" | ".join(line)} |' for line in (heads, rule, *rows)]
 
 
-def marks(name: str) -> tuple[str, str]:
+def part_marks(name: str) -> tuple[str, str]:
     """Return the two comments that enclose a generated part."""
     return f'<!-- {name}: begin -->', f'<!-- {name}: end -->'
 
 
-def filled(page: str, name: str, text: str) -> str:
+def fill_marks(page: str, name: str, text: str) -> str:
     """Return a page with a text between two of its marks; the rest stays as it is."""
-    begin, end = marks(name)
+    begin, end = part_marks(name)
     head, _, rest = page.partition(begin)
     _, _, tail = rest.partition(end)
     return f'{head}{begin}\n{text}\n{end}{tail}'

@@ -19,7 +19,7 @@ from html import escape
 from typing import NamedTuple
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.pages.document import document, facts_html, table_html
+from linkage_ros.pages.document import facts_html, html_document, table_html
 from linkage_ros.report.data import (
     event_tracks,
     facts_of_thinning,
@@ -179,7 +179,7 @@ def run_html(run: ReportedRun, header: ReportHeader) -> str:
     """
     data = page_data(run, header.wrapped)
     title = shorten_text(header.title)
-    page = document(title, _page_body(run, header, data), data, _STYLES, _SCRIPTS)
+    page = html_document(title, _page_body(run, header, data), data, _STYLES, _SCRIPTS)
     # The limits of the parts add up to less, but names in a scene have no limit.
     if len(page.encode('utf-8', 'backslashreplace')) > PAGE_BYTES:
         bound = f'{PAGE_BYTES // 1_000_000} MB'

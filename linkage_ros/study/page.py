@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from linkage_ros.pages.document import document, facts_html, table_html
+from linkage_ros.pages.document import facts_html, html_document, table_html
 from linkage_ros.study.budget import Budget, NeedAnswer
 from linkage_ros.study.budget_text import closing_lines, heads_of, lead_lines, rows_of
 from linkage_ros.study.picture import budget_svg
@@ -30,7 +30,7 @@ def budget_html(budget: Budget, answers: Sequence[NeedAnswer]) -> str:
     """
     data = {'answers': [{'error': each.error, 'text': each.text} for each in answers]}
     body = _page_body(budget, has_field=bool(answers))
-    return document(
+    return html_document(
         f'Accuracy of {budget.scene}',
         body,
         data,

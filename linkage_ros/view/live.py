@@ -25,7 +25,7 @@ from typing import Any, Protocol
 
 from aiohttp import web, WSMsgType
 from linkage_ros.kinematics.shapes import COLOURS, FACES, INK
-from linkage_ros.pages.document import document
+from linkage_ros.pages.document import html_document
 from linkage_ros.view.page import SERVED_POLICY
 from linkage_ros.view.server import SERVER_KEY
 
@@ -191,7 +191,7 @@ def live_page(bridge: Bridge) -> str:
         'server': True,
         'node': bridge.name,
     }
-    return document(
+    return html_document(
         f'{bridge.name}: linkage view',
         body,
         data,

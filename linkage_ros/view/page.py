@@ -16,7 +16,7 @@ from typing import Any
 
 from linkage_ros.errors import clean
 from linkage_ros.kinematics.shapes import COLOURS, FACES, INK
-from linkage_ros.pages.document import document, POLICY
+from linkage_ros.pages.document import html_document, POLICY
 
 SERVED_POLICY = POLICY.replace(
     "script-src 'unsafe-inline'",
@@ -98,7 +98,7 @@ def page_html(
     scripts += [(_PACKAGE, f'{name}.js') for name in _SCRIPTS]
     styles = [(_PACKAGE, 'view.css')]
     body = _page_body(title, mode, can_save)
-    return document(title, body, data, styles, scripts, policy=SERVED_POLICY)
+    return html_document(title, body, data, styles, scripts, policy=SERVED_POLICY)
 
 
 def _page_body(title: str, mode: str, can_save: bool) -> Iterator[str]:
