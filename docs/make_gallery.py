@@ -26,12 +26,12 @@ import sys
 from linkage_ros.cli.arguments import angle_text, fixed_text
 from linkage_ros.cli.check import describe_group
 from linkage_ros.drawing.animation import animate, range_motion
-from linkage_ros.drawing.figure import paint_background, picture
-from linkage_ros.drawing.painting import paint, save, set_plane, settings
+from linkage_ros.drawing.figure import paint_background, paint_picture
+from linkage_ros.drawing.painting import paint_shapes, picture_settings, save_picture, set_plane
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.pose_view import all_places, symbol_size, View, view
-from linkage_ros.kinematics.shapes import corners, outline, shapes
+from linkage_ros.kinematics.pose_view import all_places, LinkageView, prepare_view, symbol_size
+from linkage_ros.kinematics.shapes import bounding_corners, draw_shapes, shape_outline
 from linkage_ros.kinematics.sides import sides_at
 from linkage_ros.kinematics.sweep_analysis import (
     conditioning_curves,
@@ -82,9 +82,9 @@ def main() -> int:
     sizes = {}
     for file in files:
         closure = load(file)
-        shown = view(closure, usual_inputs(closure))
+        shown = prepare_view(closure, usual_inputs(closure))
         drawn = folder / f'{file.stem}.png'
-        picture(shown, file.stem, drawn, names=True)
+        paint_picture(shown, file.stem, drawn, names=True)
         small = folder / 'thumbnails' / drawn.name
         thumbnail(shown, small)
         sizes |= {_with_few_colours(drawn): LARGEST, _with_few_colours(small): LARGEST_SMALL}
@@ -100,26 +100,28 @@ def main() -> int:
     return 1 if large else 0
 
 
-def thumbnail(shown: View, file: Path) -> None:
+def thumbnail(shown: LinkageView, file: Path) -> None:
     """Draw a linkage alone, small."""
     size = symbol_size(shown)
-    drawn = shapes(shown.closure, shown.position, size, shown.sweep.travels)
-    low, high = corners([*all_places(shown), *(p for shape in drawn for p in outline(shape))])
+    drawn = draw_shapes(shown.closure, shown.position, size, shown.sweep.travels)
+    low, high = bounding_corners(
+        [*all_places(shown), *(p for shape in drawn for p in shape_outline(shape))]
+    )
     margin = complex(2.0, 2.0) * size
-    with settings():
+    with picture_settings():
         figure = Figure(figsize=(4.0, 3.0), dpi=100)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         set_plane(axes, low - margin, high + margin)
         axes.set_axis_off()
         paint_background(axes, shown)
-        paint(axes, drawn)
-        save(figure, file)
+        paint_shapes(axes, drawn)
+        save_picture(figure, file)
 
 
 def hero(file: Path) -> Path:
     """Animate a linkage beside three of its joints, readable where it is 400 pixels wide."""
     closure = load(_HERO)
-    motion = range_motion(view(closure, usual_inputs(closure)), _HERO, 4.0)
+    motion = range_motion(prepare_view(closure, usual_inputs(closure)), _HERO, 4.0)
     shown = [joint.name in _HERO_JOINTS for joint in motion.joints]
     joints = list(compress(motion.joints, shown))
     animate(motion._replace(joints=joints, values=motion.values[:, shown]), file, compact=True)

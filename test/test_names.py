@@ -23,7 +23,7 @@ from linkage_ros.cli.main import main
 from linkage_ros.drawing import painting
 from linkage_ros.drawing.animation import animate, range_motion
 from linkage_ros.drawing.dxf import links_dxf
-from linkage_ros.drawing.figure import assemblies_picture, picture
+from linkage_ros.drawing.figure import assemblies_picture, paint_picture
 from linkage_ros.drawing.svg import svg
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.linkage_text import linkage_text
@@ -32,7 +32,7 @@ from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.languages import LANGUAGES
 from linkage_ros.kinematics.compiling.source import Subject, write_source
-from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.robot_models.mjcf import mjcf
 from linkage_ros.robot_models.part import Part
@@ -235,16 +235,16 @@ def test_names_in_pictures_are_drawn_as_they_are_written(
     for closure in linkages(12):
         joints = list(closure.linkage.joints)
         pose = usual_inputs(closure)
-        picture(view(closure, pose), closure.name, file, names=True)
+        paint_picture(prepare_view(closure, pose), closure.name, file, names=True)
         # Names of links and pins have an outline: they are paths, behind the same setting.
         check_shown([*joints, closure.name], file)
         spread = [JointSpread(name, 'rad', np.zeros((2, 3))) for name in joints]
         draw_spread(closure.name, 1.0, spread, file)
         check_shown([*joints, closure.name], file)
-        drawn = view(closure, pose)
+        drawn = prepare_view(closure, pose)
         assemblies_picture({f'assembly: {{{name}: left}}': drawn for name in joints[::4]}, file)
         ET.parse(file)
-        animate(range_motion(view(closure, pose), closure.name, 0.1), file)
+        animate(range_motion(prepare_view(closure, pose), closure.name, 0.1), file)
         check_shown([*joints, closure.name], file)
         title, *_ = ET.fromstring(svg(closure))
         assert title.text == repr(closure)

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from math import isnan, nan
 from pathlib import Path
 
-from linkage_ros.drawing.painting import save, settings
+from linkage_ros.drawing.painting import picture_settings, save_picture
 from linkage_ros.kinematics.shapes import COLOURS, INK
 
 _LINKS = ('crank', 'coupler', 'rocker')
@@ -42,7 +42,7 @@ def digits_picture(
         The file to write.
 
     """
-    context = settings()
+    context = picture_settings()
     from matplotlib.figure import Figure
 
     with context:
@@ -86,4 +86,4 @@ def digits_picture(
             for side in ('top', 'right'):
                 axes.spines[side].set_visible(False)
             axes.legend(frameon=False, fontsize=7, loc='upper right')
-        save(figure, file)
+        save_picture(figure, file)

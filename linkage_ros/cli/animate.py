@@ -25,9 +25,9 @@ from linkage_ros.cli.arguments import add_output, output_or
 from linkage_ros.cli.bag_reading import open_bag
 from linkage_ros.cli.part_of_run import add_window, read_part, window_of
 from linkage_ros.cli.terminal import show_progress
-from linkage_ros.drawing.animation import animate, check_kind, KINDS, Motion, range_motion
+from linkage_ros.drawing.animation import animate, AnimatedMotion, check_kind, KINDS, range_motion
 from linkage_ros.files.linkage_file import load
-from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.run_motion import run_motion
 from linkage_ros.signals import StoppedError
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return 0
 
 
-def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> Motion:
+def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> AnimatedMotion:
     if is_bag_name(given):
         window = window_of(arguments.since, arguments.until)
         bag = open_bag(given, stop)
@@ -80,6 +80,6 @@ def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> Mot
         found, scene, _ = read_part(bag, layouts, window, stop, trust_effects=trusted)
         return run_motion(found, scene.name if scene else given.name, arguments.seconds)
     closure = load(arguments.file)
-    shown = view(closure, usual_inputs(closure))
+    shown = prepare_view(closure, usual_inputs(closure))
     seconds = _TURN if arguments.seconds is None else arguments.seconds
     return range_motion(shown, given.stem, seconds)

@@ -223,9 +223,12 @@ def _compare_states(
 def _draw_differences(
     differences: BagDifferences, turning: Mapping[str, bool], file: Path
 ) -> None:
-    from linkage_ros.drawing.painting import save, settings  # local import: only for a picture
+    from linkage_ros.drawing.painting import (  # local import: only for a picture
+        picture_settings,
+        save_picture,
+    )
 
-    context = settings()
+    context = picture_settings()
     from matplotlib.figure import Figure
 
     times, lows, highs = differences.difference_curves()
@@ -253,4 +256,4 @@ def _draw_differences(
             axes.set_ylabel(f'difference [{unit}]')
             axes.legend(loc='upper right', fontsize=7)
         axes.set_xlabel('time [s]')
-        save(figure, file)
+        save_picture(figure, file)

@@ -28,7 +28,7 @@ from linkage_ros.cli.arguments import (
     read_inputs,
 )
 from linkage_ros.drawing.dxf import links_dxf
-from linkage_ros.drawing.figure import assemblies_picture, picture
+from linkage_ros.drawing.figure import assemblies_picture, paint_picture
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import find_assemblies, load, written_linkage
@@ -36,7 +36,7 @@ from linkage_ros.files.linkage_text import pose_text
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.drawn_pose import drawn_pose
-from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.resources import named_file
 
@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem
     file = output_or(arguments, Path(f'{name}.png'))
-    picture(view(closure, pose, ghosts), name, file, names=arguments.names)
+    paint_picture(prepare_view(closure, pose, ghosts), name, file, names=arguments.names)
     print(file)
     return 0
 
@@ -104,11 +104,11 @@ def _draw_assemblies(arguments: argparse.Namespace) -> int:
         pose = read_inputs(first.linkage, arguments.at[0], '--at')
         closed = [each for each in found if each.position(*pose).joints]
         # If it closes in no assembly there, `view` says so.
-        views = [view(each, pose) for each in closed or [first]]
+        views = [prepare_view(each, pose) for each in closed or [first]]
     else:
         pose = usual_inputs(first)
         views = [
-            view(each, pose if each.position(*pose).joints else usual_inputs(each))
+            prepare_view(each, pose if each.position(*pose).joints else usual_inputs(each))
             for each in found
         ]
     file = output_or(arguments, Path(f'{Path(arguments.file).stem}.png'))

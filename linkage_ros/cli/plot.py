@@ -23,10 +23,10 @@ from threading import Event
 from linkage_ros.cli.arguments import add_bag, add_output, output_or, PICTURES
 from linkage_ros.cli.bag_reading import add_trust, open_bag, path_beside, scene_of
 from linkage_ros.drawing.figure import joint_axes, label_joints, plot_joints
-from linkage_ros.drawing.painting import save, settings, show_lengths
+from linkage_ros.drawing.painting import picture_settings, save_picture, show_lengths
 from linkage_ros.errors import BagError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.curves import Curve, sweep
+from linkage_ros.kinematics.curves import Curve, sweep_range
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep
@@ -95,7 +95,7 @@ def draw_bag(
         The event was set.
 
     """
-    settings()  # without matplotlib, say so before the bag is read
+    picture_settings()  # without matplotlib, say so before the bag is read
     bag = open_bag(bag_path, stop)
     scene = scene_of(bag, trust_effects=trust_effects)
     # The x axis is the crank of the first linkage; its joints are drawn.
@@ -223,7 +223,7 @@ def crank_curves(
     input_sweep = InputSweep(Closure(linkage), cranks[0])
     about = (each for each in input_sweep.ranges if _is_within(cranks[0][0], each))
     interval = next(about, input_sweep.widest_range)
-    ideal = sweep(input_sweep, interval).joints if interval else ()
+    ideal = sweep_range(input_sweep, interval).joints if interval else ()
     crank = np.array([inputs[0] for inputs in cranks])
     if interval and not driven.slider:
         crank = crank + np.array([interval.shift(value) for value in crank.tolist()])
@@ -272,7 +272,7 @@ def _paint_curves(
     picture: Path,
 ) -> None:
     """Paint curves over the crank; over time, if none is driven."""
-    context = settings()
+    context = picture_settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
     from matplotlib.ticker import AutoLocator
 
@@ -304,4 +304,4 @@ def _paint_curves(
         figure.draw_without_rendering()  # only now axes and texts have a size
         for panels, part, lines in drawn:
             label_joints(panels, part, lines)
-        save(figure, picture)
+        save_picture(figure, picture)

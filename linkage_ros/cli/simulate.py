@@ -194,7 +194,9 @@ def _run_study(
     pictures = [file for file in (output, arguments.picture) if file and file.suffix not in KINDS]
     if pictures:
         check_output_name(pictures[-1], PICTURES)
-        find_tool('spread').settings()  # without matplotlib, say so before the study is run
+        find_tool(
+            'spread'
+        ).picture_settings()  # without matplotlib, say so before the study is run
     if output.suffix in KINDS:
         check_kind(output)
     scene = _load_scene(arguments)

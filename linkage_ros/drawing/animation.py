@@ -32,19 +32,25 @@ from linkage_ros.drawing.figure import (
     moved_input,
     plot_joints,
 )
-from linkage_ros.drawing.painting import LAYERS, paint, plot_places, set_plane, settings
+from linkage_ros.drawing.painting import (
+    LAYERS,
+    paint_shapes,
+    picture_settings,
+    plot_places,
+    set_plane,
+)
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.files.file_access import atomic_write, check_output_name
 from linkage_ros.kinematics.curves import Curve
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.pose_view import symbol_size, View
+from linkage_ros.kinematics.pose_view import LinkageView, symbol_size
 from linkage_ros.kinematics.shapes import (
+    bounding_corners,
     carried_shapes,
     COLOURS,
-    corners,
     link_frames,
-    outline,
     Shape,
+    shape_outline,
 )
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.names import picture_text
@@ -78,11 +84,11 @@ Advance = Callable[[int, int], Any]
 """Called with the number of pictures that are painted, and of all."""
 
 
-class Motion(NamedTuple):
+class AnimatedMotion(NamedTuple):
     """A motion to be shown, at instants 1/`RATE` s apart."""
 
     title: str  # What moves
-    view: View  # The linkage, in the pose in which its shapes are made
+    view: LinkageView  # The linkage, in the pose in which its shapes are made
     repeats: bool  # Whether it ends where it begins
     links: Sequence[str]  # The links and the blocks of sliders that move
     # Position, in [m], and angle, in [rad], of their frames, of shape (instants, links, 3); NaN if
@@ -126,7 +132,7 @@ def check_kind(file: Path) -> None:
             raise LinkageError('ffmpeg', 'is not installed', 'apt install ffmpeg, or name a GIF')
 
 
-def range_motion(shown: View, title: str, seconds: float) -> Motion:
+def range_motion(shown: LinkageView, title: str, seconds: float) -> AnimatedMotion:
     """
     Return the motion through the range of the first input: a turn, or there and back.
 
@@ -152,7 +158,7 @@ def range_motion(shown: View, title: str, seconds: float) -> Motion:
             place, angle = found[link]
             frames[i, number] = place.real, place.imag, angle
     joints = shown.sweep.joints
-    return Motion(
+    return AnimatedMotion(
         title,
         shown,
         True,
@@ -166,7 +172,7 @@ def range_motion(shown: View, title: str, seconds: float) -> Motion:
 
 
 def animate(
-    motion: Motion,
+    motion: AnimatedMotion,
     file: Path,
     advance: Advance = lambda _done, _of: None,
     *,
@@ -195,16 +201,16 @@ def animate(
     """
     check_kind(file)
     kind = file.suffix.lower()
-    write = {'.gif': _gif, '.mp4': _mp4, '.svg': _svg}[kind]
-    with settings():
-        scene = _Scene(motion, _DPI[kind], compact=compact)
+    write = {'.gif': _encode_gif, '.mp4': _encode_mp4, '.svg': _encode_svg}[kind]
+    with picture_settings():
+        scene = _MovingPicture(motion, _DPI[kind], compact=compact)
         atomic_write(file, write(scene, advance))
 
 
-class _Scene:
+class _MovingPicture:
     """The picture, and what moves in it."""
 
-    def __init__(self, motion: Motion, dpi: int, *, compact: bool) -> None:
+    def __init__(self, motion: AnimatedMotion, dpi: int, *, compact: bool) -> None:
         from matplotlib.backends.backend_agg import FigureCanvasAgg  # an extra, and slow to load
         from matplotlib.figure import Figure
 
@@ -212,7 +218,7 @@ class _Scene:
         shown = motion.view
         size = symbol_size(shown)
         drawn = carried_shapes(shown.closure, shown.position, size, shown.sweep.travels)
-        low, high = _bounds(motion, drawn)
+        low, high = _motion_bounds(motion, drawn)
         margin = complex(2.0, 2.0) * size
         across = high - low + 2.0 * margin
         wide = min(max(3.6 * across.real / across.imag, 2.6), 5.0)
@@ -236,7 +242,7 @@ class _Scene:
                 )  # fmt: skip
         self.parts: list[tuple[str, Any]] = []
         for (link, _), artist in zip(
-            drawn, paint(self.plane, [shape for _, shape in drawn]), strict=True
+            drawn, paint_shapes(self.plane, [shape for _, shape in drawn]), strict=True
         ):
             artist.set_clip_on(False)
             self.parts.append((link, artist))
@@ -254,12 +260,12 @@ class _Scene:
         last = list(self.panels.values())[-1]
         label_across(last, motion.x_name, motion.x_unit)
         self.marks = [
-            axes.axvline(self.across(0), color='0.55', linewidth=0.8, linestyle=':')
+            axes.axvline(self.mark_x(0), color='0.55', linewidth=0.8, linestyle=':')
             for axes in self.panels.values()
         ]
         self.dots = [
             self.panels[joint.turning].plot(
-                [self.across(0)], [self.height(0, number)], 'o', markersize=4.0,
+                [self.mark_x(0)], [self.joint_y(0, number)], 'o', markersize=4.0,
                 color=lines[joint.name].get_color(), clip_on=False, zorder=LAYERS['label'],
             )[0]
             for number, joint in enumerate(motion.joints)
@@ -279,17 +285,17 @@ class _Scene:
         ]
         self._behind: Any = None
 
-    def across(self, i: int) -> float:
+    def mark_x(self, i: int) -> float:
         """Return the place of the mark at an instant, as its axis shows it."""
         value = float(self.motion.x[i])
         return degrees(value) if self.motion.x_unit == '°' else value
 
-    def height(self, i: int, number: int) -> float:
+    def joint_y(self, i: int, number: int) -> float:
         """Return a joint at an instant, as its axis shows it."""
         value = float(self.motion.values[i, number])
         return degrees(value) if self.motion.joints[number].turning else value
 
-    def show(self, i: int) -> None:
+    def move_to(self, i: int) -> None:
         """Move everything to an instant."""
         from matplotlib.transforms import Affine2D
 
@@ -308,11 +314,11 @@ class _Scene:
             if link in moves:
                 artist.set_transform(moves[link] + self.plane.transData)
         for mark in self.marks:
-            mark.set_xdata([self.across(i)] * 2)
+            mark.set_xdata([self.mark_x(i)] * 2)
         for number, dot in enumerate(self.dots):
-            dot.set_data([self.across(i)], [self.height(i, number)])
+            dot.set_data([self.mark_x(i)], [self.joint_y(i, number)])
 
-    def pixels(self) -> Any:
+    def render_pixels(self) -> Any:
         """
         Return the pixels of the picture, of shape (height, width, 3).
 
@@ -328,18 +334,20 @@ class _Scene:
             artist.axes.draw_artist(artist)
         return np.asarray(self.canvas.buffer_rgba())[:, :, :3].copy()
 
-    def places(self, axes: Any, x: Sequence[float], y: Sequence[float]) -> Any:
+    def svg_places(self, axes: Any, x: Sequence[float], y: Sequence[float]) -> Any:
         """Return places of axes in the coordinates of the SVG, of shape (n, 2)."""
         across, up = axes.transData.transform(np.column_stack([x, y])).T
         return np.column_stack([across, self.figure.bbox.height - up])
 
 
-def _bounds(motion: Motion, drawn: Sequence[tuple[str, Shape]]) -> tuple[complex, complex]:
+def _motion_bounds(
+    motion: AnimatedMotion, drawn: Sequence[tuple[str, Shape]]
+) -> tuple[complex, complex]:
     """Return the corners of everything that the motion reaches, in [m]."""
     made = link_frames(motion.view.closure, motion.view.position)
     places = [place for path in motion.view.sweep.paths.values() for place in path]
     for link, shape in drawn:
-        edge = np.array(outline(shape))
+        edge = np.array(shape_outline(shape))
         if link == GROUND:
             places += edge.tolist()
             continue
@@ -347,25 +355,25 @@ def _bounds(motion: Motion, drawn: Sequence[tuple[str, Shape]]) -> tuple[complex
         place, turned = made[link]
         moved = (edge - place)[:, None] * np.exp(1j * (angle - turned)) + (x + 1j * y)
         places += moved[np.isfinite(moved)].tolist()
-    return corners(places)
+    return bounding_corners(places)
 
 
-def _gif(scene: _Scene, advance: Advance) -> bytes:
+def _encode_gif(scene: _MovingPicture, advance: Advance) -> bytes:
     from PIL import Image  # local import: comes with matplotlib
 
     # One palette for all: equal pixels of successive pictures are stored once. At first every
     # part is visible, so the palette has all colours; with this method white stays white.
-    palette = Image.fromarray(scene.pixels()).quantize(_PALETTE, Image.Quantize.MAXCOVERAGE)
+    palette = Image.fromarray(scene.render_pixels()).quantize(_PALETTE, Image.Quantize.MAXCOVERAGE)
     count = len(scene.motion.x)
 
-    def pictures() -> Iterator[Image.Image]:
+    def paletted_pictures() -> Iterator[Image.Image]:
         for i in range(count):
-            scene.show(i)
-            picture = Image.fromarray(scene.pixels())
+            scene.move_to(i)
+            picture = Image.fromarray(scene.render_pixels())
             yield picture.quantize(palette=palette, dither=Image.Dither.NONE)
             advance(i + 1, count)
 
-    first, *others = pictures()
+    first, *others = paletted_pictures()
     data = BytesIO()
     first.save(
         data, 'GIF', save_all=True, append_images=others, duration=1000 // RATE, loop=0,
@@ -374,7 +382,7 @@ def _gif(scene: _Scene, advance: Advance) -> bytes:
     return data.getvalue()
 
 
-def _mp4(scene: _Scene, advance: Advance) -> bytes:
+def _encode_mp4(scene: _MovingPicture, advance: Advance) -> bytes:
     from matplotlib.animation import FFMpegWriter
 
     count = len(scene.motion.x)
@@ -384,7 +392,7 @@ def _mp4(scene: _Scene, advance: Advance) -> bytes:
         try:
             with writer.saving(scene.figure, str(video), scene.figure.dpi):
                 for i in range(count):
-                    scene.show(i)
+                    scene.move_to(i)
                     writer.grab_frame()
                     advance(i + 1, count)
         except (CalledProcessError, BrokenPipeError):
@@ -392,7 +400,7 @@ def _mp4(scene: _Scene, advance: Advance) -> bytes:
         return video.read_bytes()
 
 
-def _svg(scene: _Scene, advance: Advance) -> bytes:
+def _encode_svg(scene: _MovingPicture, advance: Advance) -> bytes:
     motion = scene.motion
     moving = [(link, artist) for link, artist in scene.parts if link != GROUND]
     marks = (*scene.marks, *scene.dots)
@@ -417,13 +425,13 @@ def _svg(scene: _Scene, advance: Advance) -> bytes:
         turns = np.full(len(keys), nan)
         known = np.isfinite(angle)
         turns[known] = -np.degrees(np.unwrap(angle[known] - scene.origin[link].angle))
-        places = scene.places(scene.plane, x, y)
-        rule, firsts[link] = _keyframes(f'link{number}', times, places, turns)
+        places = scene.svg_places(scene.plane, x, y)
+        rule, firsts[link] = _keyframe_rules(f'link{number}', times, places, turns)
         rules.append(rule)
     for number, (link, _) in enumerate(moving):
         group = groups[f'part{number}']
         origin = scene.origin[link].place
-        ((x, y),) = scene.places(scene.plane, [origin.real], [origin.imag])
+        ((x, y),) = scene.svg_places(scene.plane, [origin.real], [origin.imag])
         inner = ET.Element(f'{_SVG}g')
         inner.set('transform', f'translate({-x:.2f} {-y:.2f})')
         inner.extend(list(group))
@@ -431,17 +439,17 @@ def _svg(scene: _Scene, advance: Advance) -> bytes:
         group.set('class', f'moving link{motion.links.index(link)}')
         group.set('transform', firsts[link])
         advance(number + 1, len(moving))
-    across = [scene.across(key) for key in keys]
+    across = [scene.mark_x(key) for key in keys]
     # The mark does not run back when the next turn begins.
     jumps = np.abs(np.diff(across, append=across[-1])) > 0.5 * np.ptp(across)
     panels = [*scene.panels.values(), *(scene.panels[joint.turning] for joint in motion.joints)]
     for number, (panel, mark) in enumerate(zip(panels, marks, strict=True)):
         joint = number - len(scene.marks)
-        up = [scene.height(key, joint) if joint >= 0 else 0.0 for key in keys]
-        places = scene.places(panel, across, up)
+        up = [scene.joint_y(key, joint) if joint >= 0 else 0.0 for key in keys]
+        places = scene.svg_places(panel, across, up)
         x, y = mark.get_data()
-        places -= scene.places(panel, [x[0]], [y[0] if joint >= 0 else 0.0])
-        rule, first = _keyframes(f'at{number}', times, places, np.zeros(len(keys)), jumps)
+        places -= scene.svg_places(panel, [x[0]], [y[0] if joint >= 0 else 0.0])
+        rule, first = _keyframe_rules(f'at{number}', times, places, np.zeros(len(keys)), jumps)
         rules.append(rule)
         groups[f'mark{number}'].set('class', f'moving at{number}')
         groups[f'mark{number}'].set('transform', first)
@@ -450,7 +458,7 @@ def _svg(scene: _Scene, advance: Advance) -> bytes:
     return bytes(ET.tostring(tree, encoding='utf-8', xml_declaration=True))
 
 
-def _keyframes(
+def _keyframe_rules(
     name: str, times: Sequence[float], places: Any, turns: Any, jumps: Any = False
 ) -> tuple[str, str]:
     """

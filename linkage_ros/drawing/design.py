@@ -22,33 +22,40 @@ from pathlib import Path
 from typing import Any
 
 from linkage_ros.drawing.design_curves import (
-    Branch,
-    branches,
+    design_poses,
+    DesignBranch,
+    DesignPose,
+    is_numbered,
     misses_places,
     number_angles,
-    numbered,
     paint_angles,
     paint_distances,
     paint_error,
-    Pose,
-    poses,
+    swept_branches,
 )
 from linkage_ros.drawing.painting import (
     LAYERS,
-    Names,
+    NameLabels,
     OTHER,
     OTHER_TEXT,
-    paint,
+    paint_shapes,
+    picture_settings,
     plot_places,
-    save,
+    save_picture,
     set_plane,
-    settings,
     TRACE,
     WANTED,
 )
 from linkage_ros.kinematics.curves import drawn_once
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.shapes import bar_size, corners, INK, outline, shapes, skeleton
+from linkage_ros.kinematics.shapes import (
+    bar_size,
+    bounding_corners,
+    draw_shapes,
+    draw_skeleton,
+    INK,
+    shape_outline,
+)
 from linkage_ros.names import picture_text
 from linkage_ros.synthesis.design import COUPLER, CRANK, Design, FourBar, ROCKER
 from numpy.typing import ArrayLike
@@ -60,17 +67,17 @@ _EVERY = 6
 """Every so many places of a path are obstacles for a number."""
 
 
-def paint_wanted(axes: Any, design: Design, shown: Sequence[Pose], picture: float) -> None:
+def paint_wanted(axes: Any, design: Design, shown: Sequence[DesignPose], picture: float) -> None:
     """Paint rays to wanted rocker pins, crosses at wanted places, frames at wanted poses."""
     four_bar = design.four_bar
     pivot = four_bar.pivots[1]
     # Below all else, and wide: the line of an exact rocker runs in its middle.
     pale = {'color': WANTED, 'alpha': 0.3, 'linewidth': 3.5, 'zorder': 0.5}
-    rays = 'wanted rocker angle φ' + _zero(four_bar.rocker, 'its pin at φ')
+    rays = 'wanted rocker angle φ' + _zero_note(four_bar.rocker, 'its pin at φ')
     places, frames = 'wanted place of P', 'wanted pose at P (long: x axis)'
     for one in design.wanted:
         if one.rocker is not None:
-            end = pivot + _ray(four_bar, one.rocker, picture)
+            end = pivot + _wanted_ray(four_bar, one.rocker, picture)
             plot_places(axes, (pivot, end), label=rays, **pale)
             rays = ''
         if one.place is not None and one.coupler is None:
@@ -91,7 +98,7 @@ def paint_wanted(axes: Any, design: Design, shown: Sequence[Pose], picture: floa
                 )  # fmt: skip
             axes.plot([], [], color=WANTED, linewidth=1.3, label=frames)
             frames = ''
-    turned = _zero(four_bar.crank, 'crank pin at θ')
+    turned = _zero_note(four_bar.crank, 'crank pin at θ')
     if turned:
         axes.plot([], [], ' ', label=turned.lstrip(', '))
 
@@ -106,7 +113,7 @@ def arrow_ends(design: Design, picture: float) -> list[complex]:
     ]
 
 
-def paint_traces(axes: Any, ways: Sequence[Branch], drawn: Sequence[Pose]) -> None:
+def paint_traces(axes: Any, ways: Sequence[DesignBranch], drawn: Sequence[DesignPose]) -> None:
     """Paint the path of the traced point on every assembly that meets a position."""
     label = 'path of P'
     for way in ways:
@@ -119,33 +126,33 @@ def paint_traces(axes: Any, ways: Sequence[Branch], drawn: Sequence[Pose]) -> No
             label = '' if way.own else label
 
 
-def paint_poses(axes: Any, drawn: Sequence[Pose], size: float) -> None:
+def paint_poses(axes: Any, drawn: Sequence[DesignPose], size: float) -> None:
     """Paint the first position as bodies and the others as lines."""
     first, *others = drawn
     labelled: set[str] = set()
     for pose in others:
         label = 'other positions' if pose.own else 'met on the other assembly'
-        for line in skeleton(pose.closure, pose.position):
+        for line in draw_skeleton(pose.closure, pose.position):
             plot_places(
-                axes, (line.start, line.end), color=_ink(pose),
+                axes, (line.start, line.end), color=_pose_colour(pose),
                 linewidth=1.0 if pose.own else 1.3, marker='o', markersize=2.4,
                 zorder=LAYERS['ghost'] + (0.0 if pose.own else 0.5),
                 label='' if label in labelled else label,
             )  # fmt: skip
             labelled.add(label)
-    paint(axes, shapes(first.closure, first.position, size, {}))
+    paint_shapes(axes, draw_shapes(first.closure, first.position, size, {}))
     if (COUPLER, 'P') in first.points:
         place = first.points[COUPLER, 'P']
         plot_places(axes, [place], 'o', color=TRACE, markersize=4.0, zorder=7)
 
 
-def magnify(panel: Any, pose: Pose, link: str) -> None:
+def paint_magnified(panel: Any, pose: DesignPose, link: str) -> None:
     """Paint a position again, enlarged around a link that is too short to see."""
-    middle, length = 0.5 * sum(_ends(pose, link).values()), _length(pose, link)
+    middle, length = 0.5 * sum(_link_ends(pose, link).values()), _link_length(pose, link)
     panel.set_aspect('equal')
     panel.set_xlim(middle.real - 1.3 * length, middle.real + 1.3 * length)
     panel.set_ylim(middle.imag - 1.3 * length, middle.imag + 1.3 * length)
-    paint(panel, shapes(pose.closure, pose.position, 0.13 * length, {}))
+    paint_shapes(panel, draw_shapes(pose.closure, pose.position, 0.13 * length, {}))
     panel.set_xticks([])
     panel.set_yticks([])
     ink = INK if pose.own else OTHER
@@ -159,28 +166,34 @@ def magnify(panel: Any, pose: Pose, link: str) -> None:
     )  # fmt: skip
 
 
-def name_ends(panel: Any, pose: Pose, link: str) -> None:
+def name_ends(panel: Any, pose: DesignPose, link: str) -> None:
     """Name the pins of an enlarged link."""
-    names = Names(panel)
-    for name, place in _ends(pose, link).items():
-        radius = 0.13 * abs(names.pixel(1.0 + 0j) - names.pixel(0j)) * _length(pose, link)
-        names.want(name, (place,), 1.2 * radius, fontsize=7.5, color=INK)
-    lines = skeleton(pose.closure, pose.position)
-    names.place([(line.start, line.end) for line in lines])
+    names = NameLabels(panel)
+    for name, place in _link_ends(pose, link).items():
+        radius = (
+            0.13 * abs(names.to_pixel(1.0 + 0j) - names.to_pixel(0j)) * _link_length(pose, link)
+        )
+        names.add_name(name, (place,), 1.2 * radius, fontsize=7.5, color=INK)
+    lines = draw_skeleton(pose.closure, pose.position)
+    names.place_names([(line.start, line.end) for line in lines])
 
 
 def write_numbers(
-    axes: Any, design: Design, drawn: Sequence[Pose], ways: Sequence[Branch], size: float
+    axes: Any,
+    design: Design,
+    drawn: Sequence[DesignPose],
+    ways: Sequence[DesignBranch],
+    size: float,
 ) -> None:
     """Write the numbers of positions and wanted values, and the names of the pivots."""
-    names = Names(axes)
-    one_size = abs(names.pixel(complex(size, 0.0)) - names.pixel(0j))
+    names = NameLabels(axes)
+    one_size = abs(names.to_pixel(complex(size, 0.0)) - names.to_pixel(0j))
     count = len(design.wanted)
     for name, pivot in zip(('O2', 'O4'), design.four_bar.pivots, strict=True):
-        names.want(name, (pivot,), 1.3 * one_size, fontsize=7.5, color=INK)
+        names.add_name(name, (pivot,), 1.3 * one_size, fontsize=7.5, color=INK)
     for pose in drawn:
         a, b = pose.points[CRANK, 'A'], pose.points[ROCKER, 'B']
-        together = abs(names.pixel(a) - names.pixel(b)) < 16.0
+        together = abs(names.to_pixel(a) - names.to_pixel(b)) < 16.0
         style = {
             'fontsize': 8.0,
             'fontweight': 'bold',
@@ -188,25 +201,28 @@ def write_numbers(
         }
         clear = 1.3 * one_size if pose is drawn[0] else 4.0
         for pin in (0.5 * (a + b),) if together else (a, b):
-            names.want(str(pose.number), (pin,), clear, **style)
+            names.add_name(str(pose.number), (pin,), clear, **style)
     picture = abs(complex(*(axes.viewLim.max - axes.viewLim.min)))
     blue = {'fontsize': 7.0, 'color': WANTED}
     for number, one in enumerate(design.wanted, 1):
-        if not numbered(number, count):
+        if not is_numbered(number, count):
             continue
         if one.rocker is not None:
-            end = design.four_bar.pivots[1] + _ray(design.four_bar, one.rocker, picture)
-            names.want(f'{degrees(one.rocker):.4g}°'.replace('-', '−'), (end,), 2.0, **blue)
+            end = design.four_bar.pivots[1] + _wanted_ray(design.four_bar, one.rocker, picture)
+            names.add_name(f'{degrees(one.rocker):.4g}°'.replace('-', '−'), (end,), 2.0, **blue)
         if one.place is not None:
-            names.want(str(number), (one.place,), 5.0, **blue)
-    lines = [outline(shape) for shape in shapes(drawn[0].closure, drawn[0].position, size, {})]
+            names.add_name(str(number), (one.place,), 5.0, **blue)
+    lines = [
+        shape_outline(shape)
+        for shape in draw_shapes(drawn[0].closure, drawn[0].position, size, {})
+    ]
     lines += [way.trace[::_EVERY] for way in ways if way.trace]
     for pose in drawn:
-        lines += [(line.start, line.end) for line in skeleton(pose.closure, pose.position)]
-    names.place(lines)
+        lines += [(line.start, line.end) for line in draw_skeleton(pose.closure, pose.position)]
+    names.place_names(lines)
 
 
-def _ink(pose: Pose) -> str:
+def _pose_colour(pose: DesignPose) -> str:
     return _BEHIND if pose.own else OTHER
 
 
@@ -215,13 +231,13 @@ def _axes_of(place: complex, angle: float, picture: float) -> tuple[complex, com
     return place + rect(0.09 * picture, angle), place + rect(0.055 * picture, angle + 0.25 * tau)
 
 
-def _ray(four_bar: FourBar, angle: float, picture: float) -> complex:
+def _wanted_ray(four_bar: FourBar, angle: float, picture: float) -> complex:
     """Return the vector from O4 through the wanted pin of the rocker, and a little beyond."""
     reach = abs(four_bar.rocker)
     return rect(reach + 0.045 * picture, angle + phase(four_bar.rocker))
 
 
-def _zero(pin: complex, text: str) -> str:
+def _zero_note(pin: complex, text: str) -> str:
     """Return the legend text for a link whose pin is not on the x axis of its frame."""
     angle = degrees(phase(pin))
     if abs(remainder(angle, 360.0)) < 1e-9:
@@ -229,13 +245,13 @@ def _zero(pin: complex, text: str) -> str:
     return f', {text} {"+" if angle > 0.0 else "−"} {abs(angle):.4g}°'
 
 
-def _ends(pose: Pose, link: str) -> dict[str, complex]:
+def _link_ends(pose: DesignPose, link: str) -> dict[str, complex]:
     ends = {name: place for (carrier, name), place in pose.points.items() if carrier == link}
     return {name: place for name, place in ends.items() if name != 'P'}
 
 
-def _length(pose: Pose, link: str) -> float:
-    one, other = _ends(pose, link).values()
+def _link_length(pose: DesignPose, link: str) -> float:
+    one, other = _link_ends(pose, link).values()
     return abs(other - one)
 
 
@@ -277,18 +293,18 @@ def draw_design(
         cannot be written.
 
     """
-    context = settings()
+    context = picture_settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
 
-    shown, missing = poses(design)
-    ways = branches(design, shown)
-    drawn = _chosen(shown)
-    low, high = _frame(design, drawn, ways)
+    shown, missing = design_poses(design)
+    ways = swept_branches(design, shown)
+    drawn = _poses_to_draw(shown)
+    low, high = _drawing_corners(design, drawn, ways)
     size = bar_size(abs(high - low), min(design.four_bar.lengths))
     width, height = (high - low).real, (high - low).imag
     wide = min(max(5.2 * width / height, 3.6), 6.2)
     tall = min(max(wide * height / width, 3.6), 5.4)
-    link = _tiny(design.four_bar, abs(high - low))
+    link = _tiny_link(design.four_bar, abs(high - low))
     magnified = drawn[: _MAGNIFIED if link else 0]
     with context:
         below = (wide / max(3, len(magnified)) + 0.3) if link else 0.0
@@ -307,22 +323,22 @@ def draw_design(
         paint_traces(axes, ways, drawn)
         paint_poses(axes, drawn, size)
         for panel, pose in zip(panels, magnified, strict=True):
-            magnify(panel, pose, link)
+            paint_magnified(panel, pose, link)
         above = _paint_beside(figure, right, ways, shown, error)
         if missing:
             numbers = ', '.join(map(str, missing))
             axes.plot([], [], ' ', label=f'position {numbers}: the loop does not close')
-        _legend(axes, columns=2)
+        _write_legend(axes, columns=2)
         figure.draw_without_rendering()  # only now a text has a size
         _fix_layout(figure)
         write_numbers(axes, design, drawn, ways, size)
         number_angles(above, ways, shown)
         for panel, pose in zip(panels, magnified, strict=True):
             name_ends(panel, pose, link)
-        save(figure, file)
+        save_picture(figure, file)
 
 
-def _chosen(shown: Sequence[Pose]) -> list[Pose]:
+def _poses_to_draw(shown: Sequence[DesignPose]) -> list[DesignPose]:
     """Return the positions to draw; the first of them on the design's own assembly comes first."""
     traced = all(pose.wanted.place is not None for pose in shown)
     count = min(len(shown), _DRAWN_OF_PATH if traced else _DRAWN)
@@ -331,22 +347,22 @@ def _chosen(shown: Sequence[Pose]) -> list[Pose]:
     return [first, *(pose for pose in spread if pose is not first)]
 
 
-def _frame(
-    design: Design, drawn: Sequence[Pose], ways: Sequence[Branch]
+def _drawing_corners(
+    design: Design, drawn: Sequence[DesignPose], ways: Sequence[DesignBranch]
 ) -> tuple[complex, complex]:
     """Return the corners of the drawing, in [m]."""
     places = [place for pose in drawn for place in pose.points.values()]
     places += [one.place for one in design.wanted if one.place is not None]
     places += [place for way in ways if way.own for place in way.trace]
-    low, high = corners(places)
+    low, high = bounding_corners(places)
     places += arrow_ends(design, 1.15 * abs(high - low))
-    low, high = corners(places)
+    low, high = bounding_corners(places)
     margin = 0.07 * abs(high - low)
     # The ground of the pivots and the rays of wanted angles extend beyond the pins.
     return low - complex(margin, margin), high + complex(margin, margin)
 
 
-def _tiny(four_bar: FourBar, picture: float) -> str:
+def _tiny_link(four_bar: FourBar, picture: float) -> str:
     """Return the link that is too short to see, or ''."""
     lengths = dict(zip((CRANK, COUPLER, ROCKER, GROUND), four_bar.lengths, strict=True))
     link = min(lengths, key=lengths.__getitem__)
@@ -356,8 +372,8 @@ def _tiny(four_bar: FourBar, picture: float) -> str:
 def _paint_beside(
     figure: Any,
     right: Any,
-    ways: Sequence[Branch],
-    shown: Sequence[Pose],
+    ways: Sequence[DesignBranch],
+    shown: Sequence[DesignPose],
     error: tuple[ArrayLike, ArrayLike] | None,
 ) -> Any:
     """Paint the plots beside the linkage, and return the upper axes."""
@@ -371,7 +387,7 @@ def _paint_beside(
         else:
             paint_distances(under, shown)
     paint_angles(above, ways, shown)
-    _legend(above, columns=2)
+    _write_legend(above, columns=2)
     return above
 
 
@@ -383,7 +399,7 @@ def _fix_layout(figure: Any) -> None:
         axes.set_position([round(place, 6) for place in places])
 
 
-def _legend(axes: Any, columns: int) -> None:
+def _write_legend(axes: Any, columns: int) -> None:
     """Write the legend above the axes, where no line is."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(

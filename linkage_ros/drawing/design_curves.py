@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from math import degrees, pi, tau
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing.painting import degree_step, Names, OTHER, OTHER_TEXT, WANTED
+from linkage_ros.drawing.painting import degree_step, NameLabels, OTHER, OTHER_TEXT, WANTED
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import InputRange, Position
@@ -31,7 +31,7 @@ _SAMPLES = 481
 _TURNS = (False, False)
 
 
-class Pose(NamedTuple):
+class DesignPose(NamedTuple):
     """
     A design at one of its positions, in the assembly that meets it.
 
@@ -61,7 +61,7 @@ class Pose(NamedTuple):
         return self.closure.points(self.position)
 
 
-class Branch(NamedTuple):
+class DesignBranch(NamedTuple):
     """One assembly, while the crank goes through a range."""
 
     own: bool  # Whether it is the design's own assembly
@@ -73,7 +73,7 @@ class Branch(NamedTuple):
     trace: tuple[complex, ...]  # Places of the traced point, in [m]; (n,). Empty if there is none.
 
 
-def poses(design: Design) -> tuple[list[Pose], list[int]]:
+def design_poses(design: Design) -> tuple[list[DesignPose], list[int]]:
     """
     Return a design at its positions, and the numbers of positions where it does not close.
 
@@ -86,7 +86,7 @@ def poses(design: Design) -> tuple[list[Pose], list[int]]:
         position = closed_position(closure, wanted.crank)
         if position.joints:
             own = met.side == design.four_bar.side
-            closed.append(Pose(number, wanted, met, own, closure, position))
+            closed.append(DesignPose(number, wanted, met, own, closure, position))
         else:
             open_.append(number)
     if not closed:
@@ -96,23 +96,26 @@ def poses(design: Design) -> tuple[list[Pose], list[int]]:
     return closed, open_
 
 
-def branches(design: Design, shown: Sequence[Pose]) -> list[Branch]:
+def swept_branches(design: Design, shown: Sequence[DesignPose]) -> list[DesignBranch]:
     """Return the assemblies of the positions, over the ranges of the crank around these."""
     cranks = [pose.wanted.crank for pose in shown]
-    swept: list[Branch] = []
+    swept: list[DesignBranch] = []
     for side in SIDES:
         if any(pose.met.side == side for pose in shown):
-            way = InputSweep(closure_of(design, side))
+            sweep = InputSweep(closure_of(design, side))
             own = design.four_bar.side
-            swept += [_branch(way, interval, side, own) for interval in _ranges(way, cranks)]
+            swept += [
+                _sweep_branch(sweep, interval, side, own)
+                for interval in _crank_ranges(sweep, cranks)
+            ]
     return swept
 
 
-def _ranges(way: InputSweep, cranks: Sequence[float]) -> list[InputRange]:
+def _crank_ranges(sweep: InputSweep, cranks: Sequence[float]) -> list[InputRange]:
     """Return the ranges of the positions; for a crank that turns fully, one turn around them."""
     ranges: list[InputRange] = []
     for crank in cranks:
-        interval = way.range_about(crank)
+        interval = sweep.range_about(crank)
         if interval is None:
             continue
         if interval.is_whole:
@@ -124,7 +127,9 @@ def _ranges(way: InputSweep, cranks: Sequence[float]) -> list[InputRange]:
     return ranges
 
 
-def _branch(way: InputSweep, interval: InputRange, side: Assembly, own: Assembly) -> Branch:
+def _sweep_branch(
+    sweep: InputSweep, interval: InputRange, side: Assembly, own: Assembly
+) -> DesignBranch:
     low, high = interval.lowest, interval.highest
     part = np.linspace(0.0, 1.0, _SAMPLES)
     limited = interval.limited != _TURNS
@@ -133,15 +138,15 @@ def _branch(way: InputSweep, interval: InputRange, side: Assembly, own: Assembly
         part = 0.5 - 0.5 * np.cos(pi * part)
     crank, joints, trace = [], [], []
     for value in (low + (high - low) * part).tolist():
-        position = way.position_at(min(max(value, low), high))
+        position = sweep.position_at(min(max(value, low), high))
         if position.joints:
             crank.append(value)
             joints.append(position.joints)
-            if way.closure.linkage.traced:
-                trace.append(way.closure.points(position)[COUPLER, 'P'])
+            if sweep.closure.linkage.traced:
+                trace.append(sweep.closure.points(position)[COUPLER, 'P'])
     relative, rocker = np.unwrap(np.array(joints), axis=0).T
     at = np.array(crank)
-    return Branch(side == own, limited, at, rocker, relative + at, tuple(trace))
+    return DesignBranch(side == own, limited, at, rocker, relative + at, tuple(trace))
 
 
 _UNITS = (('m', 1.0), ('mm', 1e3), ('µm', 1e6), ('nm', 1e9))
@@ -155,12 +160,12 @@ _NUMBERED = 12
 """With more positions only every second is numbered, or every third, and so on."""
 
 
-def numbered(number: int, count: int) -> bool:
+def is_numbered(number: int, count: int) -> bool:
     """Return whether a position is labelled with its number."""
     return (number - 1) % (1 + (count - 1) // _NUMBERED) == 0
 
 
-def paint_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -> None:
+def paint_angles(axes: Any, branches: Sequence[DesignBranch], poses: Sequence[DesignPose]) -> None:
     """Plot the angle of the rocker, or of the coupler if that was wanted, over the crank's."""
     from matplotlib.ticker import MultipleLocator  # local import: an extra, and slow to load
 
@@ -169,13 +174,13 @@ def paint_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -
     both = len({branch.own for branch in branches}) > 1
     labelled: set[str] = set()
 
-    def once(text: str) -> str:
+    def label_once(text: str) -> str:
         label = '' if text in labelled else text
         labelled.add(text)
         return label
 
     for branch in sorted(branches, key=lambda branch: not branch.own):
-        angles, marks = _placed(branch, poses)
+        angles, marks = _place_marks(branch, poses)
         side = ', other assembly' if not branch.own else ', own assembly' if both else ''
         axes.plot(
             np.degrees(branch.crank),
@@ -183,43 +188,47 @@ def paint_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -
             color=INK if branch.own else OTHER,
             linewidth=1.5 if branch.own else 0.9,
             zorder=2.5 if branch.own else 2.0,
-            label=once(f'{link}{side}'),
+            label=label_once(f'{link}{side}'),
         )
         if branch.limited:
             for end in (branch.crank[0], branch.crank[-1]):
                 axes.axvline(
                     degrees(end), color='0.45', linewidth=0.8, linestyle=(0, (1, 2)),
-                    label=once('end of the range'), zorder=0,
+                    label=label_once('end of the range'), zorder=0,
                 )  # fmt: skip
         for pose, mark in marks:
-            wanted = _wanted(pose, coupler)
+            wanted = _wanted_angle(pose, coupler)
             axes.plot(
                 [mark.real], [mark.imag],
                 marker='o', linestyle='', markersize=5.5, markeredgewidth=1.4,
                 markerfacecolor='white' if wanted is None else WANTED,
                 markeredgecolor=(INK if wanted is None else WANTED) if branch.own else OTHER,
-                zorder=5, label=once('position' if wanted is None else 'wanted'),
+                zorder=5, label=label_once('position' if wanted is None else 'wanted'),
             )  # fmt: skip
-    _degrees(axes, f'{link} angle [°]')
+    _label_degrees(axes, f'{link} angle [°]')
     axes.yaxis.set_major_locator(MultipleLocator(degree_step(axes.get_ylim())))
 
 
-def number_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -> None:
+def number_angles(
+    axes: Any, branches: Sequence[DesignBranch], poses: Sequence[DesignPose]
+) -> None:
     """Write the numbers of the positions into that plot, after its layout."""
-    names = Names(axes)
+    names = NameLabels(axes)
     lines = []
     for branch in branches:
-        angles, marks = _placed(branch, poses)
+        angles, marks = _place_marks(branch, poses)
         lines.append([complex(*at) for at in np.degrees((branch.crank, angles)).T[::_EVERY]])
         for pose, mark in marks:
-            if numbered(pose.number, len(poses)):
+            if is_numbered(pose.number, len(poses)):
                 ink = INK if branch.own else OTHER_TEXT
                 style = {'fontsize': 7.5, 'fontweight': 'bold', 'color': ink}
-                names.want(str(pose.number), (mark,), 6.0, **style)
-    names.place(lines)
+                names.add_name(str(pose.number), (mark,), 6.0, **style)
+    names.place_names(lines)
 
 
-def paint_error(axes: Any, error: tuple[ArrayLike, ArrayLike], poses: Sequence[Pose]) -> None:
+def paint_error(
+    axes: Any, error: tuple[ArrayLike, ArrayLike], poses: Sequence[DesignPose]
+) -> None:
     """Plot the error of the rocker's angle over the crank's, and mark the positions on it."""
     crank, missed = (np.asarray(values, np.float64) for values in error)
     order = np.argsort(crank, kind='stable')
@@ -235,11 +244,11 @@ def paint_error(axes: Any, error: tuple[ArrayLike, ArrayLike], poses: Sequence[P
             axes.plot(
                 [at], [np.interp(at, crank, missed)], 'o', color=WANTED, markersize=4.5, zorder=5
             )
-    _degrees(axes, 'error of the rocker [°]')
+    _label_degrees(axes, 'error of the rocker [°]')
     axes.margins(x=0.03)
 
 
-def paint_distances(axes: Any, poses: Sequence[Pose]) -> None:
+def paint_distances(axes: Any, poses: Sequence[DesignPose]) -> None:
     """Plot the distance of the traced point from each of its places."""
     from matplotlib.ticker import MaxNLocator  # local import: an extra, and slow to load
 
@@ -255,31 +264,33 @@ def paint_distances(axes: Any, poses: Sequence[Pose]) -> None:
     axes.set_ylabel(f'distance [{unit}]')
     axes.set_xlabel('point')
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    _plain(axes)
+    _style_axes(axes)
 
 
-def misses_places(poses: Sequence[Pose]) -> bool:
+def misses_places(poses: Sequence[DesignPose]) -> bool:
     """Return whether wanted places are missed by more than rounding."""
     size = sum(abs(place) for place in poses[0].points.values())
     return any(pose.met.distance > _ROUNDING * size for pose in poses)
 
 
-def _wanted(pose: Pose, coupler: bool) -> float | None:
+def _wanted_angle(pose: DesignPose, coupler: bool) -> float | None:
     return pose.wanted.coupler if coupler else pose.wanted.rocker
 
 
-def _on(branch: Branch, crank: float) -> float | None:
+def _crank_on_branch(branch: DesignBranch, crank: float) -> float | None:
     """Return a crank angle with the turns that bring it into a branch's range, or None."""
     low, high = float(branch.crank[0]), float(branch.crank[-1])
     x = crank - tau * round((crank - 0.5 * (low + high)) / tau)
     return x if low - _ROUNDING <= x <= high + _ROUNDING else None
 
 
-def _of_coupler(poses: Sequence[Pose]) -> bool:
+def _of_coupler(poses: Sequence[DesignPose]) -> bool:
     return any(pose.wanted.coupler is not None for pose in poses)
 
 
-def _placed(branch: Branch, poses: Sequence[Pose]) -> tuple[Array, list[tuple[Pose, complex]]]:
+def _place_marks(
+    branch: DesignBranch, poses: Sequence[DesignPose]
+) -> tuple[Array, list[tuple[DesignPose, complex]]]:
     """
     Return a branch's angles in the wanted turn, and the marks of its positions.
 
@@ -289,10 +300,10 @@ def _placed(branch: Branch, poses: Sequence[Pose]) -> tuple[Array, list[tuple[Po
     angles = branch.coupler if coupler else branch.rocker
     placed = []
     for pose in poses:
-        x = _on(branch, pose.wanted.crank)
+        x = _crank_on_branch(branch, pose.wanted.crank)
         if pose.own == branch.own and x is not None:
             y = float(np.interp(x, branch.crank, angles))
-            placed.append((pose, x, y, _wanted(pose, coupler)))
+            placed.append((pose, x, y, _wanted_angle(pose, coupler)))
     behind = [((wanted or 0.0) - y) / tau for _, _, y, wanted in placed]
     shift = tau * round(float(np.median(behind))) if behind else 0.0
     marks = []
@@ -303,16 +314,16 @@ def _placed(branch: Branch, poses: Sequence[Pose]) -> tuple[Array, list[tuple[Po
     return angles + shift, marks
 
 
-def _degrees(axes: Any, label: str) -> None:
+def _label_degrees(axes: Any, label: str) -> None:
     from matplotlib.ticker import MultipleLocator  # local import: an extra, and slow to load
 
     axes.set_xlabel('crank angle [°]')
     axes.set_ylabel(label)
     axes.xaxis.set_major_locator(MultipleLocator(degree_step(axes.get_xlim())))
-    _plain(axes)
+    _style_axes(axes)
 
 
-def _plain(axes: Any) -> None:
+def _style_axes(axes: Any) -> None:
     axes.tick_params(labelsize=7, width=0.5)
     for side in ('top', 'right'):
         axes.spines[side].set_visible(False)

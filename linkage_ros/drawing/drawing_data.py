@@ -16,24 +16,24 @@ from typing import Any
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.curves import traced_carriers
-from linkage_ros.kinematics.pose_view import all_places, symbol_size, View
+from linkage_ros.kinematics.pose_view import all_places, LinkageView, symbol_size
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.shapes import (
+    bounding_corners,
     carried_shapes,
     Circle,
-    corners,
     link_frames,
     LinkFrame,
-    outline,
     Segment,
     Shape,
+    shape_outline,
 )
 
 _DIGITS = 6
 """Significant digits of places: a thousandth of a pixel."""
 
 
-def drawn_in_frames(shown: View) -> dict[str, Any]:
+def drawn_in_frames(shown: LinkageView) -> dict[str, Any]:
     """
     Return the drawing of a linkage as JSON data; lengths are in [m].
 
@@ -45,15 +45,15 @@ def drawn_in_frames(shown: View) -> dict[str, Any]:
     """
     size = symbol_size(shown)
     drawn = carried_shapes(shown.closure, shown.position, size, shown.sweep.travels)
-    reached = [*all_places(shown), *(p for _, shape in drawn for p in outline(shape))]
-    low, high = corners(reached)
+    reached = [*all_places(shown), *(p for _, shape in drawn for p in shape_outline(shape))]
+    low, high = bounding_corners(reached)
     margin = 2.0 * size * (1 + 1j)
     return {
-        'frame': _flat([low - margin, high + margin]),
-        'paths': {name: _flat(path) for name, path in shown.sweep.paths.items()}
+        'frame': _flatten_places([low - margin, high + margin]),
+        'paths': {name: _flatten_places(path) for name, path in shown.sweep.paths.items()}
         if len(shown.closure.linkage.inputs) == 1
         else {},
-        **_carried(shown.closure, shown.position, size, drawn),
+        **_carried_shapes(shown.closure, shown.position, size, drawn),
     }
 
 
@@ -70,16 +70,16 @@ def pose_in_frames(closure: Closure, position: Position, size: float) -> dict[st
 
     """
     drawn = carried_shapes(closure, position, size, {})
-    return _carried(closure, position, size, drawn)
+    return _carried_shapes(closure, position, size, drawn)
 
 
-def _carried(
+def _carried_shapes(
     closure: Closure, position: Position, size: float, drawn: Sequence[tuple[str, Shape]]
 ) -> dict[str, Any]:
     frames = link_frames(closure, position)
     return {
-        'size': _short(size),
-        'shapes': [_shape(link, shape, frames) for link, shape in drawn],
+        'size': _round_digits(size),
+        'shapes': [_shape_data(link, shape, frames) for link, shape in drawn],
         'traced': [
             {'point': name, 'link': link, 'at': list(closure.linkage.links[link][name])}
             for name, link in traced_carriers(closure.linkage).items()
@@ -87,24 +87,28 @@ def _carried(
     }
 
 
-def _shape(link: str, shape: Shape, frames: Mapping[str, LinkFrame]) -> dict[str, Any]:
+def _shape_data(link: str, shape: Shape, frames: Mapping[str, LinkFrame]) -> dict[str, Any]:
     frame = frames[link]
     back = rect(1.0, -frame.angle)
 
-    def within(places: Sequence[complex]) -> list[float]:
-        return _flat([(place - frame.place) * back for place in places])
+    def flat_places(places: Sequence[complex]) -> list[float]:
+        return _flatten_places([(place - frame.place) * back for place in places])
 
     data: dict[str, Any] = {'link': link, 'role': shape.role, 'name': shape.name}
     if isinstance(shape, Circle):
-        return {**data, 'points': within([shape.centre]), 'radius': _short(shape.radius)}
+        return {
+            **data,
+            'points': flat_places([shape.centre]),
+            'radius': _round_digits(shape.radius),
+        }
     if isinstance(shape, Segment):
-        return {**data, 'points': within([shape.start, shape.end])}
-    return {**data, 'points': within(shape.corners), 'closed': True}
+        return {**data, 'points': flat_places([shape.start, shape.end])}
+    return {**data, 'points': flat_places(shape.corners), 'closed': True}
 
 
-def _flat(places: Sequence[complex]) -> list[float]:
-    return [_short(value) for place in places for value in (place.real, place.imag)]
+def _flatten_places(places: Sequence[complex]) -> list[float]:
+    return [_round_digits(value) for place in places for value in (place.real, place.imag)]
 
 
-def _short(value: float) -> float:
+def _round_digits(value: float) -> float:
     return float(f'{value:.{_DIGITS}g}')

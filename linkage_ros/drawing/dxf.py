@@ -26,8 +26,8 @@ from typing import Any, NamedTuple
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import links_by_point
-from linkage_ros.kinematics.pose_view import symbol_size, View, view
-from linkage_ros.kinematics.shapes import corners, hull, link_frames
+from linkage_ros.kinematics.pose_view import LinkageView, prepare_view, symbol_size
+from linkage_ros.kinematics.shapes import bounding_corners, convex_hull, link_frames
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.names import dxf_text
 
@@ -41,7 +41,7 @@ _ROW = 6
 _FLATTEST = 1e-12
 
 
-class _Part(NamedTuple):
+class _FlatPart(NamedTuple):
     """A link in its own frame, in [mm]: the corners of its outline, its holes and slots."""
 
     name: str
@@ -72,7 +72,7 @@ def links_dxf(closure: Closure, *, width: float | None = None, hole: float | Non
     check_installed('ezdxf', "pip install 'linkage_ros[view]'")
     from ezdxf import filemanagement, units  # local import: an extra, and slow to load
 
-    shown = view(closure, usual_inputs(closure))
+    shown = prepare_view(closure, usual_inputs(closure))
     wide = _MM * (2.0 * symbol_size(shown) if width is None else width)
     bore = _HOLE * wide if hole is None else _MM * hole
     if not 0.0 < bore < wide:
@@ -83,32 +83,32 @@ def links_dxf(closure: Closure, *, width: float | None = None, hole: float | Non
         document.layers.add(name, color=colour)
     document.layers.get('ASSEMBLY').off()
     space = document.modelspace()
-    parts = list(_parts(shown))
+    parts = list(_list_parts(shown))
     margin = complex(wide, wide) / 2.0
-    boxes = [corners(part.corners) for part in parts]
+    boxes = [bounding_corners(part.corners) for part in parts]
     sizes = [top - low + 2.0 * margin for low, top in boxes]
     place = 0j
     for number, (part, (low, _), size) in enumerate(zip(parts, boxes, sizes, strict=True)):
         if number % _ROW == 0:
             tallest = max(each.imag for each in islice(sizes, number, number + _ROW))
             place = complex(0.0, place.imag - tallest - 2.0 * wide)
-        _paint(space, part, place - low + margin, 0.0, wide, bore)
+        _draw_part(space, part, place - low + margin, 0.0, wide, bore)
         text = space.add_text(dxf_text(part.name), height=wide / 3.0, dxfattribs={'layer': 'NAME'})
         text.set_placement((place.real, place.imag - wide / 2.0))
         place += size.real + wide
     # Below the parts, as the linkage stands.
-    low, top = corners([place * _MM for place in closure.points(shown.position).values()])
+    low, top = bounding_corners([place * _MM for place in closure.points(shown.position).values()])
     below = complex(0.0, place.imag - 2.0 * wide) - complex(low.real, top.imag + wide)
     frames = link_frames(closure, shown.position)
     for part in parts:
         frame = frames[part.name]
-        _paint(space, part, below + frame.place * _MM, frame.angle, wide, bore, 'ASSEMBLY')
+        _draw_part(space, part, below + frame.place * _MM, frame.angle, wide, bore, 'ASSEMBLY')
     written = StringIO()
     document.write(written)
     return written.getvalue().encode()
 
 
-def _parts(shown: View) -> list[_Part]:
+def _list_parts(shown: LinkageView) -> list[_FlatPart]:
     """Return the links as parts."""
     closure = shown.closure
     linkage = closure.linkage
@@ -127,36 +127,36 @@ def _parts(shown: View) -> list[_Part]:
                 )
         ends = [*places.values(), *(end for slot in slots for end in slot)]
         holes = [at for name, at in places.items() if name in shared]
-        parts.append(_Part(link, hull(ends), holes, slots))
+        parts.append(_FlatPart(link, convex_hull(ends), holes, slots))
     return parts
 
 
-def _paint(
-    space: Any, part: _Part, place: complex, angle: float, wide: float, bore: float,
+def _draw_part(
+    space: Any, part: _FlatPart, place: complex, angle: float, wide: float, bore: float,
     layer: str = '',
 ) -> None:  # fmt: skip
     """Add a part in a place; on its own layers, or all on one."""
 
-    def at(point: complex) -> complex:
+    def place_point(point: complex) -> complex:
         return place + point * rect(1.0, angle)
 
     attributes = {'layer': layer or 'CUT'}
     space.add_lwpolyline(
-        _outline([at(corner) for corner in part.corners], wide / 2.0), format='xyb', close=True,
+        _part_outline([place_point(corner) for corner in part.corners], wide / 2.0), format='xyb', close=True,
         dxfattribs=attributes,
     )  # fmt: skip
     attributes = {'layer': layer or 'HOLE'}
     for hole in part.holes:
-        centre = at(hole)
+        centre = place_point(hole)
         space.add_circle((centre.real, centre.imag), bore / 2.0, dxfattribs=attributes)
     for start, end in part.slots:
         space.add_lwpolyline(
-            _outline(hull([at(start), at(end)]), bore / 2.0), format='xyb', close=True,
+            _part_outline(convex_hull([place_point(start), place_point(end)]), bore / 2.0), format='xyb', close=True,
             dxfattribs=attributes,
         )  # fmt: skip
 
 
-def _outline(places: Sequence[complex], radius: float) -> list[tuple[float, float, float]]:
+def _part_outline(places: Sequence[complex], radius: float) -> list[tuple[float, float, float]]:
     """Return the outline at a distance around a convex polygon: x, y and bulge of each vertex."""
     if len(places) == 1:
         centre = places[0]

@@ -22,55 +22,57 @@ from linkage_ros.drawing.painting import (
     label_ends,
     LAYERS,
     NAME_INK,
-    Names,
-    paint,
+    NameLabels,
+    paint_shapes,
+    picture_settings,
     plot_places,
-    save,
+    save_picture,
     set_plane,
-    settings,
     show_lengths,
 )
 from linkage_ros.kinematics.curves import Curve
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.pose_view import all_places, pose_text, SAME_ANGLE, symbol_size, View
 from linkage_ros.kinematics.shapes import (
+    bounding_corners,
     Circle,
     COLOURS,
-    corners,
+    draw_shapes,
+    draw_skeleton,
     INK,
-    outline,
     Polygon,
     Shape,
-    shapes,
-    skeleton,
+    shape_outline,
 )
 from linkage_ros.names import picture_text
 
 
-def _turns_text(shown: View) -> str:
+def _turns_text(shown: LinkageView) -> str:
     """Return where the mark is, if that is not the angle that was named."""
     if abs(shown.mark - shown.inputs[0]) < SAME_ANGLE:
         return ''
     return f' ({degrees(shown.mark):.4g}° on the axis)'
 
 
-def _beyond_text(shown: View) -> str:
+def _beyond_text(shown: LinkageView) -> str:
     beyond = shown.closure.limit_exceeded(shown.position)
     return f' (limited: {beyond})' if beyond else ''
 
 
-def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None:
+def paint_picture(shown: LinkageView, title: str, file: Path, *, names: bool = False) -> None:
     """
     Paint a picture to a file.
 
     A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
     """
-    context = settings()
+    context = picture_settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
 
     size = symbol_size(shown)
-    drawn = shapes(shown.closure, shown.position, size, shown.sweep.travels)
-    low, high = corners([*all_places(shown), *(p for shape in drawn for p in outline(shape))])
+    drawn = draw_shapes(shown.closure, shown.position, size, shown.sweep.travels)
+    low, high = bounding_corners(
+        [*all_places(shown), *(p for shape in drawn for p in shape_outline(shape))]
+    )
     margin = complex(3.0, 3.0) * size
     width, height = (high - low + 2.0 * margin).real, (high - low + 2.0 * margin).imag
     wide = min(max(4.9 * width / height, 3.0), 6.4)
@@ -87,7 +89,7 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
         left.set_title(picture_text(heading, 120), loc='left', fontsize=9)
         set_plane(left, low - margin, high + margin)
         paint_background(left, shown)
-        paint(left, drawn)
+        paint_shapes(left, drawn)
         turning_input = not shown.closure.linkage.inputs[0].slider
         lines = plot_joints(panels, joints, degrees_x=turning_input)
         # A pose beyond the limits has no place on the axis.
@@ -100,21 +102,21 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
         label_joints(panels, joints, lines)
         if names:
             figure.draw_without_rendering()
-            _names(left, shown, drawn, size)
-        save(figure, file)
+            _write_names(left, shown, drawn, size)
+        save_picture(figure, file)
 
 
-def assemblies_picture(views: Mapping[str, View], file: Path) -> None:
+def assemblies_picture(views: Mapping[str, LinkageView], file: Path) -> None:
     """
     Paint the same linkage in several assemblies, each under the text that a file needs for it.
 
     A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
     """
-    context = settings()
+    context = picture_settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
 
     size = min(map(symbol_size, views.values()))
-    low, high = corners(place for shown in views.values() for place in all_places(shown))
+    low, high = bounding_corners(place for shown in views.values() for place in all_places(shown))
     margin = complex(4.0, 4.0) * size
     ratio = (high - low + 2.0 * margin).imag / (high - low + 2.0 * margin).real
     rows = ceil(len(views) / ceil(sqrt(len(views) * ratio)))
@@ -134,14 +136,16 @@ def assemblies_picture(views: Mapping[str, View], file: Path) -> None:
             set_plane(axes, low - margin, high + margin)
             axes.set_axis_off()
             paint_background(axes, shown)
-            paint(axes, shapes(shown.closure, shown.position, size, shown.sweep.travels))
-        save(figure, file)
+            paint_shapes(
+                axes, draw_shapes(shown.closure, shown.position, size, shown.sweep.travels)
+            )
+        save_picture(figure, file)
 
 
-def paint_background(axes: Any, shown: View) -> None:
+def paint_background(axes: Any, shown: LinkageView) -> None:
     """Paint poses in light grey, and the paths of the traced points dashed."""
     for number, position in enumerate(shown.ghosts):
-        for line in skeleton(shown.closure, position):
+        for line in draw_skeleton(shown.closure, position):
             plot_places(
                 axes,
                 (line.start, line.end),
@@ -214,7 +218,7 @@ def label_joints(panels: Mapping[bool, Any], joints: Sequence[Curve], lines: Any
         label_ends(axes, [lines[joint.name] for joint in joints if joint.turning == turning])
 
 
-def moved_input(shown: View) -> tuple[str, str]:
+def moved_input(shown: LinkageView) -> tuple[str, str]:
     """Return the name and the unit of the input that moves."""
     given = shown.closure.linkage.inputs[0]
     held = ', the others held' if len(shown.inputs) > 1 else ''
@@ -229,17 +233,17 @@ def label_across(axes: Any, name: str, unit: str) -> None:
         axes.set_xlabel(f'{name} [{unit}]')
 
 
-def _names(axes: Any, shown: View, drawn: Sequence[Shape], size: float) -> None:
+def _write_names(axes: Any, shown: LinkageView, drawn: Sequence[Shape], size: float) -> None:
     """Write the names of pins and links where they hide little."""
-    names = Names(axes)
-    radius = abs(names.pixel(complex(size, 0.0)) - names.pixel(0j))
+    names = NameLabels(axes)
+    radius = abs(names.to_pixel(complex(size, 0.0)) - names.to_pixel(0j))
     pins = {shape.name: shape.centre for shape in drawn if isinstance(shape, Circle)}
     points = shown.closure.points(shown.position)
     for (link, name), place in points.items():
         if link in shown.closure.linkage.links and link != GROUND:
             pins.setdefault(name, place)
     for name, place in pins.items():
-        names.want(name, (place,), 1.2 * radius, fontsize=7.5, fontweight='bold', color=INK)
+        names.add_name(name, (place,), 1.2 * radius, fontsize=7.5, fontweight='bold', color=INK)
     for link, named in shown.closure.linkage.links.items():
         if link == GROUND:
             continue
@@ -253,7 +257,9 @@ def _names(axes: Any, shown: View, drawn: Sequence[Shape], size: float) -> None:
         if len(places) > 1:
             one, other = places[0], places[-1]
             anchors += [one + (other - one) * part for part in (0.35, 0.65, 0.25, 0.75)]
-        names.want(link, anchors, 1.1 * radius, fontsize=6.5, fontstyle='italic', color=NAME_INK)
-    lines = [outline(shape) for shape in drawn]
-    lines += [(line.start, line.end) for line in skeleton(shown.closure, shown.position)]
-    names.place(lines)
+        names.add_name(
+            link, anchors, 1.1 * radius, fontsize=6.5, fontstyle='italic', color=NAME_INK
+        )
+    lines = [shape_outline(shape) for shape in drawn]
+    lines += [(line.start, line.end) for line in draw_skeleton(shown.closure, shown.position)]
+    names.place_names(lines)

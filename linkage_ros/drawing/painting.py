@@ -43,7 +43,7 @@ class Label(NamedTuple):
     clear: float  # Distance of its box from the anchor
 
 
-class Placed(NamedTuple):
+class PlacedText(NamedTuple):
     """Place of a label's centre, and its anchor."""
 
     centre: complex
@@ -54,7 +54,7 @@ def place_labels(
     labels: Sequence[Label],
     obstacles: Sequence[complex],
     frame: tuple[complex, complex],
-) -> list[Placed]:
+) -> list[PlacedText]:
     """
     Place labels one after the other, each where it hides least.
 
@@ -68,27 +68,29 @@ def place_labels(
         The lower left and the upper right corner of the drawing.
 
     """
-    placed: list[Placed] = []
+    placed: list[PlacedText] = []
     for label in labels:
-        placed.append(_best(label, obstacles, frame, list(zip(labels, placed, strict=False))))
+        placed.append(
+            _best_place(label, obstacles, frame, list(zip(labels, placed, strict=False)))
+        )
     # The first ones did not know the others.
     for _ in range(_ROUNDS):
         for number, label in enumerate(labels):
             pairs = enumerate(zip(labels, placed, strict=True))
             others = [pair for other, pair in pairs if other != number]
-            placed[number] = _best(label, obstacles, frame, others)
+            placed[number] = _best_place(label, obstacles, frame, others)
     return placed
 
 
-def _best(
+def _best_place(
     label: Label,
     obstacles: Sequence[complex],
     frame: tuple[complex, complex],
-    others: Sequence[tuple[Label, Placed]],
-) -> Placed:
+    others: Sequence[tuple[Label, PlacedText]],
+) -> PlacedText:
     """Return the place at which a label hides least."""
     half_width, half_height = 0.5 * label.width, 0.5 * label.height
-    best: tuple[float, Placed] | None = None
+    best: tuple[float, PlacedText] | None = None
     for rank, anchor in enumerate(label.anchors):
         for ring in range(_DISTANCES):
             for i in range(_DIRECTIONS):
@@ -100,28 +102,28 @@ def _best(
                 )
                 cost = 0.6 * ring + 0.3 * rank + 0.01 * i
                 cost += 400.0 * sum(
-                    _overlap(
+                    _is_overlapping(
                         centre, half_width, half_height, other.centre, 0.5 * box.width,
                         0.5 * box.height,
                     )
                     for box, other in others
                 )  # fmt: skip
-                cost += 20.0 * _outside(centre, half_width, half_height, frame)
+                cost += 20.0 * _is_outside(centre, half_width, half_height, frame)
                 if best is None or cost < best[0]:
-                    cost += 2.5 * _inside(centre, half_width, half_height, obstacles)
+                    cost += 2.5 * _count_inside(centre, half_width, half_height, obstacles)
                     if best is None or cost < best[0]:
-                        best = cost, Placed(centre, anchor)
+                        best = cost, PlacedText(centre, anchor)
     assert best is not None, 'a label has an anchor'
     return best[1]
 
 
-def _inside(centre: complex, width: float, height: float, points: Sequence[complex]) -> int:
+def _count_inside(centre: complex, width: float, height: float, points: Sequence[complex]) -> int:
     return sum(
         abs(p.real - centre.real) < width and abs(p.imag - centre.imag) < height for p in points
     )
 
 
-def _overlap(
+def _is_overlapping(
     centre: complex,
     width: float,
     height: float,
@@ -133,7 +135,9 @@ def _overlap(
     return abs(apart.real) < width + its_width and abs(apart.imag) < height + its_height
 
 
-def _outside(centre: complex, width: float, height: float, frame: tuple[complex, complex]) -> bool:
+def _is_outside(
+    centre: complex, width: float, height: float, frame: tuple[complex, complex]
+) -> bool:
     low, high = frame
     return (
         centre.real - width < low.real
@@ -163,14 +167,14 @@ _SETTINGS: Any = {
 }
 
 
-def settings() -> Any:
+def picture_settings() -> Any:
     """Return the matplotlib context of a picture; a LinkageError without matplotlib."""
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
-    return _settings()
+    return _apply_settings()
 
 
 @contextmanager
-def _settings() -> Iterator[None]:
+def _apply_settings() -> Iterator[None]:
     import matplotlib as mpl  # local import: an extra, and slow to load
 
     with mpl.rc_context(_SETTINGS), catch_warnings():
@@ -179,7 +183,7 @@ def _settings() -> Iterator[None]:
         yield
 
 
-def save(figure: Any, file: Path) -> None:
+def save_picture(figure: Any, file: Path) -> None:
     """Save a picture; equal pictures give equal bytes. A LinkageError if it cannot be written."""
     kind = file.suffix[1:].lower() or 'png'
     metadata = {'png': {'Software': None}, 'svg': {'Date': None}}.get(kind)
@@ -193,7 +197,7 @@ def save(figure: Any, file: Path) -> None:
     atomic_write(file, picture.getvalue())
 
 
-def spread(places: Sequence[float], gap: float) -> list[float]:
+def spread_places(places: Sequence[float], gap: float) -> list[float]:
     """Return places moved as little as possible until neighbours are a gap apart; same order."""
     order = sorted(range(len(places)), key=places.__getitem__)
     # Without the gaps the places may be equal but not fall: the mean of each run that falls.
@@ -221,7 +225,7 @@ def label_ends(axes: Any, lines: Sequence[Any], *, fontsize: float = 7.0) -> Non
     gap = 1.25 * fontsize / height
     lasts = [next((y for y in reversed(line.get_ydata()) if not isnan(y)), low) for line in lines]
     ends = [(last - low) / (high - low) for last in lasts]
-    for line, place in zip(lines, spread(ends, gap), strict=True):
+    for line, place in zip(lines, spread_places(ends, gap), strict=True):
         axes.text(
             1.01, place, line.get_label(), transform=axes.transAxes, va='center', ha='left',
             fontsize=fontsize, color=line.get_color(),
@@ -265,7 +269,7 @@ def plot_places(axes: Any, places: Sequence[complex], *mark: str, **style: Any) 
     return axes.plot([p.real for p in places], [p.imag for p in places], *mark, **style)
 
 
-def paint(axes: Any, drawn: Sequence[Shape]) -> list[Any]:
+def paint_shapes(axes: Any, drawn: Sequence[Shape]) -> list[Any]:
     """Paint shapes, the last on top; return their artists, in the same order."""
     from matplotlib import patches  # local import: an extra, and slow to load
 
@@ -307,7 +311,7 @@ def paint(axes: Any, drawn: Sequence[Shape]) -> list[Any]:
     return painted
 
 
-class Names:
+class NameLabels:
     """
     Texts placed together, each where it hides little.
 
@@ -323,12 +327,12 @@ class Names:
         self._texts: list[Any] = []
         self._labels: list[Label] = []
 
-    def pixel(self, place: complex) -> complex:
+    def to_pixel(self, place: complex) -> complex:
         """Return the pixel of a place in [m]."""
         x, y = self._axes.transData.transform((place.real, place.imag))
         return complex(x, y)
 
-    def want(self, name: str, anchors: Sequence[complex], clear: float, **style: Any) -> None:
+    def add_name(self, name: str, anchors: Sequence[complex], clear: float, **style: Any) -> None:
         """Add a name next to one of some places, in [m], the first the best; clear in pixels."""
         from matplotlib.patheffects import withStroke  # local import: an extra, and slow to load
 
@@ -338,15 +342,15 @@ class Names:
         )  # fmt: skip
         box = written.get_window_extent()
         self._texts.append(written)
-        pixels = tuple(map(self.pixel, anchors))
+        pixels = tuple(map(self.to_pixel, anchors))
         self._labels.append(Label(pixels, box.width + _GAP, box.height + _GAP, clear))
 
-    def place(self, lines: Iterable[Sequence[complex]]) -> None:
+    def place_names(self, lines: Iterable[Sequence[complex]]) -> None:
         """Place the texts where they hide little of some lines, in [m]."""
         obstacles = []
         for line in lines:
-            for start, end in pairwise(map(self.pixel, line)):
-                obstacles += _between(start, end)
+            for start, end in pairwise(map(self.to_pixel, line)):
+                obstacles += _points_between(start, end)
         box = self._axes.get_window_extent()
         frame = complex(box.x0, box.y0), complex(box.x1, box.y1)
         back = self._axes.transData.inverted()
@@ -365,6 +369,6 @@ class Names:
                 )  # fmt: skip
 
 
-def _between(start: complex, end: complex) -> list[complex]:
+def _points_between(start: complex, end: complex) -> list[complex]:
     count = max(1, ceil(abs(end - start) / 4.0))
     return [start + (end - start) * i / count for i in range(count)]

@@ -16,18 +16,18 @@ from xml.sax.saxutils import escape
 from linkage_ros.drawing.painting import GHOST, STROKES
 from linkage_ros.errors import quoted
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.pose_view import all_places, symbol_size, view
+from linkage_ros.kinematics.pose_view import all_places, prepare_view, symbol_size
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.shapes import (
+    bounding_corners,
     Circle,
     COLOURS,
-    corners,
+    draw_shapes,
+    draw_skeleton,
     FACES,
     INK,
-    outline,
     Polygon,
-    shapes,
-    skeleton,
+    shape_outline,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
@@ -64,33 +64,35 @@ def svg(shown: Closure | Position) -> str:
         raise TypeError(f'svg: {quoted(shown)} is not drawn; give a Closure or a Position')
     closure = position.closure
     assert isinstance(closure, Closure)
-    seen = view(closure, position.inputs)
+    seen = prepare_view(closure, position.inputs)
     size = symbol_size(seen)
-    drawn = shapes(closure, position, size, seen.sweep.travels)
-    low, high = corners([*all_places(seen), *(p for shape in drawn for p in outline(shape))])
+    drawn = draw_shapes(closure, position, size, seen.sweep.travels)
+    low, high = bounding_corners(
+        [*all_places(seen), *(p for shape in drawn for p in shape_outline(shape))]
+    )
     margin = complex(2.0, 2.0) * size
     low, high = low - margin, high + margin
     scale = _LONGER_SIDE / max((high - low).real, (high - low).imag)
     width, height = scale * (high - low).real, scale * (high - low).imag
 
-    def line(places: Iterable[complex], style: str) -> str:
+    def polyline_svg(places: Iterable[complex], style: str) -> str:
         pixels = (((p - low).real * scale, (high - p).imag * scale) for p in places)
         points = ' '.join(f'{x:.1f},{y:.1f}' for x, y in pixels)
         return f'<polyline points="{points}" {style}/>'
 
     lines = [
-        line(outline(bar), f'stroke="{GHOST}"')
+        polyline_svg(shape_outline(bar), f'stroke="{GHOST}"')
         for ghost in seen.ghosts
-        for bar in skeleton(closure, ghost)
+        for bar in draw_skeleton(closure, ghost)
     ]
     for number, path in enumerate(seen.sweep.paths.values()):
         colour = COLOURS[number % len(COLOURS)]
-        lines.append(line(path, f'stroke="{colour}" stroke-dasharray="5 2"'))
+        lines.append(polyline_svg(path, f'stroke="{colour}" stroke-dasharray="5 2"'))
     for shape in drawn:
         if isinstance(shape, Polygon):
             colour, opacity = FACES[shape.role][:7], int(FACES[shape.role][7:] or 'ff', 16) / 255
             style = f'fill="{colour}" fill-opacity="{opacity:.2f}" stroke="{INK}"'
-            lines.append(line(outline(shape), style))
+            lines.append(polyline_svg(shape_outline(shape), style))
         elif isinstance(shape, Circle):
             centre, radius = shape.centre - low, shape.radius * scale
             lines.append(
@@ -99,7 +101,9 @@ def svg(shown: Closure | Position) -> str:
             )
         else:
             colour, weight = STROKES[shape.role]
-            lines.append(line(outline(shape), f'stroke="{colour}" stroke-width="{weight}"'))
+            lines.append(
+                polyline_svg(shape_outline(shape), f'stroke="{colour}" stroke-width="{weight}"')
+            )
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
         f'viewBox="0 0 {width:.1f} {height:.1f}" fill="none" stroke-linejoin="round">'

@@ -25,19 +25,19 @@ from typing import NamedTuple
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Input, links_by_point
-from linkage_ros.kinematics.pose_view import all_places, symbol_size, view
+from linkage_ros.kinematics.pose_view import all_places, prepare_view, symbol_size
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.shapes import (
+    bounding_corners,
     carried_shapes,
     Circle,
     COLOURS,
-    corners,
     FACES,
     INK,
-    outline,
     Polygon,
     Segment,
     Shape,
+    shape_outline,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.messages.marker_array import (
@@ -133,8 +133,8 @@ def marker_shapes(
         Lifetimes of moving and of still markers, in [ns].
 
     """
-    shown = view(closure, usual_inputs(closure))
-    low, high = corners(all_places(shown))
+    shown = prepare_view(closure, usual_inputs(closure))
+    low, high = bounding_corners(all_places(shown))
     extent = abs(high - low)
     size = 0.5 * width * extent if width else symbol_size(shown)
     moves, stays = lifetimes
@@ -220,7 +220,7 @@ def _body_markers(
         if link == GROUND or isinstance(shape, Circle):
             continue
         origin, back = points[anchors[link]], rect(1.0, -angles[link])
-        edge = [_flat_point((place - origin) * back) for place in outline(shape)]
+        edge = [_flat_point((place - origin) * back) for place in shape_outline(shape)]
         if isinstance(shape, Segment):
             slot_line, z = (0.5 * pile.size, 0.0, 0.0), pile.z - 0.6 * pile.layer
             add_body(link, Marker('slots', 0, LINE_LIST, slot_line, _SLOT, edge, z=z))
@@ -248,7 +248,9 @@ def _ground_markers(drawn: Sequence[Shape], size: float, lifetime: int) -> list[
     """Return the markers of the ground: areas and lines."""
     filled = [shape for shape in drawn if isinstance(shape, Polygon)]
     area = [p for shape in filled for p in _fan_triangles([_flat_point(q) for q in shape.corners])]
-    lines = [_flat_point(q) for shape in drawn for ends in pairwise(outline(shape)) for q in ends]
+    lines = [
+        _flat_point(q) for shape in drawn for ends in pairwise(shape_outline(shape)) for q in ends
+    ]
     whole, thin = (1.0, 1.0, 1.0), (0.16 * size, 0.0, 0.0)
     found = [
         Marker('ground', 0, TRIANGLE_LIST, whole, rgba(FACES['ground']), area, lifetime=lifetime),

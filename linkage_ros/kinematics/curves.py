@@ -35,7 +35,7 @@ class Curve(NamedTuple):
     y: tuple[float, ...]
 
 
-class Sweep(NamedTuple):
+class RangeSweep(NamedTuple):
     """
     The motion of a linkage while its input goes through a range.
 
@@ -56,9 +56,9 @@ def traced_carriers(linkage: Linkage) -> dict[str, str]:
     }
 
 
-def sweep(way: InputSweep, interval: InputRange) -> Sweep:
+def sweep_range(input_sweep: InputSweep, interval: InputRange) -> RangeSweep:
     """Move a linkage through a range."""
-    closure = way.closure
+    closure = input_sweep.closure
     linkage = closure.linkage
     carriers = traced_carriers(linkage)
     x: list[float] = []
@@ -66,7 +66,7 @@ def sweep(way: InputSweep, interval: InputRange) -> Sweep:
     paths: dict[str, list[complex]] = {point: [] for point in carriers}
     slides: dict[str, list[float]] = {name: [] for name in linkage.sliders}
     for value in sample_inputs(interval):
-        position = way.position_at(value)
+        position = input_sweep.position_at(value)
         if not position.joints:
             continue
         x.append(value)
@@ -79,15 +79,15 @@ def sweep(way: InputSweep, interval: InputRange) -> Sweep:
     joints = []
     for i, (name, turning) in enumerate(zip(linkage.joints, closure.turning, strict=True)):
         y = [value[i] for value in values]
-        joints.append(Curve(name, turning, tuple(x), tuple(continuous(y) if turning else y)))
-    return Sweep(
+        joints.append(Curve(name, turning, tuple(x), tuple(unwrap_angles(y) if turning else y)))
+    return RangeSweep(
         tuple(joints),
         {point: drawn_once(path) for point, path in paths.items()},
         {name: (min(s), max(s)) for name, s in slides.items()},
     )
 
 
-def continuous(angles: Sequence[float]) -> list[float]:
+def unwrap_angles(angles: Sequence[float]) -> list[float]:
     """Return angles without jumps: the first in (−π, π], each next within π of the one before."""
     values: list[float] = []
     for angle in angles:

@@ -27,7 +27,7 @@ SAME_ANGLE = 1e-9
 """Largest difference of angles that counts as rounding, in [rad]."""
 
 
-class View(NamedTuple):
+class LinkageView(NamedTuple):
     """The content of a picture."""
 
     closure: Closure  # The linkage
@@ -37,56 +37,61 @@ class View(NamedTuple):
     ghosts: tuple[Position, ...]  # Poses in the background
     interval: InputRange  # Range of the first input around the pose, with the others held
     mark: float  # The first input, less the whole turns by which it lies outside of that range
-    sweep: Sweep  # The motion through that range
+    sweep: RangeSweep  # The motion through that range
 
 
-def view(
+def prepare_view(
     closure: Closure, inputs: tuple[float, ...], ghosts: Sequence[tuple[float, ...]] = ()
-) -> View:
+) -> LinkageView:
     """
     Prepare a picture of a pose, with others in the background.
 
     By default those are some over the whole range. A LinkageError says that a pose does not close.
     """
-    position = _closed(closure, inputs)
-    way = InputSweep(closure, inputs)
+    position = _close_loops(closure, inputs)
+    input_sweep = InputSweep(closure, inputs)
     value = inputs[0]
     # A pose beyond the limits lies in no range; show the widest one.
-    about = way.range_about(value) or way.widest_range
-    about = about or InputRange(value, value, way.turning)
-    interval = _listed(way, about)
+    about = input_sweep.range_about(value) or input_sweep.widest_range
+    about = about or InputRange(value, value, input_sweep.turning)
+    interval = _find_range(input_sweep, about)
     shift = about.shift(value) if about.is_whole else interval.lowest - about.lowest
     if ghosts:
-        behind = [_closed(closure, given) for given in ghosts]
+        behind = [_close_loops(closure, given) for given in ghosts]
     elif interval.is_whole:
         turn = interval.highest - interval.lowest
-        behind = [way.position_at(value + turn * i / (_GHOSTS + 1)) for i in range(1, _GHOSTS + 1)]
+        behind = [
+            input_sweep.position_at(value + turn * i / (_GHOSTS + 1))
+            for i in range(1, _GHOSTS + 1)
+        ]
     else:
         low, high = interval.lowest, interval.highest
-        behind = [way.position_at(low + (high - low) * i / (_GHOSTS - 1)) for i in range(_GHOSTS)]
-    return View(
+        behind = [
+            input_sweep.position_at(low + (high - low) * i / (_GHOSTS - 1)) for i in range(_GHOSTS)
+        ]
+    return LinkageView(
         closure,
         inputs,
         position,
         tuple(ghost for ghost in behind if ghost.joints),
         interval,
         value + shift,
-        sweep(way, interval),
+        sweep_range(input_sweep, interval),
     )
 
 
-def _listed(way: InputSweep, about: InputRange) -> InputRange:
+def _find_range(input_sweep: InputSweep, about: InputRange) -> InputRange:
     """Return a range with the turns with which it is among the ranges."""
-    if about in way.ranges:
+    if about in input_sweep.ranges:
         return about
-    for interval in way.ranges:
+    for interval in input_sweep.ranges:
         period = tau * interval.turns
         if period and abs(remainder(about.lowest - interval.lowest, period)) < SAME_ANGLE:
             return interval
     return about
 
 
-def _closed(closure: Closure, inputs: tuple[float, ...]) -> Position:
+def _close_loops(closure: Closure, inputs: tuple[float, ...]) -> Position:
     position = closure.position(*inputs)
     if not position.joints:
         ranges = InputSweep(closure, inputs).ranges
@@ -115,18 +120,18 @@ def pose_text(closure: Closure, inputs: tuple[float, ...]) -> str:
     )
 
 
-def all_places(shown: View) -> list[complex]:
+def all_places(shown: LinkageView) -> list[complex]:
     """Return all places that any part passes, in [m]."""
     places = [place for path in shown.sweep.paths.values() for place in path]
     for position in (shown.position, *shown.ghosts):
-        for line in skeleton(shown.closure, position):
+        for line in draw_skeleton(shown.closure, position):
             places += (line.start, line.end)
     return places
 
 
-def symbol_size(shown: View) -> float:
+def symbol_size(shown: LinkageView) -> float:
     """Return half the width of a bar, in [m], for the picture and its shortest link."""
-    low, high = corners(all_places(shown))
+    low, high = bounding_corners(all_places(shown))
     picture = abs(high - low)
     points = shown.closure.points(shown.position)
     bars = [

@@ -90,13 +90,13 @@ class Circle(NamedTuple):
 Shape = Polygon | Segment | Circle
 
 
-def corners(places: Iterable[complex]) -> tuple[complex, complex]:
+def bounding_corners(places: Iterable[complex]) -> tuple[complex, complex]:
     """Return the lower left and the upper right corner of the bounding box of places."""
     xs, ys = zip(*((p.real, p.imag) for p in places), strict=True)
     return complex(min(xs), min(ys)), complex(max(xs), max(ys))
 
 
-def outline(shape: Shape) -> tuple[complex, ...]:
+def shape_outline(shape: Shape) -> tuple[complex, ...]:
     """Return the corners of a shape's edge."""
     if isinstance(shape, Segment):
         return shape.start, shape.end
@@ -110,7 +110,7 @@ def bar_size(picture: float, shortest: float) -> float:
     return min(0.013 * picture, max(0.26 * shortest, 0.006 * picture))
 
 
-class _Pose(NamedTuple):
+class _DrawnPose(NamedTuple):
     """A linkage in a pose, with the values that the shapes need."""
 
     closure: Closure
@@ -121,7 +121,9 @@ class _Pose(NamedTuple):
     size: float
 
 
-def shapes(closure: Closure, position: Position, size: float, travels: Travels) -> list[Shape]:
+def draw_shapes(
+    closure: Closure, position: Position, size: float, travels: Travels
+) -> list[Shape]:
     """
     Draw a linkage.
 
@@ -142,7 +144,7 @@ def carried_shapes(
     closure: Closure, position: Position, size: float, travels: Travels
 ) -> list[tuple[str, Shape]]:
     """Draw a linkage as `shapes` does; return each shape with the link that carries it."""
-    pose = _Pose(
+    pose = _DrawnPose(
         closure,
         closure.points(position),
         closure.link_angles(position),
@@ -156,21 +158,21 @@ def carried_shapes(
     for name, slider in linkage.sliders.items():
         if slider.along == GROUND:
             ground += _ground_rail(pose, name, slider)
-    for place in _supports(pose):
-        ground += _support(place, size)
+    for place in _ground_pins(pose):
+        ground += _draw_support(place, size)
     drawn = [(GROUND, shape) for shape in ground]
     driven = driven_links(closure)
     links = [
-        (link, _link(pose, link, 'input' if link in driven else 'link', cylinders))
+        (link, _draw_link(pose, link, 'input' if link in driven else 'link', cylinders))
         for link in linkage.links
         if link != GROUND
     ]
     # Plates hide least below the bars, and driven links should be visible.
-    for link, parts in sorted(links, key=lambda item: _layer(item[1])):
+    for link, parts in sorted(links, key=lambda item: _shape_layer(item[1])):
         drawn += [(link, part) for part in parts]
     for name, slider in linkage.sliders.items():
         if name not in cylinders:
-            drawn.append((structure.blocks[name], _block(pose, name, slider)))
+            drawn.append((structure.blocks[name], _draw_block(pose, name, slider)))
     drawn += _pitch_circles(pose)
     pins = {
         point: (link, Circle('pin', point, place, 0.55 * size))
@@ -180,7 +182,7 @@ def carried_shapes(
     return [*drawn, *pins.values()]
 
 
-def skeleton(closure: Closure, position: Position) -> list[Segment]:
+def draw_skeleton(closure: Closure, position: Position) -> list[Segment]:
     """Return the links as lines from point to point, for a pose in the background."""
     points = closure.points(position)
     blocks = closure.structure.blocks
@@ -192,7 +194,7 @@ def skeleton(closure: Closure, position: Position) -> list[Segment]:
         for name, slider in closure.linkage.sliders.items():
             if slider.along == link:
                 places.append(points[blocks[name], slider.point])
-        corners = hull(places)
+        corners = convex_hull(places)
         ends = [*corners[1:], corners[0]] if len(corners) > 2 else corners[1:]
         drawn += [Segment('ghost', link, *line) for line in zip(corners, ends, strict=False)]
     return drawn
@@ -225,7 +227,7 @@ def driven_links(closure: Closure) -> set[str]:
     return driven
 
 
-def hull(points: Iterable[complex]) -> list[complex]:
+def convex_hull(points: Iterable[complex]) -> list[complex]:
     """
     Return the corners of the convex hull of points, counter-clockwise.
 
@@ -236,7 +238,7 @@ def hull(points: Iterable[complex]) -> list[complex]:
         return places
     slack = _FLAT * max(abs(p - places[0]) for p in places) ** 2
 
-    def chain(ordered: Iterable[complex]) -> list[complex]:
+    def half_hull(ordered: Iterable[complex]) -> list[complex]:
         corners: list[complex] = []
         for place in ordered:
             while len(corners) > 1:
@@ -247,10 +249,10 @@ def hull(points: Iterable[complex]) -> list[complex]:
             corners.append(place)
         return corners[:-1]
 
-    return chain(places) + chain(reversed(places))
+    return half_hull(places) + half_hull(reversed(places))
 
 
-def rounded(corners: Sequence[complex], radius: float) -> tuple[complex, ...]:
+def round_corners(corners: Sequence[complex], radius: float) -> tuple[complex, ...]:
     """Return the outline at a distance around a convex polygon, in order."""
     if len(corners) == 1:
         steps = round(tau / _ARC)
@@ -264,7 +266,7 @@ def rounded(corners: Sequence[complex], radius: float) -> tuple[complex, ...]:
     return tuple(outline)
 
 
-def _pitch_circles(pose: _Pose) -> Iterator[tuple[str, Shape]]:
+def _pitch_circles(pose: _DrawnPose) -> Iterator[tuple[str, Shape]]:
     """Yield the pitch circles of gears, and belts on pulleys: ratios of pins on a common link."""
     driven = {given.joint: given for given in pose.closure.linkage.driven_joints}
     for name, ratio in pose.closure.linkage.ratios.items():
@@ -299,19 +301,19 @@ def _pitch_circles(pose: _Pose) -> Iterator[tuple[str, Shape]]:
                 yield carrier, Segment('rail', name, *ends_of_belt)
 
 
-def _layer(parts: Sequence[Shape]) -> int:
+def _shape_layer(parts: Sequence[Shape]) -> int:
     roles = {shape.role for shape in parts}
     return 2 if 'input' in roles else 0 if 'plate' in roles else 1
 
 
-def _is_cylinder(pose: _Pose, name: str) -> bool:
+def _is_cylinder(pose: _DrawnPose, name: str) -> bool:
     """Return whether a slider is a rod in a tube: both links move, with the same angle."""
     slider = pose.closure.linkage.sliders[name]
     lowest, _ = pose.travels[name]
     return bool(slider.block) and slider.along != GROUND != slider.block and lowest > 0.0
 
 
-def _supports(pose: _Pose) -> list[complex]:
+def _ground_pins(pose: _DrawnPose) -> list[complex]:
     """Return the places of the pins on the ground."""
     links = pose.closure.structure.links
     return [
@@ -321,16 +323,16 @@ def _supports(pose: _Pose) -> list[complex]:
     ]
 
 
-def _support(pivot: complex, size: float) -> list[Shape]:
+def _draw_support(pivot: complex, size: float) -> list[Shape]:
     """Draw a pivot on the ground: a triangle on hatched ground."""
     foot, half = pivot - 2.6j * size, 1.7 * size
     return [
         Polygon('ground', GROUND, (pivot, foot - half, foot + half)),
-        *_hatch(foot - 1.4 * half, foot + 1.4 * half, size),
+        *_draw_hatch(foot - 1.4 * half, foot + 1.4 * half, size),
     ]
 
 
-def _hatch(start: complex, end: complex, size: float) -> list[Shape]:
+def _draw_hatch(start: complex, end: complex, size: float) -> list[Shape]:
     """Draw the surface of the ground, which lies to the right of start→end."""
     along = (end - start) / abs(end - start)
     count = min(max(3, round(abs(end - start) / (0.9 * size))), _MOST_STROKES)
@@ -342,35 +344,35 @@ def _hatch(start: complex, end: complex, size: float) -> list[Shape]:
     ]
 
 
-def _line(pose: _Pose, slider: Slider) -> tuple[complex, complex]:
+def _slider_line(pose: _DrawnPose, slider: Slider) -> tuple[complex, complex]:
     """Return the start of a slider's line, and its direction."""
     direction = complex(*slider.direction)
     unit = direction / abs(direction) * rect(1.0, pose.angles[slider.along])
     return pose.points[slider.along, slider.through], unit
 
 
-def _rail_ends(pose: _Pose, name: str, beyond: float) -> tuple[complex, complex]:
-    start, unit = _line(pose, pose.closure.linkage.sliders[name])
+def _rail_ends(pose: _DrawnPose, name: str, beyond: float) -> tuple[complex, complex]:
+    start, unit = _slider_line(pose, pose.closure.linkage.sliders[name])
     lowest, highest = pose.travels[name]
     return start + unit * (lowest - beyond), start + unit * (highest + beyond)
 
 
-def _ground_rail(pose: _Pose, name: str, slider: Slider) -> list[Shape]:
+def _ground_rail(pose: _DrawnPose, name: str, slider: Slider) -> list[Shape]:
     """Draw a slider's line on the ground: a surface, hatched below."""
     size = pose.size
     start, end = _rail_ends(pose, name, 3.0 * size)
-    _, unit = _line(pose, slider)
+    _, unit = _slider_line(pose, slider)
     upright = abs(unit.real) <= _FLAT
     if unit.real < -_FLAT or (upright and unit.imag > 0.0):
         # The ground should lie below the line, or left of a vertical line.
         start, end, unit = end, start, -unit
     below = -1j * unit * 1.5 * size
-    return _hatch(start + below, end + below, size)
+    return _draw_hatch(start + below, end + below, size)
 
 
-def _block(pose: _Pose, name: str, slider: Slider) -> Polygon:
+def _draw_block(pose: _DrawnPose, name: str, slider: Slider) -> Polygon:
     centre = pose.points[pose.closure.structure.blocks[name], slider.point]
-    _, unit = _line(pose, slider)
+    _, unit = _slider_line(pose, slider)
     driven = any(given.slider == name for given in pose.closure.linkage.inputs)
     half, across = 2.2 * pose.size * unit, 1.5j * pose.size * unit
     return Polygon(
@@ -385,7 +387,7 @@ def _block(pose: _Pose, name: str, slider: Slider) -> Polygon:
     )
 
 
-def _link(pose: _Pose, link: str, role: Role, cylinders: Sequence[str]) -> list[Shape]:
+def _draw_link(pose: _DrawnPose, link: str, role: Role, cylinders: Sequence[str]) -> list[Shape]:
     """Draw a link: its points, and the used part of its rails."""
     linkage, size = pose.closure.linkage, pose.size
     places = [pose.points[link, point] for point in linkage.links[link]]
@@ -394,7 +396,7 @@ def _link(pose: _Pose, link: str, role: Role, cylinders: Sequence[str]) -> list[
     for name, slider in linkage.sliders.items():
         if name in cylinders:
             lowest, highest = pose.travels[name]
-            start, unit = _line(pose, slider)
+            start, unit = _slider_line(pose, slider)
             if link == slider.along:
                 length = max(lowest - 2.0 * size, 0.5 * lowest)
                 across = 1j * unit * 1.7 * size
@@ -408,15 +410,15 @@ def _link(pose: _Pose, link: str, role: Role, cylinders: Sequence[str]) -> list[
                 places.append(place - unit * inside)
         elif link == slider.along:
             ends = _rail_ends(pose, name, 2.6 * size)
-            if len(hull([*places, *ends])) < 3:
+            if len(convex_hull([*places, *ends])) < 3:
                 places += ends
             else:
                 slots.append(Segment('slot', name, *_rail_ends(pose, name, 0.0)))
                 places += ends
-    corners = hull(places)
+    corners = convex_hull(places)
     if len(corners) > 1:
         thick = size if len(corners) == 2 else 0.9 * size
         kind: Role = 'plate' if len(corners) > 2 and role == 'link' else role
         thin = any(link == linkage.sliders[name].block for name in cylinders)
-        drawn.append(Polygon(kind, link, rounded(corners, 0.7 * size if thin else thick)))
+        drawn.append(Polygon(kind, link, round_corners(corners, 0.7 * size if thin else thick)))
     return [*reversed(drawn), *slots]

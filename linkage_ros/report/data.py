@@ -33,7 +33,7 @@ from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.link_frames import separate_blocks
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.shapes import COLOURS, FACES, INK, link_frames
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
@@ -323,7 +323,7 @@ def _linkages_json(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[
 def _drawing_of(closure: Closure, space: int) -> tuple[dict[str, Any] | None, int, str]:
     """Return the drawing of a linkage and its size in [bytes], or why there is none."""
     try:
-        drawn = drawn_in_frames(view(closure, usual_inputs(closure)))
+        drawn = drawn_in_frames(prepare_view(closure, usual_inputs(closure)))
         size = size_in_json(drawn)
     except LinkageError as error:
         return None, 0, shorten_text(str(error), 200)

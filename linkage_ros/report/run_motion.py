@@ -10,10 +10,10 @@
 
 from __future__ import annotations
 
-from linkage_ros.drawing.animation import count_of, Motion
+from linkage_ros.drawing.animation import AnimatedMotion, count_of
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.curves import continuous, Curve
-from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.curves import Curve, unwrap_angles
+from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.data import link_poses
 from linkage_ros.report.decimation import Numbers
@@ -24,7 +24,7 @@ _SECONDS = 10.0
 """A longer part of a run is shown faster, in this time, if no other is named."""
 
 
-def run_motion(run: ReportedRun, name: str, seconds: float | None) -> Motion:
+def run_motion(run: ReportedRun, name: str, seconds: float | None) -> AnimatedMotion:
     """
     Return the motion of the first linkage of a run.
 
@@ -76,9 +76,9 @@ def run_motion(run: ReportedRun, name: str, seconds: float | None) -> Motion:
         joints.append(Curve(joint, turns, tuple(x.tolist()), tuple(y.tolist())))
         values.append(np.where(unknown, np.nan, column[chosen]))
     closure = linkage.closure
-    return Motion(
+    return AnimatedMotion(
         title=title,
-        view=view(closure, usual_inputs(closure)),
+        view=prepare_view(closure, usual_inputs(closure)),
         repeats=False,
         links=found.links,
         frames=moved,
@@ -94,5 +94,5 @@ def _unwrap_known(angles: Numbers) -> Numbers:
     """Return angles without jumps; unknown ones stay unknown."""
     known = np.isfinite(angles)
     result = np.full(len(angles), np.nan)
-    result[known] = continuous(angles[known].tolist())
+    result[known] = unwrap_angles(angles[known].tolist())
     return result

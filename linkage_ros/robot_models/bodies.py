@@ -24,7 +24,7 @@ from typing import NamedTuple
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, SlideJoint
 from linkage_ros.kinematics.ranges import link_lengths, slide_bound
-from linkage_ros.kinematics.shapes import hull
+from linkage_ros.kinematics.shapes import convex_hull
 from linkage_ros.robot_models.orientation import named_joints, Span
 
 _COLOURS = (
@@ -100,7 +100,7 @@ def _bars(closure: Closure, link: str, z: float, width: float) -> list[Solid]:
     ]
     if link == GROUND:
         return discs
-    corners = hull(points.values())
+    corners = convex_hull(points.values())
     ends = [*corners[1:], corners[0]] if len(corners) > 2 else corners[1:]
     inner = [at for at in points.values() if at not in corners and len(corners) > 2]
     lines = [*zip(corners, ends, strict=False), *((corners[0], at) for at in inner)]

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing.painting import save, settings
+from linkage_ros.drawing.painting import picture_settings, save_picture
 from linkage_ros.kinematics.shapes import COLOURS
 from linkage_ros.names import picture_text
 import numpy as np
@@ -39,7 +39,7 @@ def draw_spread(title: str, seconds: float, joints: Sequence[JointSpread], file:
     The suffix selects the format. A LinkageError says that matplotlib is not installed, or that
     the file cannot be written.
     """
-    context = settings()
+    context = picture_settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
 
     with context:
@@ -57,7 +57,7 @@ def draw_spread(title: str, seconds: float, joints: Sequence[JointSpread], file:
         for axes in grid[-1]:
             axes.set_xlabel('time [s]')
         grid[0][0].legend(loc='best', fontsize=7)
-        save(figure, file)
+        save_picture(figure, file)
 
 
 def _percentile_levels(values: NDArray[np.float64]) -> NDArray[np.float64]:

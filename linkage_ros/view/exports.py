@@ -16,12 +16,12 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from linkage_ros.drawing.animation import animate, range_motion
-from linkage_ros.drawing.figure import picture
+from linkage_ros.drawing.figure import paint_picture
 from linkage_ros.errors import did_you_mean, LinkageError, listed, quoted
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.languages import c_name, LANGUAGES
 from linkage_ros.kinematics.compiling.source import Subject, write_source
-from linkage_ros.kinematics.pose_view import View, view
+from linkage_ros.kinematics.pose_view import LinkageView, prepare_view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 _SECONDS = 4.0
@@ -45,8 +45,8 @@ class _ExportedLinkage(NamedTuple):
     inputs: tuple[float, ...]
 
     @property
-    def view(self) -> View:
-        return view(self.closure, self.inputs)
+    def view(self) -> LinkageView:
+        return prepare_view(self.closure, self.inputs)
 
 
 def export_linkage(
@@ -87,7 +87,7 @@ def _to_yaml(linkage: _ExportedLinkage) -> bytes:
 
 
 def _to_svg(linkage: _ExportedLinkage) -> bytes:
-    return _written_bytes('svg', lambda file: picture(linkage.view, linkage.name, file))
+    return _written_bytes('svg', lambda file: paint_picture(linkage.view, linkage.name, file))
 
 
 def _to_gif(linkage: _ExportedLinkage) -> bytes:

@@ -29,7 +29,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.javascript import JavaScript
 from linkage_ros.kinematics.compiling.source import STATUSES, Subject, write_source
 from linkage_ros.kinematics.linkage import GROUND, Linkage, links_by_point
-from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.shapes import driven_links
 from linkage_ros.kinematics.sides import assembly_sides, written_sides
@@ -96,7 +96,7 @@ def build_model(
     closure = checked_closure(content, written, name, shorthand)
     try:
         inputs = usual_inputs(closure)
-        drawn = drawn_in_frames(view(closure, inputs))
+        drawn = drawn_in_frames(prepare_view(closure, inputs))
         found = _model_json(closure, name, text, content.units, inputs, drawn)
         if whole:
             found['others'] = _other_assemblies(closure, content)
@@ -109,7 +109,7 @@ def build_model(
 def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
     """Return the model of a linkage without a file, whose other assemblies are not told."""
     inputs = usual_inputs(closure)
-    drawn = drawn_in_frames(view(closure, inputs))
+    drawn = drawn_in_frames(prepare_view(closure, inputs))
     return _model_json(closure, name or closure.name, '', Units(), inputs, drawn) | {
         'others': [],
         **_analyse_linkage(closure, Units()),

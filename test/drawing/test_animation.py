@@ -18,7 +18,7 @@ from linkage_ros.cli.main import main
 from linkage_ros.drawing.animation import animate, check_kind, range_motion, RATE
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import load
-from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.shapes import link_frames
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.run import Window
@@ -38,7 +38,7 @@ SOME = ('four_bar', 'slider_crank', 'double_rocker', 'class_3', 'excavator_bucke
 
 def moved(name, seconds=1.0):
     closure = load(name)
-    shown = view(closure, usual_inputs(closure))
+    shown = prepare_view(closure, usual_inputs(closure))
     return range_motion(shown, name, seconds)
 
 

@@ -16,11 +16,11 @@ from typing import Any
 
 from linkage_ros.cli.main import main
 from linkage_ros.drawing import figure as drawing
-from linkage_ros.drawing.figure import picture
+from linkage_ros.drawing.figure import paint_picture
 from linkage_ros.drawing.painting import degree_step
 from linkage_ros.errors import FileError
 from linkage_ros.files.linkage_file import find_assemblies, load
-from linkage_ros.kinematics.pose_view import view
+from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.resources import linkage_names, named_file
 import pytest
@@ -37,8 +37,8 @@ def drawn(name: str, inputs: tuple[float, ...] = ()) -> Any:
     kept = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(drawing, 'save', lambda figure, _file: kept.append(figure))
-        shown = view(closure, inputs or usual_inputs(closure))
-        picture(shown, name, Path('never.png'), names=True)
+        shown = prepare_view(closure, inputs or usual_inputs(closure))
+        paint_picture(shown, name, Path('never.png'), names=True)
     (figure,) = kept
     figure.draw_without_rendering()
     return figure

@@ -19,9 +19,17 @@ from linkage_ros.drawing.painting import Label, place_labels
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.curves import continuous, drawn_once, sweep
+from linkage_ros.kinematics.curves import drawn_once, sweep_range, unwrap_angles
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.shapes import Circle, hull, Polygon, rounded, Segment, shapes, skeleton
+from linkage_ros.kinematics.shapes import (
+    Circle,
+    convex_hull,
+    draw_shapes,
+    draw_skeleton,
+    Polygon,
+    round_corners,
+    Segment,
+)
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 import pytest
 
@@ -39,7 +47,7 @@ def drawn(name: str) -> tuple[Closure, dict[tuple[str, str], complex], list[obje
     position = closure.position(*inputs)
     interval = way.range_about(inputs[0])
     assert interval is not None
-    found = shapes(closure, position, SIZE, sweep(way, interval).travels)
+    found = draw_shapes(closure, position, SIZE, sweep_range(way, interval).travels)
     return closure, closure.points(position), list(found)
 
 
@@ -69,7 +77,7 @@ joints: {slide: {slider: guide}}
 
 @given(st.lists(places, min_size=1, max_size=12))
 def test_a_hull_is_convex_and_holds_all_points(points):
-    corners = hull(points)
+    corners = convex_hull(points)
     assert set(corners) <= set(points)
     if len(corners) < 3:
         # All in line: the two farthest.
@@ -83,8 +91,8 @@ def test_a_hull_is_convex_and_holds_all_points(points):
 
 @given(st.lists(places, min_size=1, max_size=8), st.floats(0.1, 3.0))
 def test_an_outline_lies_at_its_distance(points, radius):
-    corners = hull(points)
-    for place in rounded(corners, radius):
+    corners = convex_hull(points)
+    for place in round_corners(corners, radius):
         assert min(abs(place - corner) for corner in corners) == pytest.approx(radius)
 
 
@@ -151,7 +159,7 @@ def test_a_cylinder_is_a_rod_in_a_tube_and_a_slider_is_a_block():
 def test_ghosts_run_from_pin_to_pin():
     closure, points, _ = drawn('four_bar')
     position = closure.position(*usual_inputs(closure))
-    lines = {frozenset((line.start, line.end)) for line in skeleton(closure, position)}
+    lines = {frozenset((line.start, line.end)) for line in draw_skeleton(closure, position)}
     assert frozenset((points['crank', 'O2'], points['crank', 'A'])) in lines
     assert len(lines) == 5  # crank, rocker, and three sides of the coupler
 
@@ -160,13 +168,13 @@ def test_ghosts_run_from_pin_to_pin():
 def test_a_curve_of_angles_has_no_jump_and_keeps_each_angle_but_for_whole_turns(steps, turns):
     angles = list(accumulate(steps, initial=0.5))
     wrapped = [remainder(angle + turns * tau, tau) for angle in angles]
-    assert continuous(wrapped) == pytest.approx(angles)
+    assert unwrap_angles(wrapped) == pytest.approx(angles)
 
 
 def test_traced_points_of_a_peaucellier_cell_run_straight():
     closure = Closure(read_linkage(read_yaml(LINKAGES / 'peaucellier.yaml')[0]))
     way = InputSweep(closure)
-    path = sweep(way, way.ranges[0]).paths['P']
+    path = sweep_range(way, way.ranges[0]).paths['P']
     assert len(path) > 700
     assert all(abs(place.real - 0.13125) < 1e-14 for place in path)
 
@@ -204,7 +212,7 @@ def test_a_label_keeps_off_what_is_drawn_and_on_the_paper():
 
 
 def test_a_whole_turn_of_an_outline_is_one_turn():
-    outline = rounded([0j], 1.0)
+    outline = round_corners([0j], 1.0)
     assert len(outline) == 16
     assert all(abs(place) == pytest.approx(1.0) for place in outline)
     assert tau / len(outline) == pytest.approx(pi / 8.0)
@@ -214,7 +222,7 @@ def test_a_whole_turn_of_an_outline_is_one_turn():
 def test_a_rail_of_any_length_is_drawn_in_few_strokes(ratio):
     closure = Closure(read_linkage(parse_yaml(SLIDER_CRANK.encode(), 'slider_crank.yaml')))
     position = closure.position(0.3)
-    drawn = shapes(closure, position, 0.01, {'guide': (0.1, 0.1 + ratio)})
+    drawn = draw_shapes(closure, position, 0.01, {'guide': (0.1, 0.1 + ratio)})
     hatched = [shape for shape in drawn if shape.role == 'hatch']
     assert 3 <= len(hatched) <= 300
     # They reach from end to end.

@@ -16,7 +16,7 @@ from math import acos, cos, hypot, log, pi, radians, remainder, tau
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.shapes import carried_shapes, outline, Polygon
+from linkage_ros.kinematics.shapes import carried_shapes, Polygon, shape_outline
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -121,7 +121,9 @@ def test_links_lie_where_a_drawing_of_the_pose_has_them(linkage):
         edges = [places(marker) for marker in named(markers, 'edges')]
         for shape in drawn:
             # Which corner an outline begins at depends on how the link is turned.
-            apart = [max(min(abs(p - q) for q in edge) for p in outline(shape)) for edge in edges]
+            apart = [
+                max(min(abs(p - q) for q in edge) for p in shape_outline(shape)) for edge in edges
+            ]
             assert min(apart) < 1e-9 * extent, shape.name
             compared += 1
     assert compared or linkage in ALL_RAILS

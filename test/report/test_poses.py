@@ -18,8 +18,8 @@ from linkage_ros.drawing.drawing_data import drawn_in_frames
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.pose_view import view
-from linkage_ros.kinematics.shapes import carried_shapes, Circle, link_frames, shapes
+from linkage_ros.kinematics.pose_view import prepare_view
+from linkage_ros.kinematics.shapes import carried_shapes, Circle, draw_shapes, link_frames
 from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -84,12 +84,14 @@ def test_points_are_where_the_closure_has_them(file):
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_shapes_in_frames_are_those_of_the_drawing(file):
     closure = closure_of(file)
-    shown = view(closure, usual_inputs(closure))
+    shown = prepare_view(closure, usual_inputs(closure))
     data = drawn_in_frames(shown)
     frames = {**link_frames(closure, shown.position), 'ground': (0j, 0.0)}
     size = data['size']
     drawn = carried_shapes(closure, shown.position, size, shown.sweep.travels)
-    assert len(data['shapes']) == len(shapes(closure, shown.position, size, shown.sweep.travels))
+    assert len(data['shapes']) == len(
+        draw_shapes(closure, shown.position, size, shown.sweep.travels)
+    )
     for told, (link, shape) in zip(data['shapes'], drawn, strict=True):
         assert (told['link'], told['role']) == (link, shape.role)
         place, angle = frames[told['link']]
