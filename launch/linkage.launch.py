@@ -23,7 +23,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from linkage_ros.cli.robot_model import model_of
 from linkage_ros.errors import LinkageError, quoted
-from linkage_ros.robot_models.urdf import urdf as write_urdf
+from linkage_ros.robot_models.urdf import urdf_model as write_urdf
 
 SHARE = Path(get_package_share_directory('linkage_ros'))
 

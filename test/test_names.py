@@ -34,9 +34,9 @@ from linkage_ros.kinematics.compiling.languages import LANGUAGES
 from linkage_ros.kinematics.compiling.source import Subject, write_source
 from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.robot_models.mjcf import mjcf
-from linkage_ros.robot_models.part import Part
-from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.mjcf import mujoco_model
+from linkage_ros.robot_models.part import ModelPart
+from linkage_ros.robot_models.urdf import urdf_model
 from linkage_ros.simulation.spread import draw_spread, JointSpread
 from linkage_ros.view.linkage_page import LinkagePage
 import numpy as np
@@ -250,10 +250,10 @@ def test_names_in_pictures_are_drawn_as_they_are_written(
         assert title.text == repr(closure)
 
 
-@pytest.mark.parametrize('write', [urdf, mjcf])
+@pytest.mark.parametrize('write', [urdf_model, mujoco_model])
 def test_names_in_robot_models_are_names(write) -> None:
     for closure in linkages(4):
-        root = ET.fromstring(write(closure.name, [Part(closure)]))
+        root = ET.fromstring(write(closure.name, [ModelPart(closure)]))
         found = {each.get('name') for each in root.iter()}
         assert {*closure.linkage.joints, *closure.linkage.links} <= found
         assert {each.tag for each in root.iter()} <= {

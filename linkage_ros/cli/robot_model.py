@@ -26,15 +26,15 @@ from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.resources import named_file
-from linkage_ros.robot_models.mjcf import mjcf
+from linkage_ros.robot_models.mjcf import mujoco_model
 from linkage_ros.robot_models.onto import urdf_onto
-from linkage_ros.robot_models.part import Part, PartError
-from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.part import ModelPart, PartError
+from linkage_ros.robot_models.urdf import urdf_model
 from linkage_ros.robot_models.urdf_file import read_urdf, read_urdf_file
 from linkage_ros.scene.load import kind_of
 from linkage_ros.scene.robot_model import scene_model, Write
 
-WRITERS: dict[str, Write] = {'urdf': urdf, 'mjcf': mjcf}
+WRITERS: dict[str, Write] = {'urdf': urdf_model, 'mjcf': mujoco_model}
 """Writers of models, by the command's name."""
 
 SUFFIXES = {'urdf': ('.urdf', '.xml'), 'mjcf': ('.xml', '.mjcf')}
@@ -75,7 +75,7 @@ def _writer_onto(file: Path) -> Write:
     data = read_urdf_file(file)
     robot = read_urdf(data, str(file))
 
-    def write(_: str, parts: Sequence[Part]) -> bytes:
+    def write(_: str, parts: Sequence[ModelPart]) -> bytes:
         return urdf_onto(robot, data, parts)
 
     return write
@@ -96,7 +96,7 @@ def model_of(named: str, write: Write) -> bytes:
         scene = load_scene(file)
         return scene_model(scene, Pipeline(scene).closures, write)
     try:
-        return write(file.stem, [Part(read_closure(content))])
+        return write(file.stem, [ModelPart(read_closure(content))])
     except PartError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
 

@@ -39,8 +39,8 @@ from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
 from linkage_ros.report.labels import EVENT_TRACKS, QUANTITIES, shorten_text, size_in_json
 from linkage_ros.report.run import APART, Curves, EventTrack, Frames, LinkageRun, ReportedRun
-from linkage_ros.robot_models.part import prefixed
-from linkage_ros.robot_models.tree import grow, Tree
+from linkage_ros.robot_models.part import prefix_names
+from linkage_ros.robot_models.tree import grow_tree, Tree
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -90,9 +90,9 @@ def link_poses(
         name: np.where(np.abs(given) < _FARTHEST, given, np.nan) for name, given in values.items()
     }
     linkage = closure.linkage
-    _, (names,) = prefixed([(prefix, linkage)])
+    _, (names,) = prefix_names([(prefix, linkage)])
     try:
-        found, reason = _by_joints(grow(linkage, names), prefix, known), ''
+        found, reason = _by_joints(grow_tree(linkage, names), prefix, known), ''
     except DefinitionError as error:
         found, reason = _by_closing(closure, [known[name] for name in inputs]), error.reason
     for block in separate_blocks(linkage, closure.structure):

@@ -25,7 +25,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, SlideJoint
 from linkage_ros.kinematics.ranges import link_lengths, slide_bound
 from linkage_ros.kinematics.shapes import convex_hull
-from linkage_ros.robot_models.orientation import named_joints, Span
+from linkage_ros.robot_models.orientation import AngleSpan, named_joints
 
 _COLOURS = (
     (0.30, 0.47, 0.66, 1.0),
@@ -55,14 +55,16 @@ class Solid(NamedTuple):
     height: float  # Size along z, in [m]
 
 
-class Body(NamedTuple):
+class LinkBody(NamedTuple):
     """The shapes of a link."""
 
     colour: tuple[float, float, float, float]
     solids: tuple[Solid, ...]
 
 
-def bodies(closure: Closure, ranges: Mapping[str, Span], first_layer: int = 0) -> dict[str, Body]:
+def link_bodies(
+    closure: Closure, ranges: Mapping[str, AngleSpan], first_layer: int = 0
+) -> dict[str, LinkBody]:
     """Return the shapes of each link, above the layers that other linkages occupy."""
     linkage = closure.linkage
     width = bar_width(closure)
@@ -73,8 +75,11 @@ def bodies(closure: Closure, ranges: Mapping[str, Span], first_layer: int = 0) -
         layer = moving.index(link) + 1 if link != GROUND else 0
         z = 1.2 * height * (first_layer + layer)
         colour = _COLOURS[(layer - 1) % len(_COLOURS)] if layer else _GREY
-        solids = [*_bars(closure, link, z, width), *_rails(closure, link, ranges, z, width)]
-        drawn[link] = Body(colour, tuple(solids))
+        solids = [
+            *_bar_solids(closure, link, z, width),
+            *_rail_solids(closure, link, ranges, z, width),
+        ]
+        drawn[link] = LinkBody(colour, tuple(solids))
     return drawn
 
 
@@ -86,13 +91,15 @@ def bar_width(closure: Closure) -> float:
     return min(0.12 * common, 0.05 * longest)
 
 
-def _bars(closure: Closure, link: str, z: float, width: float) -> list[Solid]:
+def _bar_solids(closure: Closure, link: str, z: float, width: float) -> list[Solid]:
     points = {name: complex(*at) for name, at in closure.linkage.links[link].items()}
     height = 0.5 * width
     if len(points) == 1 and link != GROUND:
         ((name, at),) = points.items()
         return [
-            Solid('block', name, at, z, _turned(closure, link), 3.0 * width, 2.0 * width, height)
+            Solid(
+                'block', name, at, z, _block_angle(closure, link), 3.0 * width, 2.0 * width, height
+            )
         ]
     discs = [
         Solid('disc', name, at, z, 0.0, 1.4 * width, 1.4 * width, height)
@@ -111,7 +118,7 @@ def _bars(closure: Closure, link: str, z: float, width: float) -> list[Solid]:
     return bars + discs
 
 
-def _turned(closure: Closure, link: str) -> float:
+def _block_angle(closure: Closure, link: str) -> float:
     """Return the angle of a block along its slider, in the block's own frame."""
     for slider in closure.linkage.sliders.values():
         if slider.block == link:
@@ -126,14 +133,14 @@ def _turned(closure: Closure, link: str) -> float:
     )
 
 
-def _rails(
-    closure: Closure, link: str, ranges: Mapping[str, Span], z: float, width: float
+def _rail_solids(
+    closure: Closure, link: str, ranges: Mapping[str, AngleSpan], z: float, width: float
 ) -> list[Solid]:
     rails = []
     for name, slider in closure.linkage.sliders.items():
         if slider.along != link:
             continue
-        low, high = travel(closure, name, ranges)
+        low, high = slider_travel(closure, name, ranges)
         if link != GROUND:
             low, high = min(low, 0.0), max(high, 0.0)  # the rail must reach the link's bars
         unit = slider.unit
@@ -146,7 +153,9 @@ def _rails(
     return rails
 
 
-def travel(closure: Closure, slider: str, ranges: Mapping[str, Span]) -> tuple[float, float]:
+def slider_travel(
+    closure: Closure, slider: str, ranges: Mapping[str, AngleSpan]
+) -> tuple[float, float]:
     """Return the range of a slider's point along its line, in [m], as far as it is known."""
     for name, joint in named_joints(closure.linkage).items():
         if isinstance(joint, SlideJoint) and joint.slider == slider:

@@ -71,7 +71,7 @@ _SAME = 1e-6
 _REMEDY = 'give a pose in which it is closed, off its toggles: --at JOINT=VALUE, for each joint'
 
 
-def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: str) -> Linkage:
+def assemble(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: str) -> Linkage:
     """
     Return a linkage with the sides that give a pose.
 
@@ -96,8 +96,8 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
     # Where a side changes at change points, it is that at the pose.
     linkage = replace(linkage, pose=AssemblyPose(inputs, {}))
     if any(isinstance(group, Iterated) for group in groups):
-        linkage = replace(linkage, pose=AssemblyPose(inputs, _points(linkage, poses)))
-    keys = [_key(each) for each in groups if isinstance(each, Dyad) and each.kind in _SIDED]
+        linkage = replace(linkage, pose=AssemblyPose(inputs, _point_positions(linkage, poses)))
+    keys = [_side_key(each) for each in groups if isinstance(each, Dyad) and each.kind in _SIDED]
     if len(keys) > _MANY:
         reason = f'{len(keys)} dyads are too many to try all their sides'
         raise DefinitionError('assembly', reason, 'import it in parts')
@@ -108,7 +108,7 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
     for sides in product(*choices):
         assembly: dict[str, Side] = dict(zip(keys, sides, strict=True))  # type: ignore[arg-type]
         closure = Closure(replace(linkage, assembly=assembly))
-        candidates.append((_off(closure, inputs, poses), closure))
+        candidates.append((_largest_error(closure, inputs, poses), closure))
     candidates.sort(key=lambda each: each[0])
     least, closure = candidates[0]
     if least > _FOUND:
@@ -117,18 +117,18 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
         raise DefinitionError('assembly', f'two ways to close it meet {where}', _REMEDY)
     if closure.linkage.pose == AssemblyPose(inputs, {}):
         bare = Closure(replace(closure.linkage, pose=None))
-        if _near(usual_inputs(bare), inputs) and _off(bare, inputs, poses) <= _FOUND:
+        if _are_near(usual_inputs(bare), inputs) and _largest_error(bare, inputs, poses) <= _FOUND:
             return bare.linkage
     return closure.linkage
 
 
-def _key(dyad: Dyad) -> str:
+def _side_key(dyad: Dyad) -> str:
     """Return the key of a dyad's side: its slider, or the pin between its links."""
     joints = (dyad.inner, *dyad.outer)
     return next((joint.name for joint in joints if joint.kind == 'P'), dyad.inner.name)
 
 
-def _points(linkage: Linkage, poses: Poses) -> dict[str, Point]:
+def _point_positions(linkage: Linkage, poses: Poses) -> dict[str, Point]:
     """Return the positions of all points in the pose, in the frame of the ground."""
     found: dict[str, Point] = {}
     for link, points in linkage.links.items():
@@ -139,7 +139,7 @@ def _points(linkage: Linkage, poses: Poses) -> dict[str, Point]:
     return found
 
 
-def _off(closure: Closure, inputs: tuple[float, ...], poses: Poses) -> float:
+def _largest_error(closure: Closure, inputs: tuple[float, ...], poses: Poses) -> float:
     """Return the largest angle between a link and its pose, in [rad]."""
     position = closure.position(*inputs)
     if not position.joints:
@@ -148,7 +148,7 @@ def _off(closure: Closure, inputs: tuple[float, ...], poses: Poses) -> float:
     return max(abs(remainder(angles[link] - poses[link][1], tau)) for link in poses)
 
 
-def _near(one: Sequence[float], other: Sequence[float]) -> bool:
+def _are_near(one: Sequence[float], other: Sequence[float]) -> bool:
     return all(abs(p - q) < _SAME for p, q in zip(one, other, strict=True))
 
 
@@ -198,10 +198,10 @@ def from_urdf(
         If it does not give a linkage; the message has a remedy.
 
     """
-    made = _Import(urdf, close, inputs, at or {}).made()
+    made = _Import(urdf, close, inputs, at or {}).make_linkage()
     if not limits:
         return made
-    return made._replace(linkage=_limited(made.linkage, urdf))
+    return made._replace(linkage=_add_limits(made.linkage, urdf))
 
 
 class _Import:
@@ -219,7 +219,7 @@ class _Import:
         for option, names in (('--input', inputs), ('--at', at)):
             for name in names:
                 if name not in moving:
-                    raise self._error(
+                    raise self._file_error(
                         f'{option} {name}',
                         'is not a moving joint',
                         did_you_mean(name, moving, f'name one of {listed(moving)}'),
@@ -228,7 +228,7 @@ class _Import:
         self._loops = find_loops(urdf, self._closings, self._inputs)
         followed = [joint.mimics for joint in urdf.joints.values() if joint.mimics]
         if not self._loops.joints or not (self._closings or {*followed} & {*self._inputs}):
-            raise self._error(
+            raise self._file_error(
                 '',
                 'closes no loop' + (f'; not read: {listed(urdf.unread)}' if urdf.unread else ''),
                 'name frames that meet: --close FRAME=FRAME, or call them PIN_on_LINK; or places: '
@@ -239,10 +239,10 @@ class _Import:
         self._told = {*urdf.start, *at}
         self._skeleton: UrdfTopology = urdf_topology(urdf, self._planar, self._closings, alone)
 
-    def _error(self, where: str, reason: str, remedy: str) -> FileError:
+    def _file_error(self, where: str, reason: str, remedy: str) -> FileError:
         return FileError(self._urdf.file, where, reason, remedy)
 
-    def made(self) -> ImportedLinkage:
+    def make_linkage(self) -> ImportedLinkage:
         made = self._skeleton
         links = {
             link: {name: (at.real, at.imag) for name, at in points.items()}
@@ -255,7 +255,7 @@ class _Import:
         }
         linkage = Linkage(
             links,
-            tuple(self._input(name) for name in self._inputs),
+            tuple(self._make_input(name) for name in self._inputs),
             {},
             {name: of for name, of in made.joints.items() if name not in self._inputs},
             made.sliders,
@@ -263,20 +263,20 @@ class _Import:
             masses=masses,
         )
         if not linkage.inputs:
-            raise self._error(
+            raise self._file_error(
                 '',
                 'does not say which joint drives it',
                 f'write --input JOINT, one of {listed(made.joints)}',
             )
-        frames = self._frames()
+        frames = self._body_frames()
         self._check_met(frames)
         linkage, ignored = self._with_ratios(linkage)
         given = tuple(self._pose[each.joint] for each in linkage.inputs)
         poses = {link: frames[body] for link, body in made.bodies.items()}
         try:
-            linkage = assembled(linkage, given, poses, self._where())
+            linkage = assemble(linkage, given, poses, self._pose_text())
         except DefinitionError as error:
-            raise self._error(error.where, error.reason, error.remedy) from None
+            raise self._file_error(error.where, error.reason, error.remedy) from None
         left_out = [f'{part}, which belongs to no loop' for part in self._loops.left_out]
         unread = [f'{tag}: close loops by --close' for tag in self._urdf.unread]
         return ImportedLinkage(linkage, (*left_out, *ignored, *unread))
@@ -290,7 +290,7 @@ class _Import:
         """
         joints = self._skeleton.joints
 
-        def ends(name: str) -> set[str]:
+        def joint_ends(name: str) -> set[str]:
             joint = joints.get(name)
             return {joint.parent, joint.child} if isinstance(joint, RevoluteJoint) else set()
 
@@ -299,7 +299,7 @@ class _Import:
             for joint in self._planar.joints
             if joint.mimics in joints and joint.name in linkage.joints
         }
-        names = sorted(ratios, key=lambda name: not ends(name) & ends(ratios[name].of))
+        names = sorted(ratios, key=lambda name: not joint_ends(name) & joint_ends(ratios[name].of))
         wanted = count_mobility(linkage) - len(linkage.inputs)
         for chosen in islice(combinations(names, max(0, min(wanted, len(names)))), _MOST_TRIED):
             with_ratios = replace(linkage, ratios={name: ratios[name] for name in chosen})
@@ -311,15 +311,15 @@ class _Import:
             return with_ratios, [f'mimic of {name}: the loops move it' for name in others]
         return linkage, []
 
-    def _input(self, name: str) -> Input:
+    def _make_input(self, name: str) -> Input:
         joint = self._skeleton.joints.get(name)
         if joint is None:
-            raise self._error(f'--input {name}', 'is not part of a loop', self._one_of())
+            raise self._file_error(f'--input {name}', 'is not part of a loop', self._one_of())
         if not isinstance(joint, RevoluteJoint):
             return Input(name, slider=joint.slider)
         links = self._skeleton.links
         if not {*links[joint.parent]} & {*links[joint.child]}:
-            raise self._error(
+            raise self._file_error(
                 f'--input {name}', 'turns links that no pin joins', self._one_of(but=name)
             )
         return Input(name, joint.parent, joint.child)
@@ -327,7 +327,7 @@ class _Import:
     def _one_of(self, but: str = '') -> str:
         return f'name one of {listed(each for each in self._skeleton.joints if each != but)}'
 
-    def _frames(self) -> dict[str, tuple[complex, float]]:
+    def _body_frames(self) -> dict[str, tuple[complex, float]]:
         """Return position and angle of every body in the pose, in the frame of the root."""
         frames = {self._planar.root: (0j, 0.0)}
         for joint in self._planar.joints:
@@ -344,7 +344,7 @@ class _Import:
         return frames
 
     def _check_met(self, frames: Mapping[str, tuple[complex, float]]) -> None:
-        def place(name: str) -> complex:
+        def frame_place(name: str) -> complex:
             frame = self._planar.frames[name]
             there, angle = frames[frame.body]
             return there + rect(1.0, angle) * frame.place
@@ -356,26 +356,26 @@ class _Import:
         for closing in self._closings:
             first, *others = closing.frames
             for other in others:
-                apart = place(other) - place(first)
+                apart = frame_place(other) - frame_place(first)
                 if closing.line:
                     frame = self._planar.frames[first]
                     _, angle = frames[frame.body]
                     apart = complex(0.0, (apart / frame.facing / rect(1.0, angle)).imag)
                 if abs(apart) > _MET * size:
-                    raise self._error(
+                    raise self._file_error(
                         f'--close {first}={other}',
-                        f'these are {abs(apart):.3g} m apart {self._where()}',
+                        f'these are {abs(apart):.3g} m apart {self._pose_text()}',
                         'give a pose in which they meet: --at JOINT=VALUE, once for each joint',
                     )
 
-    def _where(self) -> str:
+    def _pose_text(self) -> str:
         return 'in the pose' if self._told else 'where all joints are 0'
 
 
-def _limited(linkage: Linkage, urdf: UrdfFile) -> Linkage:
+def _add_limits(linkage: Linkage, urdf: UrdfFile) -> Linkage:
     """Return a linkage with the joint limits of the robot."""
 
-    def of(name: str, turns: bool) -> Limits:
+    def limits_of(name: str, turns: bool) -> Limits:
         limits = urdf.joints[name].limits if name in urdf.joints else NO_LIMITS
         if turns and limits.high - limits.low >= tau:
             # A range of a full turn or more does not limit an angle.
@@ -384,9 +384,9 @@ def _limited(linkage: Linkage, urdf: UrdfFile) -> Linkage:
 
     return replace(
         linkage,
-        inputs=tuple(replace(one, limits=of(one.joint, False)) for one in linkage.inputs),
+        inputs=tuple(replace(one, limits=limits_of(one.joint, False)) for one in linkage.inputs),
         joints={
-            name: replace(joint, limits=of(name, isinstance(joint, RevoluteJoint)))
+            name: replace(joint, limits=limits_of(name, isinstance(joint, RevoluteJoint)))
             for name, joint in linkage.joints.items()
         },
     )

@@ -34,10 +34,16 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.robot_models.bodies import bar_width, bodies, Body, Solid
-from linkage_ros.robot_models.orientation import named_joints, spans
-from linkage_ros.robot_models.part import Part, PartError, prefixed, PrefixedNames
-from linkage_ros.robot_models.xml import comment, document, number, numbers, rough
+from linkage_ros.robot_models.bodies import bar_width, link_bodies, LinkBody, Solid
+from linkage_ros.robot_models.orientation import joint_spans, named_joints
+from linkage_ros.robot_models.part import ModelPart, PartError, prefix_names, PrefixedNames
+from linkage_ros.robot_models.xml import (
+    format_number,
+    format_numbers,
+    format_rough,
+    xml_comment,
+    xml_document,
+)
 
 # The linkage as a tree of its physical pins and sliders, published or not, and the pins cut.
 #
@@ -45,7 +51,7 @@ from linkage_ros.robot_models.xml import comment, document, number, numbers, rou
 # pins, published joints have priority. A pin in a slot gets a block of its own, which slides.
 
 
-class Branch(NamedTuple):
+class TreeBranch(NamedTuple):
     """A joint of the tree."""
 
     kind: str  # ``R`` for a pin, ``P`` for a slider
@@ -61,7 +67,7 @@ class PhysicalTree(NamedTuple):
     """A linkage as a tree."""
 
     # The joints of the tree, each after the one that moves its parent.
-    branches: tuple[Branch, ...]
+    branches: tuple[TreeBranch, ...]
     # Pins that are cut: the point, and the two links that it joins.
     cuts: tuple[tuple[str, str, str], ...]
 
@@ -83,12 +89,12 @@ def physical_tree(closure: Closure) -> PhysicalTree:
     links = closure.structure.links
     part_of = {link: link for link in links}
     kept: list[_Edge] = []
-    for edge in sorted(_edges(closure), key=lambda edge: edge.rank):
+    for edge in sorted(_list_edges(closure), key=lambda edge: edge.rank):
         one, other = (part_of[end] for end in edge.ends)
         if one != other:
             kept.append(edge)
             part_of = {link: one if part == other else part for link, part in part_of.items()}
-    branches: list[Branch] = []
+    branches: list[TreeBranch] = []
     reached = [GROUND]
     for link in reached:
         for edge in kept:
@@ -96,12 +102,12 @@ def physical_tree(closure: Closure) -> PhysicalTree:
                 child = edge.ends[0] if edge.ends[1] == link else edge.ends[1]
                 if child not in reached:
                     reached.append(child)
-                    joint, sign = _named(closure, edge, link, child)
-                    branches.append(Branch(edge.kind, edge.name, link, child, joint, sign))
-    return PhysicalTree(tuple(branches), tuple(_cuts(closure, kept)))
+                    joint, sign = _joint_name(closure, edge, link, child)
+                    branches.append(TreeBranch(edge.kind, edge.name, link, child, joint, sign))
+    return PhysicalTree(tuple(branches), tuple(_find_cuts(closure, kept)))
 
 
-def _edges(closure: Closure) -> Iterator[_Edge]:
+def _list_edges(closure: Closure) -> Iterator[_Edge]:
     """Yield pins between any two links, and sliders; those to keep in the tree rank first."""
     linkage, links = closure.linkage, closure.structure.links
     driven = {frozenset((given.parent, given.child)) for given in linkage.driven_joints}
@@ -122,7 +128,7 @@ def _edges(closure: Closure) -> Iterator[_Edge]:
                 yield _Edge(rank, 'R', pin, (one, other))
 
 
-def _cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]:
+def _find_cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]:
     for point, carried in links_by_point(closure.structure.links).items():
         part_of = {link: link for link in carried}
         for edge in kept:
@@ -133,7 +139,7 @@ def _cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]
         yield from ((point, first, other) for other in others)
 
 
-def _named(closure: Closure, edge: _Edge, parent: str, child: str) -> tuple[str, int]:
+def _joint_name(closure: Closure, edge: _Edge, parent: str, child: str) -> tuple[str, int]:
     """Return the name of a joint in messages, and its sign."""
     for name, joint in named_joints(closure.linkage).items():
         if isinstance(joint, SlideJoint):
@@ -176,13 +182,13 @@ class Bodies:
     """
 
     def __init__(
-        self, world: ET.Element, part: Part, names: PrefixedNames, first_layer: int
+        self, world: ET.Element, part: ModelPart, names: PrefixedNames, first_layer: int
     ) -> None:
         self._closure = closure = part.closure
         self._names = names
         tree = physical_tree(closure)
         self.cuts = tree.cuts  # Pins that are cut: the point, and the two links that it joins
-        self._drawn = bodies(closure, spans(closure), first_layer)
+        self._drawn = link_bodies(closure, joint_spans(closure), first_layer)
         self.inputs = usual_inputs(closure)  # Inputs at the start, in [rad] or [m]
         self._position = closure.position(*self.inputs)
         self._driven = dict(
@@ -193,25 +199,25 @@ class Bodies:
         # Value of every joint at the start, in [rad] or [m], in the order of the model.
         self.start: list[float] = []
         self._masses: dict[str, float] = {}
-        self._links = {GROUND: ET.SubElement(world, 'body', name=names.own(GROUND))}
+        self._links = {GROUND: ET.SubElement(world, 'body', name=names.own_name(GROUND))}
         self._origins = {GROUND: 0j}
         self._sites: dict[tuple[str, str], str] = {}
-        _geoms(self._links[GROUND], self._drawn[GROUND], 0j)
-        self._hung: dict[str, list[Branch]] = {}
+        _write_geoms(self._links[GROUND], self._drawn[GROUND], 0j)
+        self._hung: dict[str, list[TreeBranch]] = {}
         for branch in tree.branches:
             self._hung.setdefault(branch.parent, []).append(branch)
         self._hang_on(GROUND)
 
-    def site(self, link: str, point: str) -> str:
+    def site_name(self, link: str, point: str) -> str:
         """Return the name of a site at a point of a link; make the site if it is missing."""
         if (link, point) not in self._sites:
-            name = self._sites[link, point] = self._names.on(point, link)
+            name = self._sites[link, point] = self._names.frame_on(point, link)
             place = complex(*self._closure.structure.links[link][point]) - self._origins[link]
-            where = numbers(place.real, place.imag, 0.0)
+            where = format_numbers(place.real, place.imag, 0.0)
             ET.SubElement(self._links[link], 'site', name=name, pos=where)
         return self._sites[link, point]
 
-    def inertia(self, index: int) -> float:
+    def input_inertia(self, index: int) -> float:
         """
         Return the approximate inertia that an input moves at the start, in [kg·m²] or [kg].
 
@@ -241,46 +247,46 @@ class Bodies:
     def _hang_on(self, parent: str) -> None:
         """Write the children of a link, depth first, in the order of the engine's joints."""
         for branch in self._hung.get(parent, ()):
-            self._hang(branch)
+            self._attach_body(branch)
             self._hang_on(branch.child)
 
-    def _hang(self, branch: Branch) -> None:
+    def _attach_body(self, branch: TreeBranch) -> None:
         closure, child = self._closure, branch.child
-        place, turn, axis, origin = _held(closure, branch)
+        place, turn, axis, origin = _pose_on_parent(closure, branch)
         self._origins[child] = origin
         place -= self._origins[branch.parent]
         given = child in closure.linkage.links
-        name = self._names.own(child) if given else self._names.frame(child)
-        value = self._value(branch)
+        name = self._names.own_name(child) if given else self._names.free_frame(child)
+        value = self._joint_value(branch)
         if branch.kind == 'R':
             turn += branch.sign * value
         else:
             place += value * axis * rect(1.0, turn)
-        where = numbers(place.real, place.imag, 0.0)
+        where = format_numbers(place.real, place.imag, 0.0)
         body = ET.SubElement(self._links[branch.parent], 'body', name=name, pos=where)
         if turn:
-            body.set('euler', numbers(0.0, 0.0, turn))
+            body.set('euler', format_numbers(0.0, 0.0, turn))
         self._links[child] = body
         joint = ET.SubElement(body, 'joint', type='hinge' if branch.kind == 'R' else 'slide')
         if branch.joint:
-            joint.set('name', self._names.own(branch.joint))
+            joint.set('name', self._names.own_name(branch.joint))
             self.joints[branch.joint] = joint
-            _limit(joint, closure.linkage.limits.get(branch.joint, NO_LIMITS))
+            _write_limits(joint, closure.linkage.limits.get(branch.joint, NO_LIMITS))
         else:
-            joint.set('name', self._names.joint(f'{child}_at_{branch.name}'))
-        flat = numbers(axis.real, axis.imag, 0.0)
-        joint.set('axis', numbers(0.0, 0.0, branch.sign) if branch.kind == 'R' else flat)
+            joint.set('name', self._names.free_joint(f'{child}_at_{branch.name}'))
+        flat = format_numbers(axis.real, axis.imag, 0.0)
+        joint.set('axis', format_numbers(0.0, 0.0, branch.sign) if branch.kind == 'R' else flat)
         # The engine resets to the pose as written; this is the joint's value in that pose.
-        joint.set('ref', number(value))
+        joint.set('ref', format_number(value))
         self.start.append(value)
         mass = closure.linkage.masses.get(child)
-        solids = self._drawn[child] if given else _block(closure, child)
+        solids = self._drawn[child] if given else _slot_block(closure, child)
         if mass is not None:
-            _inertial(body, mass, origin)
-        self._masses[child] = mass.mass if mass else _weight(solids)
-        _geoms(body, solids, origin)
+            _write_inertial(body, mass, origin)
+        self._masses[child] = mass.mass if mass else _approximate_mass(solids)
+        _write_geoms(body, solids, origin)
 
-    def _value(self, branch: Branch) -> float:
+    def _joint_value(self, branch: TreeBranch) -> float:
         """Return the value of a joint at the start."""
         if branch.joint in self._driven:
             return self._driven[branch.joint]
@@ -294,7 +300,9 @@ class Bodies:
         return value
 
 
-def _held(closure: Closure, branch: Branch) -> tuple[complex, float, complex, complex]:
+def _pose_on_parent(
+    closure: Closure, branch: TreeBranch
+) -> tuple[complex, float, complex, complex]:
     """
     Return the pose of a body on its parent with its joint at 0.
 
@@ -316,16 +324,16 @@ def _held(closure: Closure, branch: Branch) -> tuple[complex, float, complex, co
     return complex(*place), turn, axis, complex(*own)
 
 
-def _block(closure: Closure, block: str) -> Body:
+def _slot_block(closure: Closure, block: str) -> LinkBody:
     """Return the block that represents a pin in a slot."""
     name = next(slider for slider, of in closure.structure.blocks.items() if of == block)
     slider, width = closure.linkage.sliders[name], bar_width(closure)
     angle = phase(complex(*slider.direction))
     solid = Solid('slot', slider.point, 0j, 0.0, angle, 2.0 * width, 1.5 * width, 0.5 * width)
-    return Body((0.35, 0.35, 0.35, 1.0), (solid,))
+    return LinkBody((0.35, 0.35, 0.35, 1.0), (solid,))
 
 
-def _weight(body: Body) -> float:
+def _approximate_mass(body: LinkBody) -> float:
     """Return the approximate mass of the solids of a link, in [kg]."""
     return sum(
         (LIGHT if solid.kind == 'slot' else DENSITY)
@@ -334,45 +342,50 @@ def _weight(body: Body) -> float:
     )
 
 
-def _limit(joint: ET.Element, limits: Limits) -> None:
+def _write_limits(joint: ET.Element, limits: Limits) -> None:
     """Write the limits of a joint that MJCF can express: it has none for rates."""
     if limits.is_bounded:
-        joint.set('range', numbers(max(limits.low, -_FARTHEST), min(limits.high, _FARTHEST)))
+        joint.set(
+            'range', format_numbers(max(limits.low, -_FARTHEST), min(limits.high, _FARTHEST))
+        )
     if limits.effort < inf:
-        joint.set('actuatorfrcrange', numbers(-limits.effort, limits.effort))
+        joint.set('actuatorfrcrange', format_numbers(-limits.effort, limits.effort))
 
 
-def _inertial(body: ET.Element, mass: Mass, origin: complex) -> None:
+def _write_inertial(body: ET.Element, mass: Mass, origin: complex) -> None:
     centre = complex(*mass.center) - origin
     about = max(mass.inertia, _LEAST_INERTIA)
     ET.SubElement(
         body,
         'inertial',
-        pos=numbers(centre.real, centre.imag, 0.0),
-        mass=number(mass.mass),
-        diaginertia=numbers(0.5 * about, 0.5 * about, about),
+        pos=format_numbers(centre.real, centre.imag, 0.0),
+        mass=format_number(mass.mass),
+        diaginertia=format_numbers(0.5 * about, 0.5 * about, about),
     )
 
 
-def _geoms(element: ET.Element, body: Body, origin: complex) -> None:
+def _write_geoms(element: ET.Element, body: LinkBody, origin: complex) -> None:
     for solid in body.solids:
         at = solid.centre - origin
-        where = {'pos': rough(at.real, at.imag, solid.z), 'rgba': numbers(*body.colour)}
+        where = {
+            'pos': format_rough(at.real, at.imag, solid.z),
+            'rgba': format_numbers(*body.colour),
+        }
         if solid.kind == 'disc':
-            size = rough(0.5 * solid.width, 0.5 * solid.height)
+            size = format_rough(0.5 * solid.width, 0.5 * solid.height)
             ET.SubElement(element, 'geom', where, type='cylinder', size=size)
             continue
-        size = rough(0.5 * solid.length, 0.5 * solid.width, 0.5 * solid.height)
-        where['euler'] = rough(0.0, 0.0, solid.angle)
+        size = format_rough(0.5 * solid.length, 0.5 * solid.width, 0.5 * solid.height)
+        where['euler'] = format_rough(0.0, 0.0, solid.angle)
         if solid.kind == 'slot':
-            where['density'] = number(LIGHT)
+            where['density'] = format_number(LIGHT)
         ET.SubElement(element, 'geom', where, type='box', size=size)
 
 
 _STEP = 5e-4
 """Step of the integration, in [s]."""
 
-_STIFF = {'solref': f'{number(4.0 * _STEP)} 1', 'solimp': '0.9999 0.9999 0.001 0.5 2'}
+_STIFF = {'solref': f'{format_number(4.0 * _STEP)} 1', 'solimp': '0.9999 0.9999 0.001 0.5 2'}
 """Solver parameters of cut pins: errors decay within 2 ms, and loads hardly open the pins."""
 
 _PACE = 30.0
@@ -388,7 +401,7 @@ Friction, tolerances and other effects of a scene are not here, nor its loads on
 its gravity and its springs between points are."""
 
 
-def mjcf(name: str, parts: Sequence[Part]) -> bytes:
+def mujoco_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     """
     Return a model of linkages for MuJoCo.
 
@@ -397,16 +410,16 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
     """
     _refuse_massless(parts)
     model = ET.Element('mujoco', model=name)
-    model.append(comment(_HEAD.splitlines()))
+    model.append(xml_comment(_HEAD.splitlines()))
     ET.SubElement(model, 'compiler', angle='radian', autolimits='true')
-    gravity = numbers(*_gravity(parts), 0.0)
-    option = {'timestep': number(_STEP), 'gravity': gravity, 'integrator': 'implicitfast'}
+    gravity = format_numbers(*_common_gravity(parts), 0.0)
+    option = {'timestep': format_number(_STEP), 'gravity': gravity, 'integrator': 'implicitfast'}
     ET.SubElement(model, 'option', option, solver='Newton', iterations='200', tolerance='1e-12')
     default = ET.SubElement(model, 'default')
-    ET.SubElement(default, 'geom', contype='0', conaffinity='0', density=number(DENSITY))
+    ET.SubElement(default, 'geom', contype='0', conaffinity='0', density=format_number(DENSITY))
     ET.SubElement(default, 'equality', _STIFF)
     width = max(bar_width(part.closure) for part in parts)
-    ET.SubElement(default, 'site', size=rough(0.2 * width), group='4')
+    ET.SubElement(default, 'site', size=format_rough(0.2 * width), group='4')
     sections = {
         key: ET.SubElement(model, key)
         for key in ('worldbody', 'equality', 'tendon', 'actuator', 'keyframe')
@@ -414,23 +427,23 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
     start: list[float] = []
     commands: list[float] = []
     layers = 0
-    _, names = prefixed([(part.prefix, part.closure.linkage) for part in parts])
+    _, names = prefix_names([(part.prefix, part.closure.linkage) for part in parts])
     for part, own in zip(parts, names, strict=True):
         bodies = Bodies(sections['worldbody'], part, own, layers)
-        _close(sections, part, bodies)
-        _drive(sections['actuator'], part, bodies)
+        _write_connections(sections, part, bodies)
+        _write_servos(sections['actuator'], part, bodies)
         start += bodies.start
         commands += bodies.inputs
         layers += len(part.closure.linkage.links)
-    values = {'qpos': numbers(*start), 'ctrl': numbers(*commands)}
+    values = {'qpos': format_numbers(*start), 'ctrl': format_numbers(*commands)}
     ET.SubElement(sections['keyframe'], 'key', attrib={'name': 'start', **values})
     for key, section in sections.items():
         if not len(section) and key != 'worldbody':
             model.remove(section)
-    return document(model)
+    return xml_document(model)
 
 
-def _refuse_massless(parts: Sequence[Part]) -> None:
+def _refuse_massless(parts: Sequence[ModelPart]) -> None:
     for count, part in enumerate(parts):
         for link, mass in part.closure.linkage.masses.items():
             if not mass.mass:
@@ -442,28 +455,30 @@ def _refuse_massless(parts: Sequence[Part]) -> None:
                 )
 
 
-def _gravity(parts: Sequence[Part]) -> tuple[float, float]:
+def _common_gravity(parts: Sequence[ModelPart]) -> tuple[float, float]:
     gravities = [part.loads.gravity if part.loads else (0.0, 0.0) for part in parts]
     for count, gravity in enumerate(gravities):
         if gravity != gravities[0]:
             raise PartError(
                 count,
                 'loads.gravity',
-                f'[{numbers(*gravity)}] is another than that of the first linkage',
+                f'[{format_numbers(*gravity)}] is another than that of the first linkage',
                 'give all linkages one gravity: MuJoCo has one',
                 of_linkage=False,
             )
     return gravities[0]
 
 
-def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> None:
+def _write_connections(
+    sections: Mapping[str, ET.Element], part: ModelPart, bodies: Bodies
+) -> None:
     """Write the connections that are not joints: cut pins and springs."""
     linkage = part.closure.linkage
     links = links_by_point(linkage.links)
     for point in linkage.traced:
-        bodies.site(links[point][0], point)
+        bodies.site_name(links[point][0], point)
     for point, one, other in bodies.cuts:
-        ends = {'site1': bodies.site(one, point), 'site2': bodies.site(other, point)}
+        ends = {'site1': bodies.site_name(one, point), 'site2': bodies.site_name(other, point)}
         name = f'{ends["site1"]} = {ends["site2"]}'
         ET.SubElement(sections['equality'], 'connect', {'name': name, **ends})
     for name, ratio in linkage.ratios.items():
@@ -476,7 +491,7 @@ def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> No
             )
         one, other = (bodies.joints[joint].get('name', '') for joint in (name, ratio.of))
         # The engine counts both from the pose as written, in which the ratio holds.
-        coefficients = numbers(0.0, ratio.ratio, 0.0, 0.0, 0.0)
+        coefficients = format_numbers(0.0, ratio.ratio, 0.0, 0.0, 0.0)
         ET.SubElement(
             sections['equality'], 'joint', joint1=one, joint2=other, polycoef=coefficients
         )
@@ -485,30 +500,30 @@ def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> No
             sections['tendon'],
             'spatial',
             name=part.prefix + spring.name,
-            stiffness=number(spring.stiffness),
-            springlength=number(spring.free_length),
-            damping=number(spring.damping),
-            width=rough(0.15 * bar_width(part.closure)),
+            stiffness=format_number(spring.stiffness),
+            springlength=format_number(spring.free_length),
+            damping=format_number(spring.damping),
+            width=format_rough(0.15 * bar_width(part.closure)),
         )
         for end in spring.ends:
-            ET.SubElement(tendon, 'site', site=bodies.site(*end))
+            ET.SubElement(tendon, 'site', site=bodies.site_name(*end))
 
 
-def _drive(actuators: ET.Element, part: Part, bodies: Bodies) -> None:
+def _write_servos(actuators: ET.Element, part: ModelPart, bodies: Bodies) -> None:
     """Drive the inputs by servos whose stiffness suits the inertia that they move."""
     motor = part.loads.drive_inertia if part.loads else 0.0
     for count, given in enumerate(part.closure.linkage.inputs):
-        inertia = bodies.inertia(count) + motor
+        inertia = bodies.input_inertia(count) + motor
         joint = bodies.joints[given.joint]
         if motor:
-            joint.set('armature', number(motor))
+            joint.set('armature', format_number(motor))
         servo = ET.SubElement(
             actuators,
             'position',
             name=joint.get('name', ''),
             joint=joint.get('name', ''),
-            kp=rough(inertia * _PACE * _PACE),
-            kv=rough(2.0 * inertia * _PACE),
+            kp=format_rough(inertia * _PACE * _PACE),
+            kv=format_rough(2.0 * inertia * _PACE),
         )
         if given.limits.is_bounded:
             servo.set('ctrlrange', joint.get('range', ''))

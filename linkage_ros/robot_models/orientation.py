@@ -67,29 +67,29 @@ class Orientations:
         self._next: dict[str, list[tuple[str, Turn]]] = {link: [] for link in linkage.links}
         for slider in linkage.sliders.values():
             if slider.block:
-                self._join(slider.along, slider.block, '', slider.angle)
+                self._add_turn(slider.along, slider.block, '', slider.angle)
         for name, joint in named_joints(linkage).items():
             if isinstance(joint, RevoluteJoint):
-                self._join(joint.parent, joint.child, name, 0.0)
+                self._add_turn(joint.parent, joint.child, name, 0.0)
 
-    def _join(self, one: str, other: str, joint: str, constant: float) -> None:
+    def _add_turn(self, one: str, other: str, joint: str, constant: float) -> None:
         self._next[one].append((other, Turn(joint, 1, constant)))
         self._next[other].append((one, Turn(joint, -1, -constant)))
 
-    def between(self, link: str, other: str) -> tuple[Turn, ...] | None:
+    def angle_between(self, link: str, other: str) -> tuple[Turn, ...] | None:
         """
         Return the angle of ``other`` minus that of ``link``, with the fewest joints.
 
         None if messages do not determine it. Each partial sum is the orientation of some link.
         """
-        return self._from(link).get(other)
+        return self._paths_from(link).get(other)
 
     def known_from(self, link: str) -> Iterator[str]:
         """Yield the links whose angles relative to this one are known, in the linkage's order."""
-        known = self._from(link)
+        known = self._paths_from(link)
         return (other for other in self._links if other in known)
 
-    def _from(self, link: str) -> dict[str, tuple[Turn, ...]]:
+    def _paths_from(self, link: str) -> dict[str, tuple[Turn, ...]]:
         """Search from a link, fewest joints first; a constant does not count as a joint."""
         paths: dict[str, tuple[Turn, ...]] = {}
         ahead: list[tuple[int, int, str, tuple[Turn, ...]]] = [(0, 0, link, ())]
@@ -112,7 +112,7 @@ _MARGIN = 1e-3
 """Margin at both ends, in [rad] or as a fraction of the linkage's reach."""
 
 
-class Span(NamedTuple):
+class AngleSpan(NamedTuple):
     """The range of a joint in [rad] or [m]; −π and π for an angle without limits."""
 
     lowest: float
@@ -125,33 +125,35 @@ class Span(NamedTuple):
         return self.lowest < -pi or self.highest > pi
 
 
-_ROUND = Span(-pi, pi, False)
+_ROUND = AngleSpan(-pi, pi, False)
 """Range of an angle without limits."""
 
 
-def spans(closure: Closure) -> dict[str, Span]:
+def joint_spans(closure: Closure) -> dict[str, AngleSpan]:
     """Return the range of each joint that has a name in messages."""
     joints = named_joints(closure.linkage)
     if len(closure.linkage.inputs) > 1:
         far = slide_bound(closure)
         return {
-            name: Span(-far, far) if isinstance(joint, SlideJoint) else _ROUND
+            name: AngleSpan(-far, far) if isinstance(joint, SlideJoint) else _ROUND
             for name, joint in joints.items()
         }
     (start,) = usual_inputs(closure)
     interval = InputSweep(closure).range_about(start)
     assert interval is not None, 'what is usual lies in a range'
-    ranges = dict(zip(closure.linkage.joints, _published(closure, start, interval), strict=True))
+    ranges = dict(
+        zip(closure.linkage.joints, _published_spans(closure, start, interval), strict=True)
+    )
     (given,) = closure.linkage.inputs
     margin = _MARGIN * (1.0 if interval.turning else slide_bound(closure))
-    own = Span(interval.lowest - margin, interval.highest + margin)
+    own = AngleSpan(interval.lowest - margin, interval.highest + margin)
     if interval.is_whole or (interval.turning and own.passes_pi):
         own = _ROUND
     ranges.setdefault(given.joint, own)
     return {name: ranges[name] for name in joints}
 
 
-def _published(closure: Closure, start: float, interval: InputRange) -> list[Span]:
+def _published_spans(closure: Closure, start: float, interval: InputRange) -> list[AngleSpan]:
     import numpy as np  # local import: only the batch needs it
 
     values = np.array(sample_inputs(interval, _SAMPLES))
@@ -165,22 +167,29 @@ def _published(closure: Closure, start: float, interval: InputRange) -> list[Spa
     first = int(np.argmin(np.abs(values - start)))
     found = []
     for row, turning in zip(rows, closure.turning, strict=True):
-        found.append(_span(np.unwrap(row) if turning else row, first, turning, closure, interval))
+        found.append(
+            _joint_span(np.unwrap(row) if turning else row, first, turning, closure, interval)
+        )
     return found
 
 
-def _span(row: Array, first: int, turning: bool, closure: Closure, interval: InputRange) -> Span:
+def _joint_span(
+    row: Array, first: int, turning: bool, closure: Closure, interval: InputRange
+) -> AngleSpan:
     low, high = int(row.argmin()), int(row.argmax())
     if turning and interval.is_whole and abs(row[-1] - row[0]) > pi:
         return _ROUND
     margin = _MARGIN * (1.0 if turning else slide_bound(closure))
 
-    def beyond(i: int) -> float:
+    def highest_beyond(i: int) -> float:
         sides = [abs(row[j] - row[i]) for j in (i - 1, i + 1) if 0 <= j < len(row)]
         # At an end of a limited range the last sample is the limit itself.
         inner = 0 < i < len(row) - 1 or interval.is_whole
         return margin + (max(sides, default=0.0) if inner else 0.0)
 
     begun = remainder(row[first], tau) - row[first] if turning else 0.0
-    span = Span(float(row[low] + begun - beyond(low)), float(row[high] + begun + beyond(high)))
+    span = AngleSpan(
+        float(row[low] + begun - highest_beyond(low)),
+        float(row[high] + begun + highest_beyond(high)),
+    )
     return _ROUND if turning and span.passes_pi else span

@@ -20,7 +20,7 @@ from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.robot_models.orientation import named_joints
 
 
-class Part(NamedTuple):
+class ModelPart(NamedTuple):
     """A linkage of a model, whose links and joints get a prefix; wrapped angles are in (−π, π]."""
 
     closure: Closure
@@ -44,7 +44,7 @@ class PartError(DefinitionError):
         super().__init__(where, reason, remedy)
 
 
-class Names:
+class ModelNames:
     """
     The names of a model of one or more linkages.
 
@@ -57,7 +57,7 @@ class Names:
         self._joints: set[str] = set()
         self._count = 0
 
-    def of(self, prefix: str, linkage: Linkage) -> PrefixedNames:
+    def add_linkage(self, prefix: str, linkage: Linkage) -> PrefixedNames:
         """
         Return the names of one of its linkages; call it for all linkages before using any.
 
@@ -80,47 +80,49 @@ class Names:
         self._count += 1
         return PrefixedNames(prefix, self)
 
-    def frame(self, name: str) -> str:
+    def free_frame(self, name: str) -> str:
         """Return a free name for a frame, similar to this one."""
-        return _taken(name, self._frames)
+        return _take_name(name, self._frames)
 
-    def joint(self, name: str) -> str:
+    def free_joint(self, name: str) -> str:
         """Return a free name for a joint, similar to this one."""
-        return _taken(name, self._joints)
+        return _take_name(name, self._joints)
 
 
 class PrefixedNames:
     """The names of one linkage in a model."""
 
-    def __init__(self, prefix: str, names: Names) -> None:
+    def __init__(self, prefix: str, names: ModelNames) -> None:
         self.prefix = prefix
         self._names = names
 
-    def own(self, name: str) -> str:
+    def own_name(self, name: str) -> str:
         """Return the name of a link, or of a joint with a name in messages."""
         return self.prefix + name
 
-    def frame(self, name: str) -> str:
+    def free_frame(self, name: str) -> str:
         """Return a free name for a frame, similar to this one."""
-        return self._names.frame(self.prefix + name)
+        return self._names.free_frame(self.prefix + name)
 
     def text_on(self, name: str, link: str) -> str:
         """Return NAME_on_LINK, with both names as in the model."""
         return f'{self.prefix}{name}_on_{self.prefix}{link}'
 
-    def on(self, name: str, link: str) -> str:
+    def frame_on(self, name: str, link: str) -> str:
         """Return a free name for a frame, similar to NAME_on_LINK."""
-        return self._names.frame(self.text_on(name, link))
+        return self._names.free_frame(self.text_on(name, link))
 
-    def joint(self, name: str) -> str:
+    def free_joint(self, name: str) -> str:
         """Return a free name for a joint, similar to this one."""
-        return self._names.joint(self.prefix + name)
+        return self._names.free_joint(self.prefix + name)
 
 
-def prefixed(linkages: Sequence[tuple[str, Linkage]]) -> tuple[Names, list[PrefixedNames]]:
+def prefix_names(
+    linkages: Sequence[tuple[str, Linkage]],
+) -> tuple[ModelNames, list[PrefixedNames]]:
     """Return the names of a model and of each of its linkages, given with their prefixes."""
-    names = Names()
-    return names, [names.of(prefix, linkage) for prefix, linkage in linkages]
+    names = ModelNames()
+    return names, [names.add_linkage(prefix, linkage) for prefix, linkage in linkages]
 
 
 def free_name(name: str, taken: Collection[str]) -> str:
@@ -132,7 +134,7 @@ def free_name(name: str, taken: Collection[str]) -> str:
     return free
 
 
-def _taken(name: str, taken: set[str]) -> str:
+def _take_name(name: str, taken: set[str]) -> str:
     free = free_name(name, taken)
     taken.add(free)
     return free

@@ -87,7 +87,10 @@ def find_pinned(urdf: UrdfFile) -> Iterator[tuple[str, str]]:
     frames = {urdf.root: (np.eye(3), np.zeros(3))}
     for joint in urdf.joints.values():
         turn, place = frames[joint.parent]
-        frames[joint.child] = (turn @ _turned(joint.rpy), place + turn @ np.array(joint.xyz))
+        frames[joint.child] = (
+            turn @ _rotation_matrix(joint.rpy),
+            place + turn @ np.array(joint.xyz),
+        )
     for end, parent in urdf.pinned:
         found = _PLACE.fullmatch(end)
         assert found
@@ -114,7 +117,7 @@ def add_places(urdf: UrdfFile, asked: Sequence[tuple[str, str]]) -> UrdfFile:
 _ZERO = (0.0, 0.0, 0.0)
 
 
-class Loops(NamedTuple):
+class UrdfLoops(NamedTuple):
     """The links and joints of a URDF that belong to its loops."""
 
     ground: str  # The root link of the loops
@@ -122,7 +125,7 @@ class Loops(NamedTuple):
     left_out: tuple[str, ...]  # All other joints, and the links connected only by them, in words
 
 
-def find_loops(urdf: UrdfFile, closings: Sequence[Closing], inputs: Sequence[str]) -> Loops:
+def find_loops(urdf: UrdfFile, closings: Sequence[Closing], inputs: Sequence[str]) -> UrdfLoops:
     """Find the loops: leave out bodies held by a single joint that is not driven, repeatedly."""
     body_of = {urdf.root: urdf.root}
     edges: list[tuple[str, str, str]] = []
@@ -150,7 +153,7 @@ def find_loops(urdf: UrdfFile, closings: Sequence[Closing], inputs: Sequence[str
         edges = [edge for edge in edges if edge not in held]
         left_out.append(f'link {body}')
     kept = frozenset(edge[2] for edge in edges if edge[2])
-    return Loops(bodies[0], kept, tuple(left_out))
+    return UrdfLoops(bodies[0], kept, tuple(left_out))
 
 
 Array = Any
@@ -204,7 +207,7 @@ class Planar:
     heights: dict[str, float] = field(default_factory=dict)
 
 
-def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
+def lay_flat(urdf: UrdfFile, loops: UrdfLoops) -> Planar:
     """
     Reduce the loops of a URDF to their plane.
 
@@ -213,10 +216,10 @@ def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
     turns: dict[str, Array] = {loops.ground: np.eye(3)}
     for joint in urdf.joints.values():
         if joint.parent in turns:
-            turns[joint.child] = turns[joint.parent] @ _turned(joint.rpy)
-    basis = _basis(urdf, turns, loops)
+            turns[joint.child] = turns[joint.parent] @ _rotation_matrix(joint.rpy)
+    basis = _plane_basis(urdf, turns, loops)
 
-    def flat(vector: Array) -> complex:
+    def to_plane(vector: Array) -> complex:
         return complex(basis[0] @ vector, basis[1] @ vector)
 
     planar = Planar(loops.ground, basis=basis, turns=turns, heights={loops.ground: 0.0})
@@ -233,16 +236,16 @@ def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
             continue
         bodies[joint.child] = (joint.child, np.zeros(3))
         planar.heights[joint.child] = planar.heights[body] + float(basis[2] @ place)
-        axis = turns[joint.child] @ _unit(joint.axis)
+        axis = turns[joint.child] @ _unit_vector(joint.axis)
         turning = joint.kind != 'prismatic'
-        along = complex(1 if basis[2] @ axis > 0.0 else -1) if turning else flat(axis)
+        along = complex(1 if basis[2] @ axis > 0.0 else -1) if turning else to_plane(axis)
         planar.joints.append(
             PlanarJoint(
                 joint.name,
                 'R' if turning else 'P',
                 body,
                 joint.child,
-                flat(place),
+                to_plane(place),
                 along,
                 joint.mimics,
                 joint.multiplier,
@@ -252,23 +255,23 @@ def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
     weights: dict[str, list[tuple[float, complex, float]]] = {}
     for name, (body, place) in bodies.items():
         link = urdf.links[name]
-        planar.frames[name] = Frame(body, flat(place), flat(turns[name][:, 0]))
+        planar.frames[name] = Frame(body, to_plane(place), to_plane(turns[name][:, 0]))
         if link.bodied:
             planar.bodied.add(body)
         for mark, xyz in link.marks:
-            planar.marks.append((mark, body, flat(place + turns[name] @ np.array(xyz))))
+            planar.marks.append((mark, body, to_plane(place + turns[name] @ np.array(xyz))))
         if link.inertial is not None:
-            centre = flat(place + turns[name] @ np.array(link.inertial.xyz))
-            axes = turns[name] @ _turned(link.inertial.rpy)
+            centre = to_plane(place + turns[name] @ np.array(link.inertial.xyz))
+            axes = turns[name] @ _rotation_matrix(link.inertial.rpy)
             ixx, ixy, ixz, iyy, iyz, izz = link.inertial.tensor
             tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
             about = float(basis[2] @ axes @ tensor @ axes.T @ basis[2])
             weights.setdefault(body, []).append((link.inertial.mass, centre, about))
-    planar.masses = {body: _together(found) for body, found in weights.items()}
+    planar.masses = {body: _combine_masses(found) for body, found in weights.items()}
     return planar
 
 
-def _together(parts: list[tuple[float, complex, float]]) -> Mass:
+def _combine_masses(parts: list[tuple[float, complex, float]]) -> Mass:
     """Return the total of masses fixed to each other (parallel axis theorem)."""
     if len(parts) == 1:  # every digit as given
         ((mass, centre, inertia),) = parts
@@ -279,7 +282,7 @@ def _together(parts: list[tuple[float, complex, float]]) -> Mass:
     return Mass(mass, (centre.real, centre.imag), max(inertia, 0.0))
 
 
-def _basis(urdf: UrdfFile, turns: dict[str, Array], loops: Loops) -> Array:
+def _plane_basis(urdf: UrdfFile, turns: dict[str, Array], loops: UrdfLoops) -> Array:
     """
     Return x and y of the plane and its normal in the frame of the ground, as rows.
 
@@ -287,18 +290,18 @@ def _basis(urdf: UrdfFile, turns: dict[str, Array], loops: Loops) -> Array:
     component of the normal is positive.
     """
 
-    def axis(joint: UrdfJoint) -> Array:
-        return turns[joint.child] @ _unit(joint.axis)
+    def joint_axis(joint: UrdfJoint) -> Array:
+        return turns[joint.child] @ _unit_vector(joint.axis)
 
     moving = [joint for joint in urdf.joints.values() if joint.name in loops.joints]
     turning = [joint for joint in moving if joint.kind != 'prismatic']
     if not turning:
         raise FileError(urdf.file, '', 'no joint of its loops turns', 'close others by --close')
-    normal = axis(turning[0])
+    normal = joint_axis(turning[0])
     largest = int(np.argmax(np.abs(normal)))
     normal = normal * np.sign(normal[largest])
     for joint in moving:
-        found, first = axis(joint), turning[0].name
+        found, first = joint_axis(joint), turning[0].name
         if joint.kind == 'prismatic':
             off = abs(float(found @ normal))
             reason = f'does not slide in the plane that {first} turns in'
@@ -313,16 +316,16 @@ def _basis(urdf: UrdfFile, turns: dict[str, Array], loops: Loops) -> Array:
                 'write it fixed, or leave it out: a linkage lies in one plane',
             )
     x = np.eye(3)[(largest + 1) % 3]
-    x = _unit(x - (x @ normal) * normal)
+    x = _unit_vector(x - (x @ normal) * normal)
     return np.array([x, np.cross(normal, x), normal])
 
 
-def _unit(vector: Any) -> Array:
+def _unit_vector(vector: Any) -> Array:
     vector = np.array(vector, float)
     return vector / np.linalg.norm(vector)
 
 
-def _turned(rpy: tuple[float, float, float]) -> Array:
+def _rotation_matrix(rpy: tuple[float, float, float]) -> Array:
     """Return the rotation matrix of roll, pitch and yaw about fixed axes, as in URDF."""
     (cr, cp, cy), (sr, sp, sy) = map(cos, rpy), map(sin, rpy)
     return np.array(

@@ -26,12 +26,12 @@ from typing import Literal, NamedTuple
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.robot_models.orientation import named_joints, Orientations, Turn
-from linkage_ros.robot_models.part import free_name, Names, PrefixedNames
+from linkage_ros.robot_models.part import free_name, ModelNames, PrefixedNames
 
 # The remedy if the published joints do not determine the position of a link.
 
 
-def remedy(
+def suggest_joint(
     linkage: Linkage, placed: Collection[str]
 ) -> tuple[str, str, RevoluteJoint | SlideJoint]:
     """Return a link that is joined to placed ones, and a joint that would determine its place."""
@@ -94,12 +94,12 @@ class Tree:
     # Joints with a name in messages that attach no link.
     spare: list[str] = field(default_factory=list)
 
-    def place(self, link: str, point: str) -> complex:
+    def point_position(self, link: str, point: str) -> complex:
         """Return the position of a point of a link in the tree's frame of the link, in [m]."""
         return complex(*self.linkage.links[link][point]) - self.origins[link]
 
 
-class _Hang(NamedTuple):
+class _LinkAttachment(NamedTuple):
     """A way to attach a link to another that is in the tree."""
 
     # The two links.
@@ -113,7 +113,7 @@ class _Hang(NamedTuple):
     slide: str = ''  # Joint that measures the slide
 
 
-def grow(linkage: Linkage, names: PrefixedNames) -> Tree:
+def grow_tree(linkage: Linkage, names: PrefixedNames) -> Tree:
     """
     Attach all links of a linkage to its ground.
 
@@ -131,8 +131,8 @@ def grow(linkage: Linkage, names: PrefixedNames) -> Tree:
 
     """
     growth = _Growth(linkage, names)
-    if len(growth.grow()) < len(linkage.links):
-        raise _missing(linkage)
+    if len(growth.attach_links()) < len(linkage.links):
+        raise _missing_error(linkage)
     growth.tree.spare += growth.unused
     return growth.tree
 
@@ -146,33 +146,37 @@ class _Growth:
         self.tree = Tree(linkage)
         self.unused = dict.fromkeys(named_joints(linkage))
         self._angles = Orientations(linkage)
-        self._known = {link: self._angles.between(GROUND, link) for link in linkage.links}
+        self._known = {link: self._angles.angle_between(GROUND, link) for link in linkage.links}
         self._slides: dict[str, list[str]] = {name: [] for name in linkage.sliders}
         for name, joint in named_joints(linkage).items():
             if isinstance(joint, SlideJoint):
                 self._slides[joint.slider].append(name)
 
-    def grow(self) -> Collection[str]:
+    def attach_links(self) -> Collection[str]:
         """Attach link after link while possible; return the attached links."""
-        while ways := list(self._ways()):
-            self._hang(min(ways, key=self._cost))
+        while ways := list(self._possible_attachments()):
+            self._attach_link(min(ways, key=self._attachment_cost))
         return self.tree.origins
 
-    def _ways(self) -> Iterator[_Hang]:
+    def _possible_attachments(self) -> Iterator[_LinkAttachment]:
         links = self._linkage.links
         for link in links:
             if link in self.tree.origins:
                 continue
             for on in self.tree.origins:
-                turns = self._angles.between(on, link) if self._known[link] is not None else None
+                turns = (
+                    self._angles.angle_between(on, link) if self._known[link] is not None else None
+                )
                 if turns is None:
                     continue
                 for pin in links[link]:
                     if pin in links[on]:
-                        yield _Hang(link, on, pin, pin, turns)
-                yield from self._sliding(link, on, turns)
+                        yield _LinkAttachment(link, on, pin, pin, turns)
+                yield from self._sliding_attachments(link, on, turns)
 
-    def _sliding(self, link: str, on: str, turns: tuple[Turn, ...]) -> Iterator[_Hang]:
+    def _sliding_attachments(
+        self, link: str, on: str, turns: tuple[Turn, ...]
+    ) -> Iterator[_LinkAttachment]:
         links = self._linkage.links
         for name, slider in self._linkage.sliders.items():
             if not self._slides[name]:
@@ -180,63 +184,74 @@ class _Growth:
             slide = next((s for s in self._slides[name] if s in self.unused), '')
             slide = slide or self._slides[name][0]
             if on == slider.along and slider.point in links[link]:
-                yield _Hang(link, on, slider.through, slider.point, turns, name, slide)
+                yield _LinkAttachment(link, on, slider.through, slider.point, turns, name, slide)
             elif link == slider.along and slider.point in links[on]:
-                yield _Hang(link, on, slider.point, slider.through, turns, name, slide)
+                yield _LinkAttachment(link, on, slider.point, slider.through, turns, name, slide)
 
-    def _cost(self, way: _Hang) -> tuple[int, int]:
+    def _attachment_cost(self, attachment: _LinkAttachment) -> tuple[int, int]:
         """
         Return the cost of a way: frames without a body, and joints that another link may need.
 
         Ways of equal cost are tried in the order of the file.
         """
-        turning = [turn.joint for turn in way.turns if turn.joint]
-        moving = turning + [way.slide] * bool(way.slider)
+        turning = [turn.joint for turn in attachment.turns if turn.joint]
+        moving = turning + [attachment.slide] * bool(attachment.slider)
         mimics = sum(joint not in self.unused for joint in moving)
         taken = sum(joint in self.unused for joint in turning[:-1])
         return max(0, len(moving) - 1) + mimics + _DEAR * taken, mimics
 
-    def _hang(self, way: _Hang) -> None:
+    def _attach_link(self, attachment: _LinkAttachment) -> None:
         tree, names = self.tree, self._names
-        tree.origins[way.link] = complex(*self._linkage.links[way.link][way.point])
-        if way.slider:
-            tree.slides.append(way.slider)
+        tree.origins[attachment.link] = complex(
+            *self._linkage.links[attachment.link][attachment.point]
+        )
+        if attachment.slider:
+            tree.slides.append(attachment.slider)
         else:
-            tree.pins.append((way.at, way.on, way.link))
-        moves = list(self._moves(way))
-        parent, place = names.own(way.on), tree.place(way.on, way.at)
+            tree.pins.append((attachment.at, attachment.on, attachment.link))
+        moves = list(self._attachment_joints(attachment))
+        parent, place = (
+            names.own_name(attachment.on),
+            tree.point_position(attachment.on, attachment.at),
+        )
         for number, move in enumerate(moves, 1):
             last = number == len(moves)
-            child = names.own(way.link) if last else names.frame(f'{way.link}_{number}')
+            child = (
+                names.own_name(attachment.link)
+                if last
+                else names.free_frame(f'{attachment.link}_{number}')
+            )
             joint = move._replace(parent=parent, child=child, place=place)
             if move.kind == 'fixed':
-                joint = joint._replace(name=names.joint(f'{way.link}_at_{way.at}'))
+                joint = joint._replace(
+                    name=names.free_joint(f'{attachment.link}_at_{attachment.at}')
+                )
             elif move.name in self.unused:
                 del self.unused[move.name]
-                joint = joint._replace(name=names.own(move.name))
+                joint = joint._replace(name=names.own_name(move.name))
             else:
-                own = names.joint(f'{move.name}_in_{way.link}')
-                joint = joint._replace(name=own, mimics=names.own(move.name))
+                own = names.free_joint(f'{move.name}_in_{attachment.link}')
+                joint = joint._replace(name=own, mimics=names.own_name(move.name))
             tree.joints.append(joint)
             parent, place = child, 0j
 
-    def _moves(self, way: _Hang) -> Iterator[TreeJoint]:
+    def _attachment_joints(self, attachment: _LinkAttachment) -> Iterator[TreeJoint]:
         """Yield joints from parent to link; their frames are not yet assigned."""
-        turning = [i for i, turn in enumerate(way.turns) if turn.joint]
+        turning = [i for i, turn in enumerate(attachment.turns) if turn.joint]
         # A constant precedes the next joint, and the last ones precede the last joint: all turn
         # about one axis, so the order does not matter.
-        constant = 0.0 if turning else sum(turn.constant for turn in way.turns)
+        constant = 0.0 if turning else sum(turn.constant for turn in attachment.turns)
         slide = None
-        if way.slider:
-            slider = self._linkage.sliders[way.slider]
-            along = way.on == slider.along
+        if attachment.slider:
+            slider = self._linkage.sliders[attachment.slider]
+            along = attachment.on == slider.along
             axis = slider.unit * rect(1.0, -constant) if along else -slider.unit
-            slide = TreeJoint(way.slide, 'prismatic', '', '', 0j, constant, axis)
+            slide = TreeJoint(attachment.slide, 'prismatic', '', '', 0j, constant, axis)
             if along:
                 yield slide
         behind = turning[-1] + 1 if turning else 0
-        before, after = 0.0, sum(turn.constant for turn in way.turns[behind:])
-        for i, turn in enumerate(way.turns):
+        before, after = 0.0, sum(turn.constant for turn in attachment.turns[behind:])
+        for i, turn in enumerate(attachment.turns):
             before += turn.constant
             if turn.joint:
                 if i == turning[-1]:
@@ -253,15 +268,15 @@ _DEAR = 9
 """Cost of using a joint that another link may need."""
 
 
-def _missing(linkage: Linkage) -> DefinitionError:
+def _missing_error(linkage: Linkage) -> DefinitionError:
     """Return the error that names the joints that a complete tree would need."""
     whole, lost, added = linkage, dict[str, None](), dict[str, RevoluteJoint | SlideJoint]()
     while True:
-        growth = _Growth(whole, Names().of('', whole))
-        placed = growth.grow()
+        growth = _Growth(whole, ModelNames().add_linkage('', whole))
+        placed = growth.attach_links()
         if len(placed) == len(linkage.links):
             break
-        link, name, joint = remedy(whole, placed)
+        link, name, joint = suggest_joint(whole, placed)
         lost[link] = None
         added[free_name(name, named_joints(whole))] = joint
         whole = replace(linkage, joints=dict(linkage.joints) | added)

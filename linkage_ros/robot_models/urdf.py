@@ -35,11 +35,17 @@ from linkage_ros.kinematics.linkage import (
     RevoluteJoint,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.robot_models.bodies import bodies, Body
-from linkage_ros.robot_models.orientation import named_joints, Span, spans
-from linkage_ros.robot_models.part import Part, PartError, prefixed, PrefixedNames
-from linkage_ros.robot_models.tree import grow, Tree, TreeJoint
-from linkage_ros.robot_models.xml import comment, document, number, numbers, rough
+from linkage_ros.robot_models.bodies import link_bodies, LinkBody
+from linkage_ros.robot_models.orientation import AngleSpan, joint_spans, named_joints
+from linkage_ros.robot_models.part import ModelPart, PartError, prefix_names, PrefixedNames
+from linkage_ros.robot_models.tree import grow_tree, Tree, TreeJoint
+from linkage_ros.robot_models.xml import (
+    format_number,
+    format_numbers,
+    format_rough,
+    xml_comment,
+    xml_document,
+)
 
 # The loop joints: pins and sliders that the tree leaves open, as pairs of frames.
 #
@@ -60,21 +66,21 @@ class LoopJoint(NamedTuple):
 
 def add_frames(tree: Tree, names: PrefixedNames) -> list[LoopJoint]:
     """Add frames of all cuts, of joints that attach no link, and of traced points to a tree."""
-    adding = _Adding(tree, names)
-    cuts = [*adding.pins(), *adding.sliders()]
-    adding.spare()
-    adding.traced()
+    adding = _FrameAdding(tree, names)
+    cuts = [*adding.cut_pins(), *adding.cut_sliders()]
+    adding.add_spare()
+    adding.add_traced()
     return cuts
 
 
-class _Adding:
+class _FrameAdding:
     def __init__(self, tree: Tree, names: PrefixedNames) -> None:
         self._tree = tree
         self._names = names
         self._joints = named_joints(tree.linkage)
         self._spare = list(tree.spare)
 
-    def pins(self) -> list[LoopJoint]:
+    def cut_pins(self) -> list[LoopJoint]:
         cuts = []
         for point, links in links_by_point(self._tree.linkage.links).items():
             apart = {link: link for link in links}
@@ -85,11 +91,11 @@ class _Adding:
             # The first link of each connected part represents it.
             ends = list({of: link for link, of in reversed(apart.items())}.values())[::-1]
             if len(ends) > 1:
-                frames = tuple(self._fixed(point, link, point) for link in ends)
+                frames = tuple(self._add_fixed(point, link, point) for link in ends)
                 cuts.append(LoopJoint('pin', point, frames))
         return cuts
 
-    def sliders(self) -> list[LoopJoint]:
+    def cut_sliders(self) -> list[LoopJoint]:
         linkage, cuts = self._tree.linkage, []
         links = links_by_point(linkage.links)
         for name, slider in linkage.sliders.items():
@@ -100,50 +106,52 @@ class _Adding:
             slides = [s for s in self._spare if getattr(self._joints[s], 'slider', '') == name]
             if slides:
                 self._spare.remove(slides[0])
-                line = self._slide(slides[0], self._names.on(shown, slider.along))
+                line = self._add_slide(slides[0], self._names.frame_on(shown, slider.along))
             else:
                 turn = phase(complex(*slider.direction))
-                line = self._fixed(f'{shown}_line', slider.along, slider.through, turn)
-            frames = (line, self._fixed(shown, end, slider.point))
+                line = self._add_fixed(f'{shown}_line', slider.along, slider.through, turn)
+            frames = (line, self._add_fixed(shown, end, slider.point))
             cuts.append(LoopJoint('slide' if slides else 'line', name, frames))
         return cuts
 
-    def spare(self) -> None:
+    def add_spare(self) -> None:
         """Give a frame to every published joint that attaches no link."""
         links, names = self._tree.linkage.links, self._names
         for name in self._spare:
-            frame, joint = names.frame(f'{name}_frame'), self._joints[name]
+            frame, joint = names.free_frame(f'{name}_frame'), self._joints[name]
             if isinstance(joint, RevoluteJoint):
                 pins = [p for p in links[joint.parent] if p in links[joint.child]]
-                place = self._tree.place(joint.parent, pins[0]) if pins else 0j
-                parent = names.own(joint.parent)
-                self._add(TreeJoint(names.own(name), 'revolute', parent, frame, place))
+                place = self._tree.point_position(joint.parent, pins[0]) if pins else 0j
+                parent = names.own_name(joint.parent)
+                self._add_joint(TreeJoint(names.own_name(name), 'revolute', parent, frame, place))
             else:
-                self._slide(name, frame)
+                self._add_slide(name, frame)
 
-    def traced(self) -> None:
+    def add_traced(self) -> None:
         links = links_by_point(self._tree.linkage.links)
         there = {joint.child for joint in self._tree.joints}
         for point in self._tree.linkage.traced:
             if not any(self._names.text_on(point, link) in there for link in links[point]):
-                self._fixed(point, links[point][0], point)
+                self._add_fixed(point, links[point][0], point)
 
-    def _slide(self, name: str, frame: str) -> str:
+    def _add_slide(self, name: str, frame: str) -> str:
         joint = self._joints[name]
         assert not isinstance(joint, RevoluteJoint)
         slider = self._tree.linkage.sliders[joint.slider]
-        place = self._tree.place(slider.along, slider.through)
-        parent = self._names.own(slider.along)
-        own = self._names.own(name)
-        return self._add(TreeJoint(own, 'prismatic', parent, frame, place, 0.0, slider.unit))
+        place = self._tree.point_position(slider.along, slider.through)
+        parent = self._names.own_name(slider.along)
+        own = self._names.own_name(name)
+        return self._add_joint(TreeJoint(own, 'prismatic', parent, frame, place, 0.0, slider.unit))
 
-    def _fixed(self, name: str, link: str, point: str, turn: float = 0.0) -> str:
-        frame = self._names.on(name, link)
-        joint = self._names.joint(f'{name}_on_{link}_fixed')
-        place = self._tree.place(link, point)
-        return self._add(TreeJoint(joint, 'fixed', self._names.own(link), frame, place, turn))
+    def _add_fixed(self, name: str, link: str, point: str, turn: float = 0.0) -> str:
+        frame = self._names.frame_on(name, link)
+        joint = self._names.free_joint(f'{name}_on_{link}_fixed')
+        place = self._tree.point_position(link, point)
+        return self._add_joint(
+            TreeJoint(joint, 'fixed', self._names.own_name(link), frame, place, turn)
+        )
 
-    def _add(self, joint: TreeJoint) -> str:
+    def _add_joint(self, joint: TreeJoint) -> str:
         self._tree.joints.append(joint)
         return joint.child
 
@@ -163,15 +171,15 @@ _EXPRESSION = re.compile(r'\$[{(]')
 class _Model(NamedTuple):
     """A linkage with its tree, ready to be written."""
 
-    part: Part
+    part: ModelPart
     names: PrefixedNames
     tree: Tree
     cuts: Sequence[LoopJoint]
-    spans: Mapping[str, Span]
-    bodies: Mapping[str, Body]
+    spans: Mapping[str, AngleSpan]
+    bodies: Mapping[str, LinkBody]
 
 
-def urdf(name: str, parts: Sequence[Part]) -> bytes:
+def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     """
     Return a robot model.
 
@@ -189,22 +197,24 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
         evaluate one of its names.
 
     """
-    names, own = prefixed([(part.prefix, part.closure.linkage) for part in parts])
+    names, own = prefix_names([(part.prefix, part.closure.linkage) for part in parts])
     models = []
     layers = 0
     for count, (part, its) in enumerate(zip(parts, own, strict=True)):
         try:
-            tree = grow(part.closure.linkage, its)
+            tree = grow_tree(part.closure.linkage, its)
         except DefinitionError as error:
             raise PartError(count, error.where, error.reason, error.remedy) from None
         cuts = add_frames(tree, its)
-        ranges = spans(part.closure)
-        models.append(_Model(part, its, tree, cuts, ranges, bodies(part.closure, ranges, layers)))
+        ranges = joint_spans(part.closure)
+        models.append(
+            _Model(part, its, tree, cuts, ranges, link_bodies(part.closure, ranges, layers))
+        )
         layers += len(part.closure.linkage.links)
     robot = ET.Element('robot', name=name)
-    robot.append(comment(list(_head(models))))
+    robot.append(xml_comment(list(_head_lines(models))))
     if len(models) > 1:
-        root = names.frame(_ROOT)
+        root = names.free_frame(_ROOT)
         ET.SubElement(robot, 'link', name=root)
         for model in models:
             mount = TreeJoint(
@@ -214,10 +224,10 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
     _refuse_expressions(0, robot, of_linkage=False)
     for count, model in enumerate(models):
         before = len(robot)
-        _write(robot, model)
+        _write_linkage(robot, model)
         for element in robot[before:]:
             _refuse_expressions(count, element)
-    return document(robot)
+    return xml_document(robot)
 
 
 def _refuse_expressions(number: int, element: ET.Element, *, of_linkage: bool = True) -> None:
@@ -239,7 +249,7 @@ def _refuse_expressions(number: int, element: ET.Element, *, of_linkage: bool = 
                 )
 
 
-def _head(models: Sequence[_Model]) -> Iterator[str]:
+def _head_lines(models: Sequence[_Model]) -> Iterator[str]:
     yield from _HEAD.splitlines()
     if len(models) > 1:
         yield 'A scene does not say where its linkages stand. Change the origin of NAME_mount.'
@@ -257,7 +267,7 @@ def _head(models: Sequence[_Model]) -> Iterator[str]:
             line = f'{met} is on the x axis of {first}'
             how = line if cut.kind == 'line' else f'{first} meets {met}'
             yield f'{what} {cut.name} is cut, {how}'
-        if spare := ', '.join(map(model.names.own, model.tree.spare)):
+        if spare := ', '.join(map(model.names.own_name, model.tree.spare)):
             yield f'no link hangs by {spare}'
 
 
@@ -272,23 +282,23 @@ angles, the reach for slides. An angle that passes pi has none either, since it 
 begins in (-pi, pi], or wrapped. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
 
 
-def _write(robot: ET.Element, model: _Model) -> None:
+def _write_linkage(robot: ET.Element, model: _Model) -> None:
     names, linkage = model.names, model.part.closure.linkage
     for link in linkage.links:
-        element = ET.SubElement(robot, 'link', name=names.own(link))
+        element = ET.SubElement(robot, 'link', name=names.own_name(link))
         origin = model.tree.origins[link]
         mass = linkage.masses.get(link)
         if mass and mass.mass:  # without an inertial a link is massless
-            _inertial(element, mass, origin)
-        _visuals(element, names.own(link), model.bodies[link], origin)
-    links = {names.own(link) for link in linkage.links}
+            _write_inertial(element, mass, origin)
+        _write_visuals(element, names.own_name(link), model.bodies[link], origin)
+    links = {names.own_name(link) for link in linkage.links}
     for joint in model.tree.joints:
         if joint.child not in links:
             ET.SubElement(robot, 'link', name=joint.child)
-    ranges = {names.own(name): span for name, span in model.spans.items()}
-    given = {names.own(name): limits for name, limits in linkage.limits.items()}
+    ranges = {names.own_name(name): span for name, span in model.spans.items()}
+    given = {names.own_name(name): limits for name, limits in linkage.limits.items()}
     computed: dict[str, dict[str, str]] = {}
-    followed = {names.own(name): of for name, of in _following(linkage, names)}
+    followed = {names.own_name(name): of for name, of in _following_joints(linkage, names)}
     for joint in model.tree.joints:
         of = joint.mimics or joint.name
         limits = given.get(of, NO_LIMITS)
@@ -299,7 +309,7 @@ def _write(robot: ET.Element, model: _Model) -> None:
         robot.append(start)
 
 
-def _following(linkage: Linkage, names: PrefixedNames) -> Iterator[tuple[str, Ratio]]:
+def _following_joints(linkage: Linkage, names: PrefixedNames) -> Iterator[tuple[str, Ratio]]:
     """Yield the joints that follow an input, perhaps by others, with its name in the model."""
     for name, given in linkage.ratios.items():
         of, ratio, offset = given.of, given.ratio, given.offset
@@ -308,41 +318,44 @@ def _following(linkage: Linkage, names: PrefixedNames) -> Iterator[tuple[str, Ra
             of, offset = before.of, offset + ratio * before.offset
             ratio *= before.ratio
         if of in (driven.joint for driven in linkage.inputs):
-            yield name, Ratio(names.own(of), ratio, offset)
+            yield name, Ratio(names.own_name(of), ratio, offset)
 
 
-def _inertial(link: ET.Element, mass: Mass, origin: complex) -> None:
+def _write_inertial(link: ET.Element, mass: Mass, origin: complex) -> None:
     inertial = ET.SubElement(link, 'inertial')
-    _origin(inertial, complex(*mass.center) - origin)
-    ET.SubElement(inertial, 'mass', value=number(mass.mass))
-    flat, about = number(0.5 * mass.inertia), number(mass.inertia)
+    _write_origin(inertial, complex(*mass.center) - origin)
+    ET.SubElement(inertial, 'mass', value=format_number(mass.mass))
+    flat, about = format_number(0.5 * mass.inertia), format_number(mass.inertia)
     ET.SubElement(inertial, 'inertia', ixx=flat, ixy='0', ixz='0', iyy=flat, iyz='0', izz=about)
 
 
-def _visuals(link: ET.Element, name: str, body: Body, origin: complex) -> None:
+def _write_visuals(link: ET.Element, name: str, body: LinkBody, origin: complex) -> None:
     for count, solid in enumerate(body.solids):
         visual = ET.SubElement(link, 'visual')
         if solid.name and solid.kind in ('disc', 'block'):
             visual.set('name', solid.name)
         centre = solid.centre - origin
-        seen = {'xyz': rough(centre.real, centre.imag, solid.z), 'rpy': rough(0, 0, solid.angle)}
+        seen = {
+            'xyz': format_rough(centre.real, centre.imag, solid.z),
+            'rpy': format_rough(0, 0, solid.angle),
+        }
         ET.SubElement(visual, 'origin', seen)
         geometry = ET.SubElement(visual, 'geometry')
         if solid.kind == 'disc':
-            radius = rough(0.5 * solid.width)
-            ET.SubElement(geometry, 'cylinder', radius=radius, length=rough(solid.height))
+            radius = format_rough(0.5 * solid.width)
+            ET.SubElement(geometry, 'cylinder', radius=radius, length=format_rough(solid.height))
         else:
-            size = rough(solid.length, solid.width, solid.height)
+            size = format_rough(solid.length, solid.width, solid.height)
             ET.SubElement(geometry, 'box', size=size)
         material = ET.SubElement(visual, 'material', name=f'colour of {name}')
         if not count:
-            ET.SubElement(material, 'color', rgba=numbers(*body.colour))
+            ET.SubElement(material, 'color', rgba=format_numbers(*body.colour))
 
 
 def add_joint(
     robot: ET.Element,
     joint: TreeJoint,
-    span: Span | None,
+    span: AngleSpan | None,
     limits: Limits,
     wrapped: bool = False,
     mimic: Ratio | None = None,
@@ -351,20 +364,20 @@ def add_joint(
     kind: str = joint.kind
     if kind == 'revolute' and span is not None:
         # A wrapped angle that passes π is on both sides.
-        passing = wrapped and Span(limits.low, limits.high).passes_pi
+        passing = wrapped and AngleSpan(limits.low, limits.high).passes_pi
         if passing if limits.is_bounded else not span.limited:
             kind = 'continuous'
     element = ET.SubElement(robot, 'joint', name=joint.name, type=kind)
-    _origin(element, joint.place, joint.turn)
+    _write_origin(element, joint.place, joint.turn)
     ET.SubElement(element, 'parent', link=joint.parent)
     ET.SubElement(element, 'child', link=joint.child)
     if joint.kind == 'fixed':
         return {}
     assert span is not None, 'all that moves is published'
     if joint.kind == 'revolute':
-        axis = numbers(0.0, 0.0, joint.axis.real)
+        axis = format_numbers(0.0, 0.0, joint.axis.real)
     else:
-        axis = numbers(joint.axis.real, joint.axis.imag, 0.0)
+        axis = format_numbers(joint.axis.real, joint.axis.imag, 0.0)
     ET.SubElement(element, 'axis', xyz=axis)
     # A continuous angle that is limited on one side only gets a far limit on the other.
     lowest, highest = (span.lowest, span.highest) if span.limited else (-FARTHEST, FARTHEST)
@@ -377,17 +390,18 @@ def add_joint(
     if kind == 'continuous':
         del known['lower'], known['upper']
     written = {
-        key: number(given if isfinite(given) else ours) for key, (given, ours) in known.items()
+        key: format_number(given if isfinite(given) else ours)
+        for key, (given, ours) in known.items()
     }
     ET.SubElement(element, 'limit', written)
     if mimic:
-        multiplier, offset = number(mimic.ratio), number(mimic.offset)
+        multiplier, offset = format_number(mimic.ratio), format_number(mimic.offset)
         ET.SubElement(element, 'mimic', joint=mimic.of, multiplier=multiplier, offset=offset)
     return {key: written[key] for key, (given, _) in known.items() if not isfinite(given)}
 
 
-def _origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
-    xyz, rpy = numbers(place.real, place.imag, 0.0), numbers(0.0, 0.0, turn)
+def _write_origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
+    xyz, rpy = format_numbers(place.real, place.imag, 0.0), format_numbers(0.0, 0.0, turn)
     ET.SubElement(element, 'origin', xyz=xyz, rpy=rpy)
 
 
@@ -410,8 +424,8 @@ def start_element(
     element = ET.Element('linkage_start')
     for name in named_joints(closure.linkage):
         kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'
-        named = names.own(name)
-        joint = ET.SubElement(element, kind, name=named, value=number(values[name]))
+        named = names.own_name(name)
+        joint = ET.SubElement(element, kind, name=named, value=format_number(values[name]))
         if named in computed:
             ET.SubElement(joint, 'computed', dict(computed[named]))
     return element

@@ -141,27 +141,29 @@ class _Reader:
 
     def read(self, root: ET.Element) -> UrdfFile:
         if root.tag != 'robot':
-            raise self._error('', f'holds <{root.tag}>, not <robot>', 'name a URDF file')
+            raise self._file_error('', f'holds <{root.tag}>, not <robot>', 'name a URDF file')
         for element in root.iter():
             if 'ros.org/wiki/xacro' in element.tag or '${' in ''.join(element.attrib.values()):
-                raise self._error('', 'is written in xacro', 'run first: xacro FILE > FILE.urdf')
+                raise self._file_error(
+                    '', 'is written in xacro', 'run first: xacro FILE > FILE.urdf'
+                )
         links: dict[str, UrdfLink] = {}
         for element in root.findall('link'):
-            name = self._named(element, links, 'link')
-            links[name] = self._link(element, f'link {name}')
+            name = self._checked_name(element, links, 'link')
+            links[name] = self._read_link(element, f'link {name}')
         if not links:
-            raise self._error('', 'has no link', 'name a URDF file')
+            raise self._file_error('', 'has no link', 'name a URDF file')
         start = root.find('linkage_start')
         made_up = {} if start is None else {each.get('name', ''): _made_up(each) for each in start}
         joints: dict[str, UrdfJoint] = {}
         for element in root.findall('joint'):
-            name = self._named(element, joints, 'joint')
+            name = self._checked_name(element, joints, 'joint')
             limits = NO_LIMITS
             if name not in made_up or made_up[name] is not None:
-                limits = self._limits(element, name, made_up.get(name))
-            joints[name] = self._joint(element, name, links)._replace(limits=limits)
+                limits = self._read_limits(element, name, made_up.get(name))
+            joints[name] = self._read_joint(element, name, links)._replace(limits=limits)
         self._check_mimics(joints)
-        base, ordered = self._tree(links, joints)
+        base, ordered = self._order_joints(links, joints)
         said = [] if start is None else [each for each in start if each.get('name') in joints]
         return UrdfFile(
             self._file,
@@ -171,13 +173,16 @@ class _Reader:
             {joint.name: joint for joint in ordered},
             tuple(joints),
             tuple(each.get('name', '') for each in said if each.tag == 'input'),
-            {each.get('name', ''): self._value(each, 'value', 'linkage_start') for each in said},
-            self._closings(root, links),
-            tuple(self._pinned(root, links)),
-            tuple(_unread(root)),
+            {
+                each.get('name', ''): self._read_value(each, 'value', 'linkage_start')
+                for each in said
+            },
+            self._read_closings(root, links),
+            tuple(self._pinned_places(root, links)),
+            tuple(_unread_tags(root)),
         )
 
-    def _closings(
+    def _read_closings(
         self, root: ET.Element, links: Mapping[str, UrdfLink]
     ) -> tuple[tuple[str, str], ...]:
         """Return the pairs of places that loop tags join; a pair that two tags name, once."""
@@ -186,13 +191,13 @@ class _Reader:
             if element.tag in _LOOP_TAGS and element.get('type', '') in _PINS:
                 where = f'{element.tag} {element.get("name", "")}'.rstrip()
                 one, other = (
-                    self._place(element, link, place, where, links)
+                    self._read_place(element, link, place, where, links)
                     for link, place in _LOOP_TAGS[element.tag]
                 )
                 found.setdefault(frozenset((one, other)), (one, other))
         return tuple(found.values())
 
-    def _pinned(
+    def _pinned_places(
         self, root: ET.Element, links: Mapping[str, UrdfLink]
     ) -> Iterator[tuple[str, str]]:
         """Yield places on links, and the links that joints of <gazebo> pin them to."""
@@ -201,34 +206,36 @@ class _Reader:
             parent, child = ((joint.findtext(end) or '').strip() for end in ('parent', 'child'))
             for end, link in (('parent', parent), ('child', child)):
                 if link not in links:
-                    raise self._error(where, f'its {end} {quoted(link)} is no link', 'name a link')
+                    raise self._file_error(
+                        where, f'its {end} {quoted(link)} is no link', 'name a link'
+                    )
             pose = {'pose': joint.findtext('pose') or '0 0 0 0 0 0'}
-            values = self._values(ET.Element('joint', pose), 'pose', where, 6, '')
+            values = self._read_values(ET.Element('joint', pose), 'pose', where, 6, '')
             yield f'{child}.{",".join(map(repr, values[:3]))}', parent
 
-    def _place(
+    def _read_place(
         self, element: ET.Element, link: str, place: str, where: str, links: Mapping[str, UrdfLink]
     ) -> str:
-        name = self._end(element, link, where, links)
-        xyz = self._vector(element.find(place), 'xyz', where, '0 0 0')
+        name = self._read_end(element, link, where, links)
+        xyz = self._read_vector(element.find(place), 'xyz', where, '0 0 0')
         return f'{name}.{",".join(map(repr, xyz))}'
 
-    def _error(self, key: str, reason: str, remedy: str) -> FileError:
+    def _file_error(self, key: str, reason: str, remedy: str) -> FileError:
         return FileError(self._file, key, reason, remedy)
 
-    def _named(self, element: ET.Element, taken: Mapping[str, object], kind: str) -> str:
+    def _checked_name(self, element: ET.Element, taken: Mapping[str, object], kind: str) -> str:
         name = element.get('name', '')
         if not name or not name.isprintable():
-            raise self._error('', f'a {kind} has the name {quoted(name)}', 'give it a name')
+            raise self._file_error('', f'a {kind} has the name {quoted(name)}', 'give it a name')
         if name in taken:
-            raise self._error(f'{kind} {name}', 'is a duplicate name', 'rename one')
+            raise self._file_error(f'{kind} {name}', 'is a duplicate name', 'rename one')
         return name
 
-    def _value(self, element: ET.Element, key: str, where: str, default: str = '') -> float:
-        (value,) = self._values(element, key, where, 1, default)
+    def _read_value(self, element: ET.Element, key: str, where: str, default: str = '') -> float:
+        (value,) = self._read_values(element, key, where, 1, default)
         return value
 
-    def _values(
+    def _read_values(
         self, element: ET.Element | None, key: str, where: str, count: int, default: str
     ) -> tuple[float, ...]:
         text = default if element is None else element.get(key, default)
@@ -238,77 +245,83 @@ class _Reader:
             values = ()
         if len(values) != count or not all(isfinite(v) and abs(v) <= _FARTHEST for v in values):
             numbers = 'a finite number' if count == 1 else f'{count} finite numbers'
-            raise self._error(where, f'{key}={quoted(text)} is not {numbers}', 'correct it')
+            raise self._file_error(where, f'{key}={quoted(text)} is not {numbers}', 'correct it')
         return values
 
-    def _vector(self, element: ET.Element | None, key: str, where: str, default: str) -> Vector:
-        x, y, z = self._values(element, key, where, 3, default)
+    def _read_vector(
+        self, element: ET.Element | None, key: str, where: str, default: str
+    ) -> Vector:
+        x, y, z = self._read_values(element, key, where, 3, default)
         return x, y, z
 
-    def _link(self, element: ET.Element, where: str) -> UrdfLink:
+    def _read_link(self, element: ET.Element, where: str) -> UrdfLink:
         seen = [*element.findall('visual'), *element.findall('collision')]
         marks = tuple(
-            (each.get('name', ''), self._vector(each.find('origin'), 'xyz', where, '0 0 0'))
+            (each.get('name', ''), self._read_vector(each.find('origin'), 'xyz', where, '0 0 0'))
             for each in seen
             if each.get('name')
         )
         inertial = element.find('inertial')
-        weighed = self._inertial(inertial, where) if inertial is not None else None
+        weighed = self._read_inertial(inertial, where) if inertial is not None else None
         return UrdfLink(weighed, bool(seen) or weighed is not None, marks)
 
-    def _inertial(self, element: ET.Element, where: str) -> Inertial | None:
+    def _read_inertial(self, element: ET.Element, where: str) -> Inertial | None:
         mass = element.find('mass')
         if mass is None:
             return None
-        weight = self._value(mass, 'value', where)
+        weight = self._read_value(mass, 'value', where)
         origin, tensor = element.find('origin'), element.find('inertia')
         keys = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
         ixx, ixy, ixz, iyy, iyz, izz = (
-            self._values(tensor, key, where, 1, '0')[0] for key in keys
+            self._read_values(tensor, key, where, 1, '0')[0] for key in keys
         )
         if weight <= 0.0:
             return None  # some exporters write frames this way
         return Inertial(
             weight,
-            self._vector(origin, 'xyz', where, '0 0 0'),
-            self._vector(origin, 'rpy', where, '0 0 0'),
+            self._read_vector(origin, 'xyz', where, '0 0 0'),
+            self._read_vector(origin, 'rpy', where, '0 0 0'),
             (ixx, ixy, ixz, iyy, iyz, izz),
         )
 
-    def _joint(self, element: ET.Element, name: str, links: Mapping[str, UrdfLink]) -> UrdfJoint:
+    def _read_joint(
+        self, element: ET.Element, name: str, links: Mapping[str, UrdfLink]
+    ) -> UrdfJoint:
         where, kind = f'joint {name}', element.get('type', '')
         if kind not in _KINDS:
-            raise self._error(
+            raise self._file_error(
                 where,
                 f'type={quoted(kind)} is not a joint type',
                 f'write {listed(MOVING)} or fixed',
             )
         if kind in ('floating', 'planar'):
-            raise self._error(
+            raise self._file_error(
                 where,
                 f'is {kind}, which no pin or slider of a planar linkage is',
                 f'write {listed(MOVING)} or fixed, or leave it out with what hangs on it',
             )
-        parent, child = (self._end(element, end, where, links) for end in ('parent', 'child'))
-        axis = self._vector(element.find('axis'), 'xyz', where, '1 0 0')
+        parent, child = (self._read_end(element, end, where, links) for end in ('parent', 'child'))
+        axis = self._read_vector(element.find('axis'), 'xyz', where, '1 0 0')
         if kind in MOVING and axis == (0.0, 0.0, 0.0):
-            raise self._error(where, 'its axis is 0 0 0', 'write 0 0 1, for example')
+            raise self._file_error(where, 'its axis is 0 0 0', 'write 0 0 1, for example')
         origin, mimic = element.find('origin'), element.find('mimic')
         return UrdfJoint(
             name,
             kind,
             parent,
             child,
-            xyz=self._vector(origin, 'xyz', where, '0 0 0'),
-            rpy=self._vector(origin, 'rpy', where, '0 0 0'),
+            xyz=self._read_vector(origin, 'xyz', where, '0 0 0'),
+            rpy=self._read_vector(origin, 'rpy', where, '0 0 0'),
             axis=axis,
             mimics='' if mimic is None else mimic.get('joint', ''),
-            multiplier=self._values(mimic, 'multiplier', where, 1, '1')[0],
-            offset=self._values(mimic, 'offset', where, 1, '0')[0],
+            multiplier=self._read_values(mimic, 'multiplier', where, 1, '1')[0],
+            offset=self._read_values(mimic, 'offset', where, 1, '0')[0],
             limits=NO_LIMITS,
         )
 
-    def _limits(self, joint: ET.Element, name: str, made_up: Mapping[str, str] | None) -> Limits:
+    def _read_limits(
+        self, joint: ET.Element, name: str, made_up: Mapping[str, str] | None
+    ) -> Limits:
         """
         Return the usable limits of ``<limit>``.
 
@@ -319,7 +332,7 @@ class _Reader:
         if limit is None or joint.get('type') not in MOVING:
             return NO_LIMITS
         told = {
-            key: self._value(limit, key, where, default='0')
+            key: self._read_value(limit, key, where, default='0')
             for key in ('lower', 'upper', 'velocity', 'effort')
         }
         book = dict(made_up or {})
@@ -333,7 +346,7 @@ class _Reader:
         if joint.get('type') == 'continuous' or low == high == 0.0:
             low, high = -inf, inf
         if low >= high:
-            raise self._error(
+            raise self._file_error(
                 where,
                 f'its limits, {low:g} to {high:g}, leave nothing between them',
                 'put <limit> right, or import with --no-limits',
@@ -342,13 +355,13 @@ class _Reader:
         velocity, effort = (value if value > 0.0 else inf for value in rates)
         return Limits(low, high, velocity, effort)
 
-    def _end(
+    def _read_end(
         self, element: ET.Element, end: str, where: str, links: Mapping[str, UrdfLink]
     ) -> str:
         found = element.find(end)
         link = found.get('link', '') if found is not None else ''
         if link not in links:
-            raise self._error(where, f'its {end} {quoted(link)} is no link', 'name a link')
+            raise self._file_error(where, f'its {end} {quoted(link)} is no link', 'name a link')
         return link
 
     def _check_mimics(self, joints: Mapping[str, UrdfJoint]) -> None:
@@ -356,25 +369,25 @@ class _Reader:
             if not joint.mimics:
                 continue
             if joint.mimics not in joints:
-                raise self._error(
+                raise self._file_error(
                     f'joint {joint.name}',
                     f'mimics {quoted(joint.mimics)}, which is no joint',
                     'name a joint',
                 )
             if joints[joint.mimics].mimics or joints[joint.mimics].kind not in MOVING:
-                raise self._error(
+                raise self._file_error(
                     f'joint {joint.name}',
                     f'mimics {quoted(joint.mimics)}, which does not move by itself',
                     'name the joint that it follows in the end',
                 )
 
-    def _tree(
+    def _order_joints(
         self, links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint]
     ) -> tuple[str, list[UrdfJoint]]:
         held: dict[str, UrdfJoint] = {}
         for joint in joints.values():
             if joint.child in held:
-                raise self._error(
+                raise self._file_error(
                     f'link {joint.child}',
                     f'is the child of two joints, {held[joint.child].name} and {joint.name}',
                     'end one of them in a frame of its own, and close it by --close',
@@ -383,11 +396,13 @@ class _Reader:
         roots = [link for link in links if link not in held]
         if len(roots) != 1:
             reason = f'has {len(roots)} roots ({listed(roots)})' if roots else 'has no root'
-            raise self._error('', reason, 'join all links by joints to one that is held by none')
-        ordered = list(_below(roots[0], joints))
+            raise self._file_error(
+                '', reason, 'join all links by joints to one that is held by none'
+            )
+        ordered = list(_joints_below(roots[0], joints))
         for joint in joints.values():
             if joint not in ordered:
-                raise self._error(
+                raise self._file_error(
                     f'joint {joint.name}',
                     'is in a ring of joints',
                     'close it by --close instead',
@@ -409,7 +424,7 @@ def _is_pin_of_gazebo(joint: ET.Element) -> bool:
     return in_child and joint.get('type', '') in ('revolute', 'continuous', 'ball')
 
 
-def _unread(root: ET.Element) -> Iterator[str]:
+def _unread_tags(root: ET.Element) -> Iterator[str]:
     """Yield the tags that may close loops and are not read, in words."""
     for joint in root.findall('gazebo/joint'):
         if _is_pin_of_gazebo(joint):
@@ -423,7 +438,7 @@ def _unread(root: ET.Element) -> Iterator[str]:
             yield f'<{element.tag}>'
 
 
-def _below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJoint]:
+def _joints_below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJoint]:
     """Yield joints, parents before children."""
     reached = [root]
     for link in reached:

@@ -42,12 +42,12 @@ class Chain(NamedTuple):
     joints: tuple[PlanarJoint, ...]
 
     @property
-    def slide(self) -> PlanarJoint | None:
+    def sliding_joint(self) -> PlanarJoint | None:
         """Return the slide of the chain, or None."""
         return next((joint for joint in self.joints if joint.kind == 'P'), None)
 
 
-def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
+def find_chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
     """
     Return the connections of the bodies.
 
@@ -65,7 +65,7 @@ def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
     for joint in planar.joints:
         hung.setdefault(joint.parent, []).append(joint)
 
-    def grown(start: PlanarJoint) -> Iterator[tuple[PlanarJoint, ...]]:
+    def grow_chain(start: PlanarJoint) -> Iterator[tuple[PlanarJoint, ...]]:
         """Yield longer and longer chains that start with a joint."""
         chain = [start]
         yield tuple(chain)
@@ -84,7 +84,7 @@ def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
         for joint in hung.get(body, []):
             whole = [
                 found
-                for found in grown(joint)
+                for found in grow_chain(joint)
                 if fullmatch(_PATTERNS, ''.join(each.kind for each in found))
             ]
             made.append(Chain(body, whole[-1][-1].child, whole[-1]))
@@ -92,17 +92,17 @@ def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
     return made
 
 
-def symbols(planar: Planar) -> dict[str, Symbol]:
+def body_angles(planar: Planar) -> dict[str, Symbol]:
     """Return the angle of every body as a sum of joints."""
     angles: dict[str, Symbol] = {planar.root: ((), 0.0)}
     for joint in planar.joints:
         angles[joint.child] = angles[joint.parent]
         if joint.kind == 'R':
-            angles[joint.child] = plus(angles[joint.parent], joint)
+            angles[joint.child] = add_joint_angle(angles[joint.parent], joint)
     return angles
 
 
-def plus(symbol: Symbol, joint: PlanarJoint) -> Symbol:
+def add_joint_angle(symbol: Symbol, joint: PlanarJoint) -> Symbol:
     """Return the angle after a revolute joint."""
     terms = dict(symbol[0])
     sign = joint.axis.real
@@ -132,9 +132,9 @@ class Points:
         self._found: list[tuple[str, complex]] = []
         self._hints: list[tuple[int, int, str]] = []
 
-    def at(self, body: str, place: complex, hint: str = '', rank: int = 9) -> int:
+    def point_at(self, body: str, place: complex, hint: str = '', rank: int = 9) -> int:
         """Return the number of the point at a position of a body; a hint may become its name."""
-        number = self.there(body, place)
+        number = self.find_point(body, place)
         if number is None:
             number = len(self._found)
             self._found.append((body, place))
@@ -143,24 +143,26 @@ class Points:
             self._hints.append((rank, number, hint))
         return number
 
-    def there(self, body: str, place: complex) -> int | None:
+    def find_point(self, body: str, place: complex) -> int | None:
         """Return the number of the point at a position, or None."""
         for number, (other, there) in enumerate(self._found):
             if other == body and abs(there - place) <= self._near:
                 return number
         return None
 
-    def hint(self, number: int, name: str, rank: int) -> None:
+    def suggest_name(self, number: int, name: str, rank: int) -> None:
         """Suggest a name for a point; the lowest rank wins."""
         self._hints.append((rank, number, name))
 
-    def join(self, one: int, other: int) -> int:
+    def merge_points(self, one: int, other: int) -> int:
         """Merge two points into one pin."""
         kept, gone = self._same[one], self._same[other]
         self._same = [kept if of == gone else of for of in self._same]
         return one
 
-    def named(self, bodies: Collection[str]) -> tuple[dict[str, dict[str, complex]], list[str]]:
+    def name_points(
+        self, bodies: Collection[str]
+    ) -> tuple[dict[str, dict[str, complex]], list[str]]:
         """Return the points of each body by name, and the name of each number."""
         taken: dict[int, str] = {}
         for _, number, hint in sorted(self._hints, key=lambda hint: hint[:2]):
@@ -182,7 +184,7 @@ _TREE, _CUT, _MARK, _ALONE = 8, 0, 1, 2
 """Sources of a point's name; the lowest wins."""
 
 
-class _Rail(NamedTuple):
+class _SliderRail(NamedTuple):
     """A slider between bodies, with the numbers of its points."""
 
     point: int
@@ -215,7 +217,7 @@ def urdf_topology(
 
     A FileError says that a linkage cannot have such a joint or closing.
     """
-    return _Building(urdf, planar, closings, alone).built()
+    return _Building(urdf, planar, closings, alone).build()
 
 
 class _Building:
@@ -230,38 +232,38 @@ class _Building:
         places = [abs(joint.place) for joint in planar.joints]
         places += [abs(frame.place) for frame in planar.frames.values()]
         self.near = NEAR * (max(places, default=0.0) or 1.0)
-        self._symbols = symbols(planar)
+        self._symbols = body_angles(planar)
         closing = {frame for each in closings for frame in each.frames}
         # A slide that ends in a frame gives the position of a slider's point, not a link.
         leaves = {j.child for j in planar.joints} - {j.parent for j in planar.joints}
         self._tips = {j.child: j for j in planar.joints if j.kind == 'P' and j.child in leaves}
         self._tips = {b: j for b, j in self._tips.items() if b not in planar.bodied}
         marked = {planar.frames[frame].body for frame in closing} - set(self._tips)
-        self._chains = chains(planar, marked, self.near)
+        self._chains = find_chains(planar, marked, self.near)
         self._points = Points(self.near)
-        self._rails: dict[str, _Rail] = {}
+        self._rails: dict[str, _SliderRail] = {}
         self._joints: dict[str, tuple[str, str] | str] = {}
 
-    def built(self) -> UrdfTopology:
+    def build(self) -> UrdfTopology:
         kept = [self._planar.root]
         kept += [each.child for each in self._chains if each.child not in self._tips]
         for chain in self._chains:
             if chain.child not in self._tips:
-                self._hold(chain, kept)
+                self._connect_body(chain, kept)
         for closing in self._closings:
-            self._close(closing)
+            self._close_loop(closing)
         made = UrdfTopology(bodies=dict(self._link_names(kept)))
         names = {body: link for link, body in made.bodies.items()}
         for mark, body, place in self._planar.marks:
-            number = self._points.there(body, place)
+            number = self._points.find_point(body, place)
             if number is not None:
-                self._points.hint(number, mark, _MARK)
+                self._points.suggest_name(number, mark, _MARK)
         traced = [
-            self._points.at(frame.body, frame.place, self._alone[name], _ALONE)
+            self._points.point_at(frame.body, frame.place, self._alone[name], _ALONE)
             for name, frame in self._planar.frames.items()
             if name in self._alone
         ]
-        points, called = self._points.named(kept)
+        points, called = self._points.name_points(kept)
         made.links = {names[body]: points[body] for body in kept}
         made.traced = tuple(dict.fromkeys(called[number] for number in traced))
         for name, rail in self._rails.items():
@@ -291,41 +293,43 @@ class _Building:
                 name = f'{name}_link'
             yield name, body
 
-    def _hold(self, chain: Chain, kept: Sequence[str]) -> None:
+    def _connect_body(self, chain: Chain, kept: Sequence[str]) -> None:
         """Add the pin or slider that connects a body."""
         first, last = chain.joints[0], chain.joints[-1]
-        at_parent = self._points.at(chain.parent, first.place, f'{last.name}_pin', _TREE)
-        at_child = self._points.at(chain.child, 0j)
-        self._turns(chain, kept)
-        slide = chain.slide
+        at_parent = self._points.point_at(chain.parent, first.place, f'{last.name}_pin', _TREE)
+        at_child = self._points.point_at(chain.child, 0j)
+        self._find_turned_links(chain, kept)
+        slide = chain.sliding_joint
         if slide is None:
-            self._points.join(at_parent, at_child)
+            self._points.merge_points(at_parent, at_child)
             return
         if first is slide:
-            block = chain.child if self._rigid(chain.parent, chain.child) else ''
+            block = chain.child if self._is_rigid(chain.parent, chain.child) else ''
             angle = self._symbols[chain.child][1] - self._symbols[chain.parent][1]
-            rail = _Rail(at_child, chain.parent, at_parent, slide.axis, block, angle)
+            rail = _SliderRail(at_child, chain.parent, at_parent, slide.axis, block, angle)
         else:
             # The rod slides: its position counts opposite to its direction of motion.
-            block = chain.parent if self._rigid(chain.parent, chain.child) else ''
+            block = chain.parent if self._is_rigid(chain.parent, chain.child) else ''
             angle = self._symbols[chain.parent][1] - self._symbols[chain.child][1]
-            rail = _Rail(at_parent, chain.child, at_child, -slide.axis, block, angle)
+            rail = _SliderRail(at_parent, chain.child, at_child, -slide.axis, block, angle)
         self._rails[slide.name] = rail
         self._joints[slide.name] = slide.name
 
-    def _turns(self, chain: Chain, kept: Sequence[str]) -> None:
+    def _find_turned_links(self, chain: Chain, kept: Sequence[str]) -> None:
         """Find the two links of the angle that each joint of a chain measures."""
         symbol = self._symbols[chain.parent]
         for joint in chain.joints:
             if joint.kind != 'R':
                 continue
-            before, symbol = symbol, plus(symbol, joint)
+            before, symbol = symbol, add_joint_angle(symbol, joint)
             if joint.mimics and len(chain.joints) > 1:
                 continue  # it turns an auxiliary frame until it is parallel to a link
             ends = []
             for where, likely in ((before, chain.parent), (symbol, chain.child)):
                 found = [likely, *kept]
-                ends.append(next((b for b in found if _same(self._symbols[b], where)), ''))
+                ends.append(
+                    next((b for b in found if _is_same_angle(self._symbols[b], where)), '')
+                )
             if not all(ends):
                 raise FileError(
                     self._urdf.file,
@@ -336,14 +340,14 @@ class _Building:
             parent, child = ends if joint.axis.real > 0.0 else reversed(ends)
             self._joints[joint.name] = (parent, child)
 
-    def _rigid(self, one: str, other: str) -> bool:
+    def _is_rigid(self, one: str, other: str) -> bool:
         return self._symbols[one][0] == self._symbols[other][0]
 
-    def _close(self, closing: Closing) -> None:
+    def _close_loop(self, closing: Closing) -> None:
         frames = [self._planar.frames[name] for name in closing.frames]
         tips = [frame for frame in frames if frame.body in self._tips]
         if closing.line:
-            self._line(closing, frames[0], frames[1], frames[0].facing, '')
+            self._add_slider(closing, frames[0], frames[1], frames[0].facing, '')
             return
         if len(tips) > 1 or (tips and len(frames) > 2):
             raise FileError(
@@ -357,10 +361,10 @@ class _Building:
             other = next(frame for frame in frames if frame is not tips[0])
             line = Frame(joint.parent, joint.place + tips[0].place, joint.axis)
             # Another body at the tip may turn about it: the tip becomes a point.
-            self._line(closing, line, other, joint.axis, joint.name)
+            self._add_slider(closing, line, other, joint.axis, joint.name)
             return
         first, *others = frames
-        one = self._points.at(first.body, first.place, closing.name, _CUT)
+        one = self._points.point_at(first.body, first.place, closing.name, _CUT)
         for other in others:
             if other.body == first.body:
                 raise FileError(
@@ -369,21 +373,21 @@ class _Building:
                     f'both are fixed to {first.body!r}',
                     'name frames of two links between which something moves',
                 )
-            self._points.join(one, self._points.at(other.body, other.place))
+            self._points.merge_points(one, self._points.point_at(other.body, other.place))
 
-    def _line(
+    def _add_slider(
         self, closing: Closing, line: Frame, point: Frame, direction: complex, joint: str
     ) -> None:
         """Add a slider that connects no body of the tree."""
         name = joint or closing.name
-        at = self._points.at(point.body, point.place, f'{closing.name}_point', _TREE)
-        through = self._points.at(line.body, line.place, f'{closing.name}_line', _TREE)
-        block = point.body if self._rigid(line.body, point.body) else ''
+        at = self._points.point_at(point.body, point.place, f'{closing.name}_point', _TREE)
+        through = self._points.point_at(line.body, line.place, f'{closing.name}_line', _TREE)
+        block = point.body if self._is_rigid(line.body, point.body) else ''
         angle = self._symbols[point.body][1] - self._symbols[line.body][1]
-        self._rails[name] = _Rail(at, line.body, through, direction, block, angle)
+        self._rails[name] = _SliderRail(at, line.body, through, direction, block, angle)
         if joint:
             self._joints[joint] = joint
 
 
-def _same(one: Symbol, other: Symbol) -> bool:
+def _is_same_angle(one: Symbol, other: Symbol) -> bool:
     return one[0] == other[0] and abs(one[1] - other[1]) < NEAR

@@ -28,23 +28,23 @@ _UNREADABLE = re.compile('[^\\n -~\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U0001000
 """Characters that XML or YAML does not allow; of all names only a file's can contain them."""
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Return the shortest text that reads back as the same float; never a negative zero."""
     value = float(value) + 0.0
     return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
 
 
-def numbers(*values: float) -> str:
+def format_numbers(*values: float) -> str:
     """Return numbers separated by blanks."""
-    return ' '.join(map(number, values))
+    return ' '.join(map(format_number, values))
 
 
-def rough(*values: float) -> str:
+def format_rough(*values: float) -> str:
     """Return numbers to six digits, for sizes that are only displayed."""
     return ' '.join(f'{value:.6g}' for value in values)
 
 
-def comment(lines: Sequence[str]) -> Any:
+def xml_comment(lines: Sequence[str]) -> Any:
     """Return a comment; XML forbids two adjacent hyphens in it."""
     text = '\n'.join(f'  {line}'.rstrip() for line in lines)
     while '--' in text:
@@ -52,7 +52,7 @@ def comment(lines: Sequence[str]) -> Any:
     return ET.Comment(f'\n{text}\n')
 
 
-def document(root: ET.Element) -> bytes:
+def xml_document(root: ET.Element) -> bytes:
     """Return a whole file; the same content gives the same bytes."""
     ET.indent(root)
     text = _UNREADABLE.sub('\ufffd', ET.tostring(root, 'unicode'))

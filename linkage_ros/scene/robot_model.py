@@ -13,11 +13,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.robot_models.part import Part, PartError
+from linkage_ros.robot_models.part import ModelPart, PartError
 from linkage_ros.robot_models.urdf import urdf
 from linkage_ros.scene.scene import Scene
 
-Write = Callable[[str, Sequence[Part]], bytes]
+Write = Callable[[str, Sequence[ModelPart]], bytes]
 """Writes the robot model of some linkages, with a name."""
 
 
@@ -46,7 +46,7 @@ def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> byte
 
     """
     parts = [
-        Part(closure, member.prefix, member.loads, scene.wrapped)
+        ModelPart(closure, member.prefix, member.loads, scene.wrapped)
         for member, closure in zip(scene.linkages, closures, strict=True)
     ]
     try:

@@ -20,9 +20,9 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from linkage_ros.cli.robot_model import model_of
 from linkage_ros.errors import FileError
-from linkage_ros.robot_models.mjcf import mjcf
-from linkage_ros.robot_models.part import Part, PartError
-from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.mjcf import mujoco_model
+from linkage_ros.robot_models.part import ModelPart, PartError
+from linkage_ros.robot_models.urdf import urdf_model
 import pytest
 import yaml
 
@@ -50,7 +50,7 @@ def check(data):
     assert read.split() == text.split(), 'lines are folded, and that is all'
 
 
-@pytest.mark.parametrize('write', [urdf, mjcf])
+@pytest.mark.parametrize('write', [urdf_model, mujoco_model])
 @pytest.mark.parametrize('file', FILES, ids=lambda file: f'{file.parent.name}/{file.stem}')
 def test_what_comes_with_the_package(file, write):
     check(model_of(str(file), write))
@@ -94,8 +94,8 @@ def test_names_of_any_kind(names, robot):
     if set(names) & {'ground', 'O4', 'coupler_joint'}:
         return
     assume(not re.search(r'\$[{(]', ''.join([*names, robot])))
-    for write in (urdf, mjcf):
-        data = write(robot, [Part(named(names))])
+    for write in (urdf_model, mujoco_model):
+        data = write(robot, [ModelPart(named(names))])
         check(data)
         said = {each.get('name') for each in ET.fromstring(data).iter()}
         assert set(names[4:8]) <= said
@@ -110,11 +110,11 @@ def test_a_name_that_xacro_would_evaluate_is_refused(place, odd):
     names = [*NAMES]
     names[place] = odd
     with pytest.raises(PartError) as caught:
-        urdf('robot', [Part(named(NAMES)), Part(named(names), 'second_')])
+        urdf_model('robot', [ModelPart(named(NAMES)), ModelPart(named(names), 'second_')])
     assert caught.value.number == 1
     assert odd in caught.value.reason
     assert caught.value.reason.startswith('xacro would evaluate the name ')
-    assert mjcf('robot', [Part(named(names))])
+    assert mujoco_model('robot', [ModelPart(named(names))])
 
 
 @pytest.mark.parametrize('odd', EXPRESSIONS)
@@ -122,7 +122,7 @@ def test_a_file_whose_name_xacro_would_evaluate_is_refused(odd, tmp_path):
     file = tmp_path / f'{odd}.yaml'
     file.write_bytes((LINKAGES / 'four_bar.yaml').read_bytes())
     with pytest.raises(FileError) as caught:
-        model_of(str(file), urdf)
+        model_of(str(file), urdf_model)
     assert str(caught.value) == (
         f"{file}: xacro would evaluate the name '{odd}'; choose a name without ${{ and $("
     )
@@ -130,13 +130,13 @@ def test_a_file_whose_name_xacro_would_evaluate_is_refused(odd, tmp_path):
 
 @pytest.mark.parametrize('name', ['$', '{$}', '$a', '$[x]', '{}', '()'])
 def test_a_dollar_alone_is_a_letter_of_a_name(name):
-    assert name.encode() in urdf(name, [Part(named(NAMES))])
+    assert name.encode() in urdf_model(name, [ModelPart(named(NAMES))])
 
 
 def test_a_file_with_an_odd_name(tmp_path):
     file = tmp_path / 'leg: v2 \x01\udc80.yaml'
     file.write_bytes((LINKAGES / 'four_bar.yaml').read_bytes())
-    data = model_of(str(file), urdf)
+    data = model_of(str(file), urdf_model)
     check(data)
     assert ET.fromstring(data).get('name') == 'leg: v2 ��'
 
@@ -158,6 +158,6 @@ def test_what_xacro_makes_of_it(file, tmp_path):
             '<xacro:linkage_ros2_control name="leg" joints="a b"/></robot>'
         )
     else:
-        robot.write_bytes(model_of(str(file), urdf))
+        robot.write_bytes(model_of(str(file), urdf_model))
     text = xacro.process_file(str(robot)).toprettyxml(indent='  ')
     assert meant(yaml.safe_load(text)) == meant(text)

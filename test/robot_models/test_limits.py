@@ -18,9 +18,9 @@ from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits
 from linkage_ros.robot_models.from_urdf import from_urdf
-from linkage_ros.robot_models.mjcf import mjcf
-from linkage_ros.robot_models.part import Part
-from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.mjcf import mujoco_model
+from linkage_ros.robot_models.part import ModelPart
+from linkage_ros.robot_models.urdf import urdf_model
 from linkage_ros.robot_models.urdf_file import read_urdf
 import mujoco
 import pytest
@@ -58,14 +58,14 @@ GIVEN = {
 @pytest.mark.parametrize('name', GIVEN)
 def test_the_same_limits_come_back(name):
     linkage = closed(GIVEN[name]).linkage
-    made = from_urdf(read_urdf(urdf('it', [Part(Closure(linkage))]), 'it.urdf')).linkage
+    made = from_urdf(read_urdf(urdf_model('it', [ModelPart(Closure(linkage))]), 'it.urdf')).linkage
     assert made.limits == linkage.limits
 
 
 @pytest.mark.parametrize('name', [*ONE_INPUT, 'five_bar'])
 def test_what_gives_none_comes_back_with_none(name):
     closure = load(LINKAGES / f'{name}.yaml')
-    made = from_urdf(read_urdf(urdf('it', [Part(closure)]), 'it.urdf')).linkage
+    made = from_urdf(read_urdf(urdf_model('it', [ModelPart(closure)]), 'it.urdf')).linkage
     assert made.limits == closure.linkage.limits
 
 
@@ -77,13 +77,13 @@ WIDTH = st.floats(0.5, 3.0)
 def test_any_limits_of_the_input_come_back(low, width, rate):
     said = f'limits: [{low!r}, {low + width!r}]' + (f', velocity: {rate!r}' if rate else '')
     linkage = closed(f', input: {{{said}}}').linkage
-    made = from_urdf(read_urdf(urdf('it', [Part(Closure(linkage))]), 'it.urdf')).linkage
+    made = from_urdf(read_urdf(urdf_model('it', [ModelPart(Closure(linkage))]), 'it.urdf')).linkage
     assert made.limits == linkage.limits
 
 
 def test_what_is_written():
     said = ', input: {limits: [0.5, 1.5], velocity: 2, effort: 3}'
-    written = limits_in(urdf('it', [Part(closed(said))]))
+    written = limits_in(urdf_model('it', [ModelPart(closed(said))]))
     assert written['crank_joint'] == (
         'revolute', {'lower': '0.5', 'upper': '1.5', 'effort': '3', 'velocity': '2'},
     )  # fmt: skip
@@ -97,7 +97,7 @@ def test_what_is_written():
 
 
 def test_what_somebody_has_changed_is_kept():
-    data = urdf('it', [Part(closed(''))]).decode()
+    data = urdf_model('it', [ModelPart(closed(''))]).decode()
     _, limit = limits_in(data.encode())['rocker_joint']
     robot = ET.fromstring(data)
     for joint in robot.findall('joint'):
@@ -124,12 +124,12 @@ def without_book(data):
 
 
 def test_a_urdf_of_ours_without_a_book_has_none():
-    data = without_book(urdf('it', [Part(closed(''))]))
+    data = without_book(urdf_model('it', [ModelPart(closed(''))]))
     assert from_urdf(read_urdf(data, 'it.urdf')).linkage.limits == {}
 
 
 def test_a_urdf_of_others_says_limits():
-    robot = ET.fromstring(urdf('it', [Part(closed(''))]))
+    robot = ET.fromstring(urdf_model('it', [ModelPart(closed(''))]))
     robot.remove(robot.find('linkage_start'))
     for joint in robot.findall('joint'):
         if joint.get('name') == 'crank_joint':
@@ -146,7 +146,7 @@ def test_a_urdf_of_others_says_limits():
 
 @pytest.mark.parametrize(('lower', 'upper'), [('2', '1'), ('1', '1')])
 def test_limits_of_a_urdf_that_cross_are_refused(lower, upper):
-    robot = ET.fromstring(urdf('it', [Part(closed(''))]))
+    robot = ET.fromstring(urdf_model('it', [ModelPart(closed(''))]))
     for joint in robot.findall('joint'):
         if joint.get('name') == 'rocker_joint':
             joint.find('limit').attrib.update(lower=lower, upper=upper)
@@ -163,7 +163,7 @@ def test_an_engine_keeps_them():
         ', input: {limits: [0.5, 1.5], velocity: 2, effort: 3}, '
         'joints: {rocker_joint: {limits: [-5.4, -4.2]}}'
     )
-    model = mujoco.MjModel.from_xml_string(mjcf('it', [Part(closed(said))]).decode())
+    model = mujoco.MjModel.from_xml_string(mujoco_model('it', [ModelPart(closed(said))]).decode())
     crank, rocker = model.joint('crank_joint'), model.joint('rocker_joint')
     assert (crank.limited.item(), rocker.limited.item()) == (1, 1)
     assert crank.range.tolist() == [0.5, 1.5]
@@ -177,8 +177,8 @@ def test_an_engine_keeps_them():
 
 def test_several_linkages_have_their_prefixes():
     said = ', input: {limits: [0.5, 1.5]}'
-    parts = [Part(closed(said), prefix='left_'), Part(closed(''), prefix='right_')]
-    written = limits_in(urdf('it', parts))
+    parts = [ModelPart(closed(said), prefix='left_'), ModelPart(closed(''), prefix='right_')]
+    written = limits_in(urdf_model('it', parts))
     assert written['left_crank_joint'][1]['upper'] == '1.5'
     assert written['right_crank_joint'][0] == 'continuous'
     assert replace(Limits(), low=0.0).is_bounded

@@ -22,8 +22,8 @@ from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.robot_models.mjcf import mjcf
-from linkage_ros.robot_models.part import Part
+from linkage_ros.robot_models.mjcf import mujoco_model
+from linkage_ros.robot_models.part import ModelPart
 import numpy as np
 import pytest
 
@@ -83,7 +83,7 @@ def case(name):
 @pytest.mark.parametrize('name', CASES)
 def test_it_starts_closed(name):
     closure = case(name)
-    model, state = started(mjcf(name, [Part(closure)]))
+    model, state = started(mujoco_model(name, [ModelPart(closure)]))
     assert model.neq >= 1
     assert opened(model, state) <= AT_START * size_of(closure)
     assert off(model, state, closure) <= AT_START * size_of(closure)
@@ -108,7 +108,7 @@ ROUNDING = 1e-14
 def test_a_reset_closes_it_too(name):
     """Where no key is asked for, a simulation starts at qpos0: that is the same pose."""
     closure = case(name)
-    model = mujoco.MjModel.from_xml_string(mjcf(name, [Part(closure)]).decode())
+    model = mujoco.MjModel.from_xml_string(mujoco_model(name, [ModelPart(closure)]).decode())
     state = mujoco.MjData(model)
     mujoco.mj_resetData(model, state)
     mujoco.mj_forward(model, state)
@@ -128,7 +128,7 @@ def test_a_reset_closes_it_too(name):
 @pytest.mark.parametrize('name', CASES)
 def test_it_moves_as_the_closure_says(name):
     closure = case(name)
-    model, state = started(mjcf(name, [Part(closure)]))
+    model, state = started(mujoco_model(name, [ModelPart(closure)]))
     size, worst, first = size_of(closure), 0.0, state.ctrl.copy()
     sliding = [bool(each.slider) for each in closure.linkage.inputs]
     far = np.where(sliding, 0.05 * size, 0.3)
@@ -148,7 +148,7 @@ def test_gravity_and_springs_are_those_of_the_scene():
     closure = load(LINKAGES / 'stephenson_3.yaml')
     spring = Spring('coupler', 'C', 'ground', 'O6', 40.0, 0.03, 1.5, 'pull')
     loads = Loads((1.2, -9.81), (spring,), 0.01)
-    model, state = started(mjcf('it', [Part(closure, '', loads)]))
+    model, state = started(mujoco_model('it', [ModelPart(closure, '', loads)]))
     crank = usual_inputs(closure)[0]
     order = [model.joint(name).dofadr[0] for name in ('crank_joint', *closure.linkage.joints)]
     assert len(order) == model.nv
@@ -169,13 +169,16 @@ def test_gravity_and_springs_are_those_of_the_scene():
 
 def test_linkages_of_two_gravities_are_refused():
     (closure,) = moving(LINKAGES / 'four_bar.yaml').closures
-    parts = [Part(closure, 'a_', Loads((0.0, -9.81))), Part(closure, 'b_', Loads((0.0, 9.81)))]
+    parts = [
+        ModelPart(closure, 'a_', Loads((0.0, -9.81))),
+        ModelPart(closure, 'b_', Loads((0.0, 9.81))),
+    ]
     with pytest.raises(LinkageError, match=r'\[0 9.81\] is another than that of the first .*one'):
-        mjcf('it', parts)
+        mujoco_model('it', parts)
 
 
 def test_a_scene_of_two_linkages_is_one_model(tmp_path):
-    data = model_of(str(LINKAGES.parent / 'scenes' / 'two_fingers.yaml'), mjcf)
+    data = model_of(str(LINKAGES.parent / 'scenes' / 'two_fingers.yaml'), mujoco_model)
     model, state = started(data)
     assert model.nu == 2
     assert model.neq == 2

@@ -17,7 +17,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import RevoluteJoint
 from linkage_ros.robot_models.from_urdf import from_urdf
 from linkage_ros.robot_models.onto import urdf_onto
-from linkage_ros.robot_models.part import Part
+from linkage_ros.robot_models.part import ModelPart
 from linkage_ros.robot_models.urdf_file import read_urdf
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def added_to(name):
     text, *options = ROBOTS[name]
     urdf = read_urdf(text.encode(), 'r.urdf')
     linkage = from_urdf(urdf, *options).linkage
-    return text, linkage, urdf_onto(urdf, text.encode(), [Part(Closure(linkage))]).decode()
+    return text, linkage, urdf_onto(urdf, text.encode(), [ModelPart(Closure(linkage))]).decode()
 
 
 @pytest.mark.parametrize('name', ROBOTS)
@@ -97,7 +97,7 @@ def test_a_published_joint_that_the_robot_lacks_is_added():
     linkage = from_urdf(urdf, *options).linkage
     joints = {**linkage.joints, 'lean': RevoluteJoint('ground', 'bar')}
     closure = Closure(replace(linkage, joints=joints))
-    data = urdf_onto(urdf, text.encode(), [Part(closure)])
+    data = urdf_onto(urdf, text.encode(), [ModelPart(closure)])
     model = yourdfpy.URDF.load(
         io.BytesIO(data.replace(b'<mimic joint="motor_joint" multiplier="0.8"/>', b'')),
         build_scene_graph=True,
@@ -153,5 +153,5 @@ def test_a_robot_that_it_did_not_come_from(name):
     text, message = BAD[name]
     _, linkage, _ = added_to('a four-bar')
     with pytest.raises(FileError) as caught:
-        urdf_onto(read_urdf(text.encode(), 'r.urdf'), text.encode(), [Part(Closure(linkage))])
+        urdf_onto(read_urdf(text.encode(), 'r.urdf'), text.encode(), [ModelPart(Closure(linkage))])
     assert str(caught.value).startswith(message)

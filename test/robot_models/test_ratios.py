@@ -16,9 +16,9 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Ratio
 from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs
 from linkage_ros.robot_models.from_urdf import from_urdf, ImportedLinkage
-from linkage_ros.robot_models.mjcf import mjcf
-from linkage_ros.robot_models.part import Part
-from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.mjcf import mujoco_model
+from linkage_ros.robot_models.part import ModelPart
+from linkage_ros.robot_models.urdf import urdf_model
 from linkage_ros.robot_models.urdf_file import read_urdf
 import numpy as np
 import pytest
@@ -135,7 +135,7 @@ SHAPES = {
 def test_urdf_there_and_back(name: str) -> None:
     """The ratio is a mimic, and the joints come back the same."""
     closure = Closure(SHAPES[name]())
-    data = urdf('r', [Part(closure)])
+    data = urdf_model('r', [ModelPart(closure)])
     again = Closure(from_urdf(read_urdf(data, 'r.urdf')).linkage)
     assert again.linkage.ratios == closure.linkage.ratios
     for interval in InputSweep(closure).ranges:
@@ -151,7 +151,7 @@ def test_engine_keeps_the_ratio(name: str) -> None:
     """The engine starts closed, and still has the ratio when its servo has moved the input."""
     mujoco = pytest.importorskip('mujoco')
     closure = Closure(SHAPES[name]())
-    model = mujoco.MjModel.from_xml_string(mjcf('r', [Part(closure)]).decode())
+    model = mujoco.MjModel.from_xml_string(mujoco_model('r', [ModelPart(closure)]).decode())
     state = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, state, model.key('start').id)
 

@@ -21,8 +21,8 @@ from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usu
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.robot_models.from_urdf import from_urdf
-from linkage_ros.robot_models.part import Part, PartError
-from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.part import ModelPart, PartError
+from linkage_ros.robot_models.urdf import urdf_model
 from linkage_ros.robot_models.urdf_file import read_urdf
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.robot_model import scene_model
@@ -51,7 +51,7 @@ def numbers(element, key):
 @pytest.mark.parametrize('name', CASES)
 def test_it_is_what_urdf_asks_for(name):
     """As check_urdf has it, and what robot_state_publisher warns of."""
-    robot = ET.fromstring(urdf('it', [Part(closure(name))]))
+    robot = ET.fromstring(urdf_model('it', [ModelPart(closure(name))]))
     links = [link.get('name') for link in robot.findall('link')]
     joints = robot.findall('joint')
     names = [joint.get('name') for joint in joints]
@@ -87,7 +87,9 @@ def test_it_is_what_urdf_asks_for(name):
 
 @pytest.mark.parametrize('name', CASES[::7])
 def test_the_same_linkage_gives_the_same_bytes(name):
-    assert urdf('it', [Part(closure(name))]) == urdf('it', [Part(closure(name))])
+    assert urdf_model('it', [ModelPart(closure(name))]) == urdf_model(
+        'it', [ModelPart(closure(name))]
+    )
 
 
 def limits_of(data):
@@ -103,7 +105,7 @@ def test_joints_keep_their_limits_and_come_near_them(name):
     """A node that starts where the linkage starts publishes nothing beyond the limits."""
     file = LINKAGES / f'{name}.yaml'
     pipeline = moving_text(ODD[name]) if name in ODD else moving(file)
-    limits = limits_of(urdf('it', [Part(pipeline.closures[0])]))
+    limits = limits_of(urdf_model('it', [ModelPart(pipeline.closures[0])]))
     size = size_of(pipeline.closures[0])
     seen = {}
     for names, positions in said(pipeline, every=25_000_000, count=280):
@@ -147,7 +149,7 @@ def test_no_state_of_the_whole_range_lies_beyond_the_limits(name, angles):
     text = ODD[name].encode() if name in ODD else (LINKAGES / f'{name}.yaml').read_bytes()
     scene = from_topic(text, angles)
     closures = Pipeline(scene).closures
-    limits = limits_of(scene_model(scene, closures, urdf))
+    limits = limits_of(scene_model(scene, closures, urdf_model))
     (given,) = closures[0].linkage.inputs
     interval = InputSweep(closures[0]).range_about(*usual_inputs(closures[0]))
     values = sample_inputs(interval, 300)
@@ -178,7 +180,7 @@ def test_given_limits_that_a_wrapped_angle_leaves(angles, limits, kind):
     crank = f'input: {{limits: {limits}, effort: 2}}'
     text = f'four_bar: {{a: 0.04, b: 0.12, c: 0.08, d: 0.1, {crank}}}'
     scene = from_topic(text.encode(), angles)
-    model = scene_model(scene, Pipeline(scene).closures, urdf)
+    model = scene_model(scene, Pipeline(scene).closures, urdf_model)
     found, limit = limits_of(model)['crank_joint']
     assert found == kind
     assert limit.get('effort') == '2'
@@ -186,7 +188,7 @@ def test_given_limits_that_a_wrapped_angle_leaves(angles, limits, kind):
 
 def test_limits_are_those_worked_out_by_hand():
     """The rocker of a crank-rocker turns back where crank and coupler are in line."""
-    limits = limits_of(urdf('it', [Part(closure('four_bar'))]))
+    limits = limits_of(urdf_model('it', [ModelPart(closure('four_bar'))]))
     # Of the triangles 0.16, 0.1, 0.08 and 0.08, 0.1, 0.08: the angle at O4, from the ground's x.
     expected = (0.9569, 2.2460)
     kind, limit = limits['rocker_joint']
@@ -196,10 +198,13 @@ def test_limits_are_those_worked_out_by_hand():
     assert limits['crank_joint'][0] == limits['coupler_joint'][0] == 'continuous'
     assert limits['crank_joint'][1].get('lower') is None
     # The piston between its dead centres: sqrt((0.14 ± 0.04)² − 0.01²).
-    _, limit = limits_of(urdf('it', [Part(closure('slider_crank'))]))['piston_slide']
+    _, limit = limits_of(urdf_model('it', [ModelPart(closure('slider_crank'))]))['piston_slide']
     assert float(limit.get('lower')) == pytest.approx((0.10**2 - 0.01**2) ** 0.5, abs=4e-4)
     assert float(limit.get('upper')) == pytest.approx((0.18**2 - 0.01**2) ** 0.5, abs=4e-4)
-    assert limits_of(urdf('it', [Part(closure('five_bar'))]))['left_elbow'][0] == 'continuous'
+    assert (
+        limits_of(urdf_model('it', [ModelPart(closure('five_bar'))]))['left_elbow'][0]
+        == 'continuous'
+    )
 
 
 @pytest.mark.parametrize('name', UNTOLD)
@@ -207,16 +212,16 @@ def test_joints_that_do_not_tell_all(name):
     text, remedy = UNTOLD[name]
     linkage = linkage_of(text)
     with pytest.raises(PartError) as caught:
-        urdf('it', [Part(Closure(linkage))])
+        urdf_model('it', [ModelPart(Closure(linkage))])
     assert str(caught.value) == f'joints: the published ones do not tell where {remedy}'
     # What the remedy says is one.
     added = str(caught.value).partition('add to joints: ')[2]
     whole = text.replace('joints: {', f'joints: {{{added}, ')
-    urdf('it', [Part(Closure(linkage_of(whole)))])
+    urdf_model('it', [ModelPart(Closure(linkage_of(whole)))])
 
 
 def test_a_scene_of_two_has_prefixes_and_one_root():
-    data = model_of(str(SCENES / 'two_fingers.yaml'), urdf)
+    data = model_of(str(SCENES / 'two_fingers.yaml'), urdf_model)
     model = Walked(data)
     pipeline = Pipeline(load_scene(SCENES / 'two_fingers.yaml'))
     count = 0
@@ -234,7 +239,7 @@ def test_parts_that_deviate_are_in_the_model():
     """A scene with tolerances publishes the joints of the linkage as it was made."""
     file = SCENES / 'worn_press.yaml'
     scene = load_scene(file)
-    model, made = model_of(str(file), urdf), Pipeline(scene).closures[0].linkage
+    model, made = model_of(str(file), urdf_model), Pipeline(scene).closures[0].linkage
     assert made.links != scene.linkages[0].linkage.links
     (place,) = (
         joint.find('origin')
@@ -256,14 +261,14 @@ def test_names_that_two_linkages_come_to(tmp_path):
         f'  - {{name: a_b, linkage: {four_bar}, drive: {{constant_rate: {{rate: 1}}}}}}\n'
     )
     with pytest.raises(LinkageError, match='a second linkage publishes a_b_crank_joint'):
-        model_of(str(scene), urdf)
+        model_of(str(scene), urdf_model)
 
 
 @pytest.mark.parametrize('name', ONE_INPUT)
 def test_pinocchio_reads_it_too(name):
     """A reader that uses urdfdom, as robot_state_publisher does."""
     pinocchio = pytest.importorskip('pinocchio')
-    data = urdf('it', [Part(closure(name))])
+    data = urdf_model('it', [ModelPart(closure(name))])
     model = pinocchio.buildModelFromXML(data.decode())
     assert set(model.names) - {'universe'} == set(limits_of(data))
 
@@ -276,7 +281,7 @@ WITHIN = 1e-12
 
 def back(closure):
     """Return a linkage that went through URDF and through the text of a linkage file."""
-    made = from_urdf(read_urdf(urdf('it', [Part(closure)]), 'it.urdf'))
+    made = from_urdf(read_urdf(urdf_model('it', [ModelPart(closure)]), 'it.urdf'))
     text = linkage_text(made.linkage)
     return Closure(linkage_of(text))
 

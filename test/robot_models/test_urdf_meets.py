@@ -16,9 +16,9 @@ links compared with the closure: turned by the link's angle, with their origin o
 from cmath import rect
 from math import cos, sin
 
-from linkage_ros.robot_models.part import Part, prefixed
-from linkage_ros.robot_models.tree import grow
-from linkage_ros.robot_models.urdf import add_frames, urdf
+from linkage_ros.robot_models.part import ModelPart, prefix_names
+from linkage_ros.robot_models.tree import grow_tree
+from linkage_ros.robot_models.urdf import add_frames, urdf_model
 import numpy as np
 import pytest
 
@@ -32,8 +32,8 @@ pytest.importorskip('yourdfpy')
 def check(data, closure, messages, within=1e-12):
     """Check links and cut pins of a model at each message; return how many there were."""
     model, size = Walked(data), size_of(closure)
-    _, (names,) = prefixed([('', closure.linkage)])
-    cuts = add_frames(grow(closure.linkage, names), names)
+    _, (names,) = prefix_names([('', closure.linkage)])
+    cuts = add_frames(grow_tree(closure.linkage, names), names)
     count = 0
     for names, positions in messages:
         model.pose(names, positions)
@@ -64,7 +64,7 @@ def test_every_cut_pin_of_the_shipped_linkages_meets(name):
     file = LINKAGES / f'{name}.yaml'
     pipeline = moving(file)
     (closure,) = pipeline.closures
-    count, cuts = check(urdf(name, [Part(closure)]), closure, said(pipeline))
+    count, cuts = check(urdf_model(name, [ModelPart(closure)]), closure, said(pipeline))
     assert count > 100
     assert cuts, 'nothing closes'
 
@@ -76,7 +76,7 @@ def test_cut_pins_of_a_linkage_with_two_inputs_meet():
     names = ['left_crank_joint', 'right_crank_joint']
     closure = moving(file).closures[0]
     messages = several_inputs(file.read_bytes(), names, values)
-    count, _ = check(urdf('five_bar', [Part(closure)]), closure, messages)
+    count, _ = check(urdf_model('five_bar', [ModelPart(closure)]), closure, messages)
     assert count == 60
 
 
@@ -84,5 +84,5 @@ def test_cut_pins_of_a_linkage_with_two_inputs_meet():
 def test_every_way_from_frame_to_frame(name):
     closure = closure_of(name)
     pipeline = moving_text(ODD[name])
-    count, _ = check(urdf(name, [Part(closure)]), closure, said(pipeline))
+    count, _ = check(urdf_model(name, [ModelPart(closure)]), closure, said(pipeline))
     assert count > 100
