@@ -28,7 +28,7 @@ from linkage_ros.errors import clean, LinkageError
 from pythonfmu3 import Fmi3Causality, Fmi3Slave, Fmi3Status
 
 
-class State(Enum):
+class SlaveState(Enum):
     """A state of an instance, in which FMI 3 allows some of the calls."""
 
     INSTANTIATED = 'not initialized'
@@ -38,11 +38,11 @@ class State(Enum):
     FAILED = 'failed'
 
 
-BEFORE_STEPS = (State.INSTANTIATED, State.INITIALIZING)
+BEFORE_STEPS = (SlaveState.INSTANTIATED, SlaveState.INITIALIZING)
 
 
-def guarded(
-    call: str, states: tuple[State, ...], otherwise: Callable[..., Any]
+def guard_call(
+    call: str, states: tuple[SlaveState, ...], otherwise: Callable[..., Any]
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """
     Make a method of `GuardedSlave` that PythonFMU3 calls, and which never raises.
@@ -66,7 +66,7 @@ def guarded(
                 return method(self, *arguments)
             # Ctrl-C of an importer in Python is raised here, too.
             except BaseException as error:  # noqa: BLE001 (the wrapper cannot take any)
-                self.fail(call, error)
+                self.set_failed(call, error)
                 return otherwise(*arguments)
 
         return guard
@@ -79,9 +79,9 @@ class GuardedSlave(Fmi3Slave):
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
-        self.state = State.INSTANTIATED
+        self.state = SlaveState.INSTANTIATED
 
-    def check_state(self, call: str, states: tuple[State, ...]) -> None:
+    def check_state(self, call: str, states: tuple[SlaveState, ...]) -> None:
         """Raise LinkageError if the state does not allow a call."""
         if self.state not in states:
             raise LinkageError(
@@ -91,16 +91,16 @@ class GuardedSlave(Fmi3Slave):
                 'reset it',
             )
 
-    def fail(self, call: str, error: BaseException) -> None:
+    def set_failed(self, call: str, error: BaseException) -> None:
         """Let all further steps fail; log the first reason."""
-        if self.state is not State.FAILED:
+        if self.state is not SlaveState.FAILED:
             text = str(error) if isinstance(error, LinkageError) else f'{call}: {error!r}'
             self.log(clean(text), Fmi3Status.error)
-        self.state = State.FAILED
+        self.state = SlaveState.FAILED
 
     def terminate(self) -> None:
         """End the steps, in any state: importers call it when they give up."""
-        self.state = State.TERMINATED
+        self.state = SlaveState.TERMINATED
 
     def find_variable(self, call: str, reference: int) -> Any:
         """Return the variable of a value reference; raise LinkageError if there is none."""
@@ -114,23 +114,23 @@ class GuardedSlave(Fmi3Slave):
         return variable
 
 
-def _reader(kind: str, unknown: Any) -> Callable[..., Any]:
+def _make_reader(kind: str, unknown: Any) -> Callable[..., Any]:
     call, read = f'fmi3Get{kind}', getattr(Fmi3Slave, f'get_{kind.lower()}')
 
-    @guarded(call, tuple(State), lambda references: [unknown] * len(references))
-    def get(self: GuardedSlave, references: list[int]) -> list[Any]:
+    @guard_call(call, tuple(SlaveState), lambda references: [unknown] * len(references))
+    def get_values(self: GuardedSlave, references: list[int]) -> list[Any]:
         for reference in references:
             self.find_variable(call, reference)
         values: list[Any] = read(self, references)
         return values
 
-    return get
+    return get_values
 
 
-def _writer(kind: str) -> Callable[..., Any]:
+def _make_writer(kind: str) -> Callable[..., Any]:
     call, write = f'fmi3Set{kind}', getattr(Fmi3Slave, f'set_{kind.lower()}')
 
-    @guarded(call, (*BEFORE_STEPS, State.INITIALIZED), lambda *_: None)
+    @guard_call(call, (*BEFORE_STEPS, SlaveState.INITIALIZED), lambda *_: None)
     def set_values(self: GuardedSlave, references: list[int], values: list[Any]) -> None:
         if len(values) != len(references):
             raise LinkageError(
@@ -152,14 +152,14 @@ def _writer(kind: str) -> Callable[..., Any]:
     return set_values
 
 
-def _refusal(call: str, result: Any) -> Callable[..., Any]:
-    @guarded(call, tuple(State), lambda *_: result)
-    def refuse(_self: GuardedSlave, *_: Any) -> None:
+def _make_refusal(call: str, result: Any) -> Callable[..., Any]:
+    @guard_call(call, tuple(SlaveState), lambda *_: result)
+    def refuse_call(_self: GuardedSlave, *_: Any) -> None:
         raise LinkageError(
             call, 'is not supported', 'keep to the capabilities in the model description'
         )
 
-    return refuse
+    return refuse_call
 
 
 _UNKNOWN = {
@@ -186,7 +186,7 @@ _REFUSED: dict[str, tuple[str, Any]] = {
 """Methods that the wrapper calls for what this FMU cannot do, and what it is given."""
 
 for _kind, _value in _UNKNOWN.items():
-    setattr(GuardedSlave, f'get_{_kind.lower()}', _reader(_kind, _value))
-    setattr(GuardedSlave, f'set_{_kind.lower()}', _writer(_kind))
+    setattr(GuardedSlave, f'get_{_kind.lower()}', _make_reader(_kind, _value))
+    setattr(GuardedSlave, f'set_{_kind.lower()}', _make_writer(_kind))
 for _name, (_call, _result) in _REFUSED.items():
-    setattr(GuardedSlave, _name, _refusal(_call, _result))
+    setattr(GuardedSlave, _name, _make_refusal(_call, _result))

@@ -82,10 +82,12 @@ def scene_fmu(scene: Scene) -> bytes:
             paths[-1].write_bytes(data)
         script = Path(folder, _MODULE)
         script.write_text(_SOURCE, 'utf-8')
-        return _repacked(FmuBuilder.build_FMU(script, dest=folder, project_files=paths))
+        return _repack_without_times(
+            FmuBuilder.build_FMU(script, dest=folder, project_files=paths)
+        )
 
 
-def _repacked(made: Path) -> bytes:
+def _repack_without_times(made: Path) -> bytes:
     """Return an archive without the times of its files, in the order of their names."""
     packed = BytesIO()
     with ZipFile(made) as archive, ZipFile(packed, 'w') as target:

@@ -20,7 +20,7 @@ from xml.etree.ElementTree import Element
 from linkage_ros import __version__
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import read_regular
-from linkage_ros.fmu.border import guarded, GuardedSlave, State
+from linkage_ros.fmu.border import guard_call, GuardedSlave, SlaveState
 from linkage_ros.fmu.stepped_scene import (
     LARGEST_SEED,
     LinkageOutputs,
@@ -114,14 +114,14 @@ class SceneSlave(GuardedSlave):
         super().__init__(**given)
         folder = given['resources']
         try:
-            self._load(Path(folder))
+            self._load_content(Path(folder))
         except Exception as error:
             if folder not in _loaded:
                 raise
-            self.fail('fmi3Reset', error)
+            self.set_failed('fmi3Reset', error)
         _loaded.add(folder)
 
-    def _load(self, folder: Path) -> None:
+    def _load_content(self, folder: Path) -> None:
         """Read the scene, and declare its variables."""
         content = Content(**json.loads(read_regular(folder / CONTENT_FILE, _LARGEST_FILE)))
         if content.version != __version__:
@@ -143,11 +143,11 @@ class SceneSlave(GuardedSlave):
         self._begin: float | None = None
         self._logged: set[str] = set()
         self.time = 0.0
-        self._declare()
+        self._declare_variables()
 
-    def _declare(self) -> None:
+    def _declare_variables(self) -> None:
         """Declare the variables."""
-        self._add(
+        self._add_variable(
             Float64(
                 'time',
                 causality=Fmi3Causality.independent,
@@ -157,7 +157,7 @@ class SceneSlave(GuardedSlave):
                 getter=lambda: self.time,
             )
         )
-        self._add(
+        self._add_variable(
             Int64(
                 'seed',
                 causality=Fmi3Causality.parameter,
@@ -175,7 +175,7 @@ class SceneSlave(GuardedSlave):
         for motor in self._scene.motors:
             self._declare_numbers(motor.variables, motor.values)
         if self._scene.inputs:
-            self._add(
+            self._add_variable(
                 Int64(
                     'rejected',
                     causality=Fmi3Causality.output,
@@ -190,7 +190,7 @@ class SceneSlave(GuardedSlave):
             self._declare_numbers(variables, outputs.values[field])
         for field in outputs.variables:
             of_reading = field == 'position'
-            self._add(
+            self._add_variable(
                 Boolean(
                     f'{outputs.prefix}valid' if of_reading else f'{outputs.prefix}{field}_valid',
                     causality=Fmi3Causality.output,
@@ -201,7 +201,7 @@ class SceneSlave(GuardedSlave):
                     getter=partial(outputs.valid.__getitem__, field),
                 )
             )
-        self._add(
+        self._add_variable(
             _Enumeration(
                 f'{outputs.prefix}status',
                 causality=Fmi3Causality.output,
@@ -222,7 +222,7 @@ class SceneSlave(GuardedSlave):
     ) -> None:
         settable = causality is Fmi3Causality.input
         for number, (name, unit, text) in enumerate(variables):
-            self._add(
+            self._add_variable(
                 Float64(
                     name,
                     causality=causality,
@@ -234,7 +234,7 @@ class SceneSlave(GuardedSlave):
                 )
             )
 
-    def _add(self, variable: Any) -> None:
+    def _add_variable(self, variable: Any) -> None:
         # nested: a dot in a name would be taken for an attribute of an attribute.
         self.register_variable(variable, nested=False)
         if unit := getattr(variable, 'unit', None):
@@ -257,19 +257,21 @@ class SceneSlave(GuardedSlave):
             simulation.set('canHandleVariableCommunicationStepSize', 'true')
         return root
 
-    @guarded('fmi3EnterInitializationMode', (State.INSTANTIATED,), lambda: None)
+    @guard_call('fmi3EnterInitializationMode', (SlaveState.INSTANTIATED,), lambda: None)
     def enter_initialization_mode(self) -> None:
         """Await values for the first tick."""
-        self.state = State.INITIALIZING
+        self.state = SlaveState.INITIALIZING
 
-    @guarded('fmi3ExitInitializationMode', (State.INITIALIZING,), lambda: None)
+    @guard_call('fmi3ExitInitializationMode', (SlaveState.INITIALIZING,), lambda: None)
     def exit_initialization_mode(self) -> None:
         """Do the first tick, at the start time."""
         self._scene.start(self._seed, self._inputs)
-        self.state = State.INITIALIZED
+        self.state = SlaveState.INITIALIZED
         self._log_rejections()
 
-    @guarded('fmi3DoStep', (State.INITIALIZED,), lambda *_: Fmi3StepResult(Fmi3Status.error))
+    @guard_call(
+        'fmi3DoStep', (SlaveState.INITIALIZED,), lambda *_: Fmi3StepResult(Fmi3Status.error)
+    )
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
         """Do the ticks of a step; discard a step that is no whole number of them."""
         # PythonFMU3 keeps the start time to itself: the first step begins there.

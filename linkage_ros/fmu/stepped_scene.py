@@ -108,7 +108,7 @@ class _Sender:
             for joint, given in zip(member.sampled_joints, parts, strict=True)
         ]
 
-    def message(self, stamp: int, values: Sequence[float]) -> bytes:
+    def write_message(self, stamp: int, values: Sequence[float]) -> bytes:
         """Return the message of a time, in [ns], with values in the order of the variables."""
         given = iter(values)
         of = {field: tuple(islice(given, self._count)) for field in self._fields}
@@ -138,7 +138,7 @@ class LinkageOutputs:
                 )
                 for joint, turns in zip(member.joint_names, turning, strict=True)
             ]
-            for field in _published(member)
+            for field in _published_fields(member)
         }
         """The variables of each field."""
         self.values = {field: [0.0] * len(of) for field, of in self.variables.items()}
@@ -148,9 +148,9 @@ class LinkageOutputs:
         self.status = NO_CRANK
         """Status of the linkage at the last tick, as a number."""
 
-    def take(self, look: LinkageState) -> None:
+    def set_state(self, full_state: LinkageState) -> None:
         """Take the state of the linkage at a tick."""
-        position, reading = look.position, look.reading
+        position, reading = full_state.position, full_state.reading
         self.status = NO_CRANK if position is None else STATUS_NUMBERS[position.status]
         for field, values in self.values.items():
             newest: tuple[float, ...] = ()
@@ -170,7 +170,7 @@ _READ_AS = {
 """Name of each field in a `SensorReading`."""
 
 
-def _published(member: SceneLinkage) -> list[str]:
+def _published_fields(member: SceneLinkage) -> list[str]:
     """Return the fields that a linkage publishes."""
     named = {also for effect in member.effects for also in PUBLISHED_WITH.get(effect, ())}
     named |= {'position', *member.effects}
@@ -209,7 +209,7 @@ class MotorOutputs:
         """The newest values, in the order of the variables; 0 before the first."""
         self._writer, self._read = writer, MessageValues(JOINT_STATE).read
 
-    def take(self, messages: Sequence[bytes]) -> None:
+    def set_messages(self, messages: Sequence[bytes]) -> None:
         """Take the auxiliary messages of a tick."""
         values = self._read(messages[self._writer]) if messages else ''
         if not isinstance(values, str):
@@ -234,7 +234,7 @@ class SteppedScene:
     """
 
     def __init__(self, scene: Scene) -> None:
-        _refuse(scene)
+        _refuse_scene(scene)
         self._scene = scene
         self._pipeline = Pipeline(scene)
         self._ticks = 0
@@ -268,8 +268,8 @@ class SteppedScene:
             raise LinkageError('seed', f'{seed} is out of bounds', f'write 0 to {LARGEST_SEED}')
         if seed != self._scene.seed:
             self._pipeline = Pipeline(replace(self._scene, seed=seed))
-        self._offer(inputs)
-        self._tick()
+        self._offer_inputs(inputs)
+        self._run_tick()
 
     def whole_ticks(self, begin: float, seconds: float) -> int:
         """
@@ -311,37 +311,37 @@ class SteppedScene:
 
         A drive takes them once, as one message.
         """
-        self._offer(inputs)
+        self._offer_inputs(inputs)
         for _ in range(ticks):
             self._ticks += 1
-            self._tick()
+            self._run_tick()
 
-    def _now(self) -> int:
+    def _tick_time(self) -> int:
         """Return the time of the last tick, in [ns]; lets faults begin and end."""
         now = FIRST_TICK + round(self._ticks * NANOSECONDS / self._scene.rate)
         if self._pipeline.injection is not None:
             self._pipeline.injection.advance(now)
         return now
 
-    def _offer(self, inputs: Sequence[float]) -> None:
-        now = self._now()
+    def _offer_inputs(self, inputs: Sequence[float]) -> None:
+        now = self._tick_time()
         first = 0
         for sender in self._senders:
             end = first + len(sender.variables)
-            rejection = self._pipeline.offer(sender.message(now, inputs[first:end]), now)
+            rejection = self._pipeline.offer(sender.write_message(now, inputs[first:end]), now)
             first = end
             if rejection is not None:
                 self.rejections[rejection] = self.rejections.get(rejection, 0) + 1
 
-    def _tick(self) -> None:
-        tick = self._pipeline.tick(self._now())
+    def _run_tick(self) -> None:
+        tick = self._pipeline.tick(self._tick_time())
         for outputs, look in zip(self.outputs, tick.full_states, strict=True):
-            outputs.take(look)
+            outputs.set_state(look)
         for motor in self.motors:
-            motor.take(tick.extras)
+            motor.set_messages(tick.extras)
 
 
-def _refuse(scene: Scene) -> None:
+def _refuse_scene(scene: Scene) -> None:
     """Refuse a scene that needs more than its files and a clock from outside."""
     content = scene.linkages[0].content
     if scene.rate == 0.0:
