@@ -43,7 +43,7 @@ from campaigns.campaign import (
     tallies_of,
 )
 from flint import arb, ctx
-from linkage_ros.synthesis.pairs.freudenstein import links, three_pairs, TRUSTED
+from linkage_ros.synthesis.pairs.freudenstein import solve_links, three_pairs, TRUSTED
 import numpy as np
 from numpy.typing import NDArray
 
@@ -360,15 +360,15 @@ def judge(cases: list[Case], first: int) -> Tally:
     result = three_pairs([case.crank for case in cases], [case.truth.rocker for case in cases])
     off = np.abs(result.lengths - [case.lengths for case in cases])
     kappa = np.array([case.truth.sensitivity for case in cases])
-    trusted = np.flatnonzero((result.digits > 0.0).all(1))
+    trusted = np.flatnonzero((result.reliable_digits > 0.0).all(1))
     tally = Tally(len(cases), len(cases) - len(trusted))
     if len(trusted):
         off, kappa = off[trusted], kappa[trusted]
         sensitivity = result.sensitivity[trusted]
-        lost = result.lost[trusted] * np.abs(result.lengths[trusted])
+        lost = result.lost_digits[trusted] * np.abs(result.lengths[trusted])
         numbers = first + trusted
         linear = lost < 2.0 * TRUSTED * _ROUNDOFF * sensitivity
-        tally.digits = float(result.digits[trusted].min(1).sum())
+        tally.digits = float(result.reliable_digits[trusted].min(1).sum())
         tally.worst = _worst(np.where(linear, off / sensitivity, 0.0) / _ROUNDOFF, numbers)
         tally.worst_true = _worst(np.where(linear, off / kappa, 0.0) / _ROUNDOFF, numbers)
         tally.worst_lost = _worst(off / lost, numbers)
@@ -450,7 +450,7 @@ def _speed() -> Table:
     """Measure three-pair designs per second on one core, as a search makes them."""
     angles = np.random.default_rng(1).uniform(-np.pi, np.pi, (2, 262_144, 3))
     table = Table('Designs from three pairs, on one core', ('', 'million/s'))
-    for name, solve in (('lengths', links), ('with condition and sensitivity', three_pairs)):
+    for name, solve in (('lengths', solve_links), ('with condition and sensitivity', three_pairs)):
         best = np.inf
         for _ in range(3):
             start = time.perf_counter()
@@ -469,13 +469,15 @@ def _show_case(seed: int, family: str, index: int) -> None:
         ('synthesised', result.lengths),
         ('sensitivity', result.sensitivity),
         ('true sensitivity', case.truth.sensitivity),
-        ('digits', result.digits),
+        ('digits', result.reliable_digits),
     ):
         table.rows.append([name, *(f'{float(number):.17g}' for number in numbers)])
     show(table)
     say(f'crank {case.crank}')
     say(f'rocker {case.truth.rocker}')
-    say(f'assemblies {case.sides}; condition {result.condition:.3g}, doubt {result.doubt}')
+    say(
+        f'assemblies {case.sides}; condition {result.condition:.3g}, doubt {result.system_sensitivity}'
+    )
 
 
 if __name__ == '__main__':

@@ -195,11 +195,11 @@ assert [again.tick(number * 10_000_000).message for number in range(101)] == [
 # checks the design.
 
 # %%
-from linkage_ros.synthesis.pairs.freudenstein import exact
+from linkage_ros.synthesis.pairs.freudenstein import exact_four_bar
 from linkage_ros.synthesis.proof import prove
 
 angles = np.radians([[25, 30], [35, 40], [50, 60]])
-design, conditioning = exact(angles[:, 0], angles[:, 1], ground=1.0)
+design, conditioning = exact_four_bar(angles[:, 0], angles[:, 1], ground=1.0)
 print('crank, coupler, rocker, ground:', *(f'{length:.6f}' for length in design.four_bar.lengths))
 for wanted, met in zip(design.wanted, prove(design)):
     print(f'crank {degrees(wanted.crank):.0f}°: rocker misses by {degrees(met.angle):.1e}°')

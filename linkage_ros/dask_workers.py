@@ -38,7 +38,7 @@ _PATIENCE = 10.0
 nothing."""
 
 
-def distributed() -> Any:
+def import_distributed() -> Any:
     """Return dask.distributed, for studies on several machines."""
     check_installed('distributed', "pip install 'linkage_ros[dask]'")
     return import_module('distributed')
@@ -65,13 +65,13 @@ def results_of(
         If the scheduler or its workers fail. Errors of the work are raised unchanged.
 
     """
-    with _client(address) as client:
+    with _connect_client(address) as client:
         _check_workers(address, client)
-        waiting = parts(_threads(address, client))
+        waiting = parts(_thread_count(address, client))
         loop = client.loop.asyncio_loop
         running: dict[Future[Result], Part] = {}
         while True:
-            room = _AHEAD * _threads(address, client) - len(running)
+            room = _AHEAD * _thread_count(address, client) - len(running)
             for part in islice(waiting, max(room, 0)):
                 task = client.submit(work, part, pure=False)
                 # A future of the standard library: a wait for it can be cancelled. Those of
@@ -81,27 +81,27 @@ def results_of(
             if not running:
                 return
             for future in wait(running, _PATIENCE, FIRST_COMPLETED).done:
-                yield running.pop(future), _result(address, future)
+                yield running.pop(future), _future_result(address, future)
 
 
 @contextmanager
-def _client(address: str) -> Iterator[Any]:
-    dask = distributed()
+def _connect_client(address: str) -> Iterator[Any]:
+    dask = import_distributed()
     # Its log of a lost connection, with traceback, becomes an error here.
     log = getLogger('distributed.client')
     level = log.level
     log.setLevel(CRITICAL)
     try:
-        _knock(address)
+        _check_scheduler(address)
         with dask.Client(address, timeout=_PATIENCE, set_as_default=False) as client:
             yield client
     finally:
         log.setLevel(level)
 
 
-def _knock(address: str) -> None:
+def _check_scheduler(address: str) -> None:
     """Refuse an address without a scheduler; a client would wait for a silent one."""
-    dask = distributed()
+    dask = import_distributed()
 
     async def identity() -> Any:
         secrets = dask.Security().get_connection_args('client')
@@ -145,29 +145,29 @@ def _check_workers(address: str, client: Any) -> None:
             )
 
 
-def _threads(address: str, client: Any) -> int:
+def _thread_count(address: str, client: Any) -> int:
     try:
         threads = sum(client.nthreads().values())
     except OSError as error:
-        raise _lost(address) from error
+        raise _lost_error(address) from error
     if not threads:
         raise _no_workers(address)
     return int(threads)
 
 
-def _result(address: str, future: Future[Result]) -> Result:
+def _future_result(address: str, future: Future[Result]) -> Result:
     try:
         return future.result()
     except ImportError as error:
         raise _not_importable('Dask workers', error) from error
-    except distributed().KilledWorker as error:
+    except import_distributed().KilledWorker as error:
         raise LinkageError(
             address,
             f'{error.allowed_failures + 1} workers died at the same task, one after the other',
             'look into their logs: memory is the usual reason',
         ) from error
-    except (CancelledError, distributed().comm.CommClosedError) as error:
-        raise _lost(address) from error
+    except (CancelledError, import_distributed().comm.CommClosedError) as error:
+        raise _lost_error(address) from error
 
 
 def _not_importable(where: str, error: ImportError) -> LinkageError:
@@ -180,5 +180,5 @@ def _no_workers(address: str) -> LinkageError:
     return LinkageError(address, 'the scheduler has no workers', f'start `dask worker {address}`')
 
 
-def _lost(address: str) -> LinkageError:
+def _lost_error(address: str) -> LinkageError:
     return LinkageError(address, 'the scheduler was lost', 'start it again, and then the study')

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from linkage_ros.synthesis.defects import assess
 from linkage_ros.synthesis.design import Design
-from linkage_ros.synthesis.pairs.freudenstein import exact, three_pairs, ThreePairs
+from linkage_ros.synthesis.pairs.freudenstein import exact_four_bar, three_pairs, ThreePairs
 from mpmath import mp, mpf
 import numpy as np
 
@@ -83,7 +83,7 @@ def printed() -> Rounded:
 
 def designed() -> tuple[Design, ThreePairs]:
     """Return the design by the package."""
-    return exact([radians(x) for x in CRANK], [radians(x) for x in ROCKER], 1.0)
+    return exact_four_bar([radians(x) for x in CRANK], [radians(x) for x in ROCKER], 1.0)
 
 
 def study() -> Study:

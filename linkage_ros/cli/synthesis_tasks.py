@@ -24,10 +24,10 @@ from linkage_ros.cli.arguments import AngleUnit
 from linkage_ros.cli.terminal import ProgressCallback
 from linkage_ros.errors import LinkageError, listed
 from linkage_ros.files.tables import numbers_of
-from linkage_ros.synthesis.defects import assess, Assessment, misses, Needs
+from linkage_ros.synthesis.defects import assess, Assessment, Needs, unmet_needs
 from linkage_ros.synthesis.design import Design
-from linkage_ros.synthesis.pairs.freudenstein import exact, fit_equation, ThreePairs
-from linkage_ros.synthesis.proof import Met
+from linkage_ros.synthesis.pairs.freudenstein import exact_four_bar, fit_equation, ThreePairs
+from linkage_ros.synthesis.proof import AchievedPosition
 
 if TYPE_CHECKING:
     from linkage_ros.synthesis.function.task import FunctionTask, StructuralError
@@ -65,7 +65,7 @@ class DesignSearch(NamedTuple):
 
     def meets_needs(self, design: Design) -> bool:
         """Return whether a design meets the requirements."""
-        return not misses(assess(design), self.needs)
+        return not unmet_needs(assess(design), self.needs)
 
 
 def find_answers(typed: argparse.Namespace, search: DesignSearch) -> list[DesignAnswer]:
@@ -116,7 +116,7 @@ def _of_pairs(
     if count == 3 and free:
         return _search_answers(crank, rocker, ground, search)
     if count == 3:
-        design, found = exact(crank, rocker, ground)
+        design, found = exact_four_bar(crank, rocker, ground)
         return [
             DesignAnswer('three pairs, exact', design, assess(design), list(_pairs_facts(found)))
         ]
@@ -128,7 +128,9 @@ def _of_pairs(
 def _pairs_facts(pairs: ThreePairs) -> list[tuple[str, str]]:
     k1, k2, k3 = pairs.k
     slopes = abs(pairs.gradient).max(-1) / abs(pairs.lengths) * radians(_SHIFT)
-    digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, pairs.digits, strict=True)]
+    digits = [
+        f'{link} {value:.0f}' for link, value in zip(_LINKS, pairs.reliable_digits, strict=True)
+    ]
     moves = [f'{link} {value:.2g}' for link, value in zip(_LINKS, 100.0 * slopes, strict=True)]
     return [
         ('k1, k2, k3', f'{k1:.12g}, {k2:.12g}, {k3:.12g}'),
@@ -179,9 +181,11 @@ def _with_zeros(crank: Angles, rocker: Angles, ground: float) -> list[DesignAnsw
     found = []
     for one in solve(crank, rocker, ground):
         answer = _turned_answer(what, one.design)
-        digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, one.digits, strict=True)]
+        digits = [
+            f'{link} {value:.0f}' for link, value in zip(_LINKS, one.reliable_digits, strict=True)
+        ]
         facts = [
-            ('found', str(one.among)),
+            ('found', str(one.solution_counts)),
             ('condition', f'{one.condition:.4g}'),
             ('digits to trust', ', '.join(digits)),
         ]
@@ -194,10 +198,10 @@ def _rank_answer(answer: DesignAnswer) -> tuple[int, float]:
 
 
 def _fit_answer(crank: Angles, rocker: Angles, ground: float, free: bool) -> DesignAnswer:
-    from linkage_ros.synthesis.pairs.angle_fit import nearest
+    from linkage_ros.synthesis.pairs.angle_fit import nearest_four_bar
 
     start = fit_equation(crank, rocker, ground)
-    design = nearest(crank, rocker, ground, free_zeros=free)
+    design = nearest_four_bar(crank, rocker, ground, free_zeros=free)
     answer = _turned_answer(f'{len(crank)} pairs, nearest', design)
     met = answer.assessment.met
     facts = [
@@ -209,8 +213,8 @@ def _fit_answer(crank: Angles, rocker: Angles, ground: float, free: bool) -> Des
     )
 
 
-def _errors_text(met: Sequence[Met]) -> str:
-    closed = [one.angle for one in met if one.closed]
+def _errors_text(met: Sequence[AchievedPosition]) -> str:
+    closed = [one.angle for one in met if one.is_closed]
     if not closed:
         return 'no position can be assembled'
     rms, most = hypot(*closed) / len(closed) ** 0.5, max(map(abs, closed))
@@ -222,9 +226,9 @@ def _errors_text(met: Sequence[Met]) -> str:
 def _solve_function(typed: argparse.Namespace, search: DesignSearch) -> list[DesignAnswer]:
     from linkage_ros.synthesis.function.expression import Expression
     from linkage_ros.synthesis.function.task import (
-        chebyshev,
+        angle_pairs,
+        chebyshev_points,
         FunctionTask,
-        pairs,
         structural_error,
         wanted_rocker,
     )
@@ -240,9 +244,9 @@ def _solve_function(typed: argparse.Namespace, search: DesignSearch) -> list[Des
         _read_range(typed.angles, typed.rocker_range),
     )
     low, high = typed.range
-    points = typed.at or chebyshev(low, high, typed.points)
+    points = typed.at or chebyshev_points(low, high, typed.points)
     found = []
-    for answer in _of_pairs(*pairs(task, points), typed=typed, search=search):
+    for answer in _of_pairs(*angle_pairs(task, points), typed=typed, search=search):
         error = structural_error(
             answer.design, lambda angles: wanted_rocker(task, angles), *task.crank_range
         )
@@ -259,7 +263,7 @@ def _structural_facts(task: FunctionTask, error: StructuralError) -> Iterator[tu
         opens = degrees(error.opens_at)
         yield 'structural error', f'the loop opens on the way, with the crank at {opens:.6g}°'
     if isfinite(error.greatest):
-        worst = on_scale(task, error.at, error.greatest)
+        worst = on_scale(task, error.greatest_at, error.greatest)
         greatest, rms = degrees(error.greatest), degrees(error.rms)
         yield 'structural error', f'{greatest:+.4g}° at most, {rms:.4g}° rms'
         part = f'{worst.error:+.4g}, {worst.percent:+.3g} % of its range'
@@ -284,7 +288,7 @@ def _solve_path(typed: argparse.Namespace, search: DesignSearch) -> list[DesignA
         typed.closed,
         None if timing is None else tuple(map(typed.angles.read, timing)),
         typed.free_zeros,
-        search.needs.turning,
+        search.needs.needs_full_turn,
     )
     paths = generate_path(
         task,
@@ -314,7 +318,7 @@ def _dead_centres(typed: argparse.Namespace, search: DesignSearch) -> list[Desig
             option = f'--{name.replace("_", "-")}'
             raise LinkageError('--swing and --time-ratio', f'{option} is missing', f'add {option}')
     task = DeadCentreTask(typed.angles.read(typed.swing), typed.time_ratio, typed.ground)
-    offset = f'{degrees(task.offset):.6g}° more than half a turn for the longer stroke'
+    offset = f'{degrees(task.imbalance_angle):.6g}° more than half a turn for the longer stroke'
     return [
         DesignAnswer('dead centres', design, assess(design), [('crank', offset)])
         for design in crank_rockers(task, search.keep)
@@ -341,7 +345,9 @@ def _solve_motion(typed: argparse.Namespace, _search: DesignSearch) -> list[Desi
     design, links = solve(poses, *pivots)
     (one, one_digits), (other, other_digits) = (
         (f'({pivot.real:.10g}, {pivot.imag:.10g})', f'{digits:.0f}')
-        for pivot, digits in zip(links.pivots.tolist(), links.digits.tolist(), strict=True)
+        for pivot, digits in zip(
+            links.pivots.tolist(), links.reliable_digits.tolist(), strict=True
+        )
     )
     found = ('O2 and O4 in the ground', 'A and B in the coupler')[bool(fixed)]
     facts = [

@@ -37,7 +37,7 @@ from linkage_ros.cli.terminal import print_tables, ProgressCallback, show_progre
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.file_access import check_new
 from linkage_ros.files.linkage_text import write_linkage
-from linkage_ros.synthesis.defects import Assessment, distance, misses, Needs
+from linkage_ros.synthesis.defects import Assessment, Needs, needs_penalty, unmet_needs
 from linkage_ros.synthesis.design import FourBar
 
 # Tables of a designed four-bar: its links, its proof, its quality.
@@ -92,11 +92,11 @@ def _positions_table(answer: DesignAnswer, angles: AngleUnit) -> TerminalTable:
         for asked, angle in ((rocker, one.rocker), (coupler, one.coupler)):
             if asked:
                 row.append('' if angle is None else angles.format_angle(angle))
-        row.append(met.side if met.closed else f'open by {met.gap:.3g} m')
+        row.append(met.side if met.is_closed else f'open by {met.gap:.3g} m')
         if place:
-            row.append(f'{met.distance:.2e}' if met.closed else '')
+            row.append(f'{met.distance:.2e}' if met.is_closed else '')
         if rocker or coupler:
-            row.append(f'{angles.convert(met.angle):+.2e}' if met.closed else '')
+            row.append(f'{angles.convert(met.angle):+.2e}' if met.is_closed else '')
         rows.append(row)
     return TerminalTable('Proof: each position, analysed again', columns, rows)
 
@@ -123,7 +123,7 @@ def _assessment_facts(
         yield f'{defect.name} defect', angles.convert_text(defect.text)
     if not assessment.defects:
         yield 'defects', 'none: order, branch and circuit are right'
-    for missed in misses(assessment, needs):
+    for missed in unmet_needs(assessment, needs):
         yield 'lacks what is needed', angles.convert_text(missed)
 
 
@@ -359,10 +359,10 @@ def find_solutions(
     found = find_answers(
         typed, DesignSearch(needs, typed.seed, typed.candidates, keep, typed.dask, advance)
     )
-    meeting = [one for one in found if not misses(one.assessment, needs)]
+    meeting = [one for one in found if not unmet_needs(one.assessment, needs)]
     if meeting:
         return meeting, True
-    return sorted(found, key=lambda one: distance(one.assessment, needs)), False
+    return sorted(found, key=lambda one: needs_penalty(one.assessment, needs)), False
 
 
 def needs_of(typed: argparse.Namespace) -> Needs:

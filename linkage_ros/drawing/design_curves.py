@@ -20,8 +20,8 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import InputRange, Position
 from linkage_ros.kinematics.shapes import INK
 from linkage_ros.kinematics.sweep_analysis import InputSweep
-from linkage_ros.synthesis.design import Assembly, COUPLER, Design, Wanted
-from linkage_ros.synthesis.proof import closed_position, closure_of, Met, prove, SIDES
+from linkage_ros.synthesis.design import Assembly, COUPLER, Design, DesignRequest
+from linkage_ros.synthesis.proof import AchievedPosition, closed_position, closure_of, prove, SIDES
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -49,8 +49,8 @@ class DesignPose(NamedTuple):
     """
 
     number: int
-    wanted: Wanted
-    met: Met
+    wanted: DesignRequest
+    met: AchievedPosition
     own: bool
     closure: Closure
     position: Position

@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.ranges import golden_section
-from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
 
 _SAMPLES = 1000
 
@@ -41,7 +41,7 @@ class DeadCentreTask(NamedTuple):
     ground: float
 
     @property
-    def offset(self) -> float:
+    def imbalance_angle(self) -> float:
         """Return the crank angle by which the longer stroke exceeds half a turn, in [rad]."""
         return pi * (self.time_ratio - 1.0) / (self.time_ratio + 1.0)
 
@@ -68,7 +68,7 @@ def crank_rockers(task: DeadCentreTask, count: int) -> list[Design]:
     for side in (1.0, -1.0):
 
         def loss(ratio: float, side: float = side) -> float:
-            return -_transmission(task, ratio, side)
+            return -_least_transmission(task, ratio, side)
 
         ratios = [(i + 0.5) / _SAMPLES for i in range(_SAMPLES)]
         best = min(ratios, key=loss)
@@ -83,31 +83,35 @@ def crank_rockers(task: DeadCentreTask, count: int) -> list[Design]:
         raise SynthesisError(
             'swing and time ratio', 'no crank-rocker has both', 'ask for a smaller swing or ratio'
         )
-    return [_design(task, ratio, side) for _, ratio, side in sorted(found)[:count]]
+    return [_build_design(task, ratio, side) for _, ratio, side in sorted(found)[:count]]
 
 
-def _places(task: DeadCentreTask, ratio: float, side: float) -> tuple[complex, complex, complex]:
+def _dead_centre_places(
+    task: DeadCentreTask, ratio: float, side: float
+) -> tuple[complex, complex, complex]:
     """Return pin B folded and stretched, and pivot O4, all from O2; r₂ = 1 along x."""
-    folded, stretched = rect(ratio, task.offset), 1.0 + 0.0j
+    folded, stretched = rect(ratio, task.imbalance_angle), 1.0 + 0.0j
     chord = stretched - folded
     # The apex of the swing over the chord.
     apex = 0.5 * (folded + stretched) + side * 0.5j * chord / tan(0.5 * task.swing)
     return folded, stretched, apex
 
 
-def _lengths(task: DeadCentreTask, ratio: float, side: float) -> tuple[float, float, float, float]:
+def _link_lengths(
+    task: DeadCentreTask, ratio: float, side: float
+) -> tuple[float, float, float, float]:
     """Return crank, coupler, rocker and ground, for the wanted ground."""
-    folded, stretched, apex = _places(task, ratio, side)
+    folded, stretched, apex = _dead_centre_places(task, ratio, side)
     scale = task.ground / abs(apex)
     r1, r2 = abs(folded) * scale, abs(stretched) * scale
     return 0.5 * (r2 - r1), 0.5 * (r2 + r1), abs(stretched - apex) * scale, task.ground
 
 
-def _transmission(task: DeadCentreTask, ratio: float, side: float) -> float:
+def _least_transmission(task: DeadCentreTask, ratio: float, side: float) -> float:
     """Return the least transmission angle, in [rad]; below 0 for other than crank-rockers."""
-    folded, stretched, apex = _places(task, ratio, side)
+    folded, stretched, apex = _dead_centre_places(task, ratio, side)
     sides = [(apex.conjugate() * pin).imag for pin in (folded, stretched)]
-    a, b, c, d = _lengths(task, ratio, side)
+    a, b, c, d = _link_lengths(task, ratio, side)
     grashof = a < min(b, c, d) and 2.0 * (a + max(b, c, d)) < a + b + c + d
     if sides[0] * sides[1] <= 0.0 or not grashof:
         return -1.0
@@ -115,15 +119,15 @@ def _transmission(task: DeadCentreTask, ratio: float, side: float) -> float:
     return min(min(angle, pi - angle) for angle in angles)
 
 
-def _design(task: DeadCentreTask, ratio: float, side: float) -> Design:
+def _build_design(task: DeadCentreTask, ratio: float, side: float) -> Design:
     """Return the four-bar, with its positions at both dead centres."""
-    folded, stretched, apex = _places(task, ratio, side)
-    a, b, c, d = _lengths(task, ratio, side)
+    folded, stretched, apex = _dead_centre_places(task, ratio, side)
+    a, b, c, d = _link_lengths(task, ratio, side)
     frame = apex / abs(apex)
     wanted = []
     for pin, sign in ((folded, -1.0), (stretched, 1.0)):
         crank = phase(sign * pin / frame)
-        wanted.append(Wanted(crank, phase((pin - apex) / frame)))
+        wanted.append(DesignRequest(crank, phase((pin - apex) / frame)))
     # At a dead centre A lies on O2→B, so B is on the same side of A→O4 as of O2→O4.
     left = (stretched / frame).imag > 0.0
     return Design(FourBar.of_lengths(a, b, c, d, side='left' if left else 'right'), tuple(wanted))

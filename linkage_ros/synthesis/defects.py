@@ -31,17 +31,17 @@ from linkage_ros.kinematics.grashof import (
 )
 from linkage_ros.synthesis.design import Design
 from linkage_ros.synthesis.proof import (
+    AchievedPosition,
     Array,
     closure_of,
-    Course,
-    course,
     Flags,
     least_transmission,
-    lifted,
-    Met,
+    lift_directions,
     mobility,
     prove,
     SAME,
+    Traversal,
+    traverse_positions,
 )
 import numpy as np
 
@@ -84,7 +84,7 @@ class Assessment(NamedTuple):
 
     """
 
-    met: tuple[Met, ...]
+    met: tuple[AchievedPosition, ...]
     kind: FourBarType
     turns: bool
     defects: tuple[Defect, ...]
@@ -104,14 +104,14 @@ def assess(design: Design) -> Assessment:
     lengths = np.array(four_bar.lengths)
     directions = np.array([wanted.crank for wanted in design.wanted]) + zero
     # With a single change point two turns may differ: the actual turns are proven.
-    turns = tau * np.round((lifted(lengths, directions) - directions) / tau)
+    turns = tau * np.round((lift_directions(lengths, directions) - directions) / tau)
     moved = [
         one._replace(crank=one.crank + float(by))
         for one, by in zip(design.wanted, turns, strict=True)
     ]
     met = prove(design._replace(wanted=tuple(moved)))
-    path = course(lengths, directions, np.array([one.side == 'left' for one in met]))
-    defects = _defects(design, met, path)
+    path = traverse_positions(lengths, directions, np.array([one.side == 'left' for one in met]))
+    defects = _find_defects(design, met, path)
     if defects:
         travel = None
         # Only at the positions; there is no way between them.
@@ -125,7 +125,7 @@ def assess(design: Design) -> Assessment:
         defects = (
             Defect(
                 'transmission',
-                f'coupler and rocker are in line at a crank angle of {_degrees(at)}, and the '
+                f'coupler and rocker are in line at a crank angle of {_degrees_text(at)}, and the '
                 'rocker may go either way from there',
             ),
         )
@@ -137,29 +137,31 @@ def assess(design: Design) -> Assessment:
     return Assessment(met, kind, bool(path.turns), defects, travel, least, at, full, ratio)
 
 
-def _defects(design: Design, met: tuple[Met, ...], path: Course) -> tuple[Defect, ...]:
+def _find_defects(
+    design: Design, met: tuple[AchievedPosition, ...], path: Traversal
+) -> tuple[Defect, ...]:
     """Return the defects of a linkage; one that cannot be assembled hides all others."""
-    missed = [(number, one.gap) for number, one in enumerate(met, 1) if not one.closed]
+    missed = [(number, one.gap) for number, one in enumerate(met, 1) if not one.is_closed]
     if missed:
         worst = max(gap for _, gap in missed)
         return (
             Defect(
                 'open',
-                f'{_positions(number for number, _ in missed)} cannot be assembled, the links '
+                f'{_positions_text(number for number, _ in missed)} cannot be assembled, the links '
                 f'miss each other by up to {worst:.3g} m',
             ),
         )
     if not path.one_circuit:
-        return (_circuit(met, path),)
+        return (_circuit_defect(met, path),)
     defects = []
     if not path.one_branch:
-        defects.append(_branch(design, met))
+        defects.append(_branch_defect(design, met))
     if not path.in_order:
-        defects.append(_order(design, path))
+        defects.append(_order_defect(design, path))
     return tuple(defects)
 
 
-def _branch(design: Design, met: tuple[Met, ...]) -> Defect:
+def _branch_defect(design: Design, met: tuple[AchievedPosition, ...]) -> Defect:
     crank = design.wanted[0].crank
     closure = closure_of(design, met[0].side)
     between = []
@@ -174,47 +176,47 @@ def _branch(design: Design, met: tuple[Met, ...]) -> Defect:
                 for singular in closure.singular_inputs
                 if abs(remainder(singular.value - middle, tau)) <= half + SAME
             ]
-    where = ' and '.join(sorted({_degrees(remainder(one, tau)) for one in between}))
+    where = ' and '.join(sorted({_degrees_text(remainder(one, tau)) for one in between}))
     return Defect(
         'branch',
-        f'{_sides(met)}; they meet only where coupler and rocker are in line, at crank angles of '
+        f'{_sides_text(met)}; they meet only where coupler and rocker are in line, at crank angles of '
         f'{where}, and a crank does not lead from one to the other',
     )
 
 
-def _circuit(met: tuple[Met, ...], path: Course) -> Defect:
+def _circuit_defect(met: tuple[AchievedPosition, ...], path: Traversal) -> Defect:
     if path.turns:
-        where = _sides(met)
+        where = _sides_text(met)
     else:
         upper = np.sin(path.directions) >= 0.0
-        one, other = (_positions(np.flatnonzero(upper == end) + 1) for end in (True, False))
+        one, other = (_positions_text(np.flatnonzero(upper == end) + 1) for end in (True, False))
         where = f'the crank moves in two ranges, with {one} in one and {other} in the other'
     return Defect('circuit', f'{where}; only taking it apart leads from one to the other')
 
 
-def _order(design: Design, path: Course) -> Defect:
+def _order_defect(design: Design, path: Traversal) -> Defect:
     directions: Array = path.directions - path.directions[0]
     visited = np.argsort(np.mod(directions, tau) if path.turns else directions)
-    visits = ', '.join(f'{i + 1} ({_degrees(design.wanted[i].crank)})' for i in visited)
+    visits = ', '.join(f'{i + 1} ({_degrees_text(design.wanted[i].crank)})' for i in visited)
     return Defect('order', f'a crank that goes one way comes by the positions as {visits}')
 
 
-def _sides(met: tuple[Met, ...]) -> str:
+def _sides_text(met: tuple[AchievedPosition, ...]) -> str:
     left, right = (
-        _positions(number for number, one in enumerate(met, 1) if one.side == side)
+        _positions_text(number for number, one in enumerate(met, 1) if one.side == side)
         for side in ('left', 'right')
     )
     return f'{left} on the left assembly, {right} on the right one'
 
 
-def _positions(numbers: Iterable[int]) -> str:
+def _positions_text(numbers: Iterable[int]) -> str:
     listed = list(map(str, numbers))
     if len(listed) == 1:
         return f'position {listed[0]}'
     return f'positions {", ".join(listed[:-1])} and {listed[-1]}'
 
 
-def _degrees(angle: float) -> str:
+def _degrees_text(angle: float) -> str:
     return f'{degrees(angle):.6g}°'
 
 
@@ -252,7 +254,7 @@ class Needs(NamedTuple):
     usable: bool = False  # Whether it must have no defects
 
     @property
-    def turning(self) -> bool:
+    def needs_full_turn(self) -> bool:
         """Return whether the crank must turn fully."""
         return self.kind in _TURNING
 
@@ -276,21 +278,21 @@ class Needs(NamedTuple):
             )
 
 
-def misses(assessment: Assessment, needs: Needs) -> tuple[str, ...]:
+def unmet_needs(assessment: Assessment, needs: Needs) -> tuple[str, ...]:
     """Return the unmet requirements of a design, in a few words each."""
-    return tuple(text for text, _ in _missed(assessment, needs))
+    return tuple(text for text, _ in _missed_needs(assessment, needs))
 
 
-def distance(assessment: Assessment, needs: Needs) -> float:
+def needs_penalty(assessment: Assessment, needs: Needs) -> float:
     """Return the weighted sum of unmet requirements, to sort designs; 0 if all are met."""
-    return sum(much for _, much in _missed(assessment, needs))
+    return sum(much for _, much in _missed_needs(assessment, needs))
 
 
-def _missed(assessment: Assessment, needs: Needs) -> list[tuple[str, float]]:
+def _missed_needs(assessment: Assessment, needs: Needs) -> list[tuple[str, float]]:
     missed: list[tuple[str, float]] = []
     if needs.usable:
         missed += [(f'{defect.name} defect', _FAR) for defect in assessment.defects]
-    if needs.kind and not _is(assessment, needs.kind):
+    if needs.kind and not _is_kind(assessment, needs.kind):
         missed.append((f'a {assessment.kind.name}, no {needs.kind}', 1.0))
     if assessment.transmission < needs.transmission:
         angle, wanted = degrees(assessment.transmission), degrees(needs.transmission)
@@ -306,7 +308,7 @@ def _missed(assessment: Assessment, needs: Needs) -> list[tuple[str, float]]:
     return missed
 
 
-def distances(lengths: Array, transmission: Array, needs: Needs) -> Array:
+def needs_penalties(lengths: Array, transmission: Array, needs: Needs) -> Array:
     """
     Return `distance` for many four-bars without defects.
 
@@ -322,7 +324,7 @@ def distances(lengths: Array, transmission: Array, needs: Needs) -> Array:
     """
     total = np.zeros(transmission.shape)
     if needs.kind:
-        total += ~_are(lengths, needs.kind)
+        total += ~_are_kind(lengths, needs.kind)
     if needs.transmission:
         total += np.maximum(1.0 - transmission / needs.transmission, 0.0)
     if needs.link_ratio < inf:
@@ -331,11 +333,11 @@ def distances(lengths: Array, transmission: Array, needs: Needs) -> Array:
     return total
 
 
-def _is(assessment: Assessment, kind: str) -> bool:
+def _is_kind(assessment: Assessment, kind: str) -> bool:
     return assessment.turns if kind == 'turning' else _stands_for(kind, assessment.kind.code)
 
 
-def _are(lengths: Array, kind: str) -> Flags:
+def _are_kind(lengths: Array, kind: str) -> Flags:
     excess, turns = mobility(lengths)
     if kind == 'turning':
         return turns

@@ -97,15 +97,15 @@ class FourBar:
 
         """
         (o2, o4), (a, b) = self.pivots, self.coupler
-        coupler = {'A': _point(a), 'B': _point(b)}
+        coupler = {'A': _as_point(a), 'B': _as_point(b)}
         if self.traced is not None:
-            coupler['P'] = _point(self.traced)
+            coupler['P'] = _as_point(self.traced)
         return Linkage(
             links={
-                GROUND: {'O2': _point(o2), 'O4': _point(o4)},
-                CRANK: {'O2': (0.0, 0.0), 'A': _point(self.crank)},
+                GROUND: {'O2': _as_point(o2), 'O4': _as_point(o4)},
+                CRANK: {'O2': (0.0, 0.0), 'A': _as_point(self.crank)},
                 COUPLER: coupler,
-                ROCKER: {'O4': (0.0, 0.0), 'B': _point(self.rocker)},
+                ROCKER: {'O4': (0.0, 0.0), 'B': _as_point(self.rocker)},
             },
             inputs=(Input('crank_joint', GROUND, CRANK),),
             assembly={'B': self.side},
@@ -119,7 +119,7 @@ class FourBar:
         )
 
 
-class Wanted(NamedTuple):
+class DesignRequest(NamedTuple):
     """One wanted position."""
 
     crank: float  # The crank's angle, given or computed, in [rad]
@@ -133,8 +133,8 @@ class Design(NamedTuple):
     """A four-bar and the positions that it was designed for, in the wanted order."""
 
     four_bar: FourBar
-    wanted: tuple[Wanted, ...]
+    wanted: tuple[DesignRequest, ...]
 
 
-def _point(place: complex) -> Point:
+def _as_point(place: complex) -> Point:
     return place.real, place.imag

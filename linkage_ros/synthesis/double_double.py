@@ -55,60 +55,60 @@ def two_product(x: Array, y: Array) -> Twofold:
     return product, ((x_high * y_high - product) + x_high * y_low + x_low * y_high) + x_low * y_low
 
 
-def plus(x: Twofold, y: Twofold) -> Twofold:
+def add(x: Twofold, y: Twofold) -> Twofold:
     """Return a sum."""
     total, error = two_sum(x[0], y[0])
-    return _normal(total, error + (x[1] + y[1]))
+    return _normalize(total, error + (x[1] + y[1]))
 
 
-def minus(x: Twofold, y: Twofold) -> Twofold:
+def subtract(x: Twofold, y: Twofold) -> Twofold:
     """Return a difference."""
-    return plus(x, (-y[0], -y[1]))
+    return add(x, (-y[0], -y[1]))
 
 
-def times(x: Twofold, y: Twofold) -> Twofold:
+def multiply(x: Twofold, y: Twofold) -> Twofold:
     """Return a product."""
     product, error = two_product(x[0], y[0])
-    return _normal(product, error + (x[0] * y[1] + x[1] * y[0]))
+    return _normalize(product, error + (x[0] * y[1] + x[1] * y[0]))
 
 
-def over(x: Twofold, y: Twofold) -> Twofold:
+def divide(x: Twofold, y: Twofold) -> Twofold:
     """Return a quotient."""
     quotient = x[0] / y[0]
     product, error = two_product(quotient, y[0])
-    return _normal(quotient, (((x[0] - product) - error + x[1]) - quotient * y[1]) / y[0])
+    return _normalize(quotient, (((x[0] - product) - error + x[1]) - quotient * y[1]) / y[0])
 
 
 def sine(angle: Twofold) -> Twofold:
     """Return the sine of an angle, in [rad]."""
-    part, rest, low = _reduced(angle)
-    sines, cosines = _at(part)
-    return _turned(sines, cosines, rest, low)
+    part, rest, low = _reduce_angle(angle)
+    sines, cosines = _part_of_turn(part)
+    return _turn_by(sines, cosines, rest, low)
 
 
 def sine_cosine(angle: Twofold) -> tuple[Twofold, Twofold]:
     """Return sine and cosine of an angle, in [rad]."""
-    part, rest, low = _reduced(angle)
-    (high, tail), cosines = _at(part)
-    return _turned((high, tail), cosines, rest, low), _turned(cosines, (-high, -tail), rest, low)
+    part, rest, low = _reduce_angle(angle)
+    (high, tail), cosines = _part_of_turn(part)
+    return _turn_by((high, tail), cosines, rest, low), _turn_by(cosines, (-high, -tail), rest, low)
 
 
-def _reduced(angle: Twofold) -> tuple[NDArray[np.intp], Array, Array]:
+def _reduce_angle(angle: Twofold) -> tuple[NDArray[np.intp], Array, Array]:
     """Return the nearest part of a turn, and the angle beyond it."""
     # The first two parts have so few bits that their products with an integer are exact.
     first, second, third = _part_of_a_turn()
     parts = np.rint(angle[0] * (1.0 / first))
     rest, low = two_sum(angle[0] - parts * first, -parts * second)
-    rest, low = _normal(rest, low + (angle[1] - parts * third))
+    rest, low = _normalize(rest, low + (angle[1] - parts * third))
     return parts.astype(np.intp) & (_PARTS - 1), rest, low
 
 
-def _at(part: NDArray[np.intp]) -> tuple[Twofold, Twofold]:
-    sine_high, sine_low, cosine_high, cosine_low = (row.take(part) for row in _table())
+def _part_of_turn(part: NDArray[np.intp]) -> tuple[Twofold, Twofold]:
+    sine_high, sine_low, cosine_high, cosine_low = (row.take(part) for row in _sine_table())
     return (sine_high, sine_low), (cosine_high, cosine_low)
 
 
-def _turned(along: Twofold, across: Twofold, rest: Array, low: Array) -> Twofold:
+def _turn_by(along: Twofold, across: Twofold, rest: Array, low: Array) -> Twofold:
     """Return along·cos(rest) + across·sin(rest)."""
     square = rest * rest
     # sin x − x and cos x − 1, to x⁷ and x⁶.
@@ -117,10 +117,10 @@ def _turned(along: Twofold, across: Twofold, rest: Array, low: Array) -> Twofold
     product, error = two_product(across[0], rest)
     total, other = two_sum(along[0], product)
     tail = across[0] * (low + sine) + along[0] * cosine + across[1] * rest + along[1]
-    return _normal(total, tail + error + other)
+    return _normalize(total, tail + error + other)
 
 
-def _normal(high: Array, low: Array) -> Twofold:
+def _normalize(high: Array, low: Array) -> Twofold:
     total = high + low
     return total, low - (total - high)
 
@@ -137,7 +137,7 @@ def _part_of_a_turn() -> tuple[float, float, float]:
 
 
 @cache
-def _table() -> tuple[Array, Array, Array, Array]:
+def _sine_table() -> tuple[Array, Array, Array, Array]:
     """Return the sines of all parts of a turn, high and low, and their cosines."""
     eighth = [(1 << _BITS, 0)]
     cosine, sine = _small_turn(2 * _PI // _PARTS)
@@ -150,11 +150,11 @@ def _table() -> tuple[Array, Array, Array, Array]:
     for _ in range(3):
         quarter = [(-y, x) for x, y in quarter]
         turned = turned + quarter
-    sines, cosines = (_twofold([place[axis] for place in turned]) for axis in (1, 0))
+    sines, cosines = (_as_twofold([place[axis] for place in turned]) for axis in (1, 0))
     return *sines, *cosines
 
 
-def _twofold(numbers: list[int]) -> Twofold:
+def _as_twofold(numbers: list[int]) -> Twofold:
     unit = 1 << _BITS
     high = [number / unit for number in numbers]
     low = []

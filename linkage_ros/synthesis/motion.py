@@ -38,9 +38,16 @@ from typing import Any, NamedTuple, TypeAlias
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.batch import Array, Complex
-from linkage_ros.synthesis.design import Design, FARTHEST, FourBar, Wanted
-from linkage_ros.synthesis.double_double import minus, over, plus, sine_cosine, times, Twofold
-from linkage_ros.synthesis.proof import assembled
+from linkage_ros.synthesis.design import Design, DesignRequest, FARTHEST, FourBar
+from linkage_ros.synthesis.double_double import (
+    add,
+    divide,
+    multiply,
+    sine_cosine,
+    subtract,
+    Twofold,
+)
+from linkage_ros.synthesis.proof import assemble
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -85,19 +92,19 @@ def check_task(poses: Sequence[Pose], pivots: Mapping[str, complex]) -> None:
         ):
             raise SynthesisError(
                 f'poses {i} and {j}',
-                f'are the same, {said(one.place)} at {degrees(one.angle):.10g}°',
+                f'are the same, {place_text(one.place)} at {degrees(one.angle):.10g}°',
                 'give each pose once',
             )
     (name, place), (other_name, other_place) = pivots.items()
     if abs(place - other_place) <= 4.0 * UNIT_ROUNDOFF * (abs(place) + abs(other_place)):
         raise SynthesisError(
             f'{name} and {other_name}',
-            f'are the same place, {said(place)}: a link between them has no length',
+            f'are the same place, {place_text(place)}: a link between them has no length',
             'give two places',
         )
 
 
-def columns(poses: Sequence[Pose]) -> tuple[Complex, Array]:
+def split_poses(poses: Sequence[Pose]) -> tuple[Complex, Array]:
     """Return the places of poses, and their angles, (3,) both."""
     return (
         np.array([pose.place for pose in poses], np.complex128),
@@ -105,7 +112,7 @@ def columns(poses: Sequence[Pose]) -> tuple[Complex, Array]:
     )
 
 
-def said(place: complex) -> str:
+def place_text(place: complex) -> str:
     """Return a place as text for a user."""
     return f'({place.real:.6g}, {place.imag:.6g}) m'
 
@@ -114,36 +121,36 @@ Place: TypeAlias = tuple[Twofold, Twofold]
 """Its x and y."""
 
 
-class Circle(NamedTuple):
+class PoleCircle(NamedTuple):
     """A circle; inf or NaN if the places lie on a line, or two of them are equal."""
 
     centre: Complex  # Centre, (…)
     spokes: Complex  # From the centre to the places, (…, 3)
     # Between the places, each opposite to its place: A₃ − A₂, A₁ − A₃ and A₂ − A₁, (…, 3).
     chords: Complex
-    pull: Complex  # dc/dg of each place, as above, (…, 3)
+    centre_derivatives: Complex  # dc/dg of each place, as above, (…, 3)
 
 
-def circle(places: Place) -> Circle:
+def circle_through(places: Place) -> PoleCircle:
     """Return the circle through three places, (…, 3)."""
-    first, second, third = (_at(places, index) for index in range(3))
-    u, v = _minus(second, first), _minus(third, first)
+    first, second, third = (_place_at(places, index) for index in range(3))
+    u, v = _subtract_places(second, first), _subtract_places(third, first)
     with np.errstate(all='ignore'):
-        cross = minus(times(u[0], v[1]), times(u[1], v[0]))
+        cross = subtract(multiply(u[0], v[1]), multiply(u[1], v[0]))
         twice = (2.0 * cross[0], 2.0 * cross[1])
-        u_square, v_square = (plus(times(w[0], w[0]), times(w[1], w[1])) for w in (u, v))
+        u_square, v_square = (add(multiply(w[0], w[0]), multiply(w[1], w[1])) for w in (u, v))
         to_centre = (
-            over(minus(times(v[1], u_square), times(u[1], v_square)), twice),
-            over(minus(times(u[0], v_square), times(v[0], u_square)), twice),
+            divide(subtract(multiply(v[1], u_square), multiply(u[1], v_square)), twice),
+            divide(subtract(multiply(u[0], v_square), multiply(v[0], u_square)), twice),
         )
-        centre = plus(first[0], to_centre[0]), plus(first[1], to_centre[1])
-        spokes = [number(_minus(place, centre)) for place in (first, second, third)]
-        chords = np.stack((number(_minus(v, u)), -number(v), number(u)), -1)
+        centre = add(first[0], to_centre[0]), add(first[1], to_centre[1])
+        spokes = [to_complex(_subtract_places(place, centre)) for place in (first, second, third)]
+        chords = np.stack((to_complex(_subtract_places(v, u)), -to_complex(v), to_complex(u)), -1)
         pull = 1j * chords / cross[0][..., None]
-    return Circle(number(centre), np.stack(spokes, -1), chords, pull)
+    return PoleCircle(to_complex(centre), np.stack(spokes, -1), chords, pull)
 
 
-def sensitivity(found: Circle, own: Complex, shared: Complex) -> Array:
+def centre_sensitivity(found: PoleCircle, own: Complex, shared: Complex) -> Array:
     """
     Return Σ|x·∂c/∂x| + ``abs(c)`` of the centre c over all inputs x; (…).
 
@@ -161,26 +168,26 @@ def sensitivity(found: Circle, own: Complex, shared: Complex) -> Array:
     """
     with np.errstate(all='ignore'):
         back = np.conj(found.spokes)[..., None]
-        alone = np.abs(found.pull)[..., None] * np.abs((back * own).real)
-        together = np.abs((found.pull[..., None] * (back * shared).real).sum(-2))
+        alone = np.abs(found.centre_derivatives)[..., None] * np.abs((back * own).real)
+        together = np.abs((found.centre_derivatives[..., None] * (back * shared).real).sum(-2))
         total: Array = alone.sum((-2, -1)) + together.sum(-1) + np.abs(found.centre)
     return total
 
 
-def number(place: Place) -> Complex:
+def to_complex(place: Place) -> Complex:
     """Return a place as the nearest complex number."""
     complex_place = np.empty(place[0][0].shape, np.complex128)
     complex_place.real, complex_place.imag = place[0][0], place[1][0]
     return complex_place
 
 
-def _at(places: Place, index: int) -> Place:
+def _place_at(places: Place, index: int) -> Place:
     (x, x_low), (y, y_low) = places
     return (x[..., index], x_low[..., index]), (y[..., index], y_low[..., index])
 
 
-def _minus(one: Place, other: Place) -> Place:
-    return minus(one[0], other[0]), minus(one[1], other[1])
+def _subtract_places(one: Place, other: Place) -> Place:
+    return subtract(one[0], other[0]), subtract(one[1], other[1])
 
 
 TRUSTED = 2.0
@@ -188,7 +195,7 @@ TRUSTED = 2.0
 inputs, and one for the computation, whose measured error is a third of that."""
 
 
-class Links(NamedTuple):
+class MotionLinks(NamedTuple):
     """Links from fixed pivots to moving ones; any number of them at once."""
 
     # The computed pivots, (…), in [m]: fixed ones in the frame of the ground, moving ones in that
@@ -207,7 +214,7 @@ class Links(NamedTuple):
         return np.abs(self.arms[..., 0])
 
     @property
-    def digits(self) -> Array:
+    def reliable_digits(self) -> Array:
         """Return the number of reliable digits of each pivot, on the scale of its link; (…)."""
         with np.errstate(all='ignore'):
             lost = TRUSTED * UNIT_ROUNDOFF * self.sensitivity / self.lengths
@@ -215,7 +222,7 @@ class Links(NamedTuple):
         return digits
 
 
-def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> Links:
+def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> MotionLinks:
     """
     Return the links that carry moving pivots (…) through poses (…, 3), without raising errors.
 
@@ -228,16 +235,18 @@ def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> Links:
 
     """
     point = np.asarray(moving, np.complex128)[..., None]
-    sine, cosine = sine_cosine(_twofold(angles))
-    x, y = _turned(_twofold(point.real), _twofold(point.imag), cosine, sine)
-    circles = circle((plus(_twofold(places.real), x), plus(_twofold(places.imag), y)))
+    sine, cosine = sine_cosine(_as_twofold(angles))
+    x, y = _turn_by(_as_twofold(point.real), _as_twofold(point.imag), cosine, sine)
+    circles = circle_through((add(_as_twofold(places.real), x), add(_as_twofold(places.imag), y)))
     turn = cosine[0] + 1j * sine[0]
-    own = np.stack(_every(places.real, 1j * places.imag, 1j * angles * turn * point), -1)
-    shared = np.stack(_every(turn * point.real, 1j * turn * point.imag), -1)
-    return Links(circles.centre, circles.spokes, sensitivity(circles, own, shared), circles.chords)
+    own = np.stack(_broadcast_all(places.real, 1j * places.imag, 1j * angles * turn * point), -1)
+    shared = np.stack(_broadcast_all(turn * point.real, 1j * turn * point.imag), -1)
+    return MotionLinks(
+        circles.centre, circles.spokes, centre_sensitivity(circles, own, shared), circles.chords
+    )
 
 
-def moving_pivots(places: Complex, angles: Array, fixed: ArrayLike) -> Links:
+def moving_pivots(places: Complex, angles: Array, fixed: ArrayLike) -> MotionLinks:
     """
     Return the links that lead from fixed pivots (…) to poses (…, 3), without raising errors.
 
@@ -250,31 +259,33 @@ def moving_pivots(places: Complex, angles: Array, fixed: ArrayLike) -> Links:
 
     """
     point = np.asarray(fixed, np.complex128)[..., None]
-    sine, cosine = sine_cosine(_twofold(-angles))
-    x = minus(_twofold(point.real), _twofold(places.real))
-    y = minus(_twofold(point.imag), _twofold(places.imag))
-    circles = circle(_turned(x, y, cosine, sine))
+    sine, cosine = sine_cosine(_as_twofold(-angles))
+    x = subtract(_as_twofold(point.real), _as_twofold(places.real))
+    y = subtract(_as_twofold(point.imag), _as_twofold(places.imag))
+    circles = circle_through(_turn_by(x, y, cosine, sine))
     turn = cosine[0] + 1j * sine[0]
     about = -1j * angles * turn * (x[0] + 1j * y[0])
-    own = np.stack(_every(-turn * places.real, -1j * turn * places.imag, about), -1)
-    shared = np.stack(_every(turn * point.real, 1j * turn * point.imag), -1)
+    own = np.stack(_broadcast_all(-turn * places.real, -1j * turn * places.imag, about), -1)
+    shared = np.stack(_broadcast_all(turn * point.real, 1j * turn * point.imag), -1)
     arms = -np.conj(turn) * circles.spokes
-    return Links(circles.centre, arms, sensitivity(circles, own, shared), circles.chords)
-
-
-def _turned(x: Twofold, y: Twofold, cosine: Twofold, sine: Twofold) -> tuple[Twofold, Twofold]:
-    return (
-        minus(times(cosine, x), times(sine, y)),
-        plus(times(sine, x), times(cosine, y)),
+    return MotionLinks(
+        circles.centre, arms, centre_sensitivity(circles, own, shared), circles.chords
     )
 
 
-def _twofold(numbers: ArrayLike) -> Twofold:
+def _turn_by(x: Twofold, y: Twofold, cosine: Twofold, sine: Twofold) -> tuple[Twofold, Twofold]:
+    return (
+        subtract(multiply(cosine, x), multiply(sine, y)),
+        add(multiply(sine, x), multiply(cosine, y)),
+    )
+
+
+def _as_twofold(numbers: ArrayLike) -> Twofold:
     high = np.asarray(numbers, np.float64)
     return high, np.zeros_like(high)
 
 
-def _every(*numbers: ArrayLike) -> list[Any]:
+def _broadcast_all(*numbers: ArrayLike) -> list[Any]:
     return list(np.broadcast_arrays(*numbers))
 
 
@@ -285,7 +296,9 @@ _NEAR = 1e-3
 """Places nearer than this, relative to the motion, are at the pole rather than on a line."""
 
 
-def from_moving_pivots(poses: Sequence[Pose], a: complex, b: complex) -> tuple[Design, Links]:
+def from_moving_pivots(
+    poses: Sequence[Pose], a: complex, b: complex
+) -> tuple[Design, MotionLinks]:
     """
     Design the four-bar whose coupler has its pins at two given points.
 
@@ -304,14 +317,16 @@ def from_moving_pivots(poses: Sequence[Pose], a: complex, b: complex) -> tuple[D
     """
     check_task(poses, {'A': a, 'B': b})
     pins = np.array((a, b))
-    links = fixed_pivots(*columns(poses), pins)
+    links = fixed_pivots(*split_poses(poses), pins)
     for number, name in enumerate('AB'):
         _check_link(poses, name, links, number, 'fixed', np.abs(pins[number]))
     _check_distance(links, 'A and B', 'fixed', 'ground')
-    return _design(poses, links, links.pivots, pins), links
+    return _build_design(poses, links, links.pivots, pins), links
 
 
-def from_fixed_pivots(poses: Sequence[Pose], o2: complex, o4: complex) -> tuple[Design, Links]:
+def from_fixed_pivots(
+    poses: Sequence[Pose], o2: complex, o4: complex
+) -> tuple[Design, MotionLinks]:
     """
     Design the four-bar whose fixed pivots are two given places.
 
@@ -330,27 +345,29 @@ def from_fixed_pivots(poses: Sequence[Pose], o2: complex, o4: complex) -> tuple[
     """
     check_task(poses, {'O2': o2, 'O4': o4})
     pivots = np.array((o2, o4))
-    links = moving_pivots(*columns(poses), pivots)
+    links = moving_pivots(*split_poses(poses), pivots)
     for number, name in enumerate(('O2', 'O4')):
         _check_link(poses, name, links, number, 'moving', np.abs(pivots[number]))
     _check_distance(links, 'O2 and O4', 'moving', 'coupler')
-    return _design(poses, links, pivots, links.pivots), links
+    return _build_design(poses, links, pivots, links.pivots), links
 
 
-def _design(poses: Sequence[Pose], links: Links, fixed: Complex, moving: Complex) -> Design:
+def _build_design(
+    poses: Sequence[Pose], links: MotionLinks, fixed: Complex, moving: Complex
+) -> Design:
     o2, o4 = (complex(pivot) for pivot in fixed)
     a, b = (complex(pivot) for pivot in moving)
     crank, rocker = (complex(length, 0.0) for length in links.lengths)
     four_bar = FourBar((o2, o4), crank, (a, b), rocker, 'left', traced=0j)
     wanted = tuple(
-        Wanted(phase(arm), coupler=pose.angle, place=pose.place)
+        DesignRequest(phase(arm), coupler=pose.angle, place=pose.place)
         for arm, pose in zip(links.arms[0].tolist(), poses, strict=True)
     )
-    return assembled(Design(four_bar, wanted))
+    return assemble(Design(four_bar, wanted))
 
 
 def _check_link(
-    poses: Sequence[Pose], name: str, links: Links, index: int, kind: str, far: float
+    poses: Sequence[Pose], name: str, links: MotionLinks, index: int, kind: str, far: float
 ) -> None:
     """Refuse a pivot from which no link of constant length leads to its other end."""
     chords = np.abs(links.chords[index])
@@ -374,7 +391,7 @@ def _check_link(
             'other: links of any length would do',
             'choose another place for it',
         )
-    digits, length = float(links.digits[index]), float(links.lengths[index])
+    digits, length = float(links.reliable_digits[index]), float(links.lengths[index])
     if digits >= 1.0 and length <= _LONGEST * longest:
         return
     if chords.min() > _NEAR * longest:
@@ -393,7 +410,7 @@ def _check_link(
     )
 
 
-def _check_distance(links: Links, names: str, kind: str, link: str) -> None:
+def _check_distance(links: MotionLinks, names: str, kind: str, link: str) -> None:
     """Refuse two links that meet in the computed pivot."""
     one, other = (complex(pivot) for pivot in links.pivots)
     size = TRUSTED * float(links.sensitivity.sum()) + 4.0 * float(links.lengths.max())

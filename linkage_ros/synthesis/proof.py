@@ -33,7 +33,7 @@ from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
-from linkage_ros.synthesis.design import Assembly, COUPLER, Design, Wanted
+from linkage_ros.synthesis.design import Assembly, COUPLER, Design, DesignRequest
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,7 +53,7 @@ class Mobility(NamedTuple):
     turns: Flags  # Whether the crank turns fully; (…)
 
 
-class Course(NamedTuple):
+class Traversal(NamedTuple):
     """The way of four-bars through their positions."""
 
     turns: Flags  # Whether the crank turns fully; (…)
@@ -66,7 +66,7 @@ class Course(NamedTuple):
     directions: Array
 
     @property
-    def usable(self) -> Flags:
+    def is_usable(self) -> Flags:
         """Return whether a crank in one direction moves through all positions, in order."""
         return self.one_branch & self.one_circuit & self.in_order
 
@@ -76,7 +76,7 @@ def mobility(lengths: Array) -> Mobility:
     ordered = np.sort(lengths, -1)
     shortest = ordered[..., 0]
     excess = (ordered[..., 1] - shortest) - (ordered[..., 3] - ordered[..., 2])
-    rounding = _rounding(lengths)
+    rounding = _rounding_error(lengths)
     excess = np.where(np.abs(excess) <= rounding, 0.0, excess)
     beside = np.minimum(lengths[..., 0], lengths[..., 3])
     # The crank turns fully if crank or ground is shortest. Two shortest links occur only at a
@@ -84,7 +84,7 @@ def mobility(lengths: Array) -> Mobility:
     return Mobility(excess, (excess >= 0.0) & (beside - shortest <= rounding))
 
 
-def course(lengths: Array, directions: Array, left: Flags) -> Course:
+def traverse_positions(lengths: Array, directions: Array, left: Flags) -> Traversal:
     """
     Return the course of four-bars through their positions.
 
@@ -105,19 +105,19 @@ def course(lengths: Array, directions: Array, left: Flags) -> Course:
     upper = np.sin(directions) >= 0.0
     one_side = (upper == upper[..., :1]).all(-1)
     one_circuit = np.where(turns, one_branch, one_side) | (excess <= 0.0)
-    path, in_order = _lifted(lengths, directions, turns)
-    return Course(turns, one_branch, one_circuit, in_order, path)
+    path, in_order = _lift_between(lengths, directions, turns)
+    return Traversal(turns, one_branch, one_circuit, in_order, path)
 
 
-def lifted(lengths: Array, directions: Array) -> Array:
+def lift_directions(lengths: Array, directions: Array) -> Array:
     """Return the directions with the turns between them, as `course` does."""
-    return _lifted(lengths, directions, mobility(lengths).turns)[0]
+    return _lift_between(lengths, directions, mobility(lengths).turns)[0]
 
 
-def _lifted(lengths: Array, directions: Array, turns: Flags) -> tuple[Array, Flags]:
+def _lift_between(lengths: Array, directions: Array, turns: Flags) -> tuple[Array, Flags]:
     """Return directions with the turns between them, and whether they are in order."""
     by = np.diff(directions, axis=-1)
-    ahead, back = _ahead(by), _ahead(-by)
+    ahead, back = _forward_rotation(by), _forward_rotation(-by)
     length_ahead, length_back = ahead.sum(-1), back.sum(-1)
     round_steps = np.where((length_ahead <= length_back)[..., None], ahead, -back)
     in_turn = np.minimum(length_ahead, length_back) <= tau + SAME
@@ -125,7 +125,7 @@ def _lifted(lengths: Array, directions: Array, turns: Flags) -> tuple[Array, Fla
     # One range around the direction in which the linkage closes, 0 or π; or two, one on each side
     # of the ground line.
     a, b, c, d = (lengths[..., i] for i in range(4))
-    about_pi = np.abs(b - c) - np.abs(d - a) > _rounding(lengths)
+    about_pi = np.abs(b - c) - np.abs(d - a) > _rounding_error(lengths)
     wrapped = directions - tau * np.round(directions / tau)
     within = np.where(about_pi[..., None], np.mod(directions, tau), wrapped)
     steps = np.diff(within, axis=-1)
@@ -137,19 +137,19 @@ def _lifted(lengths: Array, directions: Array, turns: Flags) -> tuple[Array, Fla
     return path, np.where(turns, in_turn, one_way)
 
 
-def _rounding(lengths: Array) -> Array:
+def _rounding_error(lengths: Array) -> Array:
     """Return the rounding error of a sum of four lengths, as in `arithmetic.margin`."""
     total: Array = 4.0 * UNIT_ROUNDOFF * lengths.sum(-1)
     return total
 
 
-def _ahead(by: Array) -> Array:
+def _forward_rotation(by: Array) -> Array:
     """Return the forward rotation of a crank for differences of directions."""
     ahead = np.mod(by, tau)
     return np.where(ahead > tau - SAME, ahead - tau, ahead)
 
 
-def transmission(lengths: Array, direction: Array) -> Array:
+def transmission_angle(lengths: Array, direction: Array) -> Array:
     """
     Return the angle between coupler and rocker, acute, in [rad]; 0 where the loop is open.
 
@@ -197,7 +197,7 @@ def least_transmission(lengths: Array, start: Array, end: Array) -> tuple[Array,
     first = np.ceil(low / np.pi) * np.pi
     passes = (np.where(first + i * np.pi <= high, first + i * np.pi, start) for i in range(2))
     places = np.stack((start, end, *passes), -1)
-    angles = transmission(lengths[..., None, :], places)
+    angles = transmission_angle(lengths[..., None, :], places)
     least = np.argmin(angles, -1)[..., None]
     return (
         np.take_along_axis(angles, least, -1)[..., 0],
@@ -212,7 +212,7 @@ _MARKEDLY = 2.0
 the two meet, and in an approximate design, it would otherwise be the smaller of two errors."""
 
 
-class Met(NamedTuple):
+class AchievedPosition(NamedTuple):
     """
     A position of a design, compared with the wanted one.
 
@@ -239,12 +239,12 @@ class Met(NamedTuple):
     gap: float = 0.0
 
     @property
-    def closed(self) -> bool:
+    def is_closed(self) -> bool:
         """Whether the position exists."""
         return self.status.has_pose
 
 
-def prove(design: Design) -> tuple[Met, ...]:
+def prove(design: Design) -> tuple[AchievedPosition, ...]:
     """
     Return for each position the assembly that meets it, with its errors.
 
@@ -253,30 +253,32 @@ def prove(design: Design) -> tuple[Met, ...]:
     """
     side = design.four_bar.side
     results = []
-    for left, right in zip(*proofs(design), strict=True):
-        better = _better(left, right, sum(design.four_bar.lengths)) or side
+    for left, right in zip(*prove_both_sides(design), strict=True):
+        better = _better_side(left, right, sum(design.four_bar.lengths)) or side
         results.append(left if better == 'left' else right)
     return tuple(results)
 
 
-def assembled(design: Design) -> Design:
+def assemble(design: Design) -> Design:
     """Return a design on the assembly that meets most positions; on a tie, that of the first."""
     size = sum(design.four_bar.lengths)
-    left, right = proofs(design)
-    better = [_better(one, other, size) for one, other in zip(left, right, strict=True)]
+    left, right = prove_both_sides(design)
+    better = [_better_side(one, other, size) for one, other in zip(left, right, strict=True)]
     votes = [side for side in better if side]
 
-    def worth(side: Assembly) -> tuple[int, bool, float]:
-        error = sum(_error(met, size) for met in (left if side == 'left' else right))
+    def assembly_rank(side: Assembly) -> tuple[int, bool, float]:
+        error = sum(_length_error(met, size) for met in (left if side == 'left' else right))
         return votes.count(side), side in votes[:1], -error
 
-    return design._replace(four_bar=replace(design.four_bar, side=max(SIDES, key=worth)))
+    return design._replace(four_bar=replace(design.four_bar, side=max(SIDES, key=assembly_rank)))
 
 
-def proofs(design: Design) -> tuple[tuple[Met, ...], tuple[Met, ...]]:
+def prove_both_sides(
+    design: Design,
+) -> tuple[tuple[AchievedPosition, ...], tuple[AchievedPosition, ...]]:
     """Return the result of every position on the left, and on the right assembly."""
     left, right = (
-        tuple(_met(closure, side, wanted) for wanted in design.wanted)
+        tuple(_meet_position(closure, side, wanted) for wanted in design.wanted)
         for side, closure in ((side, closure_of(design, side)) for side in SIDES)
     )
     return left, right
@@ -287,10 +289,10 @@ def closure_of(design: Design, side: Assembly) -> Closure:
     return Closure(replace(design.four_bar, side=side).linkage())
 
 
-def _met(closure: Closure, side: Assembly, wanted: Wanted) -> Met:
+def _meet_position(closure: Closure, side: Assembly, wanted: DesignRequest) -> AchievedPosition:
     position = closed_position(closure, wanted.crank)
     if not position.joints:
-        return Met(side, 0.0, 0.0, position.status, position.gap)
+        return AchievedPosition(side, 0.0, 0.0, position.status, position.gap)
     coupler, rocker = position.joints
     errors = [0.0]
     if wanted.rocker is not None:
@@ -300,7 +302,7 @@ def _met(closure: Closure, side: Assembly, wanted: Wanted) -> Met:
     distance = 0.0
     if wanted.place is not None:
         distance = abs(closure.points(position)[COUPLER, 'P'] - wanted.place)
-    return Met(side, max(errors, key=abs), distance, position.status)
+    return AchievedPosition(side, max(errors, key=abs), distance, position.status)
 
 
 def closed_position(closure: Closure, crank: float) -> Position:
@@ -318,14 +320,14 @@ def closed_position(closure: Closure, crank: float) -> Position:
     return position
 
 
-def _better(left: Met, right: Met, size: float) -> Assembly | None:
+def _better_side(left: AchievedPosition, right: AchievedPosition, size: float) -> Assembly | None:
     """Return the assembly that meets a position markedly better, or None."""
-    one, other = _error(left, size), _error(right, size)
+    one, other = _length_error(left, size), _length_error(right, size)
     if other > _MARKEDLY * one + SAME * size:
         return 'left'
     return 'right' if one > _MARKEDLY * other + SAME * size else None
 
 
-def _error(met: Met, size: float) -> float:
+def _length_error(met: AchievedPosition, size: float) -> float:
     """Return the error as a length, for links of a total length."""
-    return abs(met.angle) * size + met.distance if met.closed else inf
+    return abs(met.angle) * size + met.distance if met.is_closed else inf

@@ -57,7 +57,7 @@ class Problem(Protocol):
         """Return the scores of candidates (count, n), (count,): less is better, inf is invalid."""
 
 
-class Found(NamedTuple):
+class DesignFound(NamedTuple):
     """A candidate and its score."""
 
     score: float
@@ -72,7 +72,7 @@ class _Best(NamedTuple):
     candidates: Array
 
 
-class _Part(NamedTuple):
+class _StudyPart(NamedTuple):
     """A part of a study: a range of candidates that begins with a chunk."""
 
     first: int
@@ -87,7 +87,7 @@ def search(
     keep: int,
     progress: Callable[[int, int], None] | None = None,
     address: str = '',
-) -> list[Found]:
+) -> list[DesignFound]:
     """
     Return the best candidates of a problem, the best first.
 
@@ -112,37 +112,37 @@ def search(
         If the scheduler or its workers fail.
 
     """
-    work = partial(_best, problem, seed, keep)
+    work = partial(_search_part, problem, seed, keep)
     results = (
-        results_of(work, partial(_tasks, count), address)
+        results_of(work, partial(_task_parts, count), address)
         if address
-        else ((part, work(part)) for part in _parts(count, CHUNK))
+        else ((part, work(part)) for part in _split_parts(count, CHUNK))
     )
     best, done = None, 0
     with closing(results):
         for part, chunk_best in results:
-            best = chunk_best if best is None else _merged((best, chunk_best), keep)
+            best = chunk_best if best is None else _merge_best((best, chunk_best), keep)
             done += part.last - part.first
             if progress is not None:
                 progress(done, count)
     if best is None:
         return []
     return [
-        Found(score, tuple(candidate))
+        DesignFound(score, tuple(candidate))
         for score, candidate in zip(best.scores.tolist(), best.candidates.tolist(), strict=True)
     ]
 
 
-def _parts(count: int, size: int) -> Iterator[_Part]:
-    return (_Part(first, min(first + size, count)) for first in range(0, count, size))
+def _split_parts(count: int, size: int) -> Iterator[_StudyPart]:
+    return (_StudyPart(first, min(first + size, count)) for first in range(0, count, size))
 
 
-def _tasks(count: int, threads: int) -> Iterator[_Part]:
+def _task_parts(count: int, threads: int) -> Iterator[_StudyPart]:
     chunks = count // (CHUNK * _FEWEST_TASKS * threads)
-    return _parts(count, CHUNK * min(max(chunks, 1), _MOST_CHUNKS))
+    return _split_parts(count, CHUNK * min(max(chunks, 1), _MOST_CHUNKS))
 
 
-def _best(problem: Problem, seed: int, keep: int, part: _Part) -> _Best:
+def _search_part(problem: Problem, seed: int, keep: int, part: _StudyPart) -> _Best:
     """Return the best candidates of a part, which may have several chunks."""
     best = None
     for first in range(part.first, part.last, CHUNK):
@@ -152,13 +152,13 @@ def _best(problem: Problem, seed: int, keep: int, part: _Part) -> _Best:
         possible = np.flatnonzero(scores < np.inf)
         chosen = possible[np.argsort(scores[possible], kind='stable')[:keep]]
         chunk_best = _Best(scores[chosen], first + chosen, candidates[chosen])
-        best = chunk_best if best is None else _merged((best, chunk_best), keep)
+        best = chunk_best if best is None else _merge_best((best, chunk_best), keep)
     if best is None:
         raise ValueError(f'{part} is empty')
     return best
 
 
-def _merged(parts: tuple[_Best, ...], keep: int) -> _Best:
+def _merge_best(parts: tuple[_Best, ...], keep: int) -> _Best:
     scores, places, candidates = (np.concatenate(each) for each in zip(*parts, strict=True))
     order = np.lexsort((places, scores))[:keep]
     return _Best(scores[order], places[order], candidates[order])

@@ -20,7 +20,7 @@ from linkage_ros.drawing.design import draw_design
 from linkage_ros.drawing.painting import OTHER, WANTED
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.shapes import INK
-from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
 import numpy as np
 import pytest
 
@@ -31,7 +31,7 @@ A, B, C = 5.5965383934988620854, 0.16985782027961906789, 4.8786334643580194266
 K = (0.17868187970650492505, -0.20497543160512679448, 1.0272224808848817759)
 EXAMPLE = Design(
     FourBar.of_lengths(A, B, C, 1.0),
-    tuple(Wanted(radians(t), radians(p)) for t, p in ((25, 30), (35, 40), (50, 60))),
+    tuple(DesignRequest(radians(t), radians(p)) for t, p in ((25, 30), (35, 40), (50, 60))),
 )
 CRANK_ROCKER = FourBar((0j, 0.1 + 0j), 0.04 + 0j, (0j, 0.12 + 0j), 0.08 + 0j, 'left', 0.06 + 0.05j)
 
@@ -48,21 +48,24 @@ def closed_left(four_bar: FourBar, crank: float) -> tuple[complex, float, float]
 
 
 def pairs(four_bar: FourBar, *cranks: float, off: float = 0.0) -> Design:
-    return Design(four_bar, tuple(Wanted(t, closed_left(four_bar, t)[2] + off) for t in cranks))
+    return Design(
+        four_bar, tuple(DesignRequest(t, closed_left(four_bar, t)[2] + off) for t in cranks)
+    )
 
 
 def path(count: int, off: complex = 0j) -> Design:
     cranks = [0.2 + 5.7 * i / (count - 1) for i in range(count)]
     return Design(
         CRANK_ROCKER,
-        tuple(Wanted(t, place=closed_left(CRANK_ROCKER, t)[0] + off) for t in cranks),
+        tuple(DesignRequest(t, place=closed_left(CRANK_ROCKER, t)[0] + off) for t in cranks),
     )
 
 
 def poses() -> Design:
     found = [(t, *closed_left(CRANK_ROCKER, t)) for t in (0.5, 1.5, 2.6)]
     return Design(
-        CRANK_ROCKER, tuple(Wanted(t, coupler=angle, place=place) for t, place, angle, _ in found)
+        CRANK_ROCKER,
+        tuple(DesignRequest(t, coupler=angle, place=place) for t, place, angle, _ in found),
     )
 
 
@@ -245,7 +248,9 @@ def test_places_that_are_missed_have_their_distances_drawn():
 
 
 def test_a_position_that_does_not_close_is_left_out_and_named():
-    design = EXAMPLE._replace(wanted=(*EXAMPLE.wanted, Wanted(radians(60.0), radians(70.0))))
+    design = EXAMPLE._replace(
+        wanted=(*EXAMPLE.wanted, DesignRequest(radians(60.0), radians(70.0)))
+    )
     found = drawn(design)
     assert 'position 4: the loop does not close' in legend(found.left)
     assert len(marks(found.right)) == 3
@@ -254,14 +259,14 @@ def test_a_position_that_does_not_close_is_left_out_and_named():
 def test_a_position_beyond_a_toggle_by_rounding_is_drawn_there():
     toggle = acos((A * A + 1.0 - (C - B) ** 2) / (2.0 * A))
     rocker = closed_left(EXAMPLE.four_bar, toggle + 1e-9)[2]
-    design = EXAMPLE._replace(wanted=(Wanted(toggle - 1e-10, rocker), *EXAMPLE.wanted[1:]))
+    design = EXAMPLE._replace(wanted=(DesignRequest(toggle - 1e-10, rocker), *EXAMPLE.wanted[1:]))
     found = drawn(design)
     assert not any('does not close' in said for said in legend(found.left))
     assert marks(found.right)[0].real == pytest.approx(degrees(toggle), abs=1e-6)
 
 
 def test_a_design_that_closes_nowhere_is_refused(tmp_path):
-    design = EXAMPLE._replace(wanted=(Wanted(radians(60.0), radians(70.0)),))
+    design = EXAMPLE._replace(wanted=(DesignRequest(radians(60.0), radians(70.0)),))
     with pytest.raises(LinkageError, match='closes at none of its positions'):
         draw_design(design, 'none', tmp_path / 'none.png')
 

@@ -11,7 +11,7 @@
 from cmath import phase, rect
 from math import pi, radians, sqrt
 
-from linkage_ros.synthesis.design import Assembly, Design, FourBar, Wanted
+from linkage_ros.synthesis.design import Assembly, Design, DesignRequest, FourBar
 
 Lengths = tuple[float, float, float, float]
 """Of crank, coupler, rocker and ground."""
@@ -60,7 +60,7 @@ def design(
     for angle, where in positions:
         direction = radians(angle)
         rocker = phase(on(where, lengths, direction) - d)
-        wanted.append(Wanted(direction + ground - alpha, rocker + ground - beta))
+        wanted.append(DesignRequest(direction + ground - alpha, rocker + ground - beta))
     return Design(four_bar, tuple(wanted))
 
 

@@ -83,5 +83,7 @@ def test_command_writes_the_best(tmp_path):
     answer = linkage(tmp_path, 'synthesize', *asked.split())
     assert answer.returncode == 0, answer.stderr
     assert '37.73° over the full turn' in answer.stdout
-    assert f'{degrees(DeadCentreTask(1.0, 10 / 9, 1.0).offset):.6g}° more' in answer.stdout
+    assert (
+        f'{degrees(DeadCentreTask(1.0, 10 / 9, 1.0).imbalance_angle):.6g}° more' in answer.stdout
+    )
     assert linkage(tmp_path, 'check', 'quick.yaml').returncode == 0

@@ -20,7 +20,7 @@ import random
 from typing import NamedTuple
 
 from linkage_ros.synthesis.defects import assess
-from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
 import numpy as np
 import pytest
 
@@ -229,7 +229,7 @@ def test_what_turns_is_named(lengths, code, turns):
 def test_what_cannot_be_assembled_is_said_first():
     """Stretched, the right angle's coupler and rocker are 5 long; at 180° A is 7 from O4."""
     four_bar = FourBar.of_lengths(*RIGHT_ANGLE)
-    found = assess(Design(four_bar, (Wanted(1.0), Wanted(pi), Wanted(2.0))))
+    found = assess(Design(four_bar, (DesignRequest(1.0), DesignRequest(pi), DesignRequest(2.0))))
     assert [defect.name for defect in found.defects] == ['open']
     assert found.defects[0].text == (
         'positions 2 and 3 cannot be assembled, the links miss each other by up to 2 m'
@@ -238,7 +238,7 @@ def test_what_cannot_be_assembled_is_said_first():
 
 
 def test_links_that_never_close_have_no_kind():
-    found = assess(Design(FourBar.of_lengths(1.0, 1.0, 1.0, 4.0), (Wanted(1.0, 2.0),)))
+    found = assess(Design(FourBar.of_lengths(1.0, 1.0, 1.0, 4.0), (DesignRequest(1.0, 2.0),)))
     assert found.kind.code == ''
     assert [defect.name for defect in found.defects] == ['open']
     assert not found.turns
@@ -488,5 +488,5 @@ def test_near_folding_flat_the_transmission_angle_keeps_its_digits(
     c = rocker + sign * delta
     expected = 2.0 * asin((delta * (10.0 + sign * delta) / (8.0 * c)) ** 0.5)
     four_bar = FourBar.of_lengths(1.0, 2.0, c, ground)
-    found = assess(Design(four_bar, (Wanted(direction),)))
+    found = assess(Design(four_bar, (DesignRequest(direction),)))
     assert found.transmission == pytest.approx(expected, rel=1e-14, abs=0.0)

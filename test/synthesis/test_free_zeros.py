@@ -296,7 +296,7 @@ def test_five_pairs_have_the_solutions_that_resultants_have():
             real = [(x.real, y.real) for x, y in reference if abs(mp.im(x)) < 1e-25]
             found = five_pairs(case.crank, case.rocker, 1.0)
             assert len(reference) == 3
-            assert found[0].among == (len(real), 3 - len(real), 0, 0)
+            assert found[0].solution_counts == (len(real), 3 - len(real), 0, 0)
             zeros = sorted((atan(x), atan(y)) for x, y in real)
             for one, zero in zip(
                 sorted((one.alpha, one.beta) for one in found), zeros, strict=True
@@ -376,9 +376,9 @@ def test_the_five_pairs_of_the_weaving_machine_have_one_linkage():
         ((x, y),) = [(x.real, y.real) for x, y in resultants(case) if abs(mp.im(x)) < 1e-25]
         assert found.alpha == pytest.approx(float(mp.atan(x)), abs=1e-11)
         assert found.beta == pytest.approx(float(mp.atan(y)), abs=1e-11)
-    assert str(found.among) == '3 solutions, 2 imaginary'
+    assert str(found.solution_counts) == '3 solutions, 2 imaginary'
     for met in prove(found.design):
-        assert met.closed
+        assert met.is_closed
         assert met.side == found.design.four_bar.side
         assert met.angle == pytest.approx(0.0, abs=1e-13)
 
@@ -463,7 +463,7 @@ def test_a_linkage_that_rounding_changes_by_a_tenth_is_counted_but_not_returned(
         for one in solve(case):
             for lost, length in zip(one.sensitivity[:3], one.lengths, strict=True):
                 assert 4.0 * U * lost < 0.1 * abs(length)
-            counted += one.among.vague
+            counted += one.solution_counts.vague
     assert counted
 
 
@@ -494,6 +494,6 @@ def test_five_pairs_of_a_slider_have_no_other_four_bar_or_two():
         phi = [t + alpha - beta - acos(k2 * cos(t + alpha) + k3) for t in theta]
         reasons.add(reason(theta, phi))
         if not reason(theta, phi):
-            assert five_pairs(theta, phi, 1.0)[0].among == (2, 0, 1, 0)
+            assert five_pairs(theta, phi, 1.0)[0].solution_counts == (2, 0, 1, 0)
     (refused,) = reasons - {''}
     assert 'with both zeros free: 3 solutions, 2 imaginary, 1 with infinite links' in refused

@@ -14,11 +14,11 @@ from hypothesis import given, strategies
 from linkage_ros.errors import SynthesisError
 from linkage_ros.synthesis.function.expression import Expression
 from linkage_ros.synthesis.function.task import (
-    chebyshev,
+    angle_pairs,
+    chebyshev_points,
     check_defined,
     FunctionTask,
     on_scale,
-    pairs,
     wanted_rocker,
 )
 from mpmath import mp
@@ -56,7 +56,7 @@ LOG = task_of(TASKS['log'][0])
 @pytest.mark.parametrize('count', range(1, 12))
 @pytest.mark.parametrize(('low', 'high'), [(1.0, 2.0), (-3.0, 5.0), (2.0, 1.0), (1e6, 1e6 + 1)])
 def test_precision_points_lie_as_the_cosines_say(low, high, count):
-    found = chebyshev(low, high, count)
+    found = chebyshev_points(low, high, count)
     with mp.workdps(30):
         middle, half = (mp.mpf(low) + high) / 2, (mp.mpf(high) - low) / 2
         expected = [
@@ -71,27 +71,29 @@ def test_precision_points_lie_as_the_cosines_say(low, high, count):
 
 def test_three_points_lie_where_every_textbook_has_them():
     by = 0.25 * sqrt(3.0)
-    assert chebyshev(1.0, 2.0, 3).tolist() == pytest.approx([1.5 - by, 1.5, 1.5 + by], rel=1e-15)
+    assert chebyshev_points(1.0, 2.0, 3).tolist() == pytest.approx(
+        [1.5 - by, 1.5, 1.5 + by], rel=1e-15
+    )
 
 
 def test_points_near_the_beginning_have_all_their_digits():
     with mp.workdps(30):
         expected = float(mp.sin(mp.pi / 4000) ** 2)
-    assert chebyshev(0.0, 1.0, 1000)[0] == pytest.approx(expected, rel=1e-15)
+    assert chebyshev_points(0.0, 1.0, 1000)[0] == pytest.approx(expected, rel=1e-15)
 
 
 def test_of_no_points_there_are_none_and_too_many_are_refused():
-    assert chebyshev(1.0, 2.0, 0).tolist() == chebyshev(1.0, 2.0, -3).tolist() == []
+    assert chebyshev_points(1.0, 2.0, 0).tolist() == chebyshev_points(1.0, 2.0, -3).tolist() == []
     with pytest.raises(SynthesisError, match=r'^points: 1001 of them; 1000 do$'):
-        chebyshev(1.0, 2.0, 1001)
+        chebyshev_points(1.0, 2.0, 1001)
 
 
 @pytest.mark.parametrize('name', TASKS)
 def test_pairs_are_those_of_50_digits(name):
     case, function = TASKS[name]
     _, (x0, x1), cranks, rockers = case
-    xs = chebyshev(x0, x1, 5)
-    crank, rocker = pairs(task_of(case), xs)
+    xs = chebyshev_points(x0, x1, 5)
+    crank, rocker = angle_pairs(task_of(case), xs)
     with mp.workdps(50):
         y0, y1 = function(mp.mpf(x0)), function(mp.mpf(x1))
         for x, theta, phi in zip(xs, crank, rocker, strict=True):
@@ -107,7 +109,7 @@ def test_pairs_are_those_of_50_digits(name):
 @pytest.mark.parametrize('name', TASKS)
 def test_ends_are_exactly_the_ends(name):
     task = task_of(TASKS[name][0])
-    crank, rocker = pairs(task, task.x_range)
+    crank, rocker = angle_pairs(task, task.x_range)
     assert tuple(crank) == task.crank_range
     assert tuple(rocker) == task.rocker_range
     assert tuple(wanted_rocker(task, task.crank_range)) == task.rocker_range
@@ -116,7 +118,7 @@ def test_ends_are_exactly_the_ends(name):
 @pytest.mark.parametrize('name', TASKS)
 def test_the_wanted_curve_runs_through_the_pairs(name):
     task = task_of(TASKS[name][0])
-    crank, rocker = pairs(task, chebyshev(*task.x_range, 9))
+    crank, rocker = angle_pairs(task, chebyshev_points(*task.x_range, 9))
     assert wanted_rocker(task, crank) == pytest.approx(rocker, abs=2e-15)
 
 
@@ -178,7 +180,7 @@ def test_an_error_along_a_rocker_that_turns_back_has_the_sign_that_it_has_for_y(
 )
 def test_points_that_are_none_are_refused(xs, message):
     with pytest.raises(SynthesisError) as caught:
-        pairs(LOG, xs)
+        angle_pairs(LOG, xs)
     assert str(caught.value) == message
 
 
@@ -251,7 +253,7 @@ def test_a_range_may_be_narrow():
 
 def test_chebyshev_points_of_the_angles_are_those_of_x():
     """An even scale takes them along."""
-    crank, _ = pairs(LOG, chebyshev(1.0, 2.0, 4))
+    crank, _ = angle_pairs(LOG, chebyshev_points(1.0, 2.0, 4))
     expected = [75.0 - 30.0 * cos((2 * j - 1) * pi / 8.0) for j in range(1, 5)]
     assert np.degrees(crank) == pytest.approx(expected, rel=1e-14)
 

@@ -212,7 +212,7 @@ def test_a_four_bar_is_found_again_from_its_poses(seed, way):
         assert abs(rect(1.0, crank) - rect(1.0, asked.crank)) <= unsure
         assert (asked.rocker, asked.coupler, asked.place) == (None, place.angle, place.place)
     for met in prove(design):
-        assert (met.side, met.closed) == (side, True)
+        assert (met.side, met.is_closed) == (side, True)
         # The coupler's sensitivity to the crank comes on top, near a toggle.
         assert abs(met.angle) < 1e4 * unsure
         assert met.distance < 1e4 * unsure
@@ -252,7 +252,7 @@ def test_a_task_with_fixed_pivots():
     there, _ = from_moving_pivots(SPECIFIED_GROUND, *design.four_bar.coupler)
     assert abs(there.four_bar.pivots[0]) < 1e-13
     assert abs(there.four_bar.pivots[1] - 4.354) < 1e-13
-    assert min(links.digits) > 14.0
+    assert min(links.reliable_digits) > 14.0
     assert all(met.distance < 1e-13 and abs(met.angle) < 1e-13 for met in prove(design))
 
 
@@ -341,5 +341,5 @@ def test_what_does_not_exist_is_told(way, poses, pivots, where, reason):
 def test_near_a_line_the_digits_that_are_left_are_told():
     nearly = [ON_A_LINE[0], ON_A_LINE[1], pose(2, 3 + 1e-7, -30)]
     _, links = from_moving_pivots(nearly, 0j, 1j)
-    assert 6.0 < links.digits[0] < 9.0
-    assert links.digits[1] > 13.0
+    assert 6.0 < links.reliable_digits[0] < 9.0
+    assert links.reliable_digits[1] > 13.0

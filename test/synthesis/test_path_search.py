@@ -17,15 +17,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.synthesis.path.curves import (
     Aim,
-    along,
-    closes,
     COLUMNS,
-    folds,
-    resampled,
-    slopes,
+    curve_distances,
+    point_slopes,
+    resample,
+    stay_closed,
     theta_at,
+    transmission_cotangents,
 )
-from linkage_ros.synthesis.path.generate import allowed, improve
+from linkage_ros.synthesis.path.generate import are_allowed, improve
 from linkage_ros.synthesis.path.search import problem_of
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def drawn(aim: Aim, closed: bool) -> tuple[Any, np.ndarray[Any, Any], np.ndarray
 def test_a_start_is_what_its_score_says_and_closes(aim, closed):
     problem, candidates, scores = drawn(aim, closed)
     starts = problem.starts(candidates)
-    assert allowed(starts, aim).all()
+    assert are_allowed(starts, aim).all()
     for row, angles, side, score in zip(*starts, scores, strict=True):
         a, b, c, d = (float(value) for value in np.exp(row[3:7]))
         squares = 0.0
@@ -108,7 +108,7 @@ def test_what_would_need_links_outside_of_the_box_has_no_score():
     aim = Aim(POINTS, TIMING, True, True, 0.2, 1.5)
     problem = problem_of(aim, True)
     candidates = problem.sample(np.random.default_rng(7), COUNT)
-    lengths = np.exp(problem.starts(candidates).rows[:, 3:7])
+    lengths = np.exp(problem.place_candidates(candidates).rows[:, 3:7])
     outside = (lengths.min(1) < 0.2) | (lengths.max(1) > 1.5)
     assert outside.any()
     assert (problem.score(candidates)[outside] == inf).all()
@@ -128,7 +128,7 @@ def test_a_problem_goes_to_another_process_and_scores_the_same(aim, closed):
 def test_steps_keep_what_was_asked_for(aim, closed, guard):
     problem, candidates, scores = drawn(aim, closed)
     fitted, squares = improve(problem.starts(candidates), aim, 20, guard)
-    assert allowed(fitted, aim).all()
+    assert are_allowed(fitted, aim).all()
     assert np.exp(fitted.rows[:, 3:7]).min() > aim.shortest * (1.0 - 1e-9)
     assert np.exp(fitted.rows[:, 3:7]).max() < aim.longest * (1.0 + 1e-9)
     if not guard:
@@ -167,7 +167,7 @@ def test_the_traced_point_is_where_circles_put_it(lengths, direction, side, grou
     place = (near + point * (far - near) / lengths[1]) * rect(1.0, ground) + (2.0 + 3.0j)
     rows = row(lengths, 2.0 + 3.0j, ground, point)
     sign = np.array([1.0 if side == 'left' else -1.0])
-    assert abs(slopes(rows, np.array([[direction]]), sign).places[0, 0] - place) < 1e-9
+    assert abs(point_slopes(rows, np.array([[direction]]), sign).places[0, 0] - place) < 1e-9
 
 
 GENERATOR = np.random.default_rng(5)
@@ -189,20 +189,20 @@ STEP = 1e-6
 def test_derivatives_by_dimensions_are_those_of_differences(column):
     aside = np.zeros(len(COLUMNS))
     aside[column] = STEP
-    places = [slopes(ROWS + sign * aside, ANGLES, SIDE).places for sign in (1.0, -1.0)]
-    folded = [folds(ROWS + sign * aside, ANGLES)[0] for sign in (1.0, -1.0)]
-    by_place = slopes(ROWS, ANGLES, SIDE).by_dimension[..., column]
-    by_fold = folds(ROWS, ANGLES)[1][..., column]
+    places = [point_slopes(ROWS + sign * aside, ANGLES, SIDE).places for sign in (1.0, -1.0)]
+    folded = [transmission_cotangents(ROWS + sign * aside, ANGLES)[0] for sign in (1.0, -1.0)]
+    by_place = point_slopes(ROWS, ANGLES, SIDE).by_dimension[..., column]
+    by_fold = transmission_cotangents(ROWS, ANGLES)[1][..., column]
     assert np.abs((places[0] - places[1]) / (2.0 * STEP) - by_place).max() < 1e-8
     assert np.abs((folded[0] - folded[1]) / (2.0 * STEP) - by_fold).max() < 1e-8
 
 
 def test_derivatives_by_the_crank_are_those_of_differences():
-    places = [slopes(ROWS, ANGLES + by, SIDE).places for by in (STEP, -STEP)]
-    folded = [folds(ROWS, ANGLES + by)[0] for by in (STEP, -STEP)]
-    by_place = slopes(ROWS, ANGLES, SIDE).by_angle
+    places = [point_slopes(ROWS, ANGLES + by, SIDE).places for by in (STEP, -STEP)]
+    folded = [transmission_cotangents(ROWS, ANGLES + by)[0] for by in (STEP, -STEP)]
+    by_place = point_slopes(ROWS, ANGLES, SIDE).by_angle
     assert np.abs((places[0] - places[1]) / (2.0 * STEP) - by_place).max() < 1e-8
-    by_fold = folds(ROWS, ANGLES)[2]
+    by_fold = transmission_cotangents(ROWS, ANGLES)[2]
     assert np.abs((folded[0] - folded[1]) / (2.0 * STEP) - by_fold).max() < 1e-8
 
 
@@ -211,13 +211,15 @@ def test_a_fold_is_told_by_the_transmission_angle(lengths, direction):
     assume(pins(lengths, direction) is not None)
     acute = transmission(lengths, direction)
     assume(acute > 0.01)
-    folded = folds(row(lengths, 0j, 0.0, 0j), np.array([[direction]]))[0]
+    folded = transmission_cotangents(row(lengths, 0j, 0.0, 0j), np.array([[direction]]))[0]
     assert abs(folded[0, 0]) == pytest.approx(1.0 / tan(acute), rel=1e-6, abs=1e-9)
 
 
 @given(lengths_of_any, angle, st.floats(0.0, 6.2))
 def test_a_linkage_closes_if_it_does_at_every_angle_on_the_way(lengths, low, travel):
-    closed = bool(closes(row(lengths, 0j, 0.0, 0j), np.array([low]), np.array([low + travel]))[0])
+    closed = bool(
+        stay_closed(row(lengths, 0j, 0.0, 0j), np.array([low]), np.array([low + travel]))[0]
+    )
     # The ground line's directions are where the diagonal is shortest and longest.
     turns = [i * pi for i in range(-10, 10) if low <= i * pi <= low + travel]
     found = [pins(lengths, at) for at in (*np.linspace(low, low + travel, 9), *turns)]
@@ -230,10 +232,10 @@ def test_a_linkage_closes_if_it_does_at_every_angle_on_the_way(lengths, low, tra
 
 def test_places_along_a_curve_are_found_by_the_length_of_its_chords():
     curves = np.array([[0j, 3.0, 3.0 + 1.0j], [0j, 1.0j, 4.0j]])
-    way = along(curves)
+    way = curve_distances(curves)
     assert way == pytest.approx(np.array([[0.0, 0.75, 1.0], [0.0, 0.25, 1.0]]))
     wanted = np.array([0.0, 0.25, 0.5, 1.0])
     places = np.array([[0j, 1.0, 2.0, 3.0 + 1.0j], [0j, 1.0j, 2.0j, 4.0j]])
-    assert resampled(curves, way, wanted) == pytest.approx(places)
+    assert resample(curves, way, wanted) == pytest.approx(places)
     steps = np.array([[0.0, 1 / 6, 1 / 3, 1.0], [0.0, 0.5, 2 / 3, 1.0]])
     assert theta_at(way, wanted) == pytest.approx(steps)

@@ -15,9 +15,15 @@ import random
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.status import Status
-from linkage_ros.synthesis.defects import assess, distance, distances, misses, Needs
-from linkage_ros.synthesis.design import Design, FourBar, Wanted
-from linkage_ros.synthesis.proof import assembled, proofs, prove
+from linkage_ros.synthesis.defects import (
+    assess,
+    Needs,
+    needs_penalties,
+    needs_penalty,
+    unmet_needs,
+)
+from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
+from linkage_ros.synthesis.proof import assemble, prove, prove_both_sides
 from mpmath import mp, mpf
 import numpy as np
 import pytest
@@ -30,7 +36,7 @@ from .by_hand import design, Lengths, on, transmission
 # sources/003, exactly: 25° → 30°, 35° → 40°, 50° → 60°.
 THREE_PAIRS = Design(
     FourBar.of_lengths(5.5965383934988620854, 0.16985782027961906789, 4.8786334643580194266, 1.0),
-    tuple(Wanted(radians(t), radians(p)) for t, p in ((25, 30), (35, 40), (50, 60))),
+    tuple(DesignRequest(radians(t), radians(p)) for t, p in ((25, 30), (35, 40), (50, 60))),
 )
 
 CRANK_ROCKER = (2.0, 7.0, 9.0, 6.0)
@@ -73,7 +79,7 @@ def test_an_error_is_what_the_linkage_has_over_what_was_asked():
 
 def test_whole_turns_make_no_error():
     exact = design(CRANK_ROCKER, [(40.0, 'left')])
-    turned = Wanted(exact.wanted[0].crank - 4 * pi, exact.wanted[0].rocker + 6 * pi)
+    turned = DesignRequest(exact.wanted[0].crank - 4 * pi, exact.wanted[0].rocker + 6 * pi)
     (met,) = prove(exact._replace(wanted=(turned,)))
     assert met.angle == pytest.approx(0.0, abs=1e-14)
 
@@ -88,7 +94,7 @@ def test_coupler_angles_and_places_are_proved():
         pin = rect(a, radians(angle))
         along = (on('right', CRANK_ROCKER, radians(angle)) - pin) / b
         place = pin + (3 + 0j) * along / tilt
-        wanted.append(Wanted(radians(angle), None, phase(along / tilt), place))
+        wanted.append(DesignRequest(radians(angle), None, phase(along / tilt), place))
     met = prove(Design(four_bar, tuple(wanted)))
     assert [one.side for one in met] == ['right', 'right']
     assert all(abs(one.angle) < 1e-14 and one.distance < 1e-14 for one in met)
@@ -101,7 +107,7 @@ def test_coupler_angles_and_places_are_proved():
 def test_the_worse_of_rocker_and_coupler_is_told():
     exact = design(CRANK_ROCKER, [(40.0, 'left')]).wanted[0]
     coupler = phase(on('left', CRANK_ROCKER, exact.crank) - rect(2.0, exact.crank))
-    asked = Wanted(exact.crank, exact.rocker + 0.01, coupler - 0.02)
+    asked = DesignRequest(exact.crank, exact.rocker + 0.01, coupler - 0.02)
     (met,) = prove(Design(FourBar.of_lengths(*CRANK_ROCKER), (asked,)))
     assert met.angle == pytest.approx(0.02)
 
@@ -109,8 +115,8 @@ def test_the_worse_of_rocker_and_coupler_is_told():
 def test_a_position_that_cannot_be_assembled_is_open_by_a_gap():
     """With the crank outwards A is 9 m from O4, and the links reach 3."""
     four_bar = FourBar.of_lengths(4.0, 2.0, 1.0, 5.0)
-    (met,) = prove(Design(four_bar, (Wanted(pi, 0.0),)))
-    assert not met.closed
+    (met,) = prove(Design(four_bar, (DesignRequest(pi, 0.0),)))
+    assert not met.is_closed
     assert met.status is Status.OPEN
     assert met.gap == pytest.approx(6.0)
 
@@ -121,22 +127,24 @@ def test_a_position_at_a_toggle_is_met_whatever_rounding_does_to_it(off):
     four_bar = FourBar.of_lengths(3.0, 2.0 - off, 3.0, 4.0)
     for side in ('left', 'right'):
         own = replace(four_bar, side=side)
-        (met,) = prove(Design(own, (Wanted(0.5 * pi, phase(3j - 4)),)))
-        assert met.closed
+        (met,) = prove(Design(own, (DesignRequest(0.5 * pi, phase(3j - 4)),)))
+        assert met.is_closed
         assert met.side == side, 'both assemblies are here'
         assert abs(met.angle) < 1e-6
 
 
 def test_beyond_a_toggle_by_more_than_rounding_it_is_open():
     four_bar = FourBar.of_lengths(3.0, 2.0 - 1e-6, 3.0, 4.0)
-    (met,) = prove(Design(four_bar, (Wanted(0.5 * pi, phase(3j - 4)),)))
+    (met,) = prove(Design(four_bar, (DesignRequest(0.5 * pi, phase(3j - 4)),)))
     assert met.status is Status.OPEN
 
 
 def test_where_nothing_but_the_crank_is_asked_for_the_own_assembly_does():
     for side in ('left', 'right'):
         four_bar = FourBar.of_lengths(*CRANK_ROCKER, side=side)
-        assert [one.side for one in prove(Design(four_bar, (Wanted(1.0), Wanted(2.0))))] == [
+        assert [
+            one.side for one in prove(Design(four_bar, (DesignRequest(1.0), DesignRequest(2.0))))
+        ] == [
             side,
             side,
         ]
@@ -150,7 +158,7 @@ def test_a_place_that_both_assemblies_reach_is_met_on_the_own_one():
     right = pin + beside * (on('right', lengths, direction) - pin) / 7.0
     for side in ('left', 'right'):
         four_bar = FourBar((0j, 6 + 0j), 2 + 0j, (0j, 7 + 0j), 9 + 0j, side, beside + 0j)
-        (met,) = prove(Design(four_bar, (Wanted(direction, place=right),)))
+        (met,) = prove(Design(four_bar, (DesignRequest(direction, place=right),)))
         assert met.side == side
         assert met.distance < 2.0 * beside
 
@@ -168,15 +176,15 @@ def test_a_place_that_both_assemblies_reach_is_met_on_the_own_one():
 @pytest.mark.parametrize('given', ['left', 'right'])
 def test_a_design_is_put_on_the_assembly_that_meets_most(sides, best, given):
     angles = (40.0, 100.0, 250.0)
-    found = assembled(design(CRANK_ROCKER, list(zip(angles, sides)), side=given))  # noqa: B905
+    found = assemble(design(CRANK_ROCKER, list(zip(angles, sides)), side=given))  # noqa: B905
     assert found.four_bar.side == best
 
 
 def test_a_position_at_a_toggle_has_no_vote():
     lengths = (3.0, 2.0, 3.0, 4.0)
-    toggle = Wanted(0.5 * pi, phase(3j - 4))
+    toggle = DesignRequest(0.5 * pi, phase(3j - 4))
     elsewhere = design(lengths, [(50.0, 'right')])
-    found = assembled(elsewhere._replace(wanted=(toggle, *elsewhere.wanted)))
+    found = assemble(elsewhere._replace(wanted=(toggle, *elsewhere.wanted)))
     assert found.four_bar.side == 'right'
     assert [one.side for one in prove(found)] == ['right', 'right']
 
@@ -187,7 +195,7 @@ def test_of_a_design_that_only_comes_near_small_errors_do_not_name_the_assembly(
     left, right = (phase(on(side, lengths, radians(89.99)) - 4.0) for side in ('left', 'right'))
     middle = 0.5 * (left + right) + 0.1 * (right - left)
     four_bar = FourBar.of_lengths(*lengths)
-    (met,) = prove(Design(four_bar, (Wanted(radians(89.99), middle),)))
+    (met,) = prove(Design(four_bar, (DesignRequest(radians(89.99), middle),)))
     assert abs(right - middle) < abs(left - middle) < 2.0 * abs(right - middle)
     assert met.side == 'left'
 
@@ -207,8 +215,8 @@ def test_random_designs_in_odd_frames_are_met_where_they_were_made():
         (met,) = prove(made)
         assert met.side == side
         assert abs(met.angle) < 1e-12
-        assert assembled(made).four_bar.side == side
-        left, right = proofs(made)
+        assert assemble(made).four_bar.side == side
+        left, right = prove_both_sides(made)
         assert max(abs(left[0].angle), abs(right[0].angle)) > 1e-3, 'only one can be right'
 
 
@@ -261,11 +269,11 @@ def test_a_word_stands_for_kinds_of_four_bars(word, name):
     needs = Needs(word)
     needs.check()
     if name in WORDS[word]:
-        assert misses(found, needs) == ()
-        assert distance(found, needs) == 0.0
+        assert unmet_needs(found, needs) == ()
+        assert needs_penalty(found, needs) == 0.0
     else:
-        assert misses(found, needs) == (f'a {found.kind.name}, no {word}',)
-        assert distance(found, needs) == 1.0
+        assert unmet_needs(found, needs) == (f'a {found.kind.name}, no {word}',)
+        assert needs_penalty(found, needs) == 1.0
 
 
 @pytest.mark.parametrize(
@@ -291,41 +299,41 @@ def test_an_unknown_word_is_refused(word, remedy):
 def test_misses_say_what_was_found_and_what_was_wanted():
     """At 60° on a ground of 6, s² = 28: cos μ = (49 + 81 − 28)/126, so that μ = 35.95°."""
     found = assess(design((2.0, 7.0, 9.0, 6.0), [(60.0, 'left')]))
-    assert misses(found, Needs('double-crank', radians(40.0), 4.0)) == (
+    assert unmet_needs(found, Needs('double-crank', radians(40.0), 4.0)) == (
         'a crank-rocker, no double-crank',
         'a transmission angle of 35.95°, not 40°',
         'a link ratio of 4.5, not 4',
     )
-    assert misses(found, Needs('crank-rocker', radians(35.0), 4.6)) == ()
-    assert misses(found, Needs()) == ()
+    assert unmet_needs(found, Needs('crank-rocker', radians(35.0), 4.6)) == ()
+    assert unmet_needs(found, Needs()) == ()
 
 
 def test_the_distance_grows_with_what_is_missing():
     found = assess(design((2.0, 7.0, 9.0, 6.0), [(60.0, 'left')]))
     angle = found.transmission
-    assert distance(found, Needs(transmission=2.0 * angle)) == pytest.approx(0.5)
-    assert distance(found, Needs(link_ratio=3.0)) == pytest.approx(log(1.5))
-    assert distance(found, Needs(transmission=2.0 * angle, link_ratio=3.0)) == pytest.approx(
+    assert needs_penalty(found, Needs(transmission=2.0 * angle)) == pytest.approx(0.5)
+    assert needs_penalty(found, Needs(link_ratio=3.0)) == pytest.approx(log(1.5))
+    assert needs_penalty(found, Needs(transmission=2.0 * angle, link_ratio=3.0)) == pytest.approx(
         0.5 + log(1.5)
     )
-    by_wish = [distance(found, Needs(transmission=radians(t))) for t in (30, 40, 50, 90)]
+    by_wish = [needs_penalty(found, Needs(transmission=radians(t))) for t in (30, 40, 50, 90)]
     assert by_wish == sorted(by_wish)
     assert by_wish[0] == 0.0 < by_wish[1]
 
 
 def test_a_defect_is_farther_than_any_number():
     found = assess(THREE_PAIRS)
-    assert misses(found, Needs(usable=True)) == ('branch defect',)
-    assert misses(found, Needs(usable=False)) == ()
+    assert unmet_needs(found, Needs(usable=True)) == ('branch defect',)
+    assert unmet_needs(found, Needs(usable=False)) == ()
     sound = assess(design((2.0, 7.0, 9.0, 6.0), [(60.0, 'left')]))
     wishes = Needs('non-grashof', radians(90.0), 1.0, usable=True)
-    assert distance(found, wishes._replace(link_ratio=inf)) > distance(sound, wishes)
+    assert needs_penalty(found, wishes._replace(link_ratio=inf)) > needs_penalty(sound, wishes)
 
 
 def test_links_that_never_close_are_of_no_kind():
-    found = assess(Design(FourBar.of_lengths(1.0, 1.0, 1.0, 4.0), (Wanted(1.0, 2.0),)))
+    found = assess(Design(FourBar.of_lengths(1.0, 1.0, 1.0, 4.0), (DesignRequest(1.0, 2.0),)))
     for word in WORDS:
-        assert misses(found, Needs(word)) == (f'a {found.kind.name}, no {word}',)
+        assert unmet_needs(found, Needs(word)) == (f'a {found.kind.name}, no {word}',)
 
 
 def test_many_at_once_are_as_far_as_each_alone():
@@ -345,8 +353,8 @@ def test_many_at_once_are_as_far_as_each_alone():
     assert not any(one.defects for one in found)
     for word in ('', *WORDS):
         needs = Needs(word, radians(rng.uniform(10.0, 80.0)), rng.uniform(1.5, 3.0))
-        together = distances(np.array(lengths), np.array(angles), needs)
-        assert together == pytest.approx([distance(one, needs) for one in found], abs=1e-9)
+        together = needs_penalties(np.array(lengths), np.array(angles), needs)
+        assert together == pytest.approx([needs_penalty(one, needs) for one in found], abs=1e-9)
 
 
 def _closes(lengths: Lengths, angle: float) -> bool:

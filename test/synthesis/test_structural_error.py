@@ -16,21 +16,21 @@ from math import acos, isnan, pi, radians, remainder, sqrt, tau
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.design import Assembly, Design, FourBar, Wanted
+from linkage_ros.synthesis.design import Assembly, Design, DesignRequest, FourBar
 from linkage_ros.synthesis.function.task import (
-    chebyshev,
+    angle_pairs,
+    chebyshev_points,
     FunctionTask,
-    pairs,
     structural_error,
     wanted_rocker,
 )
 from linkage_ros.synthesis.pairs.angle_fit import (
     fit_angles,
-    nearest,
+    nearest_four_bar,
     rocker_errors,
     root_mean_square,
 )
-from linkage_ros.synthesis.pairs.freudenstein import exact, fit_equation
+from linkage_ros.synthesis.pairs.freudenstein import exact_four_bar, fit_equation
 from linkage_ros.synthesis.proof import closure_of
 from mpmath import mp
 import numpy as np
@@ -67,7 +67,9 @@ class Generated:
         self.xs = [mp.mpf(x) for x in task.x_range]
         self.cranks = [mp.mpf(angle) for angle in task.crank_range]
         self.rockers = [mp.mpf(angle) for angle in task.rocker_range]
-        points = [mp.mpf(angle) for angle in pairs(task, chebyshev(*task.x_range, 3))[0]]
+        points = [
+            mp.mpf(angle) for angle in angle_pairs(task, chebyshev_points(*task.x_range, 3))[0]
+        ]
         wanted = [self.wanted(theta) for theta in points]
         rows = [[mp.cos(phi), mp.cos(theta), 1] for theta, phi in zip(points, wanted, strict=True)]
         right = [mp.cos(theta - phi) for theta, phi in zip(points, wanted, strict=True)]
@@ -99,7 +101,7 @@ class Generated:
 
 def designed(name: str) -> tuple[FunctionTask, Design, Callable[[np.ndarray], np.ndarray]]:
     task = task_of(TASKS[name][0])
-    design, _ = exact(*pairs(task, chebyshev(*task.x_range, 3)), 1.0)
+    design, _ = exact_four_bar(*angle_pairs(task, chebyshev_points(*task.x_range, 3)), 1.0)
     return task, design, lambda crank: wanted_rocker(task, crank)
 
 
@@ -121,7 +123,9 @@ def test_the_error_of_a_function_generator_is_that_of_40_digits(name):
     assert (found.crank[0], found.crank[-1]) == task.crank_range
     for angle, error in list(zip(found.crank, found.error, strict=True))[::9]:
         assert error == pytest.approx(float(reference.error(mp.mpf(float(angle)))), abs=2e-14)
-    assert found.greatest == pytest.approx(float(reference.error(mp.mpf(found.at))), abs=2e-14)
+    assert found.greatest == pytest.approx(
+        float(reference.error(mp.mpf(found.greatest_at))), abs=2e-14
+    )
     # Nowhere on a grid of its own is it greater.
     c0, c1 = reference.cranks
     grid = [abs(reference.error(c0 + (c1 - c0) * i / 300)) for i in range(301)]
@@ -154,7 +158,7 @@ def test_a_known_error_is_found_with_its_summit_and_mean(amplitude, side, direct
     ends = (0.2, 0.2 + tau)[::direction]
     found = structural_error(four_bar(CRANK_ROCKER, side), wanted, *ends)
     assert abs(found.greatest) == pytest.approx(amplitude, abs=1e-14)
-    wave = 3.0 * (found.at - 0.2)
+    wave = 3.0 * (found.greatest_at - 0.2)
     assert abs(np.sin(wave)) == pytest.approx(1.0, abs=1e-14 / amplitude + 1e-14)
     assert np.sign(found.greatest) == np.sign(np.sin(wave))
     assert found.rms == pytest.approx(amplitude / sqrt(2.0), rel=1e-4)
@@ -175,7 +179,7 @@ def test_of_nearly_equal_summits_the_highest_is_told():
     )
     dense = np.linspace(0.0, 6.0, 1_000_001)
     heights = np.abs(wave(dense))
-    assert found.at == pytest.approx(dense[np.argmax(heights)], abs=1e-4)
+    assert found.greatest_at == pytest.approx(dense[np.argmax(heights)], abs=1e-4)
     assert abs(found.greatest) == pytest.approx(np.max(heights), abs=1e-10)
 
 
@@ -240,7 +244,7 @@ def test_the_greatest_is_looked_for_where_the_loop_closes():
         radians(120.0),
     )
     stretched = phase(3j - 4.0)
-    assert found.at == pytest.approx(radians(90.0), abs=1e-8)
+    assert found.greatest_at == pytest.approx(radians(90.0), abs=1e-8)
     assert found.greatest == pytest.approx(stretched - start, abs=1e-4)
     assert abs(found.greatest) > 0.3
 
@@ -305,7 +309,7 @@ def sampled(four_bar: FourBar, crank: list[float]) -> Design | None:
     rocker = [rocker_angle(four_bar, theta) for theta in crank]
     if None in rocker:
         return None
-    return Design(four_bar, tuple(Wanted(t, p) for t, p in zip(crank, rocker, strict=True)))
+    return Design(four_bar, tuple(DesignRequest(t, p) for t, p in zip(crank, rocker, strict=True)))
 
 
 def with_noise(design: Design, noise: np.ndarray) -> Design:
@@ -429,7 +433,7 @@ def test_no_linkage_comes_nearer_than_the_nearest(number):
         )
     )
     crank, rocker = ([getattr(one, link) for one in noisy.wanted] for link in ('crank', 'rocker'))
-    found = nearest(crank, rocker, 1.0)
+    found = nearest_four_bar(crank, rocker, 1.0)
     assert root_mean_square(found) <= root_mean_square(noisy)
     from_equation = fit_angles(fit_equation(crank, rocker, 1.0))
     assert root_mean_square(found) <= root_mean_square(from_equation) * (1.0 + 1e-9)
@@ -477,7 +481,7 @@ def test_errors_are_what_the_node_will_make(size, reversed_links, side, zeros, t
     assume(all(abs(1 + x * a + y * b + x * y * c) > 1e-6 for x in (-1, 1) for y in (-1, 1)))
     assume(all(abs(1 + x * a + y * b - x * y * c) > 1e-6 for x in (-1, 1) for y in (-1, 1)))
     rocker = rocker_angle(four_bar, theta)
-    angle, gap = rocker_errors(Design(four_bar, (Wanted(theta, 0.0),)))
+    angle, gap = rocker_errors(Design(four_bar, (DesignRequest(theta, 0.0),)))
     assert (rocker is None) == (max(ends) > 0.0)
     assert gap == pytest.approx(max(*ends, 0.0) / abs(c))
     if rocker is not None:
@@ -494,6 +498,6 @@ def test_three_pairs_leave_nothing_to_fit():
 
 def test_a_position_without_a_rocker_angle_is_named():
     design = fit_equation(*WEAVING)
-    wanted = (*design.wanted[:4], Wanted(1.0, place=1j))
+    wanted = (*design.wanted[:4], DesignRequest(1.0, place=1j))
     with pytest.raises(SynthesisError, match=r'^position 5: asks for no rocker angle'):
         fit_angles(design._replace(wanted=wanted))

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import sys
 import tracemalloc
 
-from linkage_ros.dask_workers import distributed
+from linkage_ros.dask_workers import import_distributed
 from linkage_ros.errors import LinkageError
-from linkage_ros.synthesis.study import CHUNK, Found, scipy_optimize, search
+from linkage_ros.synthesis.study import CHUNK, DesignFound, scipy_optimize, search
 import numpy as np
 import pytest
 
@@ -56,7 +56,7 @@ def every_candidate(problem, seed, count):
         )
         if score < np.inf
     ]
-    return [Found(score, candidate) for score, _, _, candidate in sorted(found)]
+    return [DesignFound(score, candidate) for score, _, _, candidate in sorted(found)]
 
 
 @pytest.mark.parametrize('count', [0, 1, CHUNK - 1, CHUNK, CHUNK + 1, CAST])
@@ -140,7 +140,7 @@ def test_any_number_of_workers_finds_the_same():
 
 @pytest.mark.parametrize(
     ('library', 'asked', 'extra'),
-    [('scipy', scipy_optimize, 'design'), ('distributed', distributed, 'dask')],
+    [('scipy', scipy_optimize, 'design'), ('distributed', import_distributed, 'dask')],
 )
 def test_what_is_missing_is_told_with_what_installs_it(library, asked, extra, monkeypatch):
     # None stands for a module that is not there.

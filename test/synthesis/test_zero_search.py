@@ -13,11 +13,11 @@ from math import degrees, hypot, inf, isfinite, pi, radians, remainder
 import pickle
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.defects import assess, Assessment, distance, misses, Needs
-from linkage_ros.synthesis.design import Design, FourBar, Wanted
-from linkage_ros.synthesis.pairs.freudenstein import exact
+from linkage_ros.synthesis.defects import assess, Assessment, Needs, needs_penalty, unmet_needs
+from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
+from linkage_ros.synthesis.pairs.freudenstein import exact_four_bar
 from linkage_ros.synthesis.pairs.zero_search import search_zeros, ZeroProblem
-from linkage_ros.synthesis.proof import assembled
+from linkage_ros.synthesis.proof import assemble
 import numpy as np
 import pytest
 
@@ -49,14 +49,14 @@ def of_zeros(pairs: str, alpha: float, beta: float) -> Design | None:
     """Return the design of the turned pairs, by the solver of a single one, turned back."""
     crank, rocker = PAIRS[pairs]
     try:
-        turned, _ = exact([t + alpha for t in crank], [p + beta for p in rocker], 1.0)
+        turned, _ = exact_four_bar([t + alpha for t in crank], [p + beta for p in rocker], 1.0)
     except SynthesisError:
         return None
     bar = turned.four_bar
     _, b = bar.coupler
     back = FourBar.of_lengths(bar.crank.real, b.real, bar.rocker.real, 1.0, alpha, beta)
-    wanted = tuple(Wanted(t, p) for t, p in zip(crank, rocker, strict=True))
-    return assembled(Design(back, wanted))
+    wanted = tuple(DesignRequest(t, p) for t, p in zip(crank, rocker, strict=True))
+    return assemble(Design(back, wanted))
 
 
 def near_a_limit(found: Assessment) -> bool:
@@ -81,7 +81,7 @@ def test_scores_of_many_are_those_of_each_alone(pairs):
         if found.defects:
             assert score == inf, (zeros, found.defects)
         else:
-            missed = distance(found, needs)
+            missed = needs_penalty(found, needs)
             expected = 90.0 - degrees(found.transmission) + 90.0 * (missed + (missed > 0.0))
             assert score == pytest.approx(expected, abs=1e-6)
     assert len(seen) > 200
@@ -94,7 +94,9 @@ def test_what_is_found_meets_its_pairs_and_has_no_defect(pairs):
     assert found
     for design in found:
         crank, rocker = PAIRS[pairs]
-        assert design.wanted == tuple(Wanted(t, p) for t, p in zip(crank, rocker, strict=True))
+        assert design.wanted == tuple(
+            DesignRequest(t, p) for t, p in zip(crank, rocker, strict=True)
+        )
         assert design.four_bar.lengths[3] == 2.0
         result = assess(design)
         assert not result.defects
@@ -134,16 +136,16 @@ def test_a_place_that_is_best_is_followed():
 def test_what_is_needed_is_found():
     needs = Needs('double-crank', radians(40.0), 3.0)
     for design in found_for(needs):
-        assert misses(assess(design), needs) == ()
+        assert unmet_needs(assess(design), needs) == ()
 
 
 def test_where_nothing_has_what_is_needed_the_nearest_come():
     """No drag link of these pairs has a transmission angle of 60°."""
     needs = Needs('double-crank', radians(60.0))
     found = [assess(design) for design in found_for(needs)]
-    assert all(misses(one, needs) for one in found)
+    assert all(unmet_needs(one, needs) for one in found)
     assert found[0].kind.code == 'GCCC'
-    distances = [distance(one, needs) for one in found]
+    distances = [needs_penalty(one, needs) for one in found]
     assert distances == sorted(distances)
 
 

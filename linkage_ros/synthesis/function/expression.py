@@ -118,7 +118,7 @@ class Expression:
 
     def __post_init__(self) -> None:
         formula = ast.parse(_as_python(self.text), mode='eval')
-        object.__setattr__(self, '_steps', tuple(_steps(formula.body)))
+        object.__setattr__(self, '_steps', tuple(_evaluation_steps(formula.body)))
 
     @overload
     def __call__(self, x: float) -> float: ...
@@ -162,7 +162,7 @@ class _Token(NamedTuple):
     at: int
 
 
-def _steps(node: ast.expr) -> Iterator[_Step]:
+def _evaluation_steps(node: ast.expr) -> Iterator[_Step]:
     """Yield values, then the operations on them, in the order of evaluation."""
     match node:
         case ast.Constant():
@@ -170,27 +170,27 @@ def _steps(node: ast.expr) -> Iterator[_Step]:
         case ast.Name():
             yield CONSTANTS.get(node.id)
         case ast.Call():
-            yield from _steps(node.args[0])
+            yield from _evaluation_steps(node.args[0])
             yield FUNCTIONS[cast('ast.Name', node.func).id]
         case ast.UnaryOp():
-            yield from _steps(node.operand)
+            yield from _evaluation_steps(node.operand)
             if isinstance(node.op, ast.USub):
                 yield np.negative
         case ast.BinOp():
-            yield from _steps(node.left)
-            yield from _steps(node.right)
+            yield from _evaluation_steps(node.left)
+            yield from _evaluation_steps(node.right)
             yield _OPERATORS[type(node.op)]
 
 
 def _as_python(text: str) -> str:
     """Return a formula in Python syntax; refuse a text that is not a formula."""
     if len(text) > _LONGEST:
-        raise _error(
+        raise _formula_error(
             text, f'is {len(text)} characters long', f'keep it within {_LONGEST} characters'
         )
-    tokens = list(_tokens(text))
+    tokens = list(_split_tokens(text))
     if not tokens:
-        raise _error(text, 'is empty', 'write a formula of x, such as log10(x)')
+        raise _formula_error(text, 'is empty', 'write a formula of x, such as log10(x)')
     opened: list[_Token] = []
     depths = [1]  # of each open parenthesis: how many signs and powers the next value is within
     has_value = False
@@ -199,19 +199,19 @@ def _as_python(text: str) -> str:
         if has_value:
             if token.text == ')':
                 if not opened:
-                    raise _wrong(
+                    raise _token_error(
                         text, token, 'closes nothing', "leave it out, or write '(' before"
                     )
                 opened.pop()
                 depths.pop()
             elif token.kind != 'operator' or token.text == '(':
                 reason = f'follows {quoted(before.text)} with nothing between'
-                raise _wrong(text, token, reason, 'write * between the two')
+                raise _token_error(text, token, reason, 'write * between the two')
             else:
                 has_value = False
                 depths[-1] = depths[-1] + 1 if token.text in ('^', '**') else 1
         elif sum(depths) > _DEEPEST:
-            raise _wrong(
+            raise _token_error(
                 text, token, f'is more than {_DEEPEST} levels deep', 'write it with fewer'
             )
         elif token.text == '(':
@@ -223,22 +223,22 @@ def _as_python(text: str) -> str:
             after = tokens[number + 1] if number + 1 < len(tokens) else None
             has_value = _is_value(text, token, after)
     if not has_value:
-        raise _wrong(text, tokens[-1], 'has nothing after it', 'write what it applies to')
+        raise _token_error(text, tokens[-1], 'has nothing after it', 'write what it applies to')
     if opened:
-        raise _wrong(text, opened[-1], 'is not closed', "write ')' where it ends")
+        raise _token_error(text, opened[-1], 'is not closed', "write ')' where it ends")
     return ' '.join(
         repr(float(token.text)) if token.kind == 'number' else token.text.replace('^', '**')
         for token in tokens
     )
 
 
-def _tokens(text: str) -> Iterator[_Token]:
+def _split_tokens(text: str) -> Iterator[_Token]:
     at = len(text) - len(text.lstrip(_SPACES))
     while at < len(text):
         match = _TOKEN.match(text, at)
         if match is None:
             meant = _MEANT.get(text[at])
-            raise _wrong(
+            raise _token_error(
                 text,
                 _Token('', text[at], at),
                 'has no meaning in a formula',
@@ -253,30 +253,32 @@ def _is_value(text: str, token: _Token, after: _Token | None) -> bool:
     """Return whether a token is a value; a function before its parenthesis is not."""
     if token.kind == 'number':
         if not isfinite(float(token.text)):
-            raise _wrong(text, token, 'is beyond all numbers', 'write a smaller one')
+            raise _token_error(text, token, 'is beyond all numbers', 'write a smaller one')
         return True
     if token.kind != 'name':
         remedy = 'write a number or x before it'
-        raise _wrong(text, token, 'stands where a value is wanted', remedy)
+        raise _token_error(text, token, 'stands where a value is wanted', remedy)
     if token.text in FUNCTIONS:
         if after is None or after.text != '(':
-            raise _wrong(text, token, 'is a function', f'write {token.text}(…)')
+            raise _token_error(text, token, 'is a function', f'write {token.text}(…)')
         return False
     known = [_X, *CONSTANTS, *FUNCTIONS]
     if token.text not in known:
         remedy = did_you_mean(token.text.lower(), known, f'there are {listed(known)}')
-        raise _wrong(text, token, 'is not known', remedy)
+        raise _token_error(text, token, 'is not known', remedy)
     return True
 
 
-def _wrong(text: str, token: _Token, reason: str, remedy: str) -> SynthesisError:
-    return _error(text, f'{quoted(token.text)} at character {token.at + 1} {reason}', remedy)
+def _token_error(text: str, token: _Token, reason: str, remedy: str) -> SynthesisError:
+    return _formula_error(
+        text, f'{quoted(token.text)} at character {token.at + 1} {reason}', remedy
+    )
 
 
-def _error(text: str, reason: str, remedy: str) -> SynthesisError:
-    return SynthesisError(named(text), reason, remedy)
+def _formula_error(text: str, reason: str, remedy: str) -> SynthesisError:
+    return SynthesisError(formula_name(text), reason, remedy)
 
 
-def named(text: str) -> str:
+def formula_name(text: str) -> str:
     """Return the name of a formula in errors."""
     return f'function {quoted(text)}'

@@ -31,8 +31,8 @@ from linkage_ros.errors import quoted, SynthesisError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.synthesis.design import Design, ROCKER
-from linkage_ros.synthesis.function.expression import Array, Expression, named
-from linkage_ros.synthesis.pairs.freudenstein import exact
+from linkage_ros.synthesis.function.expression import Array, Expression, formula_name
+from linkage_ros.synthesis.pairs.freudenstein import exact_four_bar
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -65,52 +65,52 @@ def check_defined(function: Expression, low: float, high: float) -> None:
     xs = np.linspace(low, high, _SAMPLES + 1)
     ys = function(xs)
     if not np.isfinite(ys).all():
-        raise _undefined(function, xs, ys)
-    jump = _jump(function, xs, ys)
+        raise _undefined_error(function, xs, ys)
+    jump = _find_jump(function, xs, ys)
     if jump is not None:
         raise SynthesisError(
-            named(function.text),
-            f'jumps, or goes to infinity, at x = {_rounded(jump, high - low)}',
+            formula_name(function.text),
+            f'jumps, or goes to infinity, at x = {_rounded_text(jump, high - low)}',
             'choose a range on one side of it',
         )
 
 
-def _undefined(function: Expression, xs: Array, ys: Array) -> SynthesisError:
+def _undefined_error(function: Expression, xs: Array, ys: Array) -> SynthesisError:
     """Return the error for a function that is undefined at some samples."""
     span = float(xs[-1] - xs[0])
     good = np.isfinite(ys)
-    runs = _runs(function, xs, good)
+    runs = _defined_runs(function, xs, good)
     start, end = next((start, end) for start, end, has_value in runs if not has_value)
     value = ys[int(np.argmin(good))]
     reason = 'is not defined' if np.isnan(value) else 'is infinite'
     usable = [(start, end) for start, end, has_value in runs if has_value]
     if not usable:
         return SynthesisError(
-            named(function.text), f'{reason} anywhere in the range', 'choose another range'
+            formula_name(function.text), f'{reason} anywhere in the range', 'choose another range'
         )
-    first, last = _rounded(start, span), _rounded(end, span)
+    first, last = _rounded_text(start, span), _rounded_text(end, span)
     if first == last:
         place, remedy = f'at x = {first}', 'choose a range without it'
     else:
         place = f'from x = {first} to {last}'
         widest = max(usable, key=lambda run: run[1] - run[0])
-        ends = ' to '.join(_rounded(x, span) for x in widest)
+        ends = ' to '.join(_rounded_text(x, span) for x in widest)
         remedy = f'choose a range within {ends}'
-    return SynthesisError(named(function.text), f'{reason} {place}', remedy)
+    return SynthesisError(formula_name(function.text), f'{reason} {place}', remedy)
 
 
-def _runs(function: Expression, xs: Array, good: Array) -> list[tuple[float, float, bool]]:
+def _defined_runs(function: Expression, xs: Array, good: Array) -> list[tuple[float, float, bool]]:
     """Return the parts of a range in which a function is defined, and in which it is not."""
     runs = []
     start = float(xs[0])
     for i in np.flatnonzero(np.diff(good)):
-        edge = _edge(function, float(xs[i]), float(xs[i + 1]))
+        edge = _find_edge(function, float(xs[i]), float(xs[i + 1]))
         runs.append((start, edge, bool(good[i])))
         start = edge
     return [*runs, (start, float(xs[-1]), bool(good[-1]))]
 
 
-def _edge(function: Expression, low: float, high: float) -> float:
+def _find_edge(function: Expression, low: float, high: float) -> float:
     """Return the place between two others at which a function becomes defined or undefined."""
     before = isfinite(function(low))
     while low < (middle := 0.5 * (low + high)) < high:
@@ -121,7 +121,7 @@ def _edge(function: Expression, low: float, high: float) -> float:
     return high
 
 
-def _jump(function: Expression, xs: Array, ys: Array) -> float | None:
+def _find_jump(function: Expression, xs: Array, ys: Array) -> float | None:
     """
     Return the place where a function jumps: a pole between two samples, or an angle that wraps.
 
@@ -144,7 +144,7 @@ def _jump(function: Expression, xs: Array, ys: Array) -> float | None:
     return place if largest[-1] > max(_JUMP * largest[0], _ROUNDING * size) else None
 
 
-def _rounded(x: float, span: float) -> str:
+def _rounded_text(x: float, span: float) -> str:
     """Return a place with the digits that matter in a range of this width."""
     # Adding 0 makes 0 of -0.
     return f'{round(x, 10 - floor(log10(span))) + 0.0:.10g}'
@@ -204,7 +204,7 @@ class FunctionTask:
         if by <= _ROUNDING * float(np.max(np.abs(values))):
             x_start, x_end = self.x_range
             raise SynthesisError(
-                named(self.function.text),
+                formula_name(self.function.text),
                 f'is {start:.10g} both at x = {x_start:.10g} and at {x_end:.10g}, so that both '
                 'ends of the rocker range would be one',
                 'let the range end where the function is another',
@@ -213,7 +213,7 @@ class FunctionTask:
         swing = float(np.ptp(values)) / by * abs(last - first)
         if swing >= tau:
             raise SynthesisError(
-                named(self.function.text),
+                formula_name(self.function.text),
                 f'goes from {start:.6g} to {end:.6g}, but {float(np.ptp(values)):.6g} up and down '
                 f'between: the rocker would swing by {degrees(swing):.6g}°',
                 'choose a range without its summits and valleys, or a smaller rocker range',
@@ -232,7 +232,7 @@ class FunctionError(NamedTuple):
     percent: float
 
 
-def chebyshev(low: float, high: float, count: int) -> Array:
+def chebyshev_points(low: float, high: float, count: int) -> Array:
     """
     Return precision points of a range, by P. L. Chebyshev's spacing.
 
@@ -251,7 +251,7 @@ def chebyshev(low: float, high: float, count: int) -> Array:
     return points
 
 
-def pairs(task: FunctionTask, xs: ArrayLike) -> tuple[list[float], list[float]]:
+def angle_pairs(task: FunctionTask, xs: ArrayLike) -> tuple[list[float], list[float]]:
     """
     Return the angles of crank and rocker at precision points, in [rad].
 
@@ -272,41 +272,41 @@ def pairs(task: FunctionTask, xs: ArrayLike) -> tuple[list[float], list[float]]:
             )
     start, end = task.x_range
     at = np.array(points)
-    crank = _between(task.crank_range, (at - start) / (end - start))
-    return crank.tolist(), _rocker(task, at).tolist()
+    crank = _interpolate(task.crank_range, (at - start) / (end - start))
+    return crank.tolist(), _rocker_at_x(task, at).tolist()
 
 
 def wanted_rocker(task: FunctionTask, crank: ArrayLike) -> Array:
     """Return the rocker's angles for angles of the crank in its range, in [rad]; (…)."""
-    return _rocker(task, _x(task, np.asarray(crank, np.float64)))
+    return _rocker_at_x(task, _x_at_crank(task, np.asarray(crank, np.float64)))
 
 
 def on_scale(task: FunctionTask, crank: float, error: float) -> FunctionError:
     """Return an error of the rocker's angle, at a crank angle, as one of the function."""
-    x = float(_x(task, np.array(crank)))
+    x = float(_x_at_crank(task, np.array(crank)))
     (start, end), (first, last) = task.y_range, task.rocker_range
     part = error / (last - first)
     return FunctionError(x, task.function(x), part * (end - start), 100.0 * part)
 
 
-def _x(task: FunctionTask, crank: Array) -> Array:
+def _x_at_crank(task: FunctionTask, crank: Array) -> Array:
     """Return x at angles of the crank, within the range of x in spite of rounding."""
     start, end = task.crank_range
     x: Array = np.clip(
-        _between(task.x_range, (crank - start) / (end - start)),
+        _interpolate(task.x_range, (crank - start) / (end - start)),
         min(task.x_range),
         max(task.x_range),
     )
     return x
 
 
-def _rocker(task: FunctionTask, x: Array) -> Array:
+def _rocker_at_x(task: FunctionTask, x: Array) -> Array:
     """Return the rocker's angles at values of x."""
     start, end = task.y_range
-    return _between(task.rocker_range, (task.function(x) - start) / (end - start))
+    return _interpolate(task.rocker_range, (task.function(x) - start) / (end - start))
 
 
-def _between(ends: Range, part: Array) -> Array:
+def _interpolate(ends: Range, part: Array) -> Array:
     """Interpolate between two ends, which are exact themselves."""
     start, end = ends
     return start * (1.0 - part) + end * part
@@ -374,12 +374,14 @@ def generate_function(
     if points < 3:
         raise SynthesisError('points', f'there are {points}', 'ask for 3 or more')
     task = FunctionTask(Expression(function), x_range, crank_range, rocker_range)
-    crank, rocker = pairs(task, chebyshev(*x_range, points))
+    crank, rocker = angle_pairs(task, chebyshev_points(*x_range, points))
     if points > 3:
-        from linkage_ros.synthesis.pairs.angle_fit import nearest  # local import: to fit only
+        from linkage_ros.synthesis.pairs.angle_fit import (
+            nearest_four_bar,  # local import: to fit only
+        )
 
-        return nearest(crank, rocker, ground)
-    design, _ = exact(crank, rocker, ground)
+        return nearest_four_bar(crank, rocker, ground)
+    design, _ = exact_four_bar(crank, rocker, ground)
     return design
 
 
@@ -404,7 +406,7 @@ class StructuralError(NamedTuple):
     # The rocker's angle minus the wanted one there, in (−π, π] rad, NaN if the loop is open; (n,).
     error: Array
     greatest: float  # The error that is farthest from 0, in [rad]; NaN if the loop closes nowhere
-    at: float  # Angle of the crank at that error, in [rad]
+    greatest_at: float  # Angle of the crank at that error, in [rad]
     rms: float  # Root of the mean square where the loop closes, in [rad]
     # Angle of the crank, on its way through the range, at which the loop opens, in [rad]; None if
     # it closes all the way.
@@ -429,8 +431,8 @@ def structural_error(
     """
     closure = Closure(design.four_bar.linkage())
 
-    def errors(crank: Array) -> Array:
-        return _wrapped(_rocker_of(closure, crank.ravel()) - wanted(crank.ravel())).reshape(
+    def errors_at(crank: Array) -> Array:
+        return _wrap_angles(_rocker_of(closure, crank.ravel()) - wanted(crank.ravel())).reshape(
             crank.shape
         )
 
@@ -439,10 +441,10 @@ def structural_error(
     crank = np.unique(np.concatenate((np.linspace(first, last, _ERROR_SAMPLES + 1), precise)))
     if high < low:
         crank = crank[::-1]
-    error = errors(crank)
-    at, greatest = _greatest(errors, crank, error)
+    error = errors_at(crank)
+    at, greatest = _greatest_error(errors_at, crank, error)
     return StructuralError(
-        crank, error, greatest, at, _rms(crank, error), _opens_at(closure, low, high)
+        crank, error, greatest, at, _rms_error(crank, error), _opens_at(closure, low, high)
     )
 
 
@@ -452,13 +454,15 @@ def _rocker_of(closure: Closure, crank: Array) -> Array:
     return angles
 
 
-def _wrapped(angle: Array) -> Array:
+def _wrap_angles(angle: Array) -> Array:
     """Return angles in (−π, π]; small ones keep all their digits."""
     wrapped = angle - tau * np.round(angle / tau)
     return np.where(wrapped <= -np.pi, wrapped + tau, wrapped)
 
 
-def _greatest(errors: Callable[[Array], Array], crank: Array, error: Array) -> tuple[float, float]:
+def _greatest_error(
+    errors: Callable[[Array], Array], crank: Array, error: Array
+) -> tuple[float, float]:
     """Return the place where the error is farthest from 0, and the error there."""
     heights = np.nan_to_num(np.abs(error), nan=-1.0)
     highest = int(np.argmax(heights))
@@ -482,7 +486,7 @@ def _greatest(errors: Callable[[Array], Array], crank: Array, error: Array) -> t
     return float(places[i]), float(errors_at[i])
 
 
-def _rms(crank: Array, error: Array) -> float:
+def _rms_error(crank: Array, error: Array) -> float:
     """Return the root of the mean square over the parts of the range in which the loop closes."""
     by = np.abs(np.diff(crank))
     squares = 0.5 * (error[1:] ** 2 + error[:-1] ** 2)

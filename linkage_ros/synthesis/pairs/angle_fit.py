@@ -26,7 +26,7 @@ from math import inf, isfinite
 from linkage_ros.errors import SynthesisError
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.double_double import Array
-from linkage_ros.synthesis.pairs.freudenstein import fit_equation, links, wanted_of
+from linkage_ros.synthesis.pairs.freudenstein import fit_equation, solve_links, wanted_of
 from linkage_ros.synthesis.proof import SIDES
 from linkage_ros.synthesis.study import scipy_optimize
 import numpy as np
@@ -45,7 +45,7 @@ _LONGEST = 100.0
 """Largest ratio of a link and the ground in a start, either way; the fit may exceed it."""
 
 
-def nearest(
+def nearest_four_bar(
     crank: Sequence[float], rocker: Sequence[float], ground: float, *, free_zeros: bool = False
 ) -> Design:
     """
@@ -75,10 +75,10 @@ def nearest(
     starts = [fit_equation(crank, rocker, ground), *_through_triples(crank, rocker, ground)]
     starts.sort(key=root_mean_square)
     fitted = [fit_angles(start, free_zeros=free_zeros) for start in starts[:_STARTS]]
-    return min(fitted, key=lambda one: (_opens(one), root_mean_square(one)))
+    return min(fitted, key=lambda one: (_is_open(one), root_mean_square(one)))
 
 
-def _opens(design: Design) -> bool:
+def _is_open(design: Design) -> bool:
     """Return whether the loop is open at one of the positions."""
     _, gaps = np.split(rocker_errors(design), 2)
     return bool(gaps.any())
@@ -90,7 +90,7 @@ def _through_triples(
     """Yield four-bars that meet three of the pairs exactly, on either assembly."""
     triples = list(combinations(range(len(crank)), 3))
     chosen = np.array(triples[:: -(-len(triples) // _TRIPLES)])
-    lengths = links(np.array(crank)[chosen], np.array(rocker)[chosen]).lengths
+    lengths = solve_links(np.array(crank)[chosen], np.array(rocker)[chosen]).lengths
     size = np.abs(lengths)
     usual = np.all((size < _LONGEST) & (size > 1.0 / _LONGEST), axis=-1)
     wanted = wanted_of(crank, rocker)
@@ -134,11 +134,11 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
     for side in SIDES:
         start = replace(design.four_bar, side=side)
 
-        def errors(changes: Array, start: FourBar = start) -> Array:
-            return _weighed(design._replace(four_bar=_changed(start, changes)))
+        def changed_errors(changes: Array, start: FourBar = start) -> Array:
+            return _weighted_errors(design._replace(four_bar=_change_design(start, changes)))
 
         best = least_squares(
-            errors,
+            changed_errors,
             np.zeros(count),
             jac='3-point',
             x_scale='jac',
@@ -147,7 +147,7 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
             gtol=_TOLERANCE,
             max_nfev=_TRIALS,
         )
-        fitted = design._replace(four_bar=_changed(start, best.x))
+        fitted = design._replace(four_bar=_change_design(start, best.x))
         candidates.append((root_mean_square(fitted), fitted))
     # A result that overflowed counts as the worst.
     return min(candidates, key=lambda one: one[0] if isfinite(one[0]) else inf)[1]
@@ -159,10 +159,10 @@ def root_mean_square(design: Design) -> float:
 
     A gap of one rocker length counts as 30 rad.
     """
-    return float(np.sqrt((_weighed(design) ** 2).sum() / len(design.wanted)))
+    return float(np.sqrt((_weighted_errors(design) ** 2).sum() / len(design.wanted)))
 
 
-def _weighed(design: Design) -> Array:
+def _weighted_errors(design: Design) -> Array:
     """Return the weighted errors that are squared."""
     angles, gaps = np.split(rocker_errors(design), 2)
     return np.concatenate((angles, _GAP * gaps))
@@ -197,7 +197,7 @@ def rocker_errors(design: Design) -> Array:
     return np.concatenate((angle - zero - phi - 2.0 * np.pi * turns, gap))
 
 
-def _changed(four_bar: FourBar, changes: Array) -> FourBar:
+def _change_design(four_bar: FourBar, changes: Array) -> FourBar:
     """Stretch the links by the exponentials of three changes, turn crank and rocker by others."""
     crank, coupler, rocker = np.exp(changes[:3]).tolist()
     if len(changes) > 3:

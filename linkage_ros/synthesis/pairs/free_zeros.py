@@ -50,17 +50,17 @@ from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.arithmetic import SMALLEST, UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.double_double import (
-    minus,
-    over,
-    plus,
+    add,
+    divide,
+    multiply,
     sine,
     sine_cosine,
-    times,
+    subtract,
     two_sum,
     Twofold,
 )
 from linkage_ros.synthesis.pairs.freudenstein import check_pairs, LONGEST, TRUSTED, wanted_of
-from linkage_ros.synthesis.proof import assembled
+from linkage_ros.synthesis.proof import assemble
 import numpy as np
 from numpy.typing import NDArray
 
@@ -81,7 +81,7 @@ _VAGUE = 0.1
 """Largest relative uncertainty of a link."""
 
 
-class Differences(NamedTuple):
+class DividedDifferences(NamedTuple):
     """The equations of the other pairs minus the first, as rows of length 1."""
 
     # All angles; (n,).
@@ -105,7 +105,7 @@ class Solution(NamedTuple):
     sensitivity: Array
 
 
-def differences(crank: Sequence[float], rocker: Sequence[float]) -> Differences:
+def equation_differences(crank: Sequence[float], rocker: Sequence[float]) -> DividedDifferences:
     """Return the equations of the other pairs minus the first; angles in [rad], (n,)."""
     theta, phi = np.asarray(crank, np.float64), np.asarray(rocker, np.float64)
     by_theta, by_phi = 0.5 * (theta[1:] - theta[0]), 0.5 * (phi[1:] - phi[0])
@@ -116,24 +116,24 @@ def differences(crank: Sequence[float], rocker: Sequence[float]) -> Differences:
     size: Array = np.sqrt(np.abs(p) ** 2 + np.abs(q) ** 2 + np.abs(r) ** 2)
     angles = np.abs(theta) + np.abs(phi)
     noise = UNIT_ROUNDOFF * (1.0 + (angles[1:] + angles[0]) / size)
-    return Differences(theta, phi, p / size, q / size, r / size, size, noise)
+    return DividedDifferences(theta, phi, p / size, q / size, r / size, size, noise)
 
 
-def polished(rows: Differences, alpha: float, beta: float, moved: Moved) -> Solution | Lost:
+def polish(rows: DividedDifferences, alpha: float, beta: float, moved: Moved) -> Solution | Lost:
     """Return the four-bar nearest to these zeros, or the reason why there is none."""
-    columns = np.stack(_columns(rows, alpha, beta), -1)
+    columns = np.stack(_equation_columns(rows, alpha, beta), -1)
     k1, k2, one = np.linalg.svd(columns * (1.0, 1.0, -1.0))[2][2]
     if abs(one) * LONGEST <= max(abs(k1), abs(k2)):
         return 'infinite'
     free = _UNKNOWNS[moved]
     best = np.array([k1 / one, k2 / one, alpha, beta])
-    least = _residual(rows, best)
+    least = _largest_residual(rows, best)
     for _ in range(_STEPS):
         tried = best.copy()
         # A double root has no full rank: the shortest step is as good as any.
-        slopes = _slopes(rows, best)[:, free]
-        tried[free] -= np.linalg.lstsq(slopes, _left(rows, best), rcond=None)[0]
-        residual = _residual(rows, tried)
+        slopes = _residual_slopes(rows, best)[:, free]
+        tried[free] -= np.linalg.lstsq(slopes, _residuals(rows, best), rcond=None)[0]
+        residual = _largest_residual(rows, tried)
         if not residual < least:
             break
         best, least = tried, residual
@@ -142,18 +142,20 @@ def polished(rows: Differences, alpha: float, beta: float, moved: Moved) -> Solu
     if not 1.0 / LONGEST < min(abs(best[:2])) <= max(abs(best[:2])) < LONGEST:
         return 'infinite'
     with np.errstate(all='ignore'):
-        solution = _valued(rows, best, free)
+        solution = _value_solution(rows, best, free)
         lost = TRUSTED * UNIT_ROUNDOFF * solution.sensitivity[:3] / np.abs(solution.lengths)
     return solution if np.all(lost < _VAGUE) else 'vague'
 
 
-def same(one: Solution, other: Solution) -> bool:
+def are_same(one: Solution, other: Solution) -> bool:
     """Return whether two differ only by rounding, as solutions near a double root may."""
-    (pins, lost), (others, lost_too) = _pins(one), _pins(other)
+    (pins, lost), (others, lost_too) = _pin_places(one), _pin_places(other)
     return bool(np.all(np.abs(pins - others) <= NOISE * UNIT_ROUNDOFF * (lost + lost_too)))
 
 
-def _columns(rows: Differences, alpha: float, beta: float) -> tuple[Array, Array, Array]:
+def _equation_columns(
+    rows: DividedDifferences, alpha: float, beta: float
+) -> tuple[Array, Array, Array]:
     """Return Im(p·e^{iβ}), Im(q·e^{iα}) and Im(r·e^{i(α − β)}); (n − 1,) each."""
     return (
         (rows.p * rect(1.0, beta)).imag,
@@ -162,69 +164,69 @@ def _columns(rows: Differences, alpha: float, beta: float) -> tuple[Array, Array
     )
 
 
-def _left(rows: Differences, unknowns: Array) -> Array:
+def _residuals(rows: DividedDifferences, unknowns: Array) -> Array:
     """Return the residuals of the equations; (n − 1,)."""
     k1, k2, alpha, beta = unknowns
-    P, Q, R = _columns(rows, alpha, beta)
+    P, Q, R = _equation_columns(rows, alpha, beta)
     left: Array = k1 * P + k2 * Q - R
     return left
 
 
-def _left_exactly(rows: Differences, unknowns: Array) -> Array:
+def _left_exactly(rows: DividedDifferences, unknowns: Array) -> Array:
     """Return the residuals of the equations, by sums of two doubles; (n − 1,)."""
-    k1, k2, alpha, beta = _twofold(unknowns)
-    by_theta, by_phi = (_half(two_sum(z[1:], -z[:1])) for z in (rows.theta, rows.phi))
-    theta, phi = (_half(two_sum(z[1:], z[:1])) for z in (rows.theta, rows.phi))
-    theta, phi = plus(theta, alpha), plus(phi, beta)
-    P, Q = times(sine(phi), sine(by_phi)), times(sine(theta), sine(by_theta))
-    R = times(sine(minus(theta, phi)), sine(minus(by_theta, by_phi)))
-    left: Array = minus(plus(times(k1, P), times(k2, Q)), R)[0] / rows.size
+    k1, k2, alpha, beta = _as_twofold(unknowns)
+    by_theta, by_phi = (_halve_angle(two_sum(z[1:], -z[:1])) for z in (rows.theta, rows.phi))
+    theta, phi = (_halve_angle(two_sum(z[1:], z[:1])) for z in (rows.theta, rows.phi))
+    theta, phi = add(theta, alpha), add(phi, beta)
+    P, Q = multiply(sine(phi), sine(by_phi)), multiply(sine(theta), sine(by_theta))
+    R = multiply(sine(subtract(theta, phi)), sine(subtract(by_theta, by_phi)))
+    left: Array = subtract(add(multiply(k1, P), multiply(k2, Q)), R)[0] / rows.size
     return left
 
 
-def _links(
-    rows: Differences, unknowns: Array, rest: Array
+def _solve_links(
+    rows: DividedDifferences, unknowns: Array, rest: Array
 ) -> tuple[float, float, complex, complex, complex]:
     """
     Return the lengths of crank and rocker, and the directions of the links in the first pair.
 
     By sums of two doubles: with a short coupler, crank and rocker cancel.
     """
-    (one,) = _twofold(np.ones(1))
-    parts = zip(_twofold(unknowns), _twofold(rest), strict=True)
-    k1, k2, alpha, beta = (plus(value, low) for value, low in parts)
-    a, c = over(one, k1), over((-one[0], one[1]), k2)
-    crank = [times(a, z) for z in sine_cosine(plus((rows.theta[:1], one[1]), alpha))]
-    rocker = [times(c, z) for z in sine_cosine(plus((rows.phi[:1], one[1]), beta))]
-    y, x = minus(rocker[0], crank[0]), plus(one, minus(rocker[1], crank[1]))
+    (one,) = _as_twofold(np.ones(1))
+    parts = zip(_as_twofold(unknowns), _as_twofold(rest), strict=True)
+    k1, k2, alpha, beta = (add(value, low) for value, low in parts)
+    a, c = divide(one, k1), divide((-one[0], one[1]), k2)
+    crank = [multiply(a, z) for z in sine_cosine(add((rows.theta[:1], one[1]), alpha))]
+    rocker = [multiply(c, z) for z in sine_cosine(add((rows.phi[:1], one[1]), beta))]
+    y, x = subtract(rocker[0], crank[0]), add(one, subtract(rocker[1], crank[1]))
     turned = [complex(x[0].item(), y[0].item()) for y, x in (crank, rocker, (y, x))]
     return a[0].item(), c[0].item(), turned[0], turned[1], turned[2]
 
 
-def _twofold(values: Array) -> list[Twofold]:
+def _as_twofold(values: Array) -> list[Twofold]:
     return [(value, np.zeros(1)) for value in values[:, None]]
 
 
-def _half(angle: Twofold) -> Twofold:
+def _halve_angle(angle: Twofold) -> Twofold:
     return 0.5 * angle[0], 0.5 * angle[1]
 
 
-def _residual(rows: Differences, unknowns: Array) -> float:
+def _largest_residual(rows: DividedDifferences, unknowns: Array) -> float:
     """Return the largest residual, relative to the effect of rounding the angles on it."""
-    left = np.abs(_left(rows, unknowns)) / rows.noise
+    left = np.abs(_residuals(rows, unknowns)) / rows.noise
     return float(np.max(left)) / float(max(1.0, *np.abs(unknowns[:2])))
 
 
-def _slopes(rows: Differences, unknowns: Array) -> Array:
+def _residual_slopes(rows: DividedDifferences, unknowns: Array) -> Array:
     """Return the derivatives of the residuals by k1, k2, α and β; (n − 1, 4)."""
     k1, k2, alpha, beta = unknowns
-    P, Q, _ = _columns(rows, alpha, beta)
+    P, Q, _ = _equation_columns(rows, alpha, beta)
     of_p, of_q = (rows.p * rect(1.0, beta)).real, (rows.q * rect(1.0, alpha)).real
     of_r = (rows.r * rect(1.0, alpha - beta)).real
     return np.stack((P, Q, k2 * of_q - of_r, k1 * of_p + of_r), -1)
 
 
-def _valued(rows: Differences, unknowns: Array, free: list[int]) -> Solution:
+def _value_solution(rows: DividedDifferences, unknowns: Array, free: list[int]) -> Solution:
     """
     Return the links, and their accuracy.
 
@@ -233,12 +235,12 @@ def _valued(rows: Differences, unknowns: Array, free: list[int]) -> Solution:
     of the first pair all differences change by the opposite.
     """
     k1, k2, alpha, beta = unknowns
-    slopes = _slopes(rows, unknowns)[:, free]
+    slopes = _residual_slopes(rows, unknowns)[:, free]
     across = np.linalg.norm(slopes, axis=0)
     scaled = slopes / across
     condition = float(np.linalg.cond(scaled / np.linalg.norm(scaled, axis=1)[:, None]))
     inverse = np.zeros((4, len(free)))
-    inverse[free] = _inverse(scaled) / across[:, None] / rows.size
+    inverse[free] = _invert_matrix(scaled) / across[:, None] / rows.size
     t, p = rows.theta + alpha, rows.phi + beta
     by = np.sin(t - p)
     parts = np.concatenate((-inverse.sum(-1, keepdims=True), inverse), -1) / 2.0
@@ -247,7 +249,7 @@ def _valued(rows: Differences, unknowns: Array, free: list[int]) -> Solution:
     )
     rest = np.zeros(4)
     rest[free] = -inverse[free] @ (rows.size * _left_exactly(rows, unknowns))
-    a, c, crank, rocker, coupler = _links(rows, unknowns, rest)
+    a, c, crank, rocker, coupler = _solve_links(rows, unknowns, rest)
     of_a, of_c = -a * a * of_k1, c * c * of_k2
     # The coupler closes the first pair, whose angles also turn crank and rocker.
     of_t, of_p = of_alpha.copy(), of_beta.copy()
@@ -255,7 +257,7 @@ def _valued(rows: Differences, unknowns: Array, free: list[int]) -> Solution:
     of_p[len(p)] += 1.0
     moved = rocker * (of_c / c + 1j * of_p) - crank * (of_a / a + 1j * of_t)
     of_b = (np.conj(coupler) * moved).real / abs(coupler)
-    (alpha, sign_a), (beta, sign_c) = _acute(alpha + rest[2]), _acute(beta + rest[3])
+    (alpha, sign_a), (beta, sign_c) = _acute_angle(alpha + rest[2]), _acute_angle(beta + rest[3])
     values = np.array([sign_a * a, abs(coupler), sign_c * c, alpha, beta])
     angles = np.abs(np.concatenate((rows.theta, rows.phi)))
     lost = np.abs(np.stack((of_a, of_b, of_c, of_alpha, of_beta)))
@@ -263,20 +265,20 @@ def _valued(rows: Differences, unknowns: Array, free: list[int]) -> Solution:
     return Solution(values[:3], values[3:], condition, sensitivity)
 
 
-def _inverse(matrix: Array) -> Array:
+def _invert_matrix(matrix: Array) -> Array:
     try:
         return np.asarray(np.linalg.inv(matrix), np.float64)
     except np.linalg.LinAlgError:
         return np.full_like(matrix, np.nan)
 
 
-def _acute(angle: float) -> tuple[float, float]:
+def _acute_angle(angle: float) -> tuple[float, float]:
     """Return an angle minus its half turns, in [−π/2, π/2], and −1.0 if these are odd."""
     halves = round(angle / pi)
     return angle - pi * halves, -1.0 if halves % 2 else 1.0
 
 
-def _pins(solution: Solution) -> tuple[NDArray[np.complex128], Array]:
+def _pin_places(solution: Solution) -> tuple[NDArray[np.complex128], Array]:
     """Return the pins of crank and rocker in their frames, and their sensitivities; (2,)."""
     lengths = solution.lengths[::2]
     sensitivity = solution.sensitivity[[0, 2]] + np.abs(lengths) * solution.sensitivity[3:]
@@ -325,10 +327,10 @@ class FreeZeros(NamedTuple):
     # Σ|x ∂L/∂x| + ``abs(L)`` of crank, coupler, rocker, α and β over all angles x. Times 2⁻⁵³ it
     # bounds the error that rounding the angles alone causes; errors are within twice that.
     sensitivity: tuple[float, ...]
-    among: Count  # The number of all solutions of the pairs, including this one
+    solution_counts: Count  # The number of all solutions of the pairs, including this one
 
     @property
-    def digits(self) -> tuple[float, float, float]:
+    def reliable_digits(self) -> tuple[float, float, float]:
         """Return the number of reliable digits of a, b and c, 0 to 16."""
         lost = (
             TRUSTED * UNIT_ROUNDOFF * part / abs(length)
@@ -349,8 +351,8 @@ def four_pairs(
     links, or that infinitely many exist.
     """
     check_pairs(crank, rocker, ground)
-    rows = differences(crank, rocker)
-    sizes = np.linalg.svd(_real(rows), compute_uv=False)
+    rows = equation_differences(crank, rocker)
+    sizes = np.linalg.svd(_real_rows(rows), compute_uv=False)
     # Rounding error of a determinant: that of one row times the largest area of the others.
     noise = NOISE * np.sum(rows.noise) * sizes[0] * sizes[1]
     directions: list[tuple[Moved, float, float]] = []
@@ -364,22 +366,22 @@ def four_pairs(
         odd = turned.real, back * rows.r.real
         form = np.array(
             [
-                _determinant(even[0], fixed, even[1]),
-                _determinant(even[0], fixed, odd[1]) + _determinant(odd[0], fixed, even[1]),
-                _determinant(odd[0], fixed, odd[1]),
+                _triple_product(even[0], fixed, even[1]),
+                _triple_product(even[0], fixed, odd[1]) + _triple_product(odd[0], fixed, even[1]),
+                _triple_product(odd[0], fixed, odd[1]),
             ]
         )
         if np.max(np.abs(form)) <= noise:
             vague += 2
             continue
-        roots = list(_roots(form))
+        roots = list(_form_roots(form))
         imaginary += 2 - len(roots)
         for x, y in roots:
             zero = phase(complex(x, y))
             directions.append(('crank', zero, 0.0) if moved == 'crank' else ('rocker', 0.0, zero))
     if vague == 4:
-        raise _undetermined(4)
-    return _listed(rows, directions, {'imaginary': imaginary, 'vague': vague}, ground)
+        raise _undetermined_error(4)
+    return _list_solutions(rows, directions, {'imaginary': imaginary, 'vague': vague}, ground)
 
 
 def five_pairs(
@@ -391,36 +393,36 @@ def five_pairs(
     The best conditioned comes first. Units and errors are those of `four_pairs`.
     """
     check_pairs(crank, rocker, ground)
-    rows = differences(crank, rocker)
-    _, sizes, vectors = np.linalg.svd(_real(rows))
+    rows = equation_differences(crank, rocker)
+    _, sizes, vectors = np.linalg.svd(_real_rows(rows))
     noise = NOISE * np.linalg.norm(rows.noise) / max(float(sizes[3]), SMALLEST)
     # R has the opposite sign here, which is equivalent.
     P, Q, R = (vectors[4:, i] + 1j * vectors[4:, i + 1] for i in (0, 2, 4))
     form: Array = np.convolve(np.convolve(R, P), np.conj(Q)).imag
     p, q, r = map(np.linalg.norm, (P, Q, R))
     if np.max(np.abs(form)) <= noise * (p * q + q * r + r * p):
-        raise _undetermined(5)
+        raise _undetermined_error(5)
     directions: list[tuple[Moved, float, float]] = []
-    for s, t in _roots(form):
+    for s, t in _form_roots(form):
         p, q, r = (s * z[0] + t * z[1] for z in (P, Q, R))
         # From the two largest: the third may be nothing but rounding.
         smallest = min(map(abs, (p, q, r)))
         alpha = phase(p) + phase(r) if abs(q) == smallest else phase(q)
         beta = phase(q) - phase(r) if abs(p) == smallest else phase(p)
         directions.append(('both', alpha, beta))
-    return _listed(rows, directions, {'imaginary': 3 - len(directions)}, ground)
+    return _list_solutions(rows, directions, {'imaginary': 3 - len(directions)}, ground)
 
 
-def _real(rows: Differences) -> Array:
+def _real_rows(rows: DividedDifferences) -> Array:
     """Return rows of Im(p·P) + Im(q·Q) + Im(r·R) in real and imaginary parts; (n − 1, 6)."""
     return np.stack([x for z in (rows.p, rows.q, rows.r) for x in (z.imag, z.real)], -1)
 
 
-def _determinant(one: Array, other: Array, third: Array) -> float:
+def _triple_product(one: Array, other: Array, third: Array) -> float:
     return float(np.dot(np.cross(one, other), third))
 
 
-def _roots(form: Array) -> Iterator[tuple[float, float]]:
+def _form_roots(form: Array) -> Iterator[tuple[float, float]]:
     """Yield the roots of Σ form[j]·xⁿ⁻ʲ·yʲ as (x, y) of length 1; also roots almost real."""
     degree = len(form) - 1
     turns = np.arange(8) * pi / 8
@@ -428,13 +430,13 @@ def _roots(form: Array) -> Iterator[tuple[float, float]]:
     # The rotation that leaves no root near infinity.
     turn = float(turns[np.argmax(np.abs(form @ powers))])
     c, s = cos(turn), sin(turn)
-    for root in np.roots(_turned(form, c, s)):
+    for root in np.roots(_turned_form(form, c, s)):
         if abs(root.imag) < _NEARLY_REAL * (1.0 + abs(root)):
             x, y = c * root.real - s, s * root.real + c
             yield x / hypot(x, y), y / hypot(x, y)
 
 
-def _turned(form: Array, c: float, s: float) -> Array:
+def _turned_form(form: Array, c: float, s: float) -> Array:
     """Return a form at x = c·t − s, y = s·t + c as a polynomial in t, by falling powers."""
     degree = len(form) - 1
     total = np.zeros(degree + 1)
@@ -446,8 +448,8 @@ def _turned(form: Array, c: float, s: float) -> Array:
     return total
 
 
-def _listed(
-    rows: Differences,
+def _list_solutions(
+    rows: DividedDifferences,
     directions: Sequence[tuple[Moved, float, float]],
     lost: Mapping[Lost, int],
     ground: float,
@@ -456,7 +458,7 @@ def _listed(
     counts: dict[Lost, int] = {'imaginary': 0, 'infinite': 0, 'vague': 0, **lost}
     candidates: list[tuple[Moved, Solution]] = []
     for moved, alpha, beta in directions:
-        solution = polished(rows, alpha, beta, moved)
+        solution = polish(rows, alpha, beta, moved)
         if isinstance(solution, str):
             counts[solution] += 1
         else:
@@ -465,7 +467,7 @@ def _listed(
     candidates.sort(key=lambda one: float(np.sum(one[1].sensitivity)))
     four_bars: list[tuple[Moved, Solution]] = []
     for moved, solution in candidates:
-        if not any(same(solution, other) for _, other in four_bars):
+        if not any(are_same(solution, other) for _, other in four_bars):
             four_bars.append((moved, solution))
     among = Count(len(four_bars), *counts.values())
     if not four_bars:
@@ -476,24 +478,26 @@ def _listed(
             'move one of the angles, or leave the zeros as they are for the nearest four-bar',
         )
     four_bars.sort(key=lambda one: (one[0] == 'crank', one[1].condition))
-    return tuple(_result(rows, moved, solution, among, ground) for moved, solution in four_bars)
+    return tuple(
+        _scale_solution(rows, moved, solution, among, ground) for moved, solution in four_bars
+    )
 
 
-def _result(
-    rows: Differences, moved: Moved, solution: Solution, among: Count, ground: float
+def _scale_solution(
+    rows: DividedDifferences, moved: Moved, solution: Solution, among: Count, ground: float
 ) -> FreeZeros:
     """Return a solution scaled to its ground."""
     a, b, c = solution.lengths.tolist()
     alpha, beta = solution.zeros.tolist()
     lengths = a * ground, b * ground, c * ground
     four_bar = FourBar.of_lengths(*lengths, ground, alpha, beta)
-    design = assembled(Design(four_bar, wanted_of(rows.theta.tolist(), rows.phi.tolist())))
+    design = assemble(Design(four_bar, wanted_of(rows.theta.tolist(), rows.phi.tolist())))
     scale = np.array([ground, ground, ground, 1.0, 1.0])
     sensitivity = tuple((solution.sensitivity * scale).tolist())
     return FreeZeros(design, moved, lengths, alpha, beta, solution.condition, sensitivity, among)
 
 
-def _undetermined(count: int) -> SynthesisError:
+def _undetermined_error(count: int) -> SynthesisError:
     return SynthesisError(
         'pairs',
         f'the {count} equations depend on each other, so that any number of four-bars fits or '

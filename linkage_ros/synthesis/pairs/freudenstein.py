@@ -44,19 +44,19 @@ from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
-from linkage_ros.synthesis.design import Design, FARTHEST, FourBar, SHORTEST, Wanted
+from linkage_ros.synthesis.design import Design, DesignRequest, FARTHEST, FourBar, SHORTEST
 from linkage_ros.synthesis.double_double import (
+    add,
     Array,
-    minus,
-    over,
-    plus,
+    divide,
+    multiply,
     sine,
     sine_cosine,
-    times,
+    subtract,
     two_sum,
     Twofold,
 )
-from linkage_ros.synthesis.proof import assembled
+from linkage_ros.synthesis.proof import assemble
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -79,7 +79,7 @@ class System(NamedTuple):
     coupler: Array  # Vector of the coupler in the first pair, x and y; (2, n)
 
 
-def solved(theta: Array, phi: Array) -> System:
+def solve_pairs(theta: Array, phi: Array) -> System:
     """
     Solve three pairs; infinite or NaN if there is no solution.
 
@@ -90,16 +90,16 @@ def solved(theta: Array, phi: Array) -> System:
 
     """
     with np.errstate(all='ignore'):
-        P, Q, R = differences(theta, phi)
+        P, Q, R = equation_differences(theta, phi)
         determinant, of_k1, of_k2 = _determinant(P, Q), _determinant(R, Q), _determinant(P, R)
-        a, c = over(determinant, of_k1), over(determinant, (-of_k2[0], -of_k2[1]))
+        a, c = divide(determinant, of_k1), divide(determinant, (-of_k2[0], -of_k2[1]))
         # The coupler closes the first position. From k3, long links would leave few digits.
         nothing = np.zeros_like(theta[0])
         crank_y, crank_x = sine_cosine((theta[0], nothing))
         rocker_y, rocker_x = sine_cosine((phi[0], nothing))
-        x, _ = plus((nothing + 1.0, nothing), minus(times(c, rocker_x), times(a, crank_x)))
-        y, _ = minus(times(c, rocker_y), times(a, crank_y))
-        k1, k2 = over(of_k1, determinant)[0], over(of_k2, determinant)[0]
+        x, _ = add((nothing + 1.0, nothing), subtract(multiply(c, rocker_x), multiply(a, crank_x)))
+        y, _ = subtract(multiply(c, rocker_y), multiply(a, crank_y))
+        k1, k2 = divide(of_k1, determinant)[0], divide(of_k2, determinant)[0]
         k3 = np.cos(theta[0] - phi[0]) - k1 * rocker_x[0] - k2 * crank_x[0]
         return System(
             theta,
@@ -115,7 +115,7 @@ def solved(theta: Array, phi: Array) -> System:
         )
 
 
-def differences(theta: Array, phi: Array) -> tuple[Twofold, Twofold, Twofold]:
+def equation_differences(theta: Array, phi: Array) -> tuple[Twofold, Twofold, Twofold]:
     """
     Return all equations but the first minus the first, divided by −2.
 
@@ -132,22 +132,22 @@ def differences(theta: Array, phi: Array) -> tuple[Twofold, Twofold, Twofold]:
     """
     theta_by, phi_by = two_sum(theta[1:], -theta[:1]), two_sum(phi[1:], -phi[:1])
     theta_sum, phi_sum = two_sum(theta[1:], theta[:1]), two_sum(phi[1:], phi[:1])
-    sums = (phi_sum, theta_sum, minus(theta_sum, phi_sum))
-    bys = (phi_by, theta_by, minus(theta_by, phi_by))
+    sums = (phi_sum, theta_sum, subtract(theta_sum, phi_sum))
+    bys = (phi_by, theta_by, subtract(theta_by, phi_by))
     high = 0.5 * np.stack([term[0] for term in (*sums, *bys)])
     low = 0.5 * np.stack([term[1] for term in (*sums, *bys)])
     high, low = sine((high, low))
-    high, low = times((high[:3], low[:3]), (high[3:], low[3:]))
+    high, low = multiply((high[:3], low[:3]), (high[3:], low[3:]))
     return (high[0], low[0]), (high[1], low[1]), (high[2], low[2])
 
 
 def _determinant(x: Twofold, y: Twofold) -> Twofold:
     """Return x0·y1 − x1·y0."""
-    high, low = times(x, (y[0][::-1], y[1][::-1]))
-    return minus((high[0], low[0]), (high[1], low[1]))
+    high, low = multiply(x, (y[0][::-1], y[1][::-1]))
+    return subtract((high[0], low[0]), (high[1], low[1]))
 
 
-def gradient(system: System) -> Array:
+def length_gradient(system: System) -> Array:
     """
     Differentiate the lengths, and the direction of the coupler in the first pair, by the angles.
 
@@ -165,7 +165,7 @@ def gradient(system: System) -> Array:
     theta, phi = system.theta, system.phi
     k1, k2, _ = system.k
     a, b, c = system.lengths
-    of_k1, of_k2 = _inverse(system)
+    of_k1, of_k2 = _k_derivatives(system)
     across = np.sin(theta - phi)
     moves = np.concatenate((k2 * np.sin(theta) - across, k1 * np.sin(phi) + across))
     of_a = -a * a * np.concatenate((of_k1, of_k1)) * moves
@@ -185,28 +185,28 @@ def gradient(system: System) -> Array:
     return np.stack((of_a, of_b, of_c, turned / b))
 
 
-def doubt(system: System) -> Array:
+def determinant_sensitivity(system: System) -> Array:
     """
     Return Σ|x ∂D/∂x| / ``abs(D)`` of the determinant D over the six angles x; (n,).
 
     The trace of M⁻¹·dM is the differential of the logarithm of D.
     """
-    of_k1, of_k2 = _inverse(system)
+    of_k1, of_k2 = _k_derivatives(system)
     by_theta = np.sin(system.theta) * of_k2 * system.theta
     by_phi = np.sin(system.phi) * of_k1 * system.phi
     return np.asarray((np.abs(by_theta) + np.abs(by_phi)).sum(0))
 
 
-def condition(system: System) -> Array:
+def condition_number(system: System) -> Array:
     """Return the condition number of the matrix of rows (cos φ, cos θ, 1), by the 2-norm; (n,)."""
     x, y = np.cos(system.phi), np.cos(system.theta)
-    of_k1, of_k2 = _inverse(system)
+    of_k1, of_k2 = _k_derivatives(system)
     of_k3 = -x[0] * of_k1 - y[0] * of_k2
     of_k3[0] += 1.0
-    return _norm(x, y, np.ones_like(x)) * _norm(of_k1, of_k2, of_k3)
+    return _matrix_norm(x, y, np.ones_like(x)) * _matrix_norm(of_k1, of_k2, of_k3)
 
 
-def _inverse(system: System) -> tuple[Array, Array]:
+def _k_derivatives(system: System) -> tuple[Array, Array]:
     """Return the derivatives of k1 and k2 by the right sides of the equations; (3, n) each."""
     P, Q, (last_P, last_Q) = system.P, system.Q, system.last
     scale = -0.5 / system.determinant
@@ -216,7 +216,7 @@ def _inverse(system: System) -> tuple[Array, Array]:
     )
 
 
-def _norm(x: Array, y: Array, z: Array) -> Array:
+def _matrix_norm(x: Array, y: Array, z: Array) -> Array:
     """
     Return the 2-norm of matrices of three rows; (n,).
 
@@ -247,9 +247,9 @@ _CONSISTENT = 1e-9
 """Equations with a smaller relative residual do not contradict each other."""
 
 
-def wanted_of(crank: Sequence[float], rocker: Sequence[float]) -> tuple[Wanted, ...]:
+def wanted_of(crank: Sequence[float], rocker: Sequence[float]) -> tuple[DesignRequest, ...]:
     """Return pairs as wanted positions."""
-    return tuple(Wanted(t, p) for t, p in zip(crank, rocker, strict=True))
+    return tuple(DesignRequest(t, p) for t, p in zip(crank, rocker, strict=True))
 
 
 def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) -> None:
@@ -270,37 +270,37 @@ def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) 
         if not all(abs(angle) <= _FARTHEST for angle in pair):
             raise SynthesisError(
                 f'pair {number}',
-                f'{_said(pair)} is no pair of angles',
+                f'{_pair_text(pair)} is no pair of angles',
                 f'write two numbers of at most {degrees(_FARTHEST):.1g}°',
             )
     for (i, one), (j, other) in combinations(pairs, 2):
         theta, phi = (abs(remainder(u - v, tau)) for u, v in zip(one, other, strict=True))
         if theta < _SAME and phi < _SAME:
             raise SynthesisError(
-                f'pairs {i} and {j}', f'are the same, {_said(one)}', 'give each position once'
+                f'pairs {i} and {j}', f'are the same, {_pair_text(one)}', 'give each position once'
             )
         if theta < _SAME:
             raise SynthesisError(
                 f'pairs {i} and {j}',
-                f'want the rocker at {_degrees(one[1])} and at {_degrees(other[1])} for the same '
-                f'crank angle, {_degrees(one[0])}, which needs both assemblies',
+                f'want the rocker at {_degrees_text(one[1])} and at {_degrees_text(other[1])} for the same '
+                f'crank angle, {_degrees_text(one[0])}, which needs both assemblies',
                 'change one of the crank angles',
             )
 
 
-def centred(crank: Sequence[float], rocker: Sequence[float]) -> tuple[Array, Array, Array]:
+def centre_cosines(crank: Sequence[float], rocker: Sequence[float]) -> tuple[Array, Array, Array]:
     """
     Return cos φ, cos θ and cos(θ − φ) of each pair minus their means, divided by −2; (n,) each.
 
     Subtracting the means eliminates Freudenstein's k3, which makes the mean residual zero.
     """
     theta, phi = np.array(crank, np.float64), np.array(rocker, np.float64)
-    columns = differences(theta[:, None], phi[:, None])
+    columns = equation_differences(theta[:, None], phi[:, None])
     P, Q, R = (np.append(0.0, high[:, 0]) for high, _ in columns)
     return P - P.mean(), Q - Q.mean(), R - R.mean()
 
 
-def dependent(crank: Sequence[float], rocker: Sequence[float]) -> SynthesisError:
+def dependence_error(crank: Sequence[float], rocker: Sequence[float]) -> SynthesisError:
     """Return the reason why the equations of pairs do not determine a four-bar, if known."""
     pairs = [*enumerate(zip(crank, rocker, strict=True), 1)]
     if all(abs(remainder(theta - phi, tau)) < _SAME for _, (theta, phi) in pairs):
@@ -313,11 +313,11 @@ def dependent(crank: Sequence[float], rocker: Sequence[float]) -> SynthesisError
         if all(abs(remainder(u + v, tau)) < _SAME for u, v in zip(one, other, strict=True)):
             return SynthesisError(
                 f'pairs {i} and {j}',
-                f'{_said(one)} and {_said(other)} are mirror images in the ground line: a '
+                f'{_pair_text(one)} and {_pair_text(other)} are mirror images in the ground line: a '
                 'four-bar that has one has the other',
                 'give another pair in place of one of them',
             )
-    P, Q, R = centred(crank, rocker)
+    P, Q, R = centre_cosines(crank, rocker)
     matrix = np.stack((P, Q), 1)
     rest = R - matrix @ np.linalg.lstsq(matrix, R, _CONSISTENT)[0]
     if np.linalg.norm(rest) < _CONSISTENT * np.linalg.norm(R):
@@ -331,11 +331,11 @@ def dependent(crank: Sequence[float], rocker: Sequence[float]) -> SynthesisError
     )
 
 
-def _said(pair: tuple[float, float]) -> str:
-    return ' → '.join(map(_degrees, pair))
+def _pair_text(pair: tuple[float, float]) -> str:
+    return ' → '.join(map(_degrees_text, pair))
 
 
-def _degrees(angle: float) -> str:
+def _degrees_text(angle: float) -> str:
     return f'{degrees(angle):.10g}°'
 
 
@@ -352,7 +352,7 @@ _BLOCK = 2048
 """Triples of pairs that are computed at once: they stay in the cache."""
 
 
-class Links(NamedTuple):
+class FreudensteinLinks(NamedTuple):
     """The links of a four-bar with a ground of length 1; any number of them at once."""
 
     k: Array  # Freudenstein's k1, k2, k3; (…, 3)
@@ -371,7 +371,7 @@ class ThreePairs(NamedTuple):
     condition: Array
     # Σ|x ∂y/∂x| over the six angles x; (…, 2). Of the logarithm y of the system's determinant, and
     # of the coupler's angle y in the first pair, in [rad].
-    doubt: Array
+    system_sensitivity: Array
     # Σ|x ∂L/∂x| + ``abs(L)`` of each length L over the six angles x; (…, 3). Times 2⁻⁵³ it bounds
     # the error of a length that rounding the angles alone causes.
     sensitivity: Array
@@ -380,13 +380,13 @@ class ThreePairs(NamedTuple):
     gradient: Array
 
     @property
-    def digits(self) -> Array:
+    def reliable_digits(self) -> Array:
         """Return the number of reliable digits of each length, 0 to 16; (…, 3)."""
         with np.errstate(all='ignore'):
-            return np.asarray(np.clip(-np.log10(self.lost), 0.0, 16.0))
+            return np.asarray(np.clip(-np.log10(self.lost_digits), 0.0, 16.0))
 
     @property
-    def lost(self) -> Array:
+    def lost_digits(self) -> Array:
         """
         Return the relative error of each length that rounding the angles may cause; (…, 3).
 
@@ -396,42 +396,44 @@ class ThreePairs(NamedTuple):
         """
         with np.errstate(all='ignore'):
             linear = _NOISE * self.sensitivity / np.abs(self.lengths)
-            shaken = np.maximum(linear.max(-1), _NOISE * self.doubt.max(-1))[..., None]
+            shaken = np.maximum(linear.max(-1), _NOISE * self.system_sensitivity.max(-1))[
+                ..., None
+            ]
             return np.where(shaken < _SHAKEN, linear + shaken * shaken, 1.0)
 
 
-def links(crank: ArrayLike, rocker: ArrayLike) -> Links:
+def solve_links(crank: ArrayLike, rocker: ArrayLike) -> FreudensteinLinks:
     """
     Solve for three pairs of angles θ and φ in [rad], or for many triples at once, (…, 3).
 
     No error is raised: a link that does not exist is infinite or NaN.
     """
-    theta, phi = _columns(crank), _columns(rocker)
+    theta, phi = _angle_columns(crank), _angle_columns(rocker)
     k, lengths = np.empty((2, *theta.shape))
-    for block in _blocks(theta.shape[1]):
-        system = solved(theta[:, block], phi[:, block])
+    for block in _split_blocks(theta.shape[1]):
+        system = solve_pairs(theta[:, block], phi[:, block])
         k[:, block], lengths[:, block] = system.k, system.lengths
     shape = np.shape(crank)
-    return Links(k.T.reshape(shape), lengths.T.reshape(shape))
+    return FreudensteinLinks(k.T.reshape(shape), lengths.T.reshape(shape))
 
 
 def three_pairs(crank: ArrayLike, rocker: ArrayLike) -> ThreePairs:
     """Solve as `links`, with the accuracy of the result."""
-    theta, phi = _columns(crank), _columns(rocker)
+    theta, phi = _angle_columns(crank), _angle_columns(rocker)
     count = theta.shape[1]
     k, lengths, kappa = np.empty((3, 3, count))
     conditions, doubts, slopes = np.empty(count), np.empty((2, count)), np.empty((3, 6, count))
-    for block in _blocks(count):
+    for block in _split_blocks(count):
         t, p = theta[:, block], phi[:, block]
-        system = solved(t, p)
+        system = solve_pairs(t, p)
         k[:, block], lengths[:, block] = system.k, system.lengths
         with np.errstate(all='ignore'):
-            conditions[block] = condition(system)
-            by_angle = gradient(system)
+            conditions[block] = condition_number(system)
+            by_angle = length_gradient(system)
             slopes[..., block] = by_angle[:3]
             *sums, turned = (np.abs(by_angle) * np.abs(np.concatenate((t, p)))).sum(1)
             kappa[:, block] = sums + np.abs(system.lengths)
-            doubts[:, block] = doubt(system), turned
+            doubts[:, block] = determinant_sensitivity(system), turned
     shape = np.shape(crank)
     return ThreePairs(
         k.T.reshape(shape),
@@ -443,7 +445,7 @@ def three_pairs(crank: ArrayLike, rocker: ArrayLike) -> ThreePairs:
     )
 
 
-def exact(
+def exact_four_bar(
     crank: Sequence[float], rocker: Sequence[float], ground: float
 ) -> tuple[Design, ThreePairs]:
     """
@@ -465,8 +467,8 @@ def exact(
     """
     check_pairs(crank, rocker, ground)
     solution = three_pairs(crank, rocker)
-    if not _NOISE * solution.doubt[0] < _SHAKEN:
-        raise dependent(crank, rocker)
+    if not _NOISE * solution.system_sensitivity[0] < _SHAKEN:
+        raise dependence_error(crank, rocker)
     a, b, c = (float(length) for length in solution.lengths)
     parts = _NOISE * solution.sensitivity / np.abs(solution.lengths)
     for link, length, part in (('crank', a, parts[0]), ('rocker', c, parts[2])):
@@ -476,7 +478,7 @@ def exact(
                 'would be infinitely long, and is a slider on a straight line then',
                 MOVE,
             )
-    if not solution.digits.all():
+    if not solution.reliable_digits.all():
         raise SynthesisError(
             'the pairs',
             f'do not tell how long the links are: rounding their angles changes one by '
@@ -484,7 +486,7 @@ def exact(
             'move the pairs apart',
         )
     four_bar = FourBar.of_lengths(a * ground, b * ground, c * ground, ground)
-    return assembled(Design(four_bar, wanted_of(crank, rocker))), solution
+    return assemble(Design(four_bar, wanted_of(crank, rocker))), solution
 
 
 def fit_equation(crank: Sequence[float], rocker: Sequence[float], ground: float) -> Design:
@@ -509,14 +511,14 @@ def fit_equation(crank: Sequence[float], rocker: Sequence[float], ground: float)
 
     """
     check_pairs(crank, rocker, ground)
-    P, Q, R = centred(crank, rocker)
+    P, Q, R = centre_cosines(crank, rocker)
     sizes = np.array((np.linalg.norm(P), np.linalg.norm(Q)))
     size = np.linalg.norm((crank, rocker))
     k, _, rank, _ = np.linalg.lstsq(
         np.stack((P, Q), 1) / sizes, R, max(UNIT_ROUNDOFF * size / sizes.min(), 1e-12)
     )
     if rank < 2:
-        raise dependent(crank, rocker)
+        raise dependence_error(crank, rocker)
     k1, k2 = (k / sizes).tolist()
     for link, inverse in (('crank', k1), ('rocker', k2)):
         if not abs(inverse) * LONGEST > 1.0:
@@ -529,13 +531,13 @@ def fit_equation(crank: Sequence[float], rocker: Sequence[float], ground: float)
     apart = 1.0 + c * np.exp(1j * np.array(rocker)) - a * np.exp(1j * np.array(crank))
     b = float(np.sqrt((np.abs(apart) ** 2).mean()))
     four_bar = FourBar.of_lengths(a * ground, b * ground, c * ground, ground)
-    return assembled(Design(four_bar, wanted_of(crank, rocker)))
+    return assemble(Design(four_bar, wanted_of(crank, rocker)))
 
 
-def _columns(angles: ArrayLike) -> Array:
+def _angle_columns(angles: ArrayLike) -> Array:
     """Return triples of angles as (3, n)."""
     return np.ascontiguousarray(np.asarray(angles, np.float64).reshape(-1, 3).T)
 
 
-def _blocks(count: int) -> list[slice]:
+def _split_blocks(count: int) -> list[slice]:
     return [slice(start, start + _BLOCK) for start in range(0, count, _BLOCK)]

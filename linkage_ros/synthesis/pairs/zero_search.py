@@ -22,11 +22,18 @@ from dataclasses import dataclass
 from math import degrees, hypot, isfinite, pi, remainder
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.defects import distances, Needs
+from linkage_ros.synthesis.defects import Needs, needs_penalties
 from linkage_ros.synthesis.design import Design, FourBar
-from linkage_ros.synthesis.pairs.freudenstein import check_pairs, links, wanted_of
-from linkage_ros.synthesis.proof import Array, assembled, Course, course, Flags, least_transmission
-from linkage_ros.synthesis.study import Found, search
+from linkage_ros.synthesis.pairs.freudenstein import check_pairs, solve_links, wanted_of
+from linkage_ros.synthesis.proof import (
+    Array,
+    assemble,
+    Flags,
+    least_transmission,
+    Traversal,
+    traverse_positions,
+)
+from linkage_ros.synthesis.study import DesignFound, search
 import numpy as np
 
 _FAR = 90.0
@@ -67,11 +74,11 @@ class ZeroProblem:
         lengths, found, exists = self.courses(candidates)
         ends = found.directions[:, 0], found.directions[:, -1]
         angle, _ = least_transmission(lengths, *ends)
-        missed = distances(lengths, angle, self.needs)
+        missed = needs_penalties(lengths, angle, self.needs)
         score = (90.0 - np.degrees(angle)) + _FAR * (missed + (missed > 0.0))
-        return np.where(exists & found.usable, score, np.inf)
+        return np.where(exists & found.is_usable, score, np.inf)
 
-    def courses(self, candidates: Array) -> tuple[Array, Course, Flags]:
+    def courses(self, candidates: Array) -> tuple[Array, Traversal, Flags]:
         """
         Return the four-bars of zeros, and their courses through the pairs.
 
@@ -85,7 +92,7 @@ class ZeroProblem:
 
         """
         theta, phi = self.crank + candidates[:, :1], self.rocker + candidates[:, 1:]
-        signed = links(theta, phi).lengths
+        signed = solve_links(theta, phi).lengths
         size = np.abs(signed)
         inside = (size < _LARGEST) & (size > 1.0 / _LARGEST)
         exists: Flags = np.all(inside, axis=-1)
@@ -95,7 +102,11 @@ class ZeroProblem:
         ax, ay = a * np.cos(theta), a * np.sin(theta)
         bx, by = 1.0 + c * np.cos(phi), c * np.sin(phi)
         left = (1.0 - ax) * (by - ay) + ay * (bx - ax) > 0.0
-        return lengths, course(lengths, theta + np.where(a < 0.0, pi, 0.0), left), exists
+        return (
+            lengths,
+            traverse_positions(lengths, theta + np.where(a < 0.0, pi, 0.0), left),
+            exists,
+        )
 
 
 def search_zeros(
@@ -151,11 +162,11 @@ def search_zeros(
             'try more of them, or move an angle',
         )
     spacing = pi / count**0.5
-    best = [_polished(problem, one, spacing) for one in _distinct(found)[: 4 * keep]]
+    best = [_polish(problem, one, spacing) for one in _distinct(found)[: 4 * keep]]
     return tuple(_design(problem, one.candidate, ground) for one in _distinct(sorted(best))[:keep])
 
 
-def _polished(problem: ZeroProblem, start: Found, radius: float) -> Found:
+def _polish(problem: ZeroProblem, start: DesignFound, radius: float) -> DesignFound:
     """Return the best place near a candidate: in a grid around it, then in finer ones."""
     axis = np.linspace(-1.0, 1.0, _GRID)
     grid = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
@@ -165,15 +176,15 @@ def _polished(problem: ZeroProblem, start: Found, radius: float) -> Found:
         scores = problem.score(candidates)
         i = int(scores.argmin())
         if scores[i] < best.score:
-            best = Found(float(scores[i]), tuple(candidates[i].tolist()))
+            best = DesignFound(float(scores[i]), tuple(candidates[i].tolist()))
         else:
             radius *= 0.4
     return best
 
 
-def _distinct(found: Sequence[Found]) -> list[Found]:
+def _distinct(found: Sequence[DesignFound]) -> list[DesignFound]:
     """Return the best of candidates near each other, from a list with the best first."""
-    kept: list[Found] = []
+    kept: list[DesignFound] = []
     for one in found:
         alpha, beta = one.candidate
         if all(
@@ -187,6 +198,6 @@ def _distinct(found: Sequence[Found]) -> list[Found]:
 def _design(problem: ZeroProblem, zeros: Sequence[float], ground: float) -> Design:
     alpha, beta = zeros
     theta = np.array(problem.crank) + alpha
-    a, b, c = links(theta, np.array(problem.rocker) + beta).lengths.tolist()
+    a, b, c = solve_links(theta, np.array(problem.rocker) + beta).lengths.tolist()
     four_bar = FourBar.of_lengths(a * ground, b * ground, c * ground, ground, alpha, beta)
-    return assembled(Design(four_bar, wanted_of(problem.crank, problem.rocker)))
+    return assemble(Design(four_bar, wanted_of(problem.crank, problem.rocker)))

@@ -88,7 +88,7 @@ class PathTask:
     @property
     def size(self) -> float:
         """Return the diagonal of the bounding box of the points, in [m]."""
-        return _size(self.points)
+        return _path_size(self.points)
 
 
 def _check_points(points: tuple[complex, ...], closed: bool) -> None:
@@ -112,8 +112,8 @@ def _check_points(points: tuple[complex, ...], closed: bool) -> None:
             'is the first one again',
             'leave it out: a closed path returns by itself',
         )
-    if not SHORTEST <= _size(points) <= FARTHEST:
-        reason = f'its size is {_size(points):g} m'
+    if not SHORTEST <= _path_size(points) <= FARTHEST:
+        reason = f'its size is {_path_size(points):g} m'
         raise SynthesisError('path', reason, f'make it {SHORTEST:g} to {FARTHEST:g} m')
 
 
@@ -140,7 +140,7 @@ def _check_timing(timing: tuple[float, ...], points: int, closed: bool) -> None:
         )
 
 
-def _size(points: tuple[complex, ...]) -> float:
+def _path_size(points: tuple[complex, ...]) -> float:
     x, y = [point.real for point in points], [point.imag for point in points]
     return abs(complex(max(x) - min(x), max(y) - min(y)))
 
@@ -152,7 +152,7 @@ class Fitted(NamedTuple):
     angles: Array  # Crank angles from the ground line at the points, (n, N)
     side: Array  # 1 for left and −1 for right, (n,)
 
-    def some(self, chosen: NDArray[np.intp]) -> Fitted:
+    def select_rows(self, chosen: NDArray[np.intp]) -> Fitted:
         """Return the four-bars with these indices."""
         return Fitted(self.rows[chosen], self.angles[chosen], self.side[chosen])
 
@@ -223,7 +223,7 @@ def coupler_directions(
     return turned, across_square
 
 
-def slopes(rows: Array, angles: Array, side: Array) -> Slopes:
+def point_slopes(rows: Array, angles: Array, side: Array) -> Slopes:
     """Return places and derivatives of four-bars (n, 9) at crank angles (n, N)."""
     a, b, c, d = np.exp(rows[:, LENGTHS]).T[:, :, None]
     frame = np.exp(1j * rows[:, 2:3])
@@ -253,7 +253,7 @@ def slopes(rows: Array, angles: Array, side: Array) -> Slopes:
     return Slopes(pivot + swing + arm, by, by_angle)
 
 
-def folds(rows: Array, angles: Array) -> tuple[Array, Array, Array]:
+def transmission_cotangents(rows: Array, angles: Array) -> tuple[Array, Array, Array]:
     """
     Return the cotangent of the transmission angle, and its derivatives.
 
@@ -288,15 +288,15 @@ def folds(rows: Array, angles: Array) -> tuple[Array, Array, Array]:
     return inward / sine, by, -steep * swing
 
 
-def diagonals(a: Array, d: Array, low: Array, high: Array) -> tuple[Array, Array]:
+def extreme_diagonals(a: Array, d: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """
     Return the shortest and the longest diagonal from the crank's pin to the rocker's pivot.
 
     Crank angles are from the ground line, in [rad].
     """
     first, last = np.cos(low), np.cos(high)
-    nearest = np.where(_holds(low, high, 0.0), 1.0, np.maximum(first, last))
-    farthest = np.where(_holds(low, high, np.pi), -1.0, np.minimum(first, last))
+    nearest = np.where(_contains_angle(low, high, 0.0), 1.0, np.maximum(first, last))
+    farthest = np.where(_contains_angle(low, high, np.pi), -1.0, np.minimum(first, last))
     constant, factor = (a - d) ** 2, 2.0 * a * d
     return (
         np.sqrt(constant + factor * (1.0 - nearest)),
@@ -304,22 +304,22 @@ def diagonals(a: Array, d: Array, low: Array, high: Array) -> tuple[Array, Array
     )
 
 
-def closes(rows: Array, low: Array, high: Array) -> Mask:
+def stay_closed(rows: Array, low: Array, high: Array) -> Mask:
     """Return which four-bars (n, 9) stay closed, and away from toggles, between two angles."""
     a, b, c, d = np.exp(rows[:, LENGTHS]).T
-    shortest, longest = diagonals(a, d, low, high)
+    shortest, longest = extreme_diagonals(a, d, low, high)
     spare = _SPARE * longest
     closed: Mask = (b + c > longest + spare) & (np.abs(b - c) < shortest - spare)
     return closed
 
 
-def _holds(low: Array, high: Array, angle: float) -> Mask:
+def _contains_angle(low: Array, high: Array, angle: float) -> Mask:
     """Return whether an angle lies between two others, modulo a turn."""
     held: Mask = np.ceil((low - angle) / tau) * tau + angle <= high
     return held
 
 
-def along(curves: Complex) -> Array:
+def curve_distances(curves: Complex) -> Array:
     """Return the relative distance of every point along its curve, from 0 to 1, (n, M)."""
     steps = np.abs(np.diff(curves, axis=1))
     way = np.zeros(curves.shape)
@@ -328,9 +328,9 @@ def along(curves: Complex) -> Array:
     return way
 
 
-def fractions(points: Complex) -> Array:
+def path_distances(points: Complex) -> Array:
     """Return the relative distance of points along their path, from 0 to 1, (N,)."""
-    return along(points[None, :]).ravel()
+    return curve_distances(points[None, :]).ravel()
 
 
 def theta_at(way: Array, wanted: Array) -> Array:
@@ -339,22 +339,22 @@ def theta_at(way: Array, wanted: Array) -> Array:
 
     The ways are from `along`, (n, M), the distances from 0 to 1, (N,) or (n, N).
     """
-    before, part = _segment(way, wanted)
+    before, part = _find_segment(way, wanted)
     part += before
     part /= way.shape[1] - 1
     return part
 
 
-def resampled(curves: Complex, way: Array, wanted: Array) -> Complex:
+def resample(curves: Complex, way: Array, wanted: Array) -> Complex:
     """Return the places of curves (n, M) at relative distances, on their chords, (n, N)."""
-    before, part = _segment(way, wanted)
+    before, part = _find_segment(way, wanted)
     start = np.take_along_axis(curves, before, axis=1)
     end = np.take_along_axis(curves, before + 1, axis=1)
     places: Complex = start + part * (end - start)
     return places
 
 
-def _segment(
+def _find_segment(
     way: Array, wanted: Array
 ) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.int64]], Array]:
     """Return the step that holds each distance, and the fraction of that step, (n, N) both."""

@@ -41,19 +41,19 @@ from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.batch import Array, Complex, Mask
-from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
 from linkage_ros.synthesis.path.curves import (
     Aim,
-    closes,
     COLUMNS,
     Fitted,
-    folds,
-    fractions,
     LENGTHS,
+    path_distances,
     PathTask,
     POINT,
+    point_slopes,
     Slopes,
-    slopes,
+    stay_closed,
+    transmission_cotangents,
 )
 from linkage_ros.synthesis.path.search import problem_of
 from linkage_ros.synthesis.proof import least_transmission
@@ -73,7 +73,7 @@ _TINY = 1e-30
 """Prevents a division by zero if a crank angle moves nothing."""
 
 
-def step(now: Fitted, seen: Slopes, damping: Array, aim: Aim, guard: float) -> Fitted:
+def damped_step(now: Fitted, seen: Slopes, damping: Array, aim: Aim, guard: float) -> Fitted:
     """
     Return the result of one damped step, within the bounds.
 
@@ -81,21 +81,21 @@ def step(now: Fitted, seen: Slopes, damping: Array, aim: Aim, guard: float) -> F
     Improvements to the Levenberg-Marquardt algorithm, arXiv:1201.5885, 2012): errors of coupler
     curves have long, curved valleys, along which straight steps are short.
     """
-    equations = _equations(now, seen, aim, guard)
-    solve = _Solver(now, equations, damping, aim)
+    equations = _step_equations(now, seen, aim, guard)
+    solve = _PathSolver(now, equations, damping, aim)
     change = solve(equations.gaps, equations.aside)
     if not guard:
-        bend = _bend(now, seen, change, aim)
+        bend = _second_order_change(now, seen, change, aim)
         more = solve(np.stack((bend.real, bend.imag), axis=1), equations.aside)
         sizes = [np.abs(part).max(1) for part in (change.rows, more.rows)]
         helps = (sizes[1] <= _BENT * sizes[0])[:, None]
         change = Fitted(
             change.rows + helps * more.rows, change.angles + helps * more.angles, change.side
         )
-    return _moved(now, change, aim)
+    return _move_design(now, change, aim)
 
 
-class _Equations(NamedTuple):
+class _PathEquations(NamedTuple):
     """The equations of a step: derivatives times step = gaps, by least squares."""
 
     by: Array  # Derivatives by the unknowns common to all points, (n, parts, N, m)
@@ -106,7 +106,7 @@ class _Equations(NamedTuple):
     aside: Array
 
 
-def _equations(now: Fitted, seen: Slopes, aim: Aim, guard: float) -> _Equations:
+def _step_equations(now: Fitted, seen: Slopes, aim: Aim, guard: float) -> _PathEquations:
     miss = aim.points - seen.places
     by = np.stack((seen.by_dimension.real, seen.by_dimension.imag), axis=1)
     turns = np.stack((seen.by_angle.real, seen.by_angle.imag), axis=1)
@@ -115,12 +115,14 @@ def _equations(now: Fitted, seen: Slopes, aim: Aim, guard: float) -> _Equations:
     if guard:
         # If the crank's angle is not an unknown it is 0 or π, where a full turn comes nearest to
         # its toggles.
-        folded, by_dimension, by_angle = folds(now.rows, now.angles)
+        folded, by_dimension, by_angle = transmission_cotangents(now.rows, now.angles)
         by = np.concatenate((by, guard * by_dimension[:, None]), axis=1)
         turns = np.concatenate((turns, guard * by_angle[:, None]), axis=1)
         gaps = np.concatenate((gaps, -guard * folded[:, None]), axis=1)
         if aim.full_turn:
-            folded, by_dimension, _ = folds(now.rows, np.broadcast_to((0.0, np.pi), (len(by), 2)))
+            folded, by_dimension, _ = transmission_cotangents(
+                now.rows, np.broadcast_to((0.0, np.pi), (len(by), 2))
+            )
             more, aside = guard * by_dimension, -guard * folded
     if aim.timing is not None and aim.zero_free:
         by = np.concatenate((by, turns[..., None]), axis=3)
@@ -128,13 +130,13 @@ def _equations(now: Fitted, seen: Slopes, aim: Aim, guard: float) -> _Equations:
     elif aim.timing is not None:
         # The crank's angle in the world is given: turning the ground turns it back.
         by[..., 2] -= turns
-    return _Equations(by, turns, gaps, more, aside)
+    return _PathEquations(by, turns, gaps, more, aside)
 
 
-class _Solver:
+class _PathSolver:
     """The damped normal equations of a step, ready for any gaps."""
 
-    def __init__(self, now: Fitted, equations: _Equations, damping: Array, aim: Aim) -> None:
+    def __init__(self, now: Fitted, equations: _PathEquations, damping: Array, aim: Aim) -> None:
         self._now, self._equations, self._aim = now, equations, aim
         by, turns, more = equations.by, equations.turns, equations.more
         count, unknowns = len(by), by.shape[3]
@@ -150,8 +152,8 @@ class _Solver:
         matrix[:, diagonal, diagonal] += damping[:, None] * scale
         matrix[:, diagonal, diagonal] += 1e-12 * scale.max(1, keepdims=True)
         self._held = np.zeros((count, unknowns), dtype=bool)
-        slope, _ = self._slope(equations.gaps, equations.aside)
-        low, high = _box(aim)
+        slope, _ = self._error_gradient(equations.gaps, equations.aside)
+        low, high = _row_bounds(aim)
         self._held[:, :_SIZE] = (now.rows <= low) & (slope[:, :_SIZE] < 0.0)
         self._held[:, :_SIZE] |= (now.rows >= high) & (slope[:, :_SIZE] > 0.0)
         matrix *= ~self._held[:, :, None] & ~self._held[:, None, :]
@@ -160,7 +162,7 @@ class _Solver:
 
     def __call__(self, gaps: Array, aside: Array) -> Fitted:
         """Return the change of rows and angles."""
-        slope, pull = self._slope(gaps, aside)
+        slope, pull = self._error_gradient(gaps, aside)
         change = np.matmul(self._inverse, np.where(self._held, 0.0, slope)[..., None])[..., 0]
         # Far from the solution a step may have any size, and e^x must stay finite.
         np.clip(change, -1.0, 1.0, out=change)
@@ -172,7 +174,7 @@ class _Solver:
             turned = np.broadcast_to(turn, self._now.angles.shape)
         return Fitted(rows, turned, self._now.side)
 
-    def _slope(self, gaps: Array, aside: Array) -> tuple[Array, Array]:
+    def _error_gradient(self, gaps: Array, aside: Array) -> tuple[Array, Array]:
         right = np.concatenate((gaps.reshape(len(gaps), -1), aside), axis=1)
         slope = np.matmul(right[:, None, :], self._rows)[:, 0, :]
         if self._aim.timing is not None:
@@ -181,10 +183,10 @@ class _Solver:
         return slope - np.matmul(pull[:, None, :], self._shares)[:, 0, :], pull
 
 
-def _bend(now: Fitted, seen: Slopes, change: Fitted, aim: Aim) -> Complex:
+def _second_order_change(now: Fitted, seen: Slopes, change: Fitted, aim: Aim) -> Complex:
     """Return the second-order change of the places along a step, (n, N)."""
-    ahead = slopes(
-        *_moved(now, Fitted(_AHEAD * change.rows, _AHEAD * change.angles, change.side), aim)
+    ahead = point_slopes(
+        *_move_design(now, Fitted(_AHEAD * change.rows, _AHEAD * change.angles, change.side), aim)
     )
     straight = np.matmul(seen.by_dimension, change.rows[..., None])[..., 0]
     straight = straight + seen.by_angle * change.angles
@@ -192,13 +194,13 @@ def _bend(now: Fitted, seen: Slopes, change: Fitted, aim: Aim) -> Complex:
     return bend
 
 
-def _moved(now: Fitted, change: Fitted, aim: Aim) -> Fitted:
-    low, high = _box(aim)
+def _move_design(now: Fitted, change: Fitted, aim: Aim) -> Fitted:
+    low, high = _row_bounds(aim)
     moved = np.clip(now.rows + change.rows, low, high)
     return Fitted(moved, now.angles + change.angles, now.side)
 
 
-def _box(aim: Aim) -> tuple[Array, Array]:
+def _row_bounds(aim: Aim) -> tuple[Array, Array]:
     """Return the bounds of the rows, (9,)."""
     low, high = np.full(_SIZE, -np.inf), np.full(_SIZE, np.inf)
     low[LENGTHS], high[LENGTHS] = np.log(aim.shortest), np.log(aim.longest)
@@ -235,8 +237,8 @@ def improve(start: Fitted, aim: Aim, steps: int, guard: float = 0.0) -> tuple[Fi
 
     """
     now = Fitted(*(np.array(part) for part in start))
-    seen = slopes(*now)
-    cost = _cost(now, seen, aim, guard)
+    seen = point_slopes(*now)
+    cost = _fit_cost(now, seen, aim, guard)
     damping = np.full(len(cost), _DAMPING)
     going = np.flatnonzero(np.isfinite(cost))
     # A trial may be open, with meaningless derivatives: its cost is inf.
@@ -245,9 +247,9 @@ def improve(start: Fitted, aim: Aim, steps: int, guard: float = 0.0) -> tuple[Fi
             if not len(going):
                 break
             at = Slopes(*(part[going] for part in seen))
-            tried = step(now.some(going), at, damping[going], aim, guard)
-            fresh = slopes(*tried)
-            reached = _cost(tried, fresh, aim, guard)
+            tried = damped_step(now.select_rows(going), at, damping[going], aim, guard)
+            fresh = point_slopes(*tried)
+            reached = _fit_cost(tried, fresh, aim, guard)
             better = reached < cost[going]
             settled = better & (cost[going] - reached <= _SETTLED * reached)
             taken = going[better]
@@ -259,10 +261,10 @@ def improve(start: Fitted, aim: Aim, steps: int, guard: float = 0.0) -> tuple[Fi
             )
             settled |= (damping[going] > _MOST_DAMPED) | (cost[going] < _NOTHING)
             going = going[~settled]
-    return now, np.where(np.isfinite(cost), _squares(seen, aim), np.inf)
+    return now, np.where(np.isfinite(cost), _squared_distances(seen, aim), np.inf)
 
 
-def allowed(fitted: Fitted, aim: Aim) -> Mask:
+def are_allowed(fitted: Fitted, aim: Aim) -> Mask:
     """Return which four-bars stay closed on their way through the points, in order."""
     angles = fitted.angles
     low, high = angles.min(1), angles.max(1)
@@ -272,26 +274,26 @@ def allowed(fitted: Fitted, aim: Aim) -> Mask:
         good = (along > 0.0).all(1) & (high - low < tau)
     if aim.full_turn:
         low, high = np.zeros_like(low), np.full_like(high, tau)
-    good &= closes(fitted.rows, low, high)
+    good &= stay_closed(fitted.rows, low, high)
     return good
 
 
-def _cost(fitted: Fitted, seen: Slopes, aim: Aim, guard: float) -> Array:
-    squares = _squares(seen, aim)
+def _fit_cost(fitted: Fitted, seen: Slopes, aim: Aim, guard: float) -> Array:
+    squares = _squared_distances(seen, aim)
     if guard:
-        squares += guard * guard * _folded(fitted.rows, fitted.angles)
+        squares += guard * guard * _fold_angles(fitted.rows, fitted.angles)
         if aim.full_turn:
-            squares += guard * guard * _folded(fitted.rows, np.array([[0.0, np.pi]]))
-    return np.where(allowed(fitted, aim), squares, np.inf)
+            squares += guard * guard * _fold_angles(fitted.rows, np.array([[0.0, np.pi]]))
+    return np.where(are_allowed(fitted, aim), squares, np.inf)
 
 
-def _folded(rows: Array, angles: Array) -> Array:
-    folded = folds(rows, angles)[0]
+def _fold_angles(rows: Array, angles: Array) -> Array:
+    folded = transmission_cotangents(rows, angles)[0]
     squares: Array = (folded * folded).sum(1)
     return squares
 
 
-def _squares(seen: Slopes, aim: Aim) -> Array:
+def _squared_distances(seen: Slopes, aim: Aim) -> Array:
     miss = aim.points - seen.places
     total: Array = (miss.real**2 + miss.imag**2).sum(1)
     total[~np.isfinite(total)] = np.inf
@@ -387,7 +389,7 @@ def generate_path(
         task.closed or task.full_turn,
         *task.links,
     )
-    some = _thinned(len(points))
+    some = _thin_points(len(points))
     timing = None if whole.timing is None else whole.timing[some]
     thin = replace(whole, points=whole.points[some], timing=timing)
     problem = problem_of(thin, task.closed)
@@ -401,16 +403,16 @@ def generate_path(
             'times its size reaches the points',
             'allow longer links, or draw more',
         )
-    fitted = problem.starts(np.array([one.candidate for one in drawn]))
+    fitted = problem.place_candidates(np.array([one.candidate for one in drawn]))
     for steps, guard, survivors in _STAGES:
         fitted, squares = improve(fitted, thin, steps, guard)
-        fitted = fitted.some(_distinct(fitted, squares, max(survivors, 4 * keep)))
+        fitted = fitted.select_rows(_distinct_indices(fitted, squares, max(survivors, 4 * keep)))
     fitted, squares = improve(_on_all(fitted, some, whole), whole, _LAST_STEPS)
-    fitted = fitted.some(_distinct(fitted, squares, len(squares)))
-    return _sorted(_results(task, fitted, whole, middle), keep, accept)
+    fitted = fitted.select_rows(_distinct_indices(fitted, squares, len(squares)))
+    return _sort_paths(_path_results(task, fitted, whole, middle), keep, accept)
 
 
-def _thinned(points: int) -> NDArray[np.intp]:
+def _thin_points(points: int) -> NDArray[np.intp]:
     """Return the indices of the points for the search, including the first and the last."""
     chosen = np.linspace(0, points - 1, min(_THINNED, points)).round().astype(np.intp)
     return np.unique(chosen)
@@ -422,12 +424,12 @@ def _on_all(fitted: Fitted, some: NDArray[np.intp], aim: Aim) -> Fitted:
         return fitted
     if aim.timing is not None:
         return fitted._replace(angles=fitted.angles[:, :1] + (aim.timing - aim.timing[0]))
-    way = fractions(aim.points)
+    way = path_distances(aim.points)
     angles = [np.interp(way, way[some], row) for row in fitted.angles]
     return fitted._replace(angles=np.array(angles).reshape(-1, len(way)))
 
 
-def _distinct(fitted: Fitted, squares: Array, most: int) -> NDArray[np.intp]:
+def _distinct_indices(fitted: Fitted, squares: Array, most: int) -> NDArray[np.intp]:
     """Return the indices of distinct four-bars, the nearest first."""
     a, b, c, d = np.exp(fitted.rows[:, LENGTHS]).T
     x, y, direction = fitted.rows[:, :3].T
@@ -445,9 +447,9 @@ def _distinct(fitted: Fitted, squares: Array, most: int) -> NDArray[np.intp]:
     return np.array(chosen, dtype=np.intp)
 
 
-def _results(task: PathTask, fitted: Fitted, aim: Aim, middle: complex) -> list[PathResult]:
+def _path_results(task: PathTask, fitted: Fitted, aim: Aim, middle: complex) -> list[PathResult]:
     """Return the designs, by error; those without an error by transmission angle."""
-    miss = np.abs(aim.points - slopes(*fitted).places)
+    miss = np.abs(aim.points - point_slopes(*fitted).places)
     rms = np.sqrt((miss * miss).mean(1))
     start, end = fitted.angles[:, 0], fitted.angles[:, -1]
     if aim.full_turn:
@@ -456,7 +458,7 @@ def _results(task: PathTask, fitted: Fitted, aim: Aim, middle: complex) -> list[
     order = np.lexsort((-transmission, np.maximum(rms, _EXACT)))
     return [
         PathResult(
-            _design(task, fitted.rows[i], fitted.angles[i], fitted.side[i], middle),
+            _build_design(task, fitted.rows[i], fitted.angles[i], fitted.side[i], middle),
             float(rms[i]) * task.size,
             float(miss[i].max()) * task.size,
         )
@@ -464,7 +466,9 @@ def _results(task: PathTask, fitted: Fitted, aim: Aim, middle: complex) -> list[
     ]
 
 
-def _design(task: PathTask, row: Array, angles: Array, side: float, middle: complex) -> Design:
+def _build_design(
+    task: PathTask, row: Array, angles: Array, side: float, middle: complex
+) -> Design:
     x, y, direction = (float(value) for value in row[:3])
     a, b, c, d = (task.size * float(length) for length in np.exp(row[LENGTHS]))
     o2 = middle + task.size * complex(x, y)
@@ -484,11 +488,11 @@ def _design(task: PathTask, row: Array, angles: Array, side: float, middle: comp
         side='left' if side > 0.0 else 'right',
         traced=task.size * complex(*row[7:]),
     )
-    wanted = (Wanted(crank=t, place=z) for t, z in zip(turned, task.points, strict=True))
+    wanted = (DesignRequest(crank=t, place=z) for t, z in zip(turned, task.points, strict=True))
     return Design(four_bar, tuple(wanted))
 
 
-def _sorted(
+def _sort_paths(
     results: list[PathResult], keep: int, accept: Callable[[Design], bool] | None
 ) -> Paths:
     found: list[PathResult] = []

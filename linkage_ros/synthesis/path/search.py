@@ -32,12 +32,12 @@ from math import tau
 from linkage_ros.kinematics.batch import Array, Complex
 from linkage_ros.synthesis.path.curves import (
     Aim,
-    along,
     coupler_directions,
-    diagonals,
+    curve_distances,
+    extreme_diagonals,
     Fitted,
-    fractions,
-    resampled,
+    path_distances,
+    resample,
     theta_at,
 )
 import numpy as np
@@ -70,16 +70,16 @@ class Starts(ABC):
         """Draw candidates, (count, n)."""
 
     @abstractmethod
-    def _angles(self, candidates: Array) -> Array:
+    def _crank_angles(self, candidates: Array) -> Array:
         """Return the crank angles at the points for each candidate, in [rad]."""
 
     def score(self, candidates: Array) -> Array:
         """Return the error of each candidate, placed on the points."""
-        return _laid(candidates, self._angles(candidates), self.aim)[0]
+        return _fit_candidates(candidates, self._crank_angles(candidates), self.aim)[0]
 
-    def starts(self, candidates: Array) -> Fitted:
+    def place_candidates(self, candidates: Array) -> Fitted:
         """Return the candidates as four-bars placed on the points."""
-        return _started(candidates, self._angles(candidates), self.aim)
+        return _start_fits(candidates, self._crank_angles(candidates), self.aim)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,12 +88,12 @@ class Timed(Starts):
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
         zero = generator.uniform(0.0, tau, count)
-        timing = _known(self.aim.timing)
+        timing = _known_timing(self.aim.timing)
         low, high = zero + timing.min(), zero + timing.max()
-        return np.column_stack((_bars(generator, low, high, self.aim.full_turn), zero))
+        return np.column_stack((_draw_bars(generator, low, high, self.aim.full_turn), zero))
 
-    def _angles(self, candidates: Array) -> Array:
-        return candidates[:, 4:5] + _known(self.aim.timing)
+    def _crank_angles(self, candidates: Array) -> Array:
+        return candidates[:, 4:5] + _known_timing(self.aim.timing)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,14 +104,14 @@ class Open(Starts):
         start = generator.uniform(0.0, tau, count)
         travel = generator.uniform(*_ARC, count) * generator.choice((-1.0, 1.0), count)
         low, high = np.minimum(start, start + travel), np.maximum(start, start + travel)
-        bars = _bars(generator, low, high, self.aim.full_turn)
-        return np.column_stack((bars, _arms(generator, bars), start, travel))
+        bars = _draw_bars(generator, low, high, self.aim.full_turn)
+        return np.column_stack((bars, _draw_points(generator, bars), start, travel))
 
-    def _angles(self, candidates: Array) -> Array:
+    def _crank_angles(self, candidates: Array) -> Array:
         start, travel = candidates[:, 6:7], candidates[:, 7:8]
         angles = start + travel * np.linspace(0.0, 1.0, _GRID // 2)
-        way = along(_curve(candidates, angles))
-        return start + travel * theta_at(way, fractions(self.aim.points))
+        way = curve_distances(_coupler_curve(candidates, angles))
+        return start + travel * theta_at(way, path_distances(self.aim.points))
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,17 +119,17 @@ class Closed(Starts):
     """Candidates b/a, c/a, d/a, side and the traced point; the start is computed."""
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
-        bars = _bars(generator, np.zeros(count), np.full(count, tau), True)
-        return np.column_stack((bars, _arms(generator, bars)))
+        bars = _draw_bars(generator, np.zeros(count), np.full(count, tau), True)
+        return np.column_stack((bars, _draw_points(generator, bars)))
 
-    def _angles(self, candidates: Array) -> Array:
+    def _crank_angles(self, candidates: Array) -> Array:
         """Return the angles for the rotation of the whole curve that fits the points best."""
-        curve = _curve(candidates, np.linspace(0.0, tau, _GRID + 1)[None, :])
-        way = along(curve)
+        curve = _coupler_curve(candidates, np.linspace(0.0, tau, _GRID + 1)[None, :])
+        way = curve_distances(curve)
         even = np.arange(_AROUND) / _AROUND
-        spectrum = np.fft.fft(resampled(curve, way, even), axis=1)
-        wanted = fractions(np.append(self.aim.points, self.aim.points[0]))
-        target = resampled(
+        spectrum = np.fft.fft(resample(curve, way, even), axis=1)
+        wanted = path_distances(np.append(self.aim.points, self.aim.points[0]))
+        target = resample(
             np.append(self.aim.points, self.aim.points[0])[None, :], wanted[None, :], even
         )[0]
         best = np.full(len(candidates), -1.0)
@@ -156,66 +156,66 @@ def problem_of(aim: Aim, closed: bool) -> Starts:
     return Closed(aim) if closed else Open(aim)
 
 
-def _bars(generator: np.random.Generator, low: Array, high: Array, full_turn: bool) -> Array:
+def _draw_bars(generator: np.random.Generator, low: Array, high: Array, full_turn: bool) -> Array:
     """Draw b, c, d for a crank of 1, and the side, that close between these angles; (n, 4)."""
     count = len(low)
     if full_turn:
         low, high = np.zeros(count), np.full(count, tau)
     d = np.exp(generator.uniform(*_GROUND, count))
-    shortest, longest = diagonals(np.ones(count), d, low, high)
+    shortest, longest = extreme_diagonals(np.ones(count), d, low, high)
     both = longest * (1.0 + np.exp(generator.uniform(*_SPARE, count)))
     more = shortest * generator.uniform(-1.0, 1.0, count)
     side = generator.choice((-1.0, 1.0), count)
     return np.column_stack((0.5 * (both + more), 0.5 * (both - more), d, side))
 
 
-def _arms(generator: np.random.Generator, bars: Array) -> Array:
+def _draw_points(generator: np.random.Generator, bars: Array) -> Array:
     spread: Array = generator.normal(0.0, _ARM, (len(bars), 2))
     spread[:, 0] += 0.5
     return bars[:, :1] * spread
 
 
-def _curve(candidates: Array, angles: Array) -> Complex:
+def _coupler_curve(candidates: Array, angles: Array) -> Complex:
     crank = np.exp(1j * angles)
-    coupler = _couplers(candidates, crank)
+    coupler = _coupler_vectors(candidates, crank)
     curve: Complex = crank + (candidates[:, 4:5] + 1j * candidates[:, 5:6]) * coupler
     return curve
 
 
-def _couplers(candidates: Array, crank: Complex) -> Complex:
+def _coupler_vectors(candidates: Array, crank: Complex) -> Complex:
     b, c, d, side = candidates[:, :4].T[:, :, None]
     return coupler_directions(crank, b, c, d, side)[0]
 
 
-def _laid(candidates: Array, angles: Array, aim: Aim) -> tuple[Array, Complex, Complex]:
+def _fit_candidates(candidates: Array, angles: Array, aim: Aim) -> tuple[Array, Complex, Complex]:
     """
     Return the remaining squares, q and r: least squares, solved in closed form.
 
     A four-bar with a length outside of the bounds has inf.
     """
     crank = np.exp(1j * angles)
-    coupler = _couplers(candidates, crank)
+    coupler = _coupler_vectors(candidates, crank)
     crank = crank - crank.mean(1, keepdims=True)
     coupler = coupler - coupler.mean(1, keepdims=True)
     target = aim.points - aim.points.mean()
-    cranks, couplers = _squared(crank).sum(1), _squared(coupler).sum(1)
+    cranks, couplers = _square(crank).sum(1), _square(coupler).sum(1)
     shared = np.einsum('ij,ij->i', np.conj(crank), coupler)
     on_crank, on_coupler = np.conj(crank) @ target, np.conj(coupler) @ target
     with np.errstate(all='ignore'):
         if aim.timing is not None and not aim.zero_free:
             # The crank's direction is given: q lies along one direction, only its size is free.
             onward = np.exp(-1j * candidates[:, 4])
-            own = cranks - _squared(shared) / couplers
+            own = cranks - _square(shared) / couplers
             part = on_crank - shared * on_coupler / couplers
             q = onward * (np.conj(onward) * part).real / own
             r = (on_coupler - np.conj(shared) * q) / couplers
             out = (np.conj(onward) * part).real <= 0.0
         else:
-            whole = cranks * couplers - _squared(shared)
+            whole = cranks * couplers - _square(shared)
             q = (couplers * on_crank - shared * on_coupler) / whole
             r = (cranks * on_coupler - np.conj(shared) * on_crank) / whole
             out = np.zeros(len(q), dtype=bool)
-        left = _squared(target).sum() - (np.conj(q) * on_crank + np.conj(r) * on_coupler).real
+        left = _square(target).sum() - (np.conj(q) * on_crank + np.conj(r) * on_coupler).real
         a = np.abs(q)
         lengths = np.column_stack((np.ones(len(a)), candidates[:, :3]))
         out |= lengths.min(1) * a < aim.shortest
@@ -224,10 +224,10 @@ def _laid(candidates: Array, angles: Array, aim: Aim) -> tuple[Array, Complex, C
     return np.where(out | ~np.isfinite(left), np.inf, np.maximum(left, 0.0)), q, r
 
 
-def _started(candidates: Array, angles: Array, aim: Aim) -> Fitted:
-    _, q, r = _laid(candidates, angles, aim)
+def _start_fits(candidates: Array, angles: Array, aim: Aim) -> Fitted:
+    _, q, r = _fit_candidates(candidates, angles, aim)
     crank = np.exp(1j * angles)
-    coupler = _couplers(candidates, crank)
+    coupler = _coupler_vectors(candidates, crank)
     pivot = (aim.points - q[:, None] * crank - r[:, None] * coupler).mean(1)
     lengths = np.abs(q)[:, None] * np.column_stack((np.ones(len(q)), candidates[:, :3]))
     point = r * np.exp(-1j * np.angle(q))
@@ -237,7 +237,7 @@ def _started(candidates: Array, angles: Array, aim: Aim) -> Fitted:
     return Fitted(rows, angles, candidates[:, 3])
 
 
-def _squared(values: Complex) -> Array:
+def _square(values: Complex) -> Array:
     squares: Array = values.real**2 + values.imag**2
     return squares
 
@@ -248,7 +248,7 @@ def _middled_spectrum(places: Complex) -> Complex:
     return spectrum
 
 
-def _known(timing: Array | None) -> Array:
+def _known_timing(timing: Array | None) -> Array:
     if timing is None:
         raise TypeError('a timed search of a path without timing')
     return timing
