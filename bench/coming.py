@@ -26,7 +26,7 @@ from typing import Any
 from bench.report import say, Table
 from bench.ticks import cpu_time, write_turning
 from linkage_ros.processes import Graph, MeasurementError, Process
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 
 _APPEARING = 15.0
 """Time limit for the node's first tick, in [s]."""
@@ -78,7 +78,7 @@ def measure_comers(
 def _transports(folder: Path) -> Mapping[str, Mapping[str, str]]:
     """Return the node's environment for each transport; all stay on the machine."""
     local = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}
-    profile = shipped('fastdds/local.xml')
+    profile = shipped_path('fastdds/local.xml')
     text = profile.read_text('utf-8')
     for mark, more in (
         ('  </transport_descriptors>', _SHARED),
@@ -104,18 +104,18 @@ def _measure(
     """Return one row of the table."""
     with ExitStack() as stack:
         run = stack.enter_context
-        listener = run(graph.run('bench.listener'))
+        listener = run(graph.run_module('bench.listener'))
         ours = ('--ros-args', '-p', f'scene:={scene}')
-        node = run(graph.run('linkage_ros.node.linkage_node', ours, environment))
+        node = run(graph.run_module('linkage_ros.node.linkage_node', ours, environment))
         before = _report(listener, node)
         for _ in range(busy):
-            run(graph.run('bench.busy'))
+            run(graph.run_module('bench.busy'))
         ran, waited = cpu_time(node.pid)
-        comers = run(graph.run('bench.comers', (str(plan.comers), f'{plan.listens:g}')))
-        counts = comers.read(60.0 + plan.comers * (plan.listens + 2.0))
+        comers = run(graph.run_module('bench.comers', (str(plan.comers), f'{plan.listens:g}')))
+        counts = comers.read_answer(60.0 + plan.comers * (plan.listens + 2.0))
         ran_then, waited_then = cpu_time(node.pid)
         time.sleep(_DIAGNOSTICS)
-        listener.ask('forget')
+        listener.ask_line('forget')
         after = _report(listener, node)
     ticks, lost = (
         int(after['health'][key]) - int(before['health'][key])
@@ -137,8 +137,8 @@ def _measure(
 def _report(listener: Process, node: Process) -> dict[str, Any]:
     """Return the listener's report, as soon as it has diagnostics of the node."""
     until = time.monotonic() + _APPEARING
-    while not (report := listener.ask('?'))['health']:
-        node.check()
+    while not (report := listener.ask_line('?'))['health']:
+        node.check_running()
         if time.monotonic() > until:
             raise MeasurementError(f'{node.name}: no diagnostics in {_APPEARING:g} s')
         time.sleep(0.1)

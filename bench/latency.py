@@ -43,19 +43,19 @@ def measure_latency(graph: Graph, folder: Path, plan: LatencyPlan) -> Table:
     with ExitStack() as stack:
         run = stack.enter_context
         ours = run(
-            graph.run(
+            graph.run_module(
                 'linkage_ros.node.linkage_node',
                 ['--ros-args', '-p', f'scene:={scene}', *_remapped(_OURS)],
             )
         )
-        relay = run(graph.run('bench.raw_relay', ['--ros-args', *_remapped(_RELAY)]))
+        relay = run(graph.run_module('bench.raw_relay', ['--ros-args', *_remapped(_RELAY)]))
         counts = [f'{plan.rate:g}', str(plan.size), str(plan.parts + 1)]
-        prober = run(graph.run('bench.prober', [*counts, _OURS, _RELAY]))
+        prober = run(graph.run_module('bench.prober', [*counts, _OURS, _RELAY]))
         patience = 20.0 + 2.0 * plan.size * 2 / plan.rate
         for part in range(plan.parts + 1):
-            answers = prober.read(patience)
-            ours.check()
-            relay.check()
+            answers = prober.read_answer(patience)
+            ours.check_running()
+            relay.check_running()
             if part == 0:
                 continue
             for name, (times, lost) in answers.items():

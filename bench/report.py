@@ -19,7 +19,7 @@ import time
 
 from bench import ROOT
 from linkage_ros.cli import terminal
-from linkage_ros.measuring import alternating, describe_machine, spread_of
+from linkage_ros.measuring import alternate_order, describe_machine, spread_of
 from linkage_ros.pages.markdown import table_lines
 
 
@@ -97,7 +97,7 @@ def in_turn(contenders: Mapping[str, Callable[[], object]], rounds: int) -> dict
     durations: dict[str, list[float]] = {name: [] for name in contenders}
     for run in contenders.values():
         run()
-    for name in alternating([*contenders], rounds):
+    for name in alternate_order([*contenders], rounds):
         begun = time.perf_counter()
         contenders[name]()
         durations[name].append(time.perf_counter() - begun)

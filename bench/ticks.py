@@ -19,7 +19,7 @@ import time
 
 from bench import ROOT
 from bench.report import ratios, say, spread, Table
-from linkage_ros.measuring import alternating
+from linkage_ros.measuring import alternate_order
 from linkage_ros.processes import Graph, MeasurementError, Process
 
 _FOUR_BAR = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
@@ -152,11 +152,11 @@ def measure_ticks(
     """Measure every contender in turn, beside a number of busy processes."""
     found: dict[Contender, list[Measurement]] = {contender: [] for contender in contenders}
     with ExitStack() as stack:
-        stack.enter_context(graph.run('linkage_ros.node.crank_source'))
-        listener = stack.enter_context(graph.run('bench.listener'))
+        stack.enter_context(graph.run_module('linkage_ros.node.crank_source'))
+        listener = stack.enter_context(graph.run_module('bench.listener'))
         for _ in range(busy):
-            stack.enter_context(graph.run('bench.busy'))
-        for contender in alternating(contenders, plan.rounds):
+            stack.enter_context(graph.run_module('bench.busy'))
+        for contender in alternate_order(contenders, plan.rounds):
             measured = _measure(graph, contender, listener, plan)
             found[contender].append(measured)
             say(
@@ -168,14 +168,14 @@ def measure_ticks(
 
 
 def _measure(graph: Graph, contender: Contender, listener: Process, plan: TickPlan) -> Measurement:
-    first = listener.ask('forget')
-    with graph.run(contender.module, contender.arguments) as process:
-        _wait_for(lambda: listener.ask('?')['received'] > first['received'], process)
+    first = listener.ask_line('forget')
+    with graph.run_module(contender.module, contender.arguments) as process:
+        _wait_for(lambda: listener.ask_line('?')['received'] > first['received'], process)
         time.sleep(plan.warm_up)
-        before, (ran, waited) = listener.ask('?'), cpu_time(process.pid)
+        before, (ran, waited) = listener.ask_line('?'), cpu_time(process.pid)
         time.sleep(plan.window)
-        after, (ran_then, waited_then) = listener.ask('?'), cpu_time(process.pid)
-        process.check()
+        after, (ran_then, waited_then) = listener.ask_line('?'), cpu_time(process.pid)
+        process.check_running()
     process.check_end()
     duration = after['time'] - before['time']
     ticks = after['published'] - before['published']
@@ -185,14 +185,14 @@ def _measure(graph: Graph, contender: Contender, listener: Process, plan: TickPl
         cpu=(ran_then - ran) / ticks / 1e3,
         rate=ticks / duration * 1e9,
         waited=(waited_then - waited) / duration,
-        health=listener.ask('?')['health'],
+        health=listener.ask_line('?')['health'],
     )
 
 
 def _wait_for(condition: Callable[[], bool], process: Process) -> None:
     until = time.monotonic() + _APPEARING
     while not condition():
-        process.check()
+        process.check_running()
         if time.monotonic() > until:
             raise MeasurementError(f'{process.name}: no joint state in {_APPEARING:g} s')
         time.sleep(0.05)

@@ -22,10 +22,10 @@ import sys
 from typing import NamedTuple
 
 from linkage_ros.effects.stage import NEEDS, PUBLISHED_WITH
-from linkage_ros.errors import listed
+from linkage_ros.errors import list_names
 from linkage_ros.measuring import describe_machine, Progress
 from linkage_ros.pages.markdown import fill_marks, table_lines
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.scene.load import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
 from linkage_ros.study.budget import Budget
@@ -46,7 +46,7 @@ from linkage_ros.study.solving import compare_hard_cases, DISTANCES, HardCase
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'
 METHOD, EFFECTS = DOCS / 'accuracy/method.md', DOCS / 'accuracy/effects.md'
-FOUR_BAR = shipped('linkages/four_bar.yaml')
+FOUR_BAR = shipped_path('linkages/four_bar.yaml')
 
 _MARK = 'measured'
 
@@ -176,7 +176,7 @@ def hard_lines() -> Iterator[str]:
                 ['–', '–'] if case is None else [_worst(case), f'{case.failed} of {case.states}']
             )
         rows.append(row)
-    missing = listed(dict.fromkeys(case.solver for case in cases if case.failed))
+    missing = list_names(dict.fromkeys(case.solver for case in cases if case.failed))
     yield f'{missing or "nobody"} {"miss some" if missing else "misses any"}.'
     yield ''
     heads = [text for place in places for text in (f'>{place}, worst [rad]', '>missed')]
@@ -223,7 +223,7 @@ def effect_lines(*, quick: bool) -> Iterator[str]:
                 price_text(price),
                 error_text(found.error.rms) if found.error.worst else '–',
                 error_text(found.error.worst) if found.error.worst else '–',
-                listed(dict.fromkeys([*needed, *beside.get(name, ())])),
+                list_names(dict.fromkeys([*needed, *beside.get(name, ())])),
             )
         )
     yield f'A tick without effects takes {price_text(bare)} µs.'

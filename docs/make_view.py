@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 from threading import Event, Thread
 from typing import Any
 
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.view.conversation import Conversation, UserFile
 from linkage_ros.view.model import build_model
 from linkage_ros.view.page import page_html as page_of
@@ -46,7 +46,7 @@ def main() -> None:
     """Write the pictures."""
     with TemporaryDirectory() as folder:
         file = Path(folder, f'{NAME}.yaml')
-        file.write_text(shipped(f'linkages/{NAME}.yaml').read_text('utf-8'), 'utf-8')
+        file.write_text(shipped_path(f'linkages/{NAME}.yaml').read_text('utf-8'), 'utf-8')
         found = build_model(file.read_text('utf-8'), NAME)
         shown = page_of(found, mode='edit', can_save=True)
         stop, address, known = Event(), [], Event()

@@ -22,7 +22,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from linkage_ros.cli.robot_model import model_of
-from linkage_ros.errors import LinkageError, quoted
+from linkage_ros.errors import LinkageError, quote
 from linkage_ros.robot_models.urdf import urdf_model as write_urdf
 
 SHARE = Path(get_package_share_directory('linkage_ros'))
@@ -104,7 +104,7 @@ def frames(value):
         try:
             given['publish_frequency'] = float(text)
         except ValueError:
-            where = f'publish_frequency {quoted(text)}'
+            where = f'publish_frequency {quote(text)}'
             raise LinkageError(where, 'is no number', f'write 1 to {FASTEST:g}') from None
     return given
 
@@ -113,7 +113,7 @@ def flag(value, name):
     """Return the value of an argument that is true or false."""
     text = value[name].lower()
     if text not in FLAGS:
-        raise LinkageError(name, f'{quoted(value[name])} is not a flag', 'write true or false')
+        raise LinkageError(name, f'{quote(value[name])} is not a flag', 'write true or false')
     return FLAGS[text]
 
 
@@ -123,7 +123,7 @@ def text_of(file):
         return Path(file).read_text(encoding='utf-8')
     except (OSError, ValueError) as error:  # the latter for a NUL in the name, or no UTF-8
         reason = getattr(error, 'strerror', None) or str(error)
-        where = f'robot_description_file {quoted(file)}'
+        where = f'robot_description_file {quote(file)}'
         raise LinkageError(where, f'cannot be read ({reason})', 'name a URDF file') from None
 
 

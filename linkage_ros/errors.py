@@ -49,7 +49,7 @@ class LinkageError(Exception):
 
     def __init__(self, where: str | PathLike[str], reason: str, remedy: str) -> None:
         self.where, self.reason, self.remedy = (
-            shortened(clean(' '.join(text.split())), _LONGEST_PART)
+            shorten(escape_unprintable(' '.join(text.split())), _LONGEST_PART)
             for text in (str(where), reason, remedy)
         )
         super().__init__(f'{self.where}: {self.reason}; {self.remedy}')
@@ -147,20 +147,20 @@ def decimal_comma(typed: str) -> str:
     return '; a decimal has a point, not a comma' if maybe else ''
 
 
-def quoted(value: Any) -> str:
+def quote(value: Any) -> str:
     """
     Return a value as an error message shows it: on one line of bounded length.
 
     A text that is too long loses its middle: a path ends with the name that matters.
     """
-    return shortened(repr(value), _LONGEST_VALUE)
+    return shorten(repr(value), _LONGEST_VALUE)
 
 
-def listed(names: Iterable[str], between: str = ', ') -> str:
+def list_names(names: Iterable[str], between: str = ', ') -> str:
     """Return names as an error message lists them, with a bounded length."""
     names, shown, letters = list(names), [], 0
     for name in names:
-        shown.append(shortened(clean(name), _LONGEST_VALUE))
+        shown.append(shorten(escape_unprintable(name), _LONGEST_VALUE))
         letters += len(shown[-1]) + len(between)
         if letters > _LONGEST_LIST:
             break
@@ -168,13 +168,13 @@ def listed(names: Iterable[str], between: str = ', ') -> str:
     return between.join(shown) + (f' and {more} more' if more else '')
 
 
-def shortened(text: str, most: int) -> str:
+def shorten(text: str, most: int) -> str:
     """Return a text of at most ``most`` characters; a longer one loses its middle."""
     half = (most - 1) // 2
     return text if len(text) <= most else f'{text[:half]}…{text[-half:]}'
 
 
-def clean(text: str) -> str:
+def escape_unprintable(text: str) -> str:
     r"""
     Escape characters that a terminal would obey: names can come from anywhere.
 

@@ -25,18 +25,18 @@ class Lines(NamedTuple):
     bound: dict[str, Any]
 
 
-def written(source: str, name: str, bound: Mapping[str, Any]) -> Any:
+def define_function(source: str, name: str, bound: Mapping[str, Any]) -> Any:
     """
     Return the function of that name that a source text defines.
 
     Names in ``bound`` become local variables of an enclosing function, which are faster than
     globals. A text is compiled once, even if it is bound again when a running node is reset.
     """
-    return _binding(source, name, tuple(bound))(**bound)
+    return _compile_binding(source, name, tuple(bound))(**bound)
 
 
 @lru_cache(maxsize=_MOST)
-def _binding(source: str, name: str, names: tuple[str, ...]) -> Callable[..., Any]:
+def _compile_binding(source: str, name: str, names: tuple[str, ...]) -> Callable[..., Any]:
     body = ''.join(f'    {line}\n' for line in source.splitlines())
     namespace: dict[str, Any] = {}
     exec(f'def bind({", ".join(names)}):\n{body}    return {name}\n', namespace)

@@ -44,7 +44,7 @@ class Spread(NamedTuple):
     middle: float
     high: float
 
-    def scaled(self, factor: float) -> Spread:
+    def scale(self, factor: float) -> Spread:
         """Return the quartiles in a unit that is smaller by a factor."""
         return Spread(*(factor * value for value in self))
 
@@ -60,7 +60,7 @@ def percentile(values: Sequence[float], percent: float) -> float:
     return ordered[below] + (rank - below) * (ordered[above] - ordered[below])
 
 
-def alternating(items: Sequence[Item], rounds: int) -> Iterator[Item]:
+def alternate_order(items: Sequence[Item], rounds: int) -> Iterator[Item]:
     """Yield items forward in one round and backward in the next, so that drift favours none."""
     for number in range(rounds):
         yield from items if number % 2 == 0 else reversed(items)
@@ -81,15 +81,15 @@ FEWEST, MOST = 5, 200
 """Minimum number of rounds."""
 
 
-class Contender(NamedTuple):
+class Candidate(NamedTuple):
     """A call to be timed, and the number of states that it solves."""
 
     run: Callable[[], object]
     states: int
 
 
-def in_turn(
-    contenders: Sequence[Contender],
+def time_in_turn(
+    candidates: Sequence[Candidate],
     seconds: float,
     progress: Progress = lambda _: None,
     clock: Callable[[], float] | None = None,
@@ -111,19 +111,19 @@ def in_turn(
     """
     clock = clock or thread_clock()
     repeats, block_time = [], 0.0
-    for run, _ in contenders:
+    for run, _ in candidates:
         run()
         begun = clock()
         run()
         once = max(clock() - begun, 1e-7)
         repeats.append(max(1, round(BLOCK / once)))
         block_time += repeats[-1] * once
-    rounds = min(MOST, max(FEWEST, int(seconds / block_time))) if contenders else 0
-    times: list[list[float]] = [[] for _ in contenders]
-    forward = [*zip(contenders, repeats, times, strict=True)]
+    rounds = min(MOST, max(FEWEST, int(seconds / block_time))) if candidates else 0
+    times: list[list[float]] = [[] for _ in candidates]
+    forward = [*zip(candidates, repeats, times, strict=True)]
     collecting = gc.isenabled()
     try:
-        turns = enumerate(alternating(forward, rounds), 1)
+        turns = enumerate(alternate_order(forward, rounds), 1)
         for done, ((run, states), count, found) in turns:
             gc.disable()
             begun = clock()
@@ -164,14 +164,14 @@ def describe_machine() -> list[tuple[str, str]]:
         ('governor', _GOVERNOR.read_text().strip() if _GOVERNOR.exists() else 'unknown'),
         ('kernel', platform.release()),
         ('python', platform.python_version()),
-        ('numpy', _version('numpy')),
-        ('rclpy', _version('rclpy', 'ros-jazzy-rclpy')),
+        ('numpy', _installed_version('numpy')),
+        ('rclpy', _installed_version('rclpy', 'ros-jazzy-rclpy')),
         ('middleware', os.environ.get('RMW_IMPLEMENTATION', 'as rclpy chooses')),
         ('linkage_ros', __version__),
     ]
 
 
-def _version(*names: str) -> str:
+def _installed_version(*names: str) -> str:
     for name in names:
         with suppress(metadata.PackageNotFoundError):
             return metadata.version(name)

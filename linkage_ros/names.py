@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import re
 
-from linkage_ros.errors import clean, shortened
+from linkage_ros.errors import escape_unprintable, shorten
 
 _IN_COMMENT = re.compile(r'\\|(?<=\*)/|(?<=/)\*|(?<=\?)\?')
 """A backslash, and what ends a comment or begins one or a trigraph together with what precedes."""
@@ -39,7 +39,7 @@ def comment_text(name: str) -> str:
     A backslash escapes itself and the second of two characters that would end a comment, begin
     one, or be a trigraph: ``*\/``. A character that is not printable is written as ``\x1b``.
     """
-    return clean(_IN_COMMENT.sub(r'\\\g<0>', name))
+    return escape_unprintable(_IN_COMMENT.sub(r'\\\g<0>', name))
 
 
 def csv_text(text: str) -> str:
@@ -53,9 +53,9 @@ def csv_text(text: str) -> str:
 
 def dxf_text(name: str) -> str:
     """Return a name for a TEXT of a DXF file; blanks break what would be a code."""
-    return shortened(_DXF_CODES.sub(' ', clean(name)), _LONGEST_IN_DXF)
+    return shorten(_DXF_CODES.sub(' ', escape_unprintable(name)), _LONGEST_IN_DXF)
 
 
 def picture_text(name: str, most: int = 60) -> str:
     """Return a name for a picture by matplotlib within `painting.settings`, on one short line."""
-    return shortened(clean(name), most)
+    return shorten(escape_unprintable(name), most)

@@ -58,7 +58,7 @@ def held_domain() -> Iterator[int]:
     # From a place of its own, since other programs take the first ones.
     first = os.getpid() % len(_DOMAINS)
     for domain in (*_DOMAINS[first:], *_DOMAINS[:first]):
-        with _lock(domain) as held:
+        with _lock_domain(domain) as held:
             if held:
                 yield domain
                 return
@@ -68,7 +68,7 @@ def held_domain() -> Iterator[int]:
 
 
 @contextmanager
-def _lock(domain: int) -> Iterator[bool]:
+def _lock_domain(domain: int) -> Iterator[bool]:
     """Lock the file of a domain; tell whether it could be locked."""
     with ExitStack() as opened:
         try:
@@ -104,18 +104,18 @@ class Process:
         self._log = log
         self._rest = b''
 
-    def ask(self, question: str) -> Any:
+    def ask_line(self, question: str) -> Any:
         """Write a line; return its answer, a line of JSON."""
         assert self._popen.stdin is not None
         try:
             self._popen.stdin.write(question.encode() + b'\n')
             self._popen.stdin.flush()
         except OSError:
-            self.check()
+            self.check_running()
             raise
-        return self.read()
+        return self.read_answer()
 
-    def read(self, patience: float = _PATIENCE) -> Any:
+    def read_answer(self, patience: float = _PATIENCE) -> Any:
         """Return the next line of JSON; ``patience`` is the time limit in [s]."""
         assert self._popen.stdout is not None
         until = time.monotonic() + patience
@@ -132,12 +132,12 @@ class Process:
         line, self._rest = self._rest.split(b'\n', 1)
         return json.loads(line)
 
-    def check(self) -> None:
+    def check_running(self) -> None:
         """Raise if the process has ended by itself."""
         if (code := self._popen.poll()) is not None:
             raise MeasurementError(f'{self.name}: ended with {code}{self._last_words()}')
 
-    def end(self) -> None:
+    def end_process(self) -> None:
         """End the process: ask, then SIGTERM, then SIGKILL; only this very process."""
         for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
             if self._popen.poll() is None:
@@ -183,7 +183,7 @@ class Graph:
         self._environment.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
 
     @contextmanager
-    def run(
+    def run_module(
         self, module: str, arguments: Sequence[str] = (), more: Mapping[str, str] | None = None
     ) -> Iterator[Process]:
         """Run ``python -m module`` for a with statement; ``more`` is for its environment."""
@@ -209,5 +209,5 @@ class Graph:
         try:
             yield process
         finally:
-            process.end()
+            process.end_process()
             self._alive.remove(process)

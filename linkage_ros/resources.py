@@ -15,7 +15,7 @@ from os import PathLike
 from pathlib import Path
 import sys
 
-from linkage_ros.errors import did_you_mean, FileError, listed, quoted
+from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 
 
 def share_folders(package: str) -> list[Path]:
@@ -24,7 +24,7 @@ def share_folders(package: str) -> list[Path]:
     return [Path(prefix, 'share', package) for prefix in prefixes if prefix]
 
 
-def shipped(name: str) -> Path:
+def shipped_path(name: str) -> Path:
     """
     Return the path of a file or folder under ``config/``; a FileError if it is not installed.
 
@@ -42,12 +42,12 @@ def shipped(name: str) -> Path:
 
 def linkage_names() -> list[str]:
     """Return the names of the linkages that come with the package."""
-    return _names('linkages')
+    return _yaml_names('linkages')
 
 
 def scene_names() -> list[str]:
     """Return the names of the scenes that come with the package."""
-    return _names('scenes')
+    return _yaml_names('scenes')
 
 
 def named_file(named: str | PathLike[str], *folders: str) -> Path:
@@ -72,14 +72,14 @@ def named_file(named: str | PathLike[str], *folders: str) -> Path:
         If ``named`` cannot be a path.
 
     """
-    known = {name: folder for folder in reversed(folders) for name in _names(folder)}
+    known = {name: folder for folder in reversed(folders) for name in _yaml_names(folder)}
     try:
         path = Path(named)
     except TypeError:
-        message = f'{quoted(named)} is neither a path nor a name; name a file, or one of '
-        raise TypeError(message + listed(known)) from None
+        message = f'{quote(named)} is neither a path nor a name; name a file, or one of '
+        raise TypeError(message + list_names(known)) from None
     if isinstance(named, str) and named in known:
-        return shipped(f'{known[named]}/{named}.yaml')
+        return shipped_path(f'{known[named]}/{named}.yaml')
     exists = os.path.exists(path)  # noqa: PTH110 (Path's raises where a name is too long)
     if str(path) == path.name and path.suffix and path.stem in known and not exists:
         raise FileError(named, '', 'is not a file', f'did you mean {path.stem!r}?')
@@ -90,14 +90,14 @@ def named_file(named: str | PathLike[str], *folders: str) -> Path:
         named or "''",
         '',
         'is a shipped scene, not a linkage' if named in scene_names() else reason,
-        did_you_mean(str(named), known, f'name a file, or one of {listed(known)}'),
+        did_you_mean(str(named), known, f'name a file, or one of {list_names(known)}'),
     )
 
 
 def linkage_of_scene(name: str, folder: Path) -> Path:
     """Return the path of a linkage that a scene in a folder names: a shipped one, or a file."""
-    return shipped(f'linkages/{name}.yaml') if name in linkage_names() else folder / name
+    return shipped_path(f'linkages/{name}.yaml') if name in linkage_names() else folder / name
 
 
-def _names(folder: str) -> list[str]:
-    return sorted(file.stem for file in shipped(folder).glob('*.yaml'))
+def _yaml_names(folder: str) -> list[str]:
+    return sorted(file.stem for file in shipped_path(folder).glob('*.yaml'))

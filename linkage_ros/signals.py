@@ -86,12 +86,12 @@ class Stop(Event):
 def end_at_signals(line: bytes) -> None:
     """Let a signal end the process at once, with a line, until `stop_on_signals` is called."""
 
-    def end(_number: int, _frame: object) -> NoReturn:
+    def exit_process(_number: int, _frame: object) -> NoReturn:
         os.write(2, line)
         os._exit(1)
 
     for number in _SIGNALS:
-        signal.signal(number, end)
+        signal.signal(number, exit_process)
 
 
 class _Raising:
@@ -106,7 +106,7 @@ def stop_on_signals() -> Stop:
     """Install the handlers, and return the event that they set."""
     stop = Stop()
 
-    def handle(number: int, _frame: object) -> None:
+    def handle_signal(number: int, _frame: object) -> None:
         stop.set()
         # A second signal of an impatient user does not interrupt the clean-up.
         again = number == signal.SIGALRM or monotonic() - _Raising.last > _LONGEST_UNWINDING
@@ -114,20 +114,20 @@ def stop_on_signals() -> Stop:
             return
         _Raising.last = monotonic()
         # Python only prints what is raised in __del__ and the like: raise once more then.
-        sys.unraisablehook = _unraisable
-        signal.signal(signal.SIGALRM, handle)
+        sys.unraisablehook = _ignore_unraisable
+        signal.signal(signal.SIGALRM, handle_signal)
         signal.setitimer(signal.ITIMER_REAL, _LONGEST_UNWINDING)
         raise StoppedError
 
     for number in _SIGNALS:
-        signal.signal(number, handle)
+        signal.signal(number, handle_signal)
     # Python removes its handlers before the process ends: a signal would kill the process then.
-    atexit.register(_ignore)
+    atexit.register(_ignore_signals)
     return stop
 
 
 @contextmanager
-def raising() -> Iterator[None]:
+def raise_on_signals() -> Iterator[None]:
     """Let a signal raise `StoppedError` in the main thread while the context lasts."""
     _Raising.now, _Raising.last = True, -inf
     try:
@@ -142,7 +142,7 @@ def has_raised() -> bool:
 
 
 @contextmanager
-def heeded() -> Iterator[None]:
+def heed_signals() -> Iterator[None]:
     """Let a signal only set the stop event; the code within the context checks it often."""
     before, _Raising.now = _Raising.now, False
     try:
@@ -154,10 +154,10 @@ def heeded() -> Iterator[None]:
 def end_soon(code: int) -> None:
     """Make the process end with this code, even if threads or the reader of its output block."""
 
-    def end(_number: int, _frame: object) -> NoReturn:
+    def exit_process(_number: int, _frame: object) -> NoReturn:
         os._exit(code)
 
-    signal.signal(signal.SIGALRM, end)
+    signal.signal(signal.SIGALRM, exit_process)
     signal.setitimer(signal.ITIMER_REAL, _LONGEST_GOODBYE)
 
 
@@ -178,12 +178,12 @@ def bounded_end() -> Iterator[None]:
         signal.alarm(0)
 
 
-def _unraisable(unraisable: Any) -> None:
+def _ignore_unraisable(unraisable: Any) -> None:
     if unraisable.exc_type is not StoppedError:
         sys.__unraisablehook__(unraisable)
 
 
-def _ignore() -> None:
+def _ignore_signals() -> None:
     # For clean-up by the interpreter and libraries after Python has removed its handlers.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(_LONGEST_END)

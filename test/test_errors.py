@@ -13,7 +13,7 @@ import pickle
 from pkgutil import walk_packages
 
 import linkage_ros
-from linkage_ros.errors import FileError, LinkageError, listed
+from linkage_ros.errors import FileError, LinkageError, list_names
 from linkage_ros.robot_models.part import PartError
 import pytest
 
@@ -49,15 +49,15 @@ def test_every_error_comes_back_from_another_process():
 
 
 def test_a_list_of_names_is_short_and_says_how_many_more_there_are():
-    assert listed(['a', 'b\n', 'c']) == 'a, b\\n, c'
-    assert listed([]) == ''
+    assert list_names(['a', 'b\n', 'c']) == 'a, b\\n, c'
+    assert list_names([]) == ''
     names = [f'joint_{number:03}' for number in range(1000)]
-    text = listed(names)
+    text = list_names(names)
     assert len(text) < 1000
     shown = text.partition(' and ')[0].split(', ')
     assert shown == names[: len(shown)]
     assert text.endswith(f' and {1000 - len(shown)} more')
-    assert len(listed(['x' * 100_000] * 3)) < 1000
+    assert len(list_names(['x' * 100_000] * 3)) < 1000
 
 
 def test_an_error_that_lists_the_names_of_a_file_can_be_read():

@@ -33,7 +33,7 @@ def holder():
 
 def held(domain):
     """Return whether this process could hold a domain."""
-    with processes._lock(domain) as locked:
+    with processes._lock_domain(domain) as locked:
         return locked
 
 

@@ -21,7 +21,7 @@ from typing import Any
 import xml.etree.ElementTree as ET
 
 import linkage_ros as lr
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.solvers.table import TableClosure
 import pytest
 
@@ -30,7 +30,7 @@ FOUR_BAR, FIVE_BAR = lr.load('four_bar'), lr.load('five_bar')
 ROCKER = lr.load('double_rocker')
 POSITION, OPEN = FOUR_BAR.position(0.7), ROCKER.position(2.5)
 RANGES = ((1.0, 2.0), (0.8, 1.8), (2.4, 3.9))
-SCENE = shipped('scenes/demo.yaml')
+SCENE = shipped_path('scenes/demo.yaml')
 VELOCITY = FOUR_BAR.velocity(POSITION, 3.0)
 
 

@@ -34,7 +34,7 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 
 _NUMBER = re.compile(rb'(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.])')
 _NAME = re.compile(rb'[A-Za-z_]\w*')
@@ -222,14 +222,14 @@ def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
 
 def _originals(folder: Path) -> dict[str, dict[str, bytes]]:
     """Return unchanged files by kind and name, and link the linkages beside the scenes."""
-    linkages = shipped('linkages/four_bar.yaml').parent
+    linkages = shipped_path('linkages/four_bar.yaml').parent
     (folder / 'linkages').symlink_to(linkages)
     (folder / 'scenes').mkdir()
     originals: dict[str, dict[str, bytes]] = {
         'linkage': {file.name: file.read_bytes() for file in sorted(linkages.glob('*.yaml'))},
         'scene': {
             file.name: file.read_bytes()
-            for file in sorted(shipped('scenes/demo.yaml').parent.glob('*.yaml'))
+            for file in sorted(shipped_path('scenes/demo.yaml').parent.glob('*.yaml'))
         },
         'urdf': {},
         'table': _TABLES,

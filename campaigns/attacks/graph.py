@@ -35,7 +35,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from linkage_ros.files.linkage_file import load
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter
 from linkage_ros.processes import Graph, MeasurementError, private_domain
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -154,7 +154,7 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
     """Attack a node for some seconds; return the tries by kind, and a line per violation."""
     with TemporaryDirectory(prefix='linkage_ros_attack_') as name:
         folder = Path(name)
-        linkage = shipped('linkages/four_bar.yaml')
+        linkage = shipped_path('linkages/four_bar.yaml')
         (folder / 'attacked.yaml').write_text(_SCENE.format(linkage=linkage))
         # Below 102, so that the ports stay below the kernel's ephemeral ones.
         graph = Graph(private_domain(), folder, longest=round(seconds) + 200)
@@ -163,10 +163,12 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
             *('-p', f'runs_directory:={folder}', '-p', 'diagnostics_period:=0.5'),
         )
         try:
-            with graph.run('linkage_ros.node.linkage_node', node_arguments) as node:
-                with graph.run('campaigns.attacks.graph', (str(seconds), str(seed))) as attacker:
-                    outcome = attacker.read(patience=seconds + 8 * _PATIENCE)
-                node.check()
+            with graph.run_module('linkage_ros.node.linkage_node', node_arguments) as node:
+                with graph.run_module(
+                    'campaigns.attacks.graph', (str(seconds), str(seed))
+                ) as attacker:
+                    outcome = attacker.read_answer(patience=seconds + 8 * _PATIENCE)
+                node.check_running()
             # 1: the snapshot memory overflowed in a flood, which the node reports.
             node.check_end(1)
         except MeasurementError as error:
@@ -247,7 +249,7 @@ class Attacker:
         self._publisher = self.node.create_publisher(JointState, 'crank_states', 100)
         self._calls = Calls(self.node, '/linkage_node', self._random)
         self._heard = 0
-        closure = load(shipped('linkages/four_bar.yaml'))
+        closure = load(shipped_path('linkages/four_bar.yaml'))
         self._reader = JointStateReader(closure.joint_names)
         self._pose = closure.position(GOOD).joints
         self.node.create_subscription(JointState, 'joint_states', self._hear, 100, raw=True)

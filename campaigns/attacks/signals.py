@@ -27,7 +27,7 @@ import sys
 import tempfile
 import time
 
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 
 _SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 _LATEST = 1.5
@@ -69,7 +69,7 @@ def _try(rng: random.Random) -> tuple[str, str]:
     results = [word for word in _COMMANDS[command] if word.startswith('x.')]
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / 'jansen_leg.yaml').write_bytes(
-            shipped('linkages/jansen_leg.yaml').read_bytes()
+            shipped_path('linkages/jansen_leg.yaml').read_bytes()
         )
         process = subprocess.Popen(
             [sys.executable, '-m', 'linkage_ros.cli.main', command, *_COMMANDS[command]],

@@ -133,10 +133,10 @@ def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
         module, arguments = 'campaigns.disk.slow_node', [str(file), *arguments]
     log = work / f'{module.rsplit(".", 1)[-1]}.log'
     try:
-        with graph.run(module, arguments) as node:
+        with graph.run_module(module, arguments) as node:
             until = monotonic() + _START
             while not (folder / 'bag' / METADATA_FILE).exists() and monotonic() < until:
-                node.check()
+                node.check_running()
                 sleep(0.05)
             sleep(0.5 * (plan.seconds - plan.stall))
             begin = time_ns()
@@ -146,7 +146,7 @@ def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
                 if not plan.recovers:
                     done.ended, done.last_line = _ended(node.pid, log)
             sleep(0.5 * (plan.seconds - plan.stall) if plan.recovers else 0.0)
-            node.end()
+            node.end_process()
             done.last_line = done.last_line or _last_line(log)
         if plan.recovers:
             # A run that lost messages has exit code 1.

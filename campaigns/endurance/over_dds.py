@@ -75,20 +75,20 @@ def run(minutes: float) -> DdsRun:
 def _record(graph: Graph, scene: Path, bag: Path, done: DdsRun) -> None:
     """Run node and source, sample the node's usage, and end both."""
     node_arguments = ['--ros-args', '-p', f'scene:={scene}']
-    with graph.run('linkage_ros.node.linkage_node', node_arguments) as node:
+    with graph.run_module('linkage_ros.node.linkage_node', node_arguments) as node:
         until = time.monotonic() + _START
         while not (bag / 'metadata.yaml').exists() and time.monotonic() < until:
-            node.check()
+            node.check_running()
             time.sleep(0.05)
         source_arguments = ['--ros-args', '-p', f'rate:={_CRANK_RATE}.0']
-        with graph.run('linkage_ros.node.crank_source', source_arguments) as source:
+        with graph.run_module('linkage_ros.node.crank_source', source_arguments) as source:
             begin = time.monotonic()
             seconds = 60.0 * done.minutes
             step = max(seconds / _SAMPLES, min(1.0, seconds / 40))
             progress = progress_lines(seconds, 's over DDS')
             while (now := time.monotonic() - begin) < seconds:
-                node.check()
-                source.check()
+                node.check_running()
+                source.check_running()
                 done.samples.append(usage(now, node.pid))
                 progress(step)
                 time.sleep(max(0.0, begin + step * len(done.samples) - time.monotonic()))

@@ -41,7 +41,7 @@ from linkage_ros.bag.other_formats import (
     unpacked_file,
 )
 from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
-from linkage_ros.errors import BagError, quoted
+from linkage_ros.errors import BagError, quote
 from linkage_ros.files.file_access import read_regular
 from linkage_ros.files.file_kinds import BINARY, kind_of_bytes
 from linkage_ros.files.yaml_file import bounded_yaml
@@ -109,7 +109,7 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
         raise BagError(path, 'holds no .mcap file', "name a bag's folder")
     for number, name in enumerate(names):
         if name in names[:number]:
-            raise BagError(path / METADATA_FILE, f'names {quoted(name)} twice', _WITHOUT)
+            raise BagError(path / METADATA_FILE, f'names {quote(name)} twice', _WITHOUT)
         within = os.path.realpath(path)
         if os.path.commonpath([within, os.path.realpath(path / name)]) != within:
             raise BagError(
@@ -136,7 +136,7 @@ def by_number(file: Path) -> tuple[int, str]:
 
 def _name_of(folder: Path, path: PurePosixPath) -> str:
     if '..' in path.parts or not path.name or not path.name.isprintable():
-        raise BagError(folder / METADATA_FILE, f'names {quoted(str(path))} as a file', _WITHOUT)
+        raise BagError(folder / METADATA_FILE, f'names {quote(str(path))} as a file', _WITHOUT)
     return path.name
 
 
@@ -174,7 +174,7 @@ def is_finished(file: Path) -> bool:
     if not start.startswith(MCAP0_MAGIC):
         kind = kind_of_bytes(start)
         binary = kind.noun == BINARY.noun
-        found = f'starts with {quoted(start[:length])}' if binary else f'is {kind.noun}'
+        found = f'starts with {quote(start[:length])}' if binary else f'is {kind.noun}'
         raise BagError(
             file, f'{found}, and no MCAP file', "name a bag's folder, or its .mcap file"
         )

@@ -44,7 +44,7 @@ from linkage_ros.bag.reader import (
 )
 from linkage_ros.bag.salvage import BEGINNING, LostRange, Salvage
 from linkage_ros.bag.topic import Topic
-from linkage_ros.errors import BagError, quoted, RecordingError
+from linkage_ros.errors import BagError, quote, RecordingError
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.records import Attachment, Channel
 from mcap.writer import CompressionType, Writer
@@ -410,7 +410,7 @@ def _why_nothing(file: Path, salvage: Salvage) -> str:
     if not start:
         return f'{file.name} is empty'
     if BEGINNING in salvage.repaired:
-        return f'{file.name} starts with {quoted(start)}, as no MCAP file does'
+        return f'{file.name} starts with {quote(start)}, as no MCAP file does'
     if salvage.losses:
         loss = salvage.losses[0]
         return f'{file.name} at byte {loss.start:,}: {loss.reason}'

@@ -26,7 +26,7 @@ from typing import NamedTuple
 from linkage_ros.cli.arguments import add_output, add_set, bounded_number, LINKAGES, output_path
 from linkage_ros.cli.bag_reading import open_bag, scene_of
 from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
-from linkage_ros.errors import did_you_mean, LinkageError, listed
+from linkage_ros.errors import did_you_mean, LinkageError, list_names
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
@@ -80,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--only',
         default=','.join(PARTS),
         metavar='PARTS',
-        help=f'parts to measure, separated by commas, of {listed(PARTS)}',
+        help=f'parts to measure, separated by commas, of {list_names(PARTS)}',
     )
     parser.add_argument(
         '--quick', action='store_true', help='take 20 s at most, and say what is left out'
@@ -160,7 +160,7 @@ def _read_parts(text: str) -> list[str]:
     parts = [part.strip() for part in text.split(',')]
     for part in parts:
         if part not in PARTS:
-            remedy = did_you_mean(part, PARTS, f'known: {listed(PARTS)}')
+            remedy = did_you_mean(part, PARTS, f'known: {list_names(PARTS)}')
             raise LinkageError(f'--only {part}', 'there is no such part', remedy)
     return parts
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
-from linkage_ros.errors import decimal_comma, LinkageError, listed
+from linkage_ros.errors import decimal_comma, LinkageError, list_names
 from linkage_ros.files.file_access import check_new, check_output_name
 from linkage_ros.kinematics.linkage import Linkage
 
@@ -56,7 +56,7 @@ def add_output(
         What happens without ``-o``; '' if it is required.
 
     """
-    kinds = listed([f'OUTPUT{suffix}' for suffix in suffixes], ' or ')
+    kinds = list_names([f'OUTPUT{suffix}' for suffix in suffixes], ' or ')
     parser.add_argument(
         '-o',
         '--output',

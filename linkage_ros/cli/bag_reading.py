@@ -39,12 +39,12 @@ from linkage_ros.bag.run_events import (
 )
 from linkage_ros.cli.arguments import finite_or_none
 from linkage_ros.cli.terminal import show_progress
-from linkage_ros.errors import BagError, clean, listed
+from linkage_ros.errors import BagError, escape_unprintable, list_names
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.replay.replay import recorded_scene
 from linkage_ros.replay.verify import ExaminedRun, WorstResiduals
 from linkage_ros.scene.scene import Scene, SceneLinkage
-from linkage_ros.signals import heeded, StoppedError
+from linkage_ros.signals import heed_signals, StoppedError
 
 _MIB = 2**20
 _BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its content
@@ -66,9 +66,9 @@ def open_bag(path: Path, stop: Event) -> Bag:
     if bag.passed_over:
         line = (
             f'linkage: {path}: attachments beyond {MOST_ATTACHED // _MIB} MiB are not read: '
-            f'{listed(bag.passed_over)}'
+            f'{list_names(bag.passed_over)}'
         )
-        print(clean(line), file=sys.stderr)
+        print(escape_unprintable(line), file=sys.stderr)
     return bag
 
 
@@ -100,7 +100,7 @@ def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> 
     for name in scene.not_imported:
         where = found_in(name)
         line = f'linkage: {bag.path} is trusted: imports {name}, and the name leads to {where}'
-        print(clean(line), file=sys.stderr, flush=True)
+        print(escape_unprintable(line), file=sys.stderr, flush=True)
     return recorded_scene(bag, trust_effects=True, settings=settings)
 
 
@@ -165,7 +165,7 @@ class BagReading:
     @contextmanager
     def with_progress(self) -> Iterator[Iterator[BagMessage]]:
         """Give an iterator over the messages, and show the progress on the terminal."""
-        with heeded(), show_progress('replayed [MiB]') as self._advance:
+        with heed_signals(), show_progress('replayed [MiB]') as self._advance:
             yield self._read_messages()
 
     def _read_messages(self) -> Iterator[BagMessage]:

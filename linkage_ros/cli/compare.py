@@ -28,7 +28,7 @@ from linkage_ros.cli.arguments import add_output, PICTURES
 from linkage_ros.cli.bag_reading import BagReading, open_bag, run_or_blank
 from linkage_ros.cli.replay import deviations_account, joints_table
 from linkage_ros.cli.terminal import print_tables
-from linkage_ros.errors import BagError, clean, LinkageError, listed
+from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
 from linkage_ros.messages.joint_values import JOINT_STATE, Key, MessageValues, POSITION
 from linkage_ros.replay.compare import Deviation, TickPlace
 from linkage_ros.replay.replay import recorded_scene
@@ -191,7 +191,9 @@ def _read_states(bag: Bag, messages: Iterator[Any]) -> Iterator[TimedState]:
     topic = run_or_blank(bag).joint_states_topic or '/joint_states'
     if topic not in held:
         raise BagError(
-            bag.path, f'holds no {topic} of {JOINT_STATE}', f'it holds {listed(held) or "none"}'
+            bag.path,
+            f'holds no {topic} of {JOINT_STATE}',
+            f'it holds {list_names(held) or "none"}',
         )
     read = MessageValues(JOINT_STATE).read
     begin = last = None
@@ -249,7 +251,7 @@ def _draw_differences(
         for place, (unit, scale, columns) in enumerate(panels, 1):
             axes = figure.add_subplot(len(panels), 1, place)
             for column in columns:
-                name = clean(differences.positions[column]).replace('$', r'\$')
+                name = escape_unprintable(differences.positions[column]).replace('$', r'\$')
                 low, high = lows[:, column] * scale, highs[:, column] * scale
                 (line,) = axes.plot(times, (low + high) / 2.0, label=name, linewidth=0.8)
                 axes.fill_between(times, low, high, color=line.get_color(), alpha=0.4, linewidth=0)

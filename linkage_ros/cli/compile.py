@@ -21,7 +21,7 @@ from pathlib import Path
 from threading import Event
 
 from linkage_ros.cli.arguments import add_file, add_output
-from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quoted
+from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quote
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import linkage_content, read_closure
 from linkage_ros.kinematics.closure import Closure
@@ -78,7 +78,7 @@ def _source_name(file: Path, typed: str | None) -> str:
     if not C_NAME.fullmatch(name):
         where, wrong = (str(file), file.stem) if typed is None else ('--name', typed)
         raise LinkageError(
-            where, f'{quoted(wrong)} makes no name in C', 'write one, as --name four_bar'
+            where, f'{quote(wrong)} makes no name in C', 'write one, as --name four_bar'
         )
     return name
 
@@ -93,7 +93,7 @@ def _requested_joints(closure: Closure, typed: str | None) -> tuple[str, ...]:
         if name not in published:
             raise LinkageError(
                 '--joints',
-                f'{quoted(name)} is no published joint',
+                f'{quote(name)} is no published joint',
                 did_you_mean(name, published, f'name some of {", ".join(published)}'),
             )
     return names

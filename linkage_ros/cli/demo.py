@@ -29,13 +29,13 @@ from typing import TYPE_CHECKING
 from linkage_ros.cli.gallery import first_sentence
 from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.terminal import print_tables, TerminalTable
-from linkage_ros.errors import did_you_mean, LinkageError, listed
+from linkage_ros.errors import did_you_mean, LinkageError, list_names
 from linkage_ros.node.real_time import stay_on_this_machine
 from linkage_ros.processes import private_domain
-from linkage_ros.resources import scene_names, shipped
+from linkage_ros.resources import scene_names, shipped_path
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene, SceneLinkage
-from linkage_ros.signals import heeded
+from linkage_ros.signals import heed_signals
 from linkage_ros.workbench import find_tool
 
 if TYPE_CHECKING:
@@ -73,14 +73,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Run the demo."""
     if arguments.list:
-        rows = [_scene_row(shipped(f'scenes/{name}.yaml')) for name in scene_names()]
+        rows = [_scene_row(shipped_path(f'scenes/{name}.yaml')) for name in scene_names()]
         print_tables(TerminalTable('', ('scene', 'drive', 'recorded', ''), rows))
         return 0
     name, names = arguments.name, scene_names()
     if name not in names:
-        remedy = did_you_mean(name, names, f'there are: {listed(names)}')
+        remedy = did_you_mean(name, names, f'there are: {list_names(names)}')
         raise LinkageError(name, 'there is no such scene', remedy)
-    file = shipped(f'scenes/{name}.yaml')
+    file = shipped_path(f'scenes/{name}.yaml')
     scene = load_scene(file, arguments.set)
     stay_on_this_machine()
     os.environ['ROS_DOMAIN_ID'] = str(private_domain())
@@ -94,8 +94,10 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         flush=True,  # needed during the run, also by a pipe
     )
     if scene.faults:
-        print(f'faults    {listed(map(_fault_text, scene.faults, scene.faults.values()), "; ")}')
-    with heeded(), _run_companions(scene, arguments.seconds):
+        print(
+            f'faults    {list_names(map(_fault_text, scene.faults, scene.faults.values()), "; ")}'
+        )
+    with heed_signals(), _run_companions(scene, arguments.seconds):
         code, bag = run_scene(str(file), arguments, stop, patience=_PATIENCE)
     if bag is not None:
         picture = Path(f'{bag}.png')
@@ -147,7 +149,7 @@ def _companion_command(scene_linkage: SceneLinkage, seconds: float) -> list[str]
 
 def _fault_text(name: str, fault: Fault) -> str:
     """Return a fault as text: its name, its kind, and when it happens."""
-    times = listed(f'{time:g}' for time in fault.at)
+    times = list_names(f'{time:g}' for time in fault.at)
     when = f'at {times} s for {fault.seconds:g} s' if fault.at else 'by service call'
     return f'{name} ({fault.kind}) {when}'
 

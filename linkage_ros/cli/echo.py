@@ -25,11 +25,11 @@ from time import monotonic
 from typing import Any
 
 from linkage_ros.cli.arguments import bounded_number
-from linkage_ros.errors import clean, did_you_mean, LinkageError, listed, shortened
+from linkage_ros.errors import did_you_mean, escape_unprintable, LinkageError, list_names, shorten
 from linkage_ros.messages.joint_values import EFFORT, JOINT_STATE, POSITION, RATE, UNITS
 from linkage_ros.node.player import player_node
 from linkage_ros.replay.topic_description import message_type
-from linkage_ros.signals import heeded
+from linkage_ros.signals import heed_signals
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     end = monotonic() + arguments.seconds
     timeout = arguments.timeout or (_TIMEOUT if isfinite(arguments.count) else inf)
     seen = 0
-    with heeded(), player_node([], 'linkage_echo') as node:
+    with heed_signals(), player_node([], 'linkage_echo') as node:
         silence = _Silence(node, topic, timeout)
         kind = _await_type(node, topic, silence, end, stop)
         if kind is not None:
@@ -146,7 +146,7 @@ class _Silence:
             for name, _ in self._node.get_topic_names_and_types()
         }
         others = [name for name, count in topics.items() if count and name != self._topic]
-        remedy = did_you_mean(self._topic, others, f'topics: {listed(others) or "none"}')
+        remedy = did_you_mean(self._topic, others, f'topics: {list_names(others) or "none"}')
         return f'({topics.get(self._topic, 0)} publishers); {remedy}'
 
 
@@ -155,7 +155,9 @@ def _await_type(node: Node, topic: str, silence: _Silence, end: float, stop: Eve
     while not stop.is_set() and monotonic() < end and not silence.too_long():
         types = dict(node.get_topic_names_and_types()).get(topic, [])
         if len(types) > 1:
-            raise LinkageError(topic, f'has several types: {listed(types)}', 'end one publisher')
+            raise LinkageError(
+                topic, f'has several types: {list_names(types)}', 'end one publisher'
+            )
         if types:
             return str(types[0])
         stop.wait(_LOOK)
@@ -228,7 +230,7 @@ def _compatible_qos(node: Node, topic: str) -> QoSProfile:
 
 
 def _print_note(text: str) -> None:
-    print(clean(f'linkage echo: {text}'), file=sys.stderr, flush=True)
+    print(escape_unprintable(f'linkage echo: {text}'), file=sys.stderr, flush=True)
 
 
 def rate_text(arrivals: Sequence[float]) -> str:
@@ -264,7 +266,7 @@ def _yaml_value(value: Any) -> Any:
             name: _yaml_value(getattr(value, name)) for name in value.get_fields_and_field_types()
         }
     if isinstance(value, str):
-        return shortened(value, _LONGEST_TEXT)
+        return shorten(value, _LONGEST_TEXT)
     if isinstance(value, bool | int | float | Mapping):
         return value
     items = list(value[:_MOST_ITEMS])

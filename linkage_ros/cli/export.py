@@ -31,7 +31,7 @@ from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.arguments import add_bag, add_output
 from linkage_ros.cli.bag_reading import open_bag, run_or_blank, unfinished_text
 from linkage_ros.cli.terminal import show_progress
-from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError, listed
+from linkage_ros.errors import BagError, did_you_mean, escape_unprintable, LinkageError, list_names
 from linkage_ros.files.tables import block_rows, check_kind, KINDS, table_file
 from linkage_ros.messages.joint_values import (
     FORCE_X,
@@ -236,8 +236,10 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         return 1
     for (topic, reason), count in result.left_out.items():
         line = f'linkage export: {topic}: {count} messages left out: {reason}'
-        print(clean(line), file=sys.stderr)
-    of = ', '.join(f'{count} of {clean(topic)}' for topic, count in result.counts.items())
+        print(escape_unprintable(line), file=sys.stderr)
+    of = ', '.join(
+        f'{count} of {escape_unprintable(topic)}' for topic, count in result.counts.items()
+    )
     print(f'{arguments.output}: {result.rows} rows, {4 + len(result.keys)} columns ({of})')
     return 0
 
@@ -320,7 +322,7 @@ def _choose_topics(bag: Bag, scene: Scene | None, topic: str | None) -> ExportSo
     readable = {name: kind for name, kind in types.items() if kind in TYPES}
     run = run_or_blank(bag)
     if topic is not None:
-        others = f'name {listed(readable, " or ") or "another bag"}'
+        others = f'name {list_names(readable, " or ") or "another bag"}'
         if topic not in types:
             raise BagError(
                 bag.path, f'holds no topic {topic}', did_you_mean(topic, readable, others)
@@ -356,12 +358,12 @@ def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
         return topics[0]
     if topics:
         raise BagError(
-            bag.path, f'holds joint states on {listed(topics)}', 'name one with --topic'
+            bag.path, f'holds joint states on {list_names(topics)}', 'name one with --topic'
         )
     raise BagError(
         bag.path,
         f'holds no topic of {JOINT_STATE}',
-        f'name {listed(readable, " or ")} with --topic' if readable else 'name another bag',
+        f'name {list_names(readable, " or ")} with --topic' if readable else 'name another bag',
     )
 
 
@@ -370,7 +372,7 @@ def _nothing_error(source: ExportSource, result: ExportResult) -> BagError:
     why = f' ({reasons[0][1]} left out: {reasons[0][0][1]})' if reasons else ''
     return BagError(
         source.bag.path,
-        f'holds no message on {listed(source.types)} to write{why}',
+        f'holds no message on {list_names(source.types)} to write{why}',
         'name another topic with --topic, or another bag',
     )
 

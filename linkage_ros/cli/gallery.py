@@ -24,7 +24,7 @@ from linkage_ros.cli.arguments import add_output, LINKAGES
 from linkage_ros.cli.terminal import print_tables, TerminalTable
 from linkage_ros.errors import FileError
 from linkage_ros.files.file_access import atomic_write
-from linkage_ros.resources import linkage_names, named_file, scene_names, shipped
+from linkage_ros.resources import linkage_names, named_file, scene_names, shipped_path
 
 EXAMPLE = 'linkage gallery worn_press -o my_press.yaml'
 
@@ -66,14 +66,14 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 def _gallery_table(folder: str) -> TerminalTable:
     names = {'linkages': linkage_names, 'scenes': scene_names}[folder]()
-    rows = [(name, first_sentence(shipped(f'{folder}/{name}.yaml'))) for name in names]
+    rows = [(name, first_sentence(shipped_path(f'{folder}/{name}.yaml'))) for name in names]
     return TerminalTable('', (folder, ''), rows)
 
 
 def _shipped_file(name: str, folders: tuple[str, ...]) -> Path:
     """Return a file of the gallery; a path is none, even of a file that exists."""
     file = named_file(name, *folders)
-    if file.parent.parent != shipped(''):
+    if file.parent.parent != shipped_path(''):
         raise FileError(name, '', 'is not in the gallery', 'linkage gallery lists its names')
     return file
 
@@ -88,7 +88,7 @@ def _copied_files(file: Path, output: Path) -> dict[Path, str]:
     text = _SCHEMA.sub('', file.read_text('utf-8'))
     copies = {output: _REFERENCE.sub(r'\1\2', text)}
     for found in _REFERENCE.finditer(text):
-        copy, linkage = output.with_name(found[2]), shipped(f'linkages/{found[2]}')
+        copy, linkage = output.with_name(found[2]), shipped_path(f'linkages/{found[2]}')
         linkage_text = _SCHEMA.sub('', linkage.read_text('utf-8'))
         if copy == output or (copy.exists() and copy.read_bytes() != linkage_text.encode()):
             raise FileError(

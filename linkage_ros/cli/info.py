@@ -36,9 +36,9 @@ from linkage_ros.cli.bag_reading import (
     worst_account,
 )
 from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
-from linkage_ros.errors import clean, LinkageError
+from linkage_ros.errors import escape_unprintable, LinkageError
 from linkage_ros.replay.verify import examine_states
-from linkage_ros.signals import heeded
+from linkage_ros.signals import heed_signals
 
 _MIB = 2**20
 
@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Describe the bag; return 1 if stopped."""
     bag = open_bag(arguments.bag, stop)
-    with heeded():  # a signal ends the reading; the part read so far is still shown
+    with heed_signals():  # a signal ends the reading; the part read so far is still shown
         account = describe_bag(bag, stop, trust_effects=arguments.trust_effects)
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
@@ -109,8 +109,8 @@ def bag_tables(account: dict[str, Any], angles: AngleUnit) -> Iterator[TerminalT
     heads = ('topic', 'type', '>messages', '>rate [Hz]', *counted, 'QoS')
     rows = [
         (
-            clean(topic['name']),
-            clean(topic['type']),
+            escape_unprintable(topic['name']),
+            escape_unprintable(topic['type']),
             str(topic['messages']),
             '' if topic['rate_hz'] is None else f'{topic["rate_hz"]:.6g}',
             *('?' if topic[word] is None else str(topic[word]) for word in words),
@@ -130,7 +130,7 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in ('begin', 'end') if duration is not None else ():
         yield name, f'{account[name]} ({account[f"{name}_ns"]} ns)'
     yield 'size', f'{account["size_bytes"]} bytes'
-    yield 'files', ', '.join(clean(file['name']) for file in account['files'])
+    yield 'files', ', '.join(escape_unprintable(file['name']) for file in account['files'])
     yield 'compression', ', '.join(map(_compression_text, account['compressions'])) or 'none'
     yield 'unfinished', account['unfinished'] or 'no'
     if account['beginning_missing']:
@@ -222,7 +222,7 @@ def _input_text(value: float, given: dict[str, str], angles: AngleUnit) -> str:
 def _compression_text(found: dict[str, Any]) -> str:
     if found['name'] == 'none':
         return 'none'
-    return f'{clean(found["name"])}, {found["content_bytes"]} bytes in {found["stored_bytes"]}'
+    return f'{escape_unprintable(found["name"])}, {found["content_bytes"]} bytes in {found["stored_bytes"]}'
 
 
 def _version_texts(versions: dict[str, Any]) -> Iterator[str]:
@@ -235,7 +235,7 @@ def _version_texts(versions: dict[str, Any]) -> Iterator[str]:
         ('written_by', 'written by'),
     ):
         if versions[key] is not None:
-            yield f'{name} {clean(str(versions[key]))}'
+            yield f'{name} {escape_unprintable(str(versions[key]))}'
 
 
 def _qos_text(topic: dict[str, Any]) -> str:
@@ -243,8 +243,12 @@ def _qos_text(topic: dict[str, Any]) -> str:
     if not topic['qos_understood']:
         return 'not understood, taken as reliable'
     latched = ', transient local' if topic['durability'] == 'transient_local' else ''
-    return clean(topic['reliability']).replace('_', ' ') + latched
+    return escape_unprintable(topic['reliability']).replace('_', ' ') + latched
 
 
 def _facts_table(title: str, facts: Iterator[tuple[str, str]]) -> TerminalTable:
-    return TerminalTable(clean(title), ('', ''), [(name, clean(value)) for name, value in facts])
+    return TerminalTable(
+        escape_unprintable(title),
+        ('', ''),
+        [(name, escape_unprintable(value)) for name, value in facts],
+    )

@@ -27,11 +27,17 @@ from linkage_ros.errors import (
     decimal_comma,
     did_you_mean,
     LinkageError,
-    listed,
+    list_names,
     missing_packages_reported,
-    quoted,
+    quote,
 )
-from linkage_ros.signals import end_soon, has_raised, raising, stop_on_signals, StoppedError
+from linkage_ros.signals import (
+    end_soon,
+    has_raised,
+    raise_on_signals,
+    stop_on_signals,
+    StoppedError,
+)
 from linkage_ros.workbench import find_tool, TOOLS
 
 COMMANDS = {
@@ -102,14 +108,14 @@ class Parser(argparse.ArgumentParser):
             name = word.partition('=')[0]
             if name.startswith('--') and not any(option.startswith(name) for option in options):
                 remedy = did_you_mean(name, options, 'leave it out')
-                self.error(f'there is no option {quoted(name)}; {remedy}')
+                self.error(f'there is no option {quote(name)}; {remedy}')
         return super().parse_args(args, namespace)
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             choices = list(map(str, action.choices))
-            remedy = did_you_mean(str(value), choices, f'write one of {listed(choices)}')
-            raise argparse.ArgumentError(action, f'there is no {quoted(value)}; {remedy}')
+            remedy = did_you_mean(str(value), choices, f'write one of {list_names(choices)}')
+            raise argparse.ArgumentError(action, f'there is no {quote(value)}; {remedy}')
 
     def error(self, message: str) -> NoReturn:
         """Print one line, and exit as for any wrong input."""
@@ -154,7 +160,7 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     try:
         try:
-            with raising():
+            with raise_on_signals():
                 if stop.is_set():
                     raise StoppedError
                 try:

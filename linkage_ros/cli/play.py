@@ -28,12 +28,12 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.cli.arguments import add_bag, add_ros_arguments, bounded_number
 from linkage_ros.cli.bag_reading import open_bag
 from linkage_ros.cli.terminal import ProgressCallback, show_progress
-from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
+from linkage_ros.errors import BagError, did_you_mean, escape_unprintable, LinkageError
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.bag_topics import create_publishers
 from linkage_ros.node.playback import LATE, Playback, PlaybackPart
 from linkage_ros.node.player import CLOCK, play, PlaybackOptions, player_node
-from linkage_ros.signals import heeded
+from linkage_ros.signals import heed_signals
 
 _CLOCK_RATE = 40.0  # as ``ros2 bag play``
 
@@ -106,7 +106,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             f'it lasts {(order.end - begin) / 1e9:g} s',
         )
     ros = ['--ros-args', *arguments.ros_args] if arguments.ros_args else []
-    with heeded(), player_node(ros) as node, show_progress('played [s]') as advance:
+    with heed_signals(), player_node(ros) as node, show_progress('played [s]') as advance:
         publishers = create_publishers(node, topics, _print_error)
         if not publishers:
             raise BagError(bag.path, 'has no topic that can be published', 'nothing to play')
@@ -147,7 +147,7 @@ def _choose_topics(bag: Bag, names: Sequence[str] | None) -> list[Topic]:
         return list(topics.values())
     for name in names:
         if name not in topics:
-            others = f'there are: {clean(", ".join(topics))}'
+            others = f'there are: {escape_unprintable(", ".join(topics))}'
             remedy = did_you_mean(name, topics, others)
             raise LinkageError(name, f'{bag.path} has no such topic', remedy)
     return [topics[name] for name in dict.fromkeys(names)]
@@ -161,7 +161,7 @@ def _without_clock(topics: Sequence[Topic]) -> list[Topic]:
 
 
 def _print_error(error: LinkageError, what: str = 'left out: ') -> None:
-    print(f'linkage play: {what}{clean(str(error))}', file=sys.stderr)
+    print(f'linkage play: {what}{escape_unprintable(str(error))}', file=sys.stderr)
 
 
 def _report_progress(advance: ProgressCallback, first: int, last: float, now: int) -> None:
@@ -176,7 +176,7 @@ def _summary_text(playback: Playback, rate: float) -> str:
     late = f'{playback.late} of {sent} messages by more than {LATE / 1e6:g} ms'
     rows = [
         ('played', f'{of} in {took}, at a rate of {rate:g}'),
-        *(('', f'{clean(name)}: {count}') for name, count in playback.counts.items()),
+        *(('', f'{escape_unprintable(name)}: {count}') for name, count in playback.counts.items()),
         ('late', f'{late}; at most {playback.latest / 1e6:.1f} ms'),
     ]
     return '\n'.join(f'{head:<8}{text}' for head, text in rows)

@@ -21,7 +21,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import recorded_scene, ReplayedTick
 from linkage_ros.replay.verify import beginning_text, DIFFERENT, UNDECIDED, verify_replay
-from linkage_ros.signals import raising, StoppedError
+from linkage_ros.signals import raise_on_signals, StoppedError
 
 LONGEST_PROOF = 2.0
 """Time that the replay of the bag takes at the end of a run, in [s]."""
@@ -54,7 +54,7 @@ def proof_of(folder: Path, ticks: int, longest: float) -> str:
         pipeline = Pipeline(scene)
         closures = pipeline.closures
         sample = Beginning(bag.messages(), longest)
-        with raising(), show_progress('ticks replayed') as advance:
+        with raise_on_signals(), show_progress('ticks replayed') as advance:
             proof = verify_replay(bag, scene, sample, observe_tick)
     except LinkageError as error:
         return str(error)

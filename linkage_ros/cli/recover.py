@@ -18,9 +18,9 @@ from threading import Event
 from linkage_ros.bag.recover import recover_bag, recovered_name, Recovery
 from linkage_ros.cli.arguments import add_bag, add_force, output_or
 from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
-from linkage_ros.errors import clean
+from linkage_ros.errors import escape_unprintable
 from linkage_ros.files.file_access import remove_bag
-from linkage_ros.signals import heeded
+from linkage_ros.signals import heed_signals
 
 WHOLE, STOPPED, LOSS = 0, 1, 3
 
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Recover the bag; return 0 without loss, 3 with losses, 1 if stopped."""
     # A signal within a record would cut it; `recover` asks the event.
-    with heeded(), show_progress('bytes') as advance:
+    with heed_signals(), show_progress('bytes') as advance:
         folder = output_or(arguments, recovered_name(arguments.bag))
         remove_bag(folder, force=arguments.force)
         recovery = recover_bag(arguments.bag, folder, advance, stop.is_set)
@@ -61,7 +61,7 @@ def _print_recovery(recovery: Recovery) -> None:
     if rows:
         print_tables(TerminalTable('', ('topic', '>saved', '>of'), rows))
     if recovery.attachments:
-        print(clean(f'attachments  {", ".join(recovery.attachments)}'))
+        print(escape_unprintable(f'attachments  {", ".join(recovery.attachments)}'))
     _print_lines('note', list(recovery.remarks))
     _print_lines('repaired', list(recovery.repaired))
     lost = []
@@ -79,6 +79,6 @@ def _print_recovery(recovery: Recovery) -> None:
 def _print_lines(word: str, lines: list[str]) -> None:
     for line in lines[:_MOST_SHOWN]:
         # A name in a damaged file may contain line breaks; one loss stays one line.
-        print(f'{word:<13}{clean(line)}')
+        print(f'{word:<13}{escape_unprintable(line)}')
     if len(lines) > _MOST_SHOWN:
         print(f'{word:<13}and {len(lines) - _MOST_SHOWN:,} more')

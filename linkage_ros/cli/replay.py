@@ -44,7 +44,7 @@ from linkage_ros.cli.bag_reading import (
 )
 from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource, TopicNames
 from linkage_ros.cli.terminal import print_tables, TerminalTable
-from linkage_ros.errors import BagError, clean, LinkageError, listed
+from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
 from linkage_ros.files.file_access import remove_bag
 from linkage_ros.messages.joint_values import JOINT_STATE, Key, UNITS
 from linkage_ros.replay.compare import (
@@ -78,7 +78,7 @@ from linkage_ros.replay.verify import (
 )
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
-from linkage_ros.signals import heeded
+from linkage_ros.signals import heed_signals
 
 
 def unit_of(joint: str, quantity: str, turning: Mapping[str, bool]) -> str:
@@ -239,7 +239,8 @@ def topics_table(account: Mapping[str, Any]) -> TerminalTable:
         heads.insert(3, '>but for turns')
         keys.insert(2, 'same_but_for_turns')
     rows = [
-        (clean(topic['name']), *(str(topic[key]) for key in keys)) for topic in account['topics']
+        (escape_unprintable(topic['name']), *(str(topic[key]) for key in keys))
+        for topic in account['topics']
     ]
     return TerminalTable('', heads, rows)
 
@@ -263,7 +264,7 @@ def joints_table(account: Mapping[str, Any], begin: int) -> TerminalTable:
     """Return the table of differences joint by joint."""
     rows = [
         (
-            clean(row['joint']),
+            escape_unprintable(row['joint']),
             f'{row["quantity"]} [{row["unit"]}]',
             str(row['compared']),
             _number_text(row['rms']),
@@ -286,13 +287,19 @@ def versions_text(versions: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
 
 def _versions_text(said: Mapping[str, str]) -> str:
     words = {'linkage_ros': 'linkage_ros', 'python': 'Python', 'machine': 'on'}
-    texts = [f'{word} {clean(said[key])}' for key, word in words.items() if key in said]
-    texts += [f'{clean(key)} ({clean(said[key])})' for key in said if key not in words]
+    texts = [
+        f'{word} {escape_unprintable(said[key])}' for key, word in words.items() if key in said
+    ]
+    texts += [
+        f'{escape_unprintable(key)} ({escape_unprintable(said[key])})'
+        for key in said
+        if key not in words
+    ]
     return ', '.join(texts) or 'versions that it does not tell'
 
 
 def _place_text(where: Mapping[str, Any], begin: int) -> str:
-    return f'{clean(where["joint"])}, {_tick_text(where, begin)}'
+    return f'{escape_unprintable(where["joint"])}, {_tick_text(where, begin)}'
 
 
 def _tick_text(where: Mapping[str, Any], begin: int) -> str:
@@ -333,7 +340,7 @@ def _replayed_with(
     begin: list[int] = []
     published = 0
     new_bag = None
-    with heeded(), ExitStack() as at_end:
+    with heed_signals(), ExitStack() as at_end:
         if output is not None:
             remove_bag(output, force=force)
             new_bag = ReplayBag(output, source, scene, counterfactual, names)
@@ -388,7 +395,7 @@ def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path |
         return
     raise LinkageError(
         scene.linkages[0].content.file,
-        f'publishes {listed(scene.joint_names)}, and {bag.path} holds {listed(recorded.joint_names)}: '
+        f'publishes {list_names(scene.joint_names)}, and {bag.path} holds {list_names(recorded.joint_names)}: '
         'nothing to compare',
         'write a new bag with -o',
     )
@@ -517,15 +524,15 @@ def _show_proof(account: dict[str, Any]) -> None:
     if account['beginning_missing']:
         print(account['beginning_missing'])
     for gap in account['gaps'] if differ else ():
-        print(clean(gap))
+        print(escape_unprintable(gap))
     first = account['first_difference']
     if first and differ:
-        print(clean(f'first: {first_text(first, begin)}'))
+        print(escape_unprintable(f'first: {first_text(first, begin)}'))
         last = account['last_different_tick']['tick']
         if last < account['ticks'] and last != first['tick']:
             print(f'from tick {last + 1} on all are the same')
     elif first:
-        print(clean(f'not told, first: {first_text(first, begin)}'))
+        print(escape_unprintable(f'not told, first: {first_text(first, begin)}'))
     if account['withheld_ticks']:
         print(f'{account["withheld_ticks"]} ticks are without a message, then and now')
     for line in versions_text(account['versions']):
@@ -540,7 +547,7 @@ def _show_proof(account: dict[str, Any]) -> None:
 def _show_counterfactual(account: dict[str, Any]) -> None:
     print(
         f'{account["bag"]}, as {account["scene"]}: {account["joint_states"]} joint states, '
-        f'from {clean(account["crank_topic"])}'
+        f'from {escape_unprintable(account["crank_topic"])}'
     )
     for key, when in (('joints_only_recorded', 'recorded'), ('joints_only_now', 'now')):
         if account[key] and account['topics']:

@@ -36,7 +36,7 @@ from linkage_ros.node.node import LinkageNode
 from linkage_ros.node.run import run_linkage_node
 from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.verify import turning_joints
-from linkage_ros.signals import heeded
+from linkage_ros.signals import heed_signals
 
 _RICH = find_spec('rich') is not None
 if _RICH:
@@ -302,7 +302,7 @@ def run_scene(
         check_page()
     display = Display(plain=arguments.plain, angles=arguments.angles, page=arguments.view)
     try:
-        with heeded():
+        with heed_signals():
             code = run_linkage_node(
                 stop,
                 ros,

@@ -31,7 +31,7 @@ from linkage_ros.cli.terminal import print_tables, TerminalTable
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.dispatch import effects_requiring, module_of
 from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import did_you_mean, FileError, LinkageError, listed
+from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names
 from linkage_ros.faults import FAULTS
 from linkage_ros.files.parameters import (
     declared_fields,
@@ -373,7 +373,7 @@ def _items_to_list(names: list[str]) -> Iterator[tuple[str, str]]:
             raise LinkageError(
                 f'--list {name}',
                 'there is no such drive, effect, fault or solver',
-                did_you_mean(name, words, f'known: {listed(words)}'),
+                did_you_mean(name, words, f'known: {list_names(words)}'),
             )
         yield from found
 

@@ -29,7 +29,7 @@ from threading import Event
 from linkage_ros.cli.arguments import add_force, add_set, bounded_number, PICTURES, SCENE_HELP
 from linkage_ros.cli.export import export_bag
 from linkage_ros.cli.terminal import show_progress
-from linkage_ros.errors import clean, LinkageError
+from linkage_ros.errors import escape_unprintable, LinkageError
 from linkage_ros.files.file_access import check_output_name, remove_bag
 from linkage_ros.files.tables import check_kind, KINDS, table_file
 from linkage_ros.messages.joint_values import EFFORT, POSITION, RATE, UNITS
@@ -137,7 +137,9 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if not output.suffix:
         remove_bag(output, force=arguments.force)
         counts = _simulate_into(scene, output, ticks, stop)
-        parts = ', '.join(f'{count} on {clean(name)}' for name, count in counts.items() if count)
+        parts = ', '.join(
+            f'{count} on {escape_unprintable(name)}' for name, count in counts.items() if count
+        )
         print(f'{output}: {parts or "no messages"}')
         return int(stop.is_set())
     with TemporaryDirectory() as folder:

@@ -38,7 +38,7 @@ from linkage_ros.cli.arguments import (
     wrap_angle,
 )
 from linkage_ros.cli.terminal import print_tables, show_progress, table_text, TerminalTable
-from linkage_ros.errors import LinkageError, listed
+from linkage_ros.errors import LinkageError, list_names
 from linkage_ros.files.file_access import atomic_write
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
@@ -198,8 +198,8 @@ def _exchanged_table(
     groups = assur_groups(inverse.linkage).groups
     links = [link for group in groups if isinstance(group, Iterated) for link in group.links]
     if links:
-        told = f'{listed(links)} are solved by iteration, from the pose of the file'
-        print(f'linkage solve: note: with {listed(names)} as inputs {told}', file=sys.stderr)
+        told = f'{list_names(links)} are solved by iteration, from the pose of the file'
+        print(f'linkage solve: note: with {list_names(names)} as inputs {told}', file=sys.stderr)
     return _forward_table(inverse, argparse.Namespace(**vars(arguments) | {'at': [typed]}))
 
 

@@ -22,7 +22,7 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.cli.arguments import AngleUnit
 from linkage_ros.cli.terminal import ProgressCallback
-from linkage_ros.errors import LinkageError, listed
+from linkage_ros.errors import LinkageError, list_names
 from linkage_ros.files.tables import numbers_of
 from linkage_ros.synthesis.defects import assess, Assessment, Needs, unmet_needs
 from linkage_ros.synthesis.design import Design
@@ -84,9 +84,9 @@ def find_answers(typed: argparse.Namespace, search: DesignSearch) -> list[Design
     named = [option for option, value in tasks.items() if value]
     if len(named) != 1:
         raise LinkageError(
-            listed(named, ' and ') or 'the task',
+            list_names(named, ' and ') or 'the task',
             'stand for two tasks' if named else 'is not said',
-            f'name one of {listed(tasks)}',
+            f'name one of {list_names(tasks)}',
         )
     work = {
         '--pair': _solve_pairs,

@@ -22,7 +22,7 @@ from textwrap import fill
 from time import monotonic
 from typing import Any, NamedTuple, TextIO
 
-from linkage_ros.errors import clean, shortened
+from linkage_ros.errors import escape_unprintable, shorten
 
 _LONGEST_CELL = 4000
 
@@ -63,8 +63,12 @@ def print_tables(*tables: TerminalTable) -> None:
 
 
 def _clean_table(table: TerminalTable) -> TerminalTable:
-    rows = [[shortened(clean(cell), _LONGEST_CELL) for cell in row] for row in table.rows]
-    return TerminalTable(clean(table.title), list(map(clean, table.columns)), rows)
+    rows = [
+        [shorten(escape_unprintable(cell), _LONGEST_CELL) for cell in row] for row in table.rows
+    ]
+    return TerminalTable(
+        escape_unprintable(table.title), list(map(escape_unprintable, table.columns)), rows
+    )
 
 
 def _print_table(table: TerminalTable, width: int) -> None:
@@ -235,7 +239,7 @@ class PrintableStream:
     def write(self, text: str) -> int:
         """Write a text, of one line or several."""
         if not text.isprintable():
-            text = '\n'.join(map(clean, text.split('\n')))
+            text = '\n'.join(map(escape_unprintable, text.split('\n')))
         return self._stream.write(text)
 
     def __getattr__(self, name: str) -> Any:

@@ -28,13 +28,18 @@ import webbrowser
 from linkage_ros.bag.other_formats import is_bag_name
 from linkage_ros.cli.arguments import add_output
 from linkage_ros.cli.report import bag_page, check_page, write_page
-from linkage_ros.errors import check_installed, clean, LinkageError, missing_packages_reported
+from linkage_ros.errors import (
+    check_installed,
+    escape_unprintable,
+    LinkageError,
+    missing_packages_reported,
+)
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.report.run import Window
 from linkage_ros.resources import linkage_names, named_file, scene_names
 from linkage_ros.scene.load import kind_of, load_scene, SCENE_FILE
-from linkage_ros.signals import heeded
+from linkage_ros.signals import heed_signals
 
 EXAMPLE = 'linkage view jansen_leg -o jansen_leg.html'
 
@@ -191,12 +196,12 @@ def _serve_page(
     from linkage_ros.view.worker import report_line as report_line
 
     def announce_address(address: str) -> None:
-        print(clean(f'{name}: {address}'), flush=True)
+        print(escape_unprintable(f'{name}: {address}'), flush=True)
         if not arguments.no_browser and _has_display():
             # Some browsers let whoever opens them wait.
             Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
-    with heeded():
+    with heed_signals():
         serve(page, routes, stop, announce_address, report_line, port=arguments.port)
     print('linkage view: ended')
     return 0

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from xml.sax.saxutils import escape
 
 from linkage_ros.drawing.painting import GHOST, STROKES
-from linkage_ros.errors import quoted
+from linkage_ros.errors import quote
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.pose_view import all_places, prepare_view, symbol_size
 from linkage_ros.kinematics.results import Position
@@ -61,7 +61,7 @@ def svg(shown: Closure | Position) -> str:
     """
     position = shown.position(*usual_inputs(shown)) if isinstance(shown, Closure) else shown
     if not isinstance(position, Position):
-        raise TypeError(f'svg: {quoted(shown)} is not drawn; give a Closure or a Position')
+        raise TypeError(f'svg: {quote(shown)} is not drawn; give a Closure or a Position')
     closure = position.closure
     assert isinstance(closure, Closure)
     seen = prepare_view(closure, position.inputs)

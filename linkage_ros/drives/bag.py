@@ -34,7 +34,7 @@ from linkage_ros.bag.reader import Bag, read_bag
 from linkage_ros.bag.run_events import read_raw_metadata
 from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.errors import BagError, DefinitionError, listed
+from linkage_ros.errors import BagError, DefinitionError, list_names
 from linkage_ros.files.parameters import choice, file, flag, number, text
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
 
@@ -148,7 +148,7 @@ def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -
     """
     of_type = [each.name for each in bag.topics if each.type == _TYPE]
     if topic and topic not in of_type:
-        known = listed(of_type) or 'no other'
+        known = list_names(of_type) or 'no other'
         raise BagError(bag.path, f'holds no topic {topic!r} of {_TYPE}', f'it holds {known}')
     crank_topic = topic or _crank_topic_of_run(bag)
     samples_of = {
@@ -167,12 +167,12 @@ def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -
     if good:
         raise BagError(
             bag.path,
-            f'holds crank samples on {listed(good)}',
+            f'holds crank samples on {list_names(good)}',
             'name one of them as drive.bag.topic',
         )
     raise BagError(
         bag.path,
-        f'holds no crank sample of {listed(context.inputs_in_messages)}{_rejection_text(samples_of)}',
+        f'holds no crank sample of {list_names(context.inputs_in_messages)}{_rejection_text(samples_of)}',
         'name another bag, or its topic as drive.bag.topic',
     )
 

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 from linkage_ros.drives.drive import Context, CrankState, Drive
-from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep
@@ -57,7 +57,7 @@ def refuse_beyond(
     given = closure.linkage.inputs[number]
     low, high = extent
     unit = given.unit
-    goes = f'takes {quoted(given.joint)} from {low:.6g} {unit} to {high:.6g} {unit}'
+    goes = f'takes {quote(given.joint)} from {low:.6g} {unit} to {high:.6g} {unit}'
     for bound in closure.bounds.inputs:
         if bound.number == number and (bound.is_beyond(low) or bound.is_beyond(high)):
             raise DefinitionError(
@@ -83,7 +83,7 @@ def refuse_beyond(
         if by and outward * (value - end) > 1e-12 * (abs(end) + 1.0):
             raise DefinitionError(
                 where,
-                f'{goes}, beyond {end:.6g} {unit}, where {quoted(by)} is at its limit',
+                f'{goes}, beyond {end:.6g} {unit}, where {quote(by)} is at its limit',
                 'stay within it, or widen it in the linkage file',
             )
 
@@ -183,7 +183,7 @@ def build_clocked(
     if inputs and len(inputs) == len(names):
         raise DefinitionError(
             f'{where}.inputs',
-            f'names every input ({listed(names)}), so the values beside it are unused',
+            f'names every input ({list_names(names)}), so the values beside it are unused',
             f'leave one of them out: it then takes the values beside {where}.inputs',
         )
     curves = []

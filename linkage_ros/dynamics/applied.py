@@ -26,7 +26,7 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros.dynamics import longest_step
 from linkage_ros.dynamics.laws import Contact, Law, LawTerm, TorqueTable
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, JointSpring, PointLoad, SoftStop
-from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
+from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics.arithmetic import call, remainder, unit_vector
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
@@ -449,8 +449,8 @@ def _check_loads(closure: Closure, applied: AppliedLoads) -> None:
         if wrench.point and wrench.point not in points:
             raise DefinitionError(
                 f'loads.wrenches.{link}.point',
-                f'{quoted(wrench.point)} is not a point of {quoted(link)}',
-                did_you_mean(wrench.point, points, f'name one of {listed(sorted(points))}'),
+                f'{quote(wrench.point)} is not a point of {quote(link)}',
+                did_you_mean(wrench.point, points, f'name one of {list_names(sorted(points))}'),
             )
     for key, load, unit in loads:
         tables = {'over_time': 's', 'over_position': unit, 'over_rate': f'{unit}/s'}

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.files.parameters import choice, each_part, number, number_rows, point, text
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 
@@ -274,7 +274,7 @@ def check_masses(linkage: Linkage, loads: Loads) -> None:
         if link != GROUND and link not in linkage.masses:
             raise DefinitionError(
                 'masses',
-                f'link {quoted(link)} has no mass, and forces are asked for',
+                f'link {quote(link)} has no mass, and forces are asked for',
                 f'add masses: {{{link}: {{mass: 0.1, center: [0, 0], inertia: 1.0e-5}}}} '
                 'in [kg], [m] and [kg·m²]; mass: 0 for a massless link',
             )
@@ -295,11 +295,11 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
         key = f'loads.springs.{spring.name or count}'
         for link, end in spring.ends:
             if link not in linkage.links:
-                raise DefinitionError(key, f'{quoted(link)} is not a link', _one_of(linkage.links))
+                raise DefinitionError(key, f'{quote(link)} is not a link', _one_of(linkage.links))
             if end not in linkage.links[link]:
                 raise DefinitionError(
                     key,
-                    f'{quoted(end)} is not a point of {link!r}',
+                    f'{quote(end)} is not a point of {link!r}',
                     _one_of(linkage.links[link]),
                 )
         if spring.from_link == spring.to_link:
@@ -316,16 +316,16 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
         if name not in pins and name not in linkage.sliders:
             raise DefinitionError(
                 key,
-                f'{quoted(name)} is no pin or slider',
+                f'{quote(name)} is no pin or slider',
                 _one_of({*pins, *linkage.sliders}),
             )
         if name in pins and name in linkage.sliders:
             raise DefinitionError(
-                key, f'{quoted(name)} names a pin and a slider', 'give the slider another name'
+                key, f'{quote(name)} names a pin and a slider', 'give the slider another name'
             )
         if name in linkage.sliders and joint.radius:
             raise DefinitionError(
-                f'{key}.radius', f'{quoted(name)} is a slider, which has none', 'leave it out'
+                f'{key}.radius', f'{quote(name)} is a slider, which has none', 'leave it out'
             )
         if name in pins and bool(joint.coefficient) != bool(joint.radius):
             given, missing = (
@@ -339,11 +339,11 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
     if friction and friction.holds and friction.load_dependent_joint:
         raise DefinitionError(
             'effects.friction.holds',
-            f'at rest the force in {quoted(friction.load_dependent_joint)} has no certain value, and neither '
+            f'at rest the force in {quote(friction.load_dependent_joint)} has no certain value, and neither '
             'has its friction',
             'leave it out, or write breakaway instead of coefficient',
         )
 
 
 def _one_of(names: Iterable[str]) -> str:
-    return f'name one of {listed(sorted(names))}'
+    return f'name one of {list_names(sorted(names))}'

@@ -41,7 +41,7 @@ from linkage_ros.dynamics.mechanics import (
     slip_direction,
     spring_length,
 )
-from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.arithmetic import call, has_result, make_vector, unit_vector
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
@@ -277,7 +277,7 @@ class Reactions:
         if linkage.ratios:
             raise DefinitionError(
                 'effects',
-                f'forces in pins are not known with ratios ({listed(linkage.ratios)}): the force '
+                f'forces in pins are not known with ratios ({list_names(linkage.ratios)}): the force '
                 'between teeth, on a belt or a rack, is not computed',
                 'leave out pin forces, clearance, compliance, and friction by coefficient',
             )

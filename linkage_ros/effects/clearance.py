@@ -36,7 +36,7 @@ from math import hypot
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import MechanismState, Stage, with_deflection
-from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.files.parameters import each_part, Number
 from linkage_ros.kinematics.arithmetic import call, make_vector
 
@@ -76,7 +76,7 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
             raise DefinitionError(
                 f'effects.clearance.pins.{name}',
                 f'{name!r} is a slider, and clearance is a property of pins',
-                f'name pins: {listed(sorted(pins))}',
+                f'name pins: {list_names(sorted(pins))}',
             )
     plays = tuple(
         (number, parameters.pins[joint.name])

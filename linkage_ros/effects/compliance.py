@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import MechanismState, Stage, with_deflection
-from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.files.parameters import each_part, Number
 from linkage_ros.kinematics.arithmetic import unit_vector
 from linkage_ros.kinematics.topology import Joint
@@ -110,7 +110,7 @@ def _make_bar(context: Context, link: str, stiffness: float) -> _Bar:
             _check_joint(link, joint)
             ends.setdefault(joint.name, []).append((number, 1.0 if joint.link == link else -1.0))
     if len(ends) != 2:
-        raise _bar_error(link, f'has the pins {listed(ends)}')
+        raise _bar_error(link, f'has the pins {list_names(ends)}')
     near, far = ends
     points = closure.linkage.links[link]
     between = complex(*points[far]) - complex(*points[near])

@@ -33,7 +33,7 @@ from types import ModuleType
 from typing import Any
 
 from linkage_ros.effects.stage import EFFECTS, NEEDS
-from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
+from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.files.parameters import declared_fields
 
 QUANTITIES = ('velocity', 'acceleration', 'effort', 'pin_forces')
@@ -91,7 +91,7 @@ def found_in(name: str) -> str:
         spec = None
     if spec is None:
         return 'no module'
-    return quoted(spec.origin or next(iter(spec.submodule_search_locations or ()), package))
+    return quote(spec.origin or next(iter(spec.submodule_search_locations or ()), package))
 
 
 def user_needs(name: str) -> tuple[str, ...]:
@@ -132,7 +132,7 @@ def _order_key(name: str) -> tuple[int, str]:
 def _failure(name: str, error: BaseException) -> DefinitionError:
     return DefinitionError(
         name,
-        f'cannot be imported: {type(error).__name__}: {quoted(str(error))}',
+        f'cannot be imported: {type(error).__name__}: {quote(str(error))}',
         f'put it right; `python3 -c "import {name}"` says where',
     )
 
@@ -152,17 +152,17 @@ def _check_module(name: str, module: ModuleType) -> None:
         )
     own = [function for function in FUNCTIONS if hasattr(module, function)]
     if not own:
-        raise DefinitionError(name, 'does nothing', f'define one of {listed(FUNCTIONS)}')
+        raise DefinitionError(name, 'does nothing', f'define one of {list_names(FUNCTIONS)}')
     topics = [key for key in ('TOPIC', 'MESSAGE', 'writer') if hasattr(module, key)]
     if topics and len(topics) < 3:
         raise DefinitionError(
             name,
-            f'has {listed(topics, " and ")} alone',
+            f'has {list_names(topics, " and ")} alone',
             'TOPIC, MESSAGE and writer(parameters, context) go together',
         )
     if topics and not str(module.TOPIC).startswith('~/'):
         raise DefinitionError(
-            name, f'has the TOPIC {quoted(module.TOPIC)}', "write one of the node's own: '~/name'"
+            name, f'has the TOPIC {quote(module.TOPIC)}', "write one of the node's own: '~/name'"
         )
     _check_order(name, module)
 
@@ -171,15 +171,15 @@ def _check_order(name: str, module: ModuleType) -> None:
     """Refuse an effect that acts before one that it starts from, or after the last sensor."""
     after = getattr(module, 'AFTER', None)
     if after not in EFFECTS:
-        known = f'name one of {listed(EFFECTS)}'
-        said = f'AFTER is {quoted(after)}' if after is not None else 'does not say AFTER which'
+        known = f'name one of {list_names(EFFECTS)}'
+        said = f'AFTER is {quote(after)}' if after is not None else 'does not say AFTER which'
         remedy = did_you_mean(after, EFFECTS, known) if isinstance(after, str) else known
         raise DefinitionError(name, f'{said}: that is no effect', remedy)
     needs = getattr(module, 'NEEDS', ())
     for need in needs:
         if need not in QUANTITIES:
             raise DefinitionError(
-                name, f'NEEDS {quoted(need)}', f'of quantities there are {listed(QUANTITIES)}'
+                name, f'NEEDS {quote(need)}', f'of quantities there are {list_names(QUANTITIES)}'
             )
     last = max((_ORDER.index(need) for need in needs), default=0)
     if last > _ORDER.index(after):

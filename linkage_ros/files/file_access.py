@@ -25,7 +25,7 @@ from secrets import token_hex
 import stat
 from typing import BinaryIO
 
-from linkage_ros.errors import LinkageError, listed
+from linkage_ros.errors import LinkageError, list_names
 
 _KINDS = (
     (stat.S_ISFIFO, 'is a pipe'),
@@ -80,7 +80,7 @@ def check_output_name(file: Path, suffixes: Collection[str]) -> None:
         raise LinkageError(
             file,
             f'ends in {ending!r}' if ending else 'has no ending',
-            f'name a file that ends in {listed(suffixes, " or ")}',
+            f'name a file that ends in {list_names(suffixes, " or ")}',
         )
     _check_folder(file)
 

@@ -18,7 +18,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.errors import DefinitionError, FileError, listed, quoted
+from linkage_ros.errors import DefinitionError, FileError, list_names, quote
 from linkage_ros.files.section import Section
 from linkage_ros.files.units import ANGLES, LENGTHS, Units
 from linkage_ros.files.yaml_file import read_yaml
@@ -290,7 +290,7 @@ def _read_masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
         if name not in links:
             moving = sorted({*links} - {GROUND})
             raise content.error(
-                name, f'{quoted(name)} is not a link', f'name one of {listed(moving)}'
+                name, f'{quote(name)} is not a link', f'name one of {list_names(moving)}'
             )
         link = content.section(name)
         masses[name] = Mass(
@@ -377,7 +377,7 @@ def _add_limits(written_out: dict[str, Any], content: Section) -> dict[str, Any]
     for name in limited:
         if name not in joints:
             raise limited.error(
-                name, f'{quoted(name)} is no joint of it', f'name one of {listed(joints)}'
+                name, f'{quote(name)} is no joint of it', f'name one of {list_names(joints)}'
             )
     places = [(driven, content.section('input', required=False))]
     places += [(joints[name], limited.section(name)) for name in limited]

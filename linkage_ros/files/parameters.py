@@ -23,7 +23,7 @@ from math import inf
 from os.path import join
 from typing import Any, ClassVar
 
-from linkage_ros.errors import did_you_mean, listed, quoted
+from linkage_ros.errors import did_you_mean, list_names, quote
 from linkage_ros.files.section import Section
 from linkage_ros.files.units import most_in_one, unit_of
 
@@ -262,8 +262,8 @@ class Name(Kind):
             return name
         raise content.error(
             key,
-            f'there is no {self.kind.removeprefix("any_")} {quoted(name)}',
-            did_you_mean(name, names, f'there are: {listed(names) or "none"}'),
+            f'there is no {self.kind.removeprefix("any_")} {quote(name)}',
+            did_you_mean(name, names, f'there are: {list_names(names) or "none"}'),
         )
 
 

@@ -16,7 +16,7 @@ from math import inf, isfinite, isnan
 from re import fullmatch
 from typing import Any, cast
 
-from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed, quoted
+from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 from linkage_ros.files.units import unit_of, Units
 
 
@@ -92,7 +92,7 @@ class Section:
         value = self._take_value(key, default, f'a number{_unit_text(name)}')
         if not _is_number(value):
             raise self.error(
-                key, f'{quoted(value)} is not a number', f'write a number{_unit_text(name)}'
+                key, f'{quote(value)} is not a number', f'write a number{_unit_text(name)}'
             )
         found = self._to_si(key, value, unit)
         if not isfinite(found) or not least <= found <= most or found <= above:
@@ -103,7 +103,7 @@ class Section:
             )
             raise self.error(
                 key,
-                f'{quoted(value)} is out of bounds',
+                f'{quote(value)} is out of bounds',
                 f'write a finite number{bounds and f", {bounds}"}{name and f" [{name}]"}',
             )
         return found
@@ -127,7 +127,7 @@ class Section:
         """Return a boolean."""
         value = self._take_value(key, default, 'true or false')
         if not isinstance(value, bool):
-            raise self.error(key, f'{quoted(value)} is not a flag', 'write true or false')
+            raise self.error(key, f'{quote(value)} is not a flag', 'write true or false')
         return value
 
     def text(self, key: str, default: str | None = None, *, expected: str = 'a text') -> str:
@@ -136,7 +136,7 @@ class Section:
         if value == default and default is not None:
             return default
         if not isinstance(value, str) or not value.isprintable() or not value:
-            raise self.error(key, f'{quoted(value)} is not a text', 'write a name; quote numbers')
+            raise self.error(key, f'{quote(value)} is not a text', 'write a name; quote numbers')
         return value
 
     def ros_name(self, name: str) -> str:
@@ -144,17 +144,17 @@ class Section:
         if not fullmatch('[A-Za-z][A-Za-z0-9_]*', name):
             raise self.error(
                 name if name in self._content else '',
-                f'{quoted(name)} is no ROS name',
+                f'{quote(name)} is no ROS name',
                 'use letters, digits and _, a letter first',
             )
         return name
 
     def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
         """Return one of a set of words."""
-        value = self._take_value(key, default, listed(choices, ' or '))
+        value = self._take_value(key, default, list_names(choices, ' or '))
         if value not in choices:
             raise self.error(
-                key, f'{quoted(value)} is not a choice', f'write {listed(choices, " or ")}'
+                key, f'{quote(value)} is not a choice', f'write {list_names(choices, " or ")}'
             )
         return cast(str, value)
 
@@ -172,7 +172,7 @@ class Section:
             both = ', '.join(group[-1] for group in groups)
             raise self.error(
                 key,
-                f'{quoted(value)} is not a choice',
+                f'{quote(value)} is not a choice',
                 f'write {choices}, or one of each: [{both}]',
             )
         return [
@@ -189,7 +189,7 @@ class Section:
                 whole = all(float(part).is_integer() for part in value)
                 comma = '; a decimal has a point, not a comma: [0.040, 0]'
                 remedy += comma if whole else '; a planar linkage has no z'
-            raise self.error(key, f'{quoted(value)} is not a point', remedy)
+            raise self.error(key, f'{quote(value)} is not a point', remedy)
         x, y = (self._to_si(key, part, unit) for part in value)
         self._check_most(key, value, (x, y), most, unit)
         return x, y
@@ -204,7 +204,7 @@ class Section:
         if not _is_pair(value) or any(map(isnan, value)):
             raise self.error(
                 key,
-                f'{quoted(value)} is not two numbers',
+                f'{quote(value)} is not two numbers',
                 'write [low, high]; -.inf or .inf for none on a side',
             )
         low, high = (self._to_si(key, end, unit) for end in value)
@@ -217,7 +217,7 @@ class Section:
         line = self._line_of(key)
         if not isinstance(value, dict):
             remedy = f'write {key}: {_as_mapping(value)}'
-            reason = 'is empty' if value is None else f'{quoted(value)} is not a mapping'
+            reason = 'is empty' if value is None else f'{quote(value)} is not a mapping'
             raise self.error(key, reason, remedy)
         path = '.'.join(filter(None, (self._path, key)))
         return Section(self.file, path, value, line, self.units)
@@ -231,7 +231,7 @@ class Section:
         for i, item in enumerate(value, 1):
             path = '.'.join(filter(None, (self._path, f'{key}[{i}]')))
             if not isinstance(item, dict):
-                raise self.error(key, f'{quoted(item)} is not a mapping', 'write {…}')
+                raise self.error(key, f'{quote(item)} is not a mapping', 'write {…}')
             found.append(Section(self.file, path, item, self._line_of(key), self.units))
         if not found:
             raise self.error(key, 'the list is empty', 'name one at least')
@@ -242,7 +242,7 @@ class Section:
         value = self._take_value(key, None, 'a list of numbers')
         if not _is_list_of_finite(value):
             raise self.error(
-                key, f'{quoted(value)} is no list of finite numbers', 'write [0.1, 0.2]'
+                key, f'{quote(value)} is no list of finite numbers', 'write [0.1, 0.2]'
             )
         found = [self._to_si(key, v, unit) for v in value]
         self._check_most(key, value, found, most, unit)
@@ -261,11 +261,11 @@ class Section:
         row = f'[{", ".join(names)}]'
         table: list[tuple[float, ...]] = []
         if not isinstance(value, list) or not value:
-            raise self.error(key, f'{quoted(value)} is no list of rows', f'write [{row}, …]')
+            raise self.error(key, f'{quote(value)} is no list of rows', f'write [{row}, …]')
         for number, found in enumerate(value, 1):
             if not _is_list_of_finite(found) or len(found) != len(units):
                 raise self.error(
-                    key, f'row {number}, {quoted(found)}, is not {row}', 'write finite numbers'
+                    key, f'row {number}, {quote(found)}, is not {row}', 'write finite numbers'
                 )
             table.append(tuple(map(self._to_si, repeat(key), found, units)))
             for value, unit in zip(table[-1], units, strict=True):
@@ -276,7 +276,7 @@ class Section:
         """Return a list of names; empty if the key is absent."""
         value = self._take_value(key, [], 'a list of names')
         if not isinstance(value, list) or any(not isinstance(v, str) or not v for v in value):
-            raise self.error(key, f'{quoted(value)} is no list of names', 'write [one, other]')
+            raise self.error(key, f'{quote(value)} is no list of names', 'write [one, other]')
         return list(value)
 
     def remove_key(self, key: str) -> None:
@@ -296,7 +296,7 @@ class Section:
         for key in self._content:
             if key not in self._taken:
                 names = sorted(self._taken | set(known))
-                known_names = f'known: {listed(names)}' if names else 'leave it out'
+                known_names = f'known: {list_names(names)}' if names else 'leave it out'
                 remedy = did_you_mean(key, names, known_names)
                 raise self.error(key, 'unknown key', remedy)
 
@@ -317,7 +317,7 @@ class Section:
         if value and self.units.is_ambiguous(unit):
             raise self.error(
                 key,
-                f'{quoted(value)} is for joints that turn and joints that slide, '
+                f'{quote(value)} is for joints that turn and joints that slide, '
                 f'in {self.units.file_unit(unit)}',
                 'leave units and angles out of this file',
             )
@@ -330,7 +330,7 @@ class Section:
             name = self.units.file_unit(unit)
             raise self.error(
                 key,
-                f'{quoted(value)} is out of bounds',
+                f'{quote(value)} is out of bounds',
                 f'write numbers of at most {self.units.to_file_unit(most, unit):g}'
                 f'{name and f" [{name}]"}',
             )
@@ -361,7 +361,7 @@ def _as_mapping(value: Any) -> str:
     names = value if isinstance(value, list) else [value]
     if not names or not all(isinstance(name, str) and fullmatch(r'\w+', name) for name in names):
         return '{…}'
-    return f'{{{listed(f"{name}: {{}}" for name in names)}}}'
+    return f'{{{list_names(f"{name}: {{}}" for name in names)}}}'
 
 
 def _unit_text(unit: str) -> str:

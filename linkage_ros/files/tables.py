@@ -25,7 +25,7 @@ import os
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from linkage_ros.errors import FileError, LinkageError, quoted
+from linkage_ros.errors import FileError, LinkageError, quote
 from linkage_ros.files.file_access import check_output_name, read_regular, replace_file
 from linkage_ros.names import csv_text
 
@@ -174,7 +174,7 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
             raise FileError(
                 file,
                 '',
-                f'line {number}: {quoted(delimiter.join(cells))} is no row of {wanted} numbers',
+                f'line {number}: {quote(delimiter.join(cells))} is no row of {wanted} numbers',
                 'write numbers with commas between them',
             )
         rows.append(row)

@@ -20,7 +20,7 @@ from pathlib import Path
 import re
 from typing import Any, cast, ClassVar
 
-from linkage_ros.errors import FileError, quoted
+from linkage_ros.errors import FileError, quote
 from linkage_ros.files.file_access import read_regular
 from linkage_ros.files.file_kinds import kind_of_bytes, kind_of_folder
 from linkage_ros.files.section import LinedDict, Section
@@ -224,7 +224,7 @@ def parse_yaml(data: bytes, file: str) -> Section:
         if loader is not None:
             loader.dispose()
     if not isinstance(content, dict):
-        raise FileError(file, '', f'holds {quoted(content)}', 'write a mapping (key: value)')
+        raise FileError(file, '', f'holds {quote(content)}', 'write a mapping (key: value)')
     return Section(file, '', content)
 
 
@@ -245,7 +245,7 @@ class _StrictLoader(BoundedLoader):
             line = key_node.start_mark.line + 1
             if not isinstance(key, str) or not key.isprintable():
                 raise FileError(
-                    self.file, '', f'the key {quoted(key)} is not a name', 'write a name', line
+                    self.file, '', f'the key {quote(key)} is not a name', 'write a name', line
                 )
             if key in mapping:
                 first = mapping.lines[key]

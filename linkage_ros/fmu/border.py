@@ -24,7 +24,7 @@ from functools import wraps
 from math import nan
 from typing import Any
 
-from linkage_ros.errors import clean, LinkageError
+from linkage_ros.errors import escape_unprintable, LinkageError
 from pythonfmu3 import Fmi3Causality, Fmi3Slave, Fmi3Status
 
 
@@ -95,7 +95,7 @@ class GuardedSlave(Fmi3Slave):
         """Let all further steps fail; log the first reason."""
         if self.state is not SlaveState.FAILED:
             text = str(error) if isinstance(error, LinkageError) else f'{call}: {error!r}'
-            self.log(clean(text), Fmi3Status.error)
+            self.log(escape_unprintable(text), Fmi3Status.error)
         self.state = SlaveState.FAILED
 
     def terminate(self) -> None:

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import PUBLISHED_WITH
-from linkage_ros.errors import LinkageError, listed
+from linkage_ros.errors import LinkageError, list_names
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues
@@ -366,7 +366,7 @@ def _refuse_scene(scene: Scene) -> None:
             raise member.content.error(
                 f'drive.{drive}',
                 f'listens to {topic}, for which an FMU has no inputs',
-                f'name one of {listed(_INPUT_FIELDS)}, or a drive that moves by itself',
+                f'name one of {list_names(_INPUT_FIELDS)}, or a drive that moves by itself',
             )
         if member.loads is not None and member.loads.applied.wrenches:
             raise member.content.error(

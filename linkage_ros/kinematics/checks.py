@@ -14,7 +14,7 @@ from collections import Counter
 from itertools import combinations
 from math import hypot, inf, isfinite, isnan
 
-from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.linkage import (
     GROUND,
     Input,
@@ -56,7 +56,7 @@ def check_linkage(linkage: Linkage) -> None:
     for name in names:
         if names.count(name) > 1:
             raise DefinitionError(
-                'input', f'{quoted(name)} is named twice', 'give each input its own name'
+                'input', f'{quote(name)} is named twice', 'give each input its own name'
             )
     for name, joint in linkage.joints.items():
         if isinstance(joint, RevoluteJoint):
@@ -71,9 +71,7 @@ def check_linkage(linkage: Linkage) -> None:
     for point in (*linkage.traced, *(linkage.pose.points if linkage.pose else ())):
         if point not in points:
             key = 'traced' if point in linkage.traced else 'pose.points'
-            raise DefinitionError(
-                key, f'{quoted(point)} is not a point of a link', _one_of(points)
-            )
+            raise DefinitionError(key, f'{quote(point)} is not a point of a link', _one_of(points))
     for link in linkage.pose.angles if linkage.pose else ():
         _check_link(linkage, 'pose.angles', link)
     if linkage.pose and len(linkage.pose.inputs) != len(linkage.inputs):
@@ -107,7 +105,7 @@ def _check_points(linkage: Linkage) -> None:
         if len(shared) > 1:
             raise DefinitionError(
                 f'links.{other}',
-                f'shares the points {listed(shared)} with {one!r}',
+                f'shares the points {list_names(shared)} with {one!r}',
                 'two links have one pin between them; rename the points that are not pins',
             )
     ends = [point for points in linkage.links.values() for point in points]
@@ -137,20 +135,20 @@ def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
     if slider.through not in points:
         raise DefinitionError(
             f'{key}.through',
-            f'{quoted(slider.through)} is not a point of {slider.along!r}',
+            f'{quote(slider.through)} is not a point of {slider.along!r}',
             _one_of(points),
         )
     carriers = [link for link, carried in linkage.links.items() if slider.point in carried]
     if not carriers or slider.along in carriers:
         raise DefinitionError(
             f'{key}.point',
-            f'{quoted(slider.point)} is named on {listed(carriers) or "no link"}',
+            f'{quote(slider.point)} is named on {list_names(carriers) or "no link"}',
             f'name a point of a link other than {slider.along!r}',
         )
     if slider.block and slider.block not in carriers:
         raise DefinitionError(
             f'{key}.block',
-            f'{quoted(slider.block)} does not carry {slider.point!r}',
+            f'{quote(slider.block)} does not carry {slider.point!r}',
             _one_of(carriers),
         )
     if hypot(*slider.direction) < _SHORTEST or not all(map(isfinite, slider.direction)):
@@ -169,7 +167,7 @@ def _check_input(linkage: Linkage, given: Input) -> None:
         _check_link(linkage, f'input.{end}', getattr(given, end))
     if given.parent == given.child:
         raise DefinitionError(
-            'input.child', f'{quoted(given.child)} is its own parent', 'name two links'
+            'input.child', f'{quote(given.child)} is its own parent', 'name two links'
         )
     if not set(linkage.links[given.parent]) & set(linkage.links[given.child]):
         raise DefinitionError(
@@ -185,19 +183,19 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
     names = [one.joint for one in inputs]
     if name in names:
         raise DefinitionError(
-            key, f'{quoted(name)} is an input, which follows no joint', 'leave one of the two out'
+            key, f'{quote(name)} is an input, which follows no joint', 'leave one of the two out'
         )
     if name not in linkage.joints:
         free = sorted({*linkage.joints} - {*names})
         raise DefinitionError(
             key,
-            f'{quoted(name)} is not a published joint',
+            f'{quote(name)} is not a published joint',
             _one_of(free) if free else 'publish it: name it under joints',
         )
     if given.of not in (*names, *linkage.joints):
         choices = {*names, *linkage.joints} - {name}
         raise DefinitionError(
-            f'{key}.of', f'{quoted(given.of)} is no joint of this linkage', _one_of(choices)
+            f'{key}.of', f'{quote(given.of)} is no joint of this linkage', _one_of(choices)
         )
     chain = [name]
     while chain[-1] in linkage.ratios and chain[-1] not in chain[:-1]:
@@ -218,7 +216,7 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
         if joint.parent == joint.child or not set(one) & set(other):
             raise DefinitionError(
                 key,
-                f'{quoted(joint.parent)} and {quoted(joint.child)} have no common pin about '
+                f'{quote(joint.parent)} and {quote(joint.child)} have no common pin about '
                 'which it could turn',
                 'name a joint of two links that share a pin, or of a slider',
             )
@@ -242,7 +240,7 @@ def _check_all_limits(linkage: Linkage) -> None:
                 raise DefinitionError(
                     'pose.inputs',
                     f'{value:g} {given.unit} is beyond the limits {given.limits} {given.unit} of '
-                    f'{quoted(given.joint)}',
+                    f'{quote(given.joint)}',
                     'start within the limits, or widen them',
                 )
 
@@ -253,21 +251,21 @@ def _check_limits(key: str, limits: Limits, name: str, unit: str) -> None:
     if isnan(low) or isnan(high) or low == inf or high == -inf:
         raise DefinitionError(
             f'{key}.limits',
-            f'{limits} {unit} of {quoted(name)} are not valid limits',
+            f'{limits} {unit} of {quote(name)} are not valid limits',
             'write [low, high]; -.inf or .inf for none on a side',
         )
     if low >= high:
         fault = 'are the same number' if low == high else 'cross'
         raise DefinitionError(
             f'{key}.limits',
-            f'{limits} {unit} of {quoted(name)} {fault}',
+            f'{limits} {unit} of {quote(name)} {fault}',
             'write [low, high], the lower one first',
         )
     for what in ('velocity', 'effort'):
         if not (value := getattr(limits, what)) > 0.0:
             raise DefinitionError(
                 f'{key}.{what}',
-                f'{value:g} of {quoted(name)} allows no motion',
+                f'{value:g} of {quote(name)} allows no motion',
                 'write a number of more than 0, or leave it out',
             )
 
@@ -276,15 +274,15 @@ def _check_slider_name(linkage: Linkage, key: str, name: str) -> None:
     if name not in linkage.sliders:
         raise DefinitionError(
             key,
-            f'{quoted(name)} is not a slider',
+            f'{quote(name)} is not a slider',
             _one_of(linkage.sliders) if linkage.sliders else 'this linkage has none',
         )
 
 
 def _check_link(linkage: Linkage, key: str, name: str) -> None:
     if name not in linkage.links:
-        raise DefinitionError(key, f'{quoted(name)} is not a link', _one_of(linkage.links))
+        raise DefinitionError(key, f'{quote(name)} is not a link', _one_of(linkage.links))
 
 
 def _one_of(names: object) -> str:
-    return f'name one of {listed(sorted(names))}'  # type: ignore[call-overload]
+    return f'name one of {list_names(sorted(names))}'  # type: ignore[call-overload]

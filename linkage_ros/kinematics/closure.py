@@ -20,7 +20,7 @@ from math import inf
 from operator import mul
 from typing import Any, ClassVar, overload, TYPE_CHECKING
 
-from linkage_ros.errors import clean, listed, quoted
+from linkage_ros.errors import escape_unprintable, list_names, quote
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.checks import check_linkage
@@ -112,7 +112,7 @@ class Closure:
 
     def __init__(self, linkage: Linkage, name: str = '') -> None:
         if not isinstance(linkage, Linkage):
-            raise TypeError(f'linkage: {quoted(linkage)} is not a Linkage; load() reads files')
+            raise TypeError(f'linkage: {quote(linkage)} is not a Linkage; load() reads files')
         check_linkage(linkage)
         self.linkage = linkage
         self.name = name
@@ -159,7 +159,7 @@ class Closure:
     def __repr__(self) -> str:
         counts = ((len(self.input_names), 'input'), (len(self.joint_names), 'joint'))
         has = ', '.join(f'{n} {what}{"s" * (n != 1)}' for n, what in counts)
-        return f'<{" ".join(filter(None, (type(self).__name__, clean(self.name))))}: {has}>'
+        return f'<{" ".join(filter(None, (type(self).__name__, escape_unprintable(self.name))))}: {has}>'
 
     def _repr_svg_(self) -> str:
         from linkage_ros import svg  # local import: only a notebook asks for pictures
@@ -674,7 +674,7 @@ class Closure:
             if type(value) is float and -most < value < most:
                 return [0.0, value + zero]
         if len(values) != len(self.input_names):
-            names = listed(self.input_names)
+            names = list_names(self.input_names)
             raise ValueError(f'{what}: {len(values)} given; give {len(self.input_names)}: {names}')
         numbers = self._as_doubles(what, values)
         x = [0.0, *self._scale_inputs([number + zero for number in numbers])]
@@ -701,7 +701,7 @@ class Closure:
         closure = getattr(found, 'closure', None)
         linkage = getattr(closure, 'linkage', None)
         if linkage is not self.linkage and linkage != self.linkage:
-            message = f'{what}: {quoted(found)} is not of {self!r}; give what that returned'
+            message = f'{what}: {quote(found)} is not of {self!r}; give what that returned'
             raise TypeError(message)
 
     def _joint_rates(self, values: list[float]) -> tuple[float, ...]:

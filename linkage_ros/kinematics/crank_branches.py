@@ -28,7 +28,7 @@ from itertools import pairwise
 from math import atan2, ceil, floor, inf, isfinite, nan, pi, remainder, sin, sqrt, tau
 from typing import NamedTuple
 
-from linkage_ros.errors import DefinitionError, did_you_mean, listed
+from linkage_ros.errors import DefinitionError, did_you_mean, list_names
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.trace import OutputSelection, TracedMotion
@@ -100,7 +100,7 @@ def output_named(closure: LoopClosure, name: str) -> Output:
         raise DefinitionError(
             name,
             'is neither a published joint nor a coordinate of a traced point',
-            did_you_mean(name, [*known, *traced], f'name one of {listed([*known, *traced])}'),
+            did_you_mean(name, [*known, *traced], f'name one of {list_names([*known, *traced])}'),
         )
     key = next((link, point) for link, at in closure.linkage.links.items() if point in at)
 
@@ -556,7 +556,7 @@ class Inverse(NamedTuple):
             if branch.number == number or (number is None and len(branches) == 1):
                 return branch
         unit = 'rad' if branches[0].crank_turns else 'm'
-        told = listed(
+        told = list_names(
             f'{one.number} ({one.least:.6g} to {one.most:.6g} {unit})' for one in branches
         )
         if number is not None:

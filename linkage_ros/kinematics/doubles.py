@@ -18,7 +18,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.errors import quoted
+from linkage_ros.errors import quote
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array
@@ -59,7 +59,7 @@ def to_double(what: str, value: Any, remedy: str = '') -> float:
     except (TypeError, ValueError) as error:
         if str(error).startswith(what):
             raise
-    raise TypeError(f'{what}: {quoted(value)} is not a number{remedy}')
+    raise TypeError(f'{what}: {quote(value)} is not a number{remedy}')
 
 
 def to_doubles(what: str, values: Any) -> Array:
@@ -82,6 +82,6 @@ def to_doubles(what: str, values: Any) -> Array:
             return array.astype(np.float64)
     if kind != 'O':
         first = array.ravel()[:1].tolist()
-        raise TypeError(f'{what}: {quoted(first[0] if first else values)} is not a number')
+        raise TypeError(f'{what}: {quote(first[0] if first else values)} is not a number')
     doubles = [to_double(what, value) for value in array.ravel().tolist()]
     return np.array(doubles, np.float64).reshape(array.shape)

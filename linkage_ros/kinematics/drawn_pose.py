@@ -23,7 +23,7 @@ from collections.abc import Iterator, Sequence
 from math import remainder, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.linkage import AssemblyPose, Linkage
 from linkage_ros.kinematics.point_tracker import PointTracker
 from linkage_ros.kinematics.sides import closes_in_two_ways, telling_part, TwoWays
@@ -213,7 +213,7 @@ def _closing_assemblies(
         if len(found) > _MOST_KEPT:
             found.sort(key=lambda one: one.square)
             if found[_MOST_KEPT].square <= _CLEARLY * _CLEARLY * found[0].square:
-                names = listed(repr(one.assembly_key) for one in ways[:number])
+                names = list_names(repr(one.assembly_key) for one in ways[:number])
                 raise DefinitionError(
                     'pose', f'does not tell the sides of {names}', 'name a point of each'
                 )
@@ -268,7 +268,7 @@ def _ambiguity_error(
             f'{ways[i].assembly_key}: {ways[i].side_word(one.sides[i] or one.signs[i])}'
             for i in differ
         ]
-        sides.append(f'{{{listed(words)}}}')
+        sides.append(f'{{{list_names(words)}}}')
     if len(alike) > _MOST_LISTED:
         sides.append(f'{len(alike) - _MOST_LISTED} more')
     telling = []
@@ -276,7 +276,7 @@ def _ambiguity_error(
         other = next(one for one in alike if one.signs[i] != first.signs[i])
         telling.append(_telling_text(plan, ways[i].dyad, (first.state, other.state)))
     return DefinitionError(
-        'pose', f'does not tell {listed(sides, " from ")}', f'name {listed(telling, "; ")}'
+        'pose', f'does not tell {list_names(sides, " from ")}', f'name {list_names(telling, "; ")}'
     )
 
 

@@ -16,7 +16,7 @@ from itertools import islice, product
 from math import sin
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.errors import DefinitionError, did_you_mean, listed
+from linkage_ros.errors import DefinitionError, did_you_mean, list_names
 from linkage_ros.kinematics.checks import check_linkage
 from linkage_ros.kinematics.linkage import AssemblyPose, Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.sides import assembly_sides
@@ -63,7 +63,7 @@ def exchange_inputs(
             inputs.append(Input.from_joint(name, joint))
         else:
             known = [*linkage.joints, *driven]
-            remedy = did_you_mean(name, known, f'name one of {listed(known)}')
+            remedy = did_you_mean(name, known, f'name one of {list_names(known)}')
             raise DefinitionError(name, 'is neither a published joint nor an input', remedy)
     # The inputs as joints, and the other joints.
     joints = {given.joint: given.as_joint() for given in linkage.inputs}

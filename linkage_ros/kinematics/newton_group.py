@@ -30,7 +30,7 @@ from math import hypot, inf, isnan, nan
 from operator import add, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.arithmetic import call, has_result, UNIT_ROUNDOFF
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
 from linkage_ros.kinematics.built_once import keep_results
@@ -538,7 +538,7 @@ def make_iteration(
     if pose is None:
         raise DefinitionError(
             'pose',
-            f'is missing: no dyad covers {listed(links)}, they are solved by iteration',
+            f'is missing: no dyad covers {list_names(links)}, they are solved by iteration',
             'give inputs, and where points of these links lie then: '
             'pose: {inputs: [...], points: {...}}',
         )
@@ -609,7 +609,7 @@ def _initial_guess(
                     raise DefinitionError(
                         'pose.points',
                         f'does not say where {link!r} lies',
-                        f'give two of its points: {listed(points[link])}',
+                        f'give two of its points: {list_names(points[link])}',
                     )
                 angles[link] = angle
         return angles[link]

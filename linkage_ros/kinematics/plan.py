@@ -16,7 +16,7 @@ from dataclasses import replace
 from math import inf
 from typing import Any, NamedTuple
 
-from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.arithmetic import cross_product, resolve_along, ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.diagonals import AnyDiagonal, CrankDiagonal, FreeDiagonal
 from linkage_ros.kinematics.dyads.prp import CrankPRPDyad, PRPDyad
@@ -107,10 +107,10 @@ class SolutionPlan(SolvedLinks):
                 self._add_iteration(group)
         self._choose_sides()
         for name in self._assembly:
-            keys = listed(repr(one.assembly_key) for one in self.two_ways)
+            keys = list_names(repr(one.assembly_key) for one in self.two_ways)
             raise DefinitionError(
                 f'assembly.{name}',
-                f'{quoted(name)} does not close a dyad that has two assemblies',
+                f'{quote(name)} does not close a dyad that has two assemblies',
                 f'name {keys}' if keys else 'leave it out',
             )
 
@@ -136,19 +136,19 @@ class SolutionPlan(SolvedLinks):
                 self._missing.pop(one.assembly_key, None)
         if self._missing:
             verb = 'is' if len(self._missing) == 1 else 'are'
-            remedy = f'write {listed(self._missing.values())}'
+            remedy = f'write {list_names(self._missing.values())}'
             drawn = [
                 one for one in self.two_ways if one.crosses and one.assembly_key in self._missing
             ]
             if drawn:
                 parts = (telling_part(self.points, one.dyad) for one in drawn)
-                points = listed(f'{point}: [x, y]' for _, point in parts if point)
+                points = list_names(f'{point}: [x, y]' for _, point in parts if point)
                 remedy = (
                     f'draw it, since its side changes at change points: '
                     f'pose: {{inputs: [...], points: {{{points}}}}}'
                 )
             raise DefinitionError(
-                'assembly', f'{listed(map(repr, self._missing))} {verb} missing', remedy
+                'assembly', f'{list_names(map(repr, self._missing))} {verb} missing', remedy
             )
 
     def _add_driven(self, driven: Driven) -> None:
@@ -491,7 +491,7 @@ class SolutionPlan(SolvedLinks):
             self._missing[name] = f'{name}: {choices} ({meaning})'
         elif side not in sides:
             raise DefinitionError(
-                f'assembly.{name}', f'{quoted(side)} is no side', f'write {choices} ({meaning})'
+                f'assembly.{name}', f'{quote(side)} is no side', f'write {choices} ({meaning})'
             )
         written = sides[side] if side else 0
         sign = self._nominal[name].sign if self._nominal else (written or 1) * upright

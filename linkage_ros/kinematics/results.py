@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, fields
 from math import tau
 from typing import Any, NamedTuple, Protocol
 
-from linkage_ros.errors import listed, quoted
+from linkage_ros.errors import list_names, quote
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step, StepPose
@@ -203,7 +203,7 @@ class _JointValues(Mapping[str, float]):
         """
         names = self.closure.joint_names
         if joint not in names:
-            raise KeyError(f'{quoted(joint)} is not a published joint; use {listed(names)}')
+            raise KeyError(f'{quote(joint)} is not a published joint; use {list_names(names)}')
         if not self.joints:
             raise ValueError(f'{joint}: {self!r} has no joint values; check its status first')
         return self.joints[names.index(joint)]
@@ -221,7 +221,7 @@ class _JointValues(Mapping[str, float]):
 
     def __repr__(self) -> str:
         values = zip(self.closure.joint_names, self.joints, strict=False)
-        shown = listed(f'{name} {value:.6g}' for name, value in values)
+        shown = list_names(f'{name} {value:.6g}' for name, value in values)
         return f'<{self._repr_title}: {shown}>' if shown else f'<{self._repr_title}>'
 
     @property

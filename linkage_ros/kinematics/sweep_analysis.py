@@ -15,7 +15,7 @@ from itertools import pairwise, product
 from math import cos, inf, isfinite, nan, pi, remainder, tau
 from typing import NamedTuple
 
-from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.limits import Bound, without_mirrored
 from linkage_ros.kinematics.linkage import GROUND, Linkage
@@ -567,7 +567,7 @@ def check_closes(closure: LoopClosure) -> None:
         links.append('the rest')
     raise DefinitionError(
         'links',
-        f'the loops close at no value of the input; {listed(links, " and ")} miss each other by '
+        f'the loops close at no value of the input; {list_names(links, " and ")} miss each other by '
         f'{nearest.gap:.3g} m or more',
         'the longest link of a loop must be shorter than its others together',
     )
@@ -587,9 +587,9 @@ def check_turns(closure: LoopClosure) -> None:
                 of = closure.linkage.ratios[step.joint].of
                 raise DefinitionError(
                     f'ratios.{step.joint}.of',
-                    f'{quoted(of)} passes {step.middle + pi:.4g} rad, where its turns are not '
+                    f'{quote(of)} passes {step.middle + pi:.4g} rad, where its turns are not '
                     'known, and the ratio is no whole number',
-                    f'write limits for {quoted(of)}, whose middle is that of its swing',
+                    f'write limits for {quote(of)}, whose middle is that of its swing',
                 )
 
 
@@ -609,7 +609,7 @@ def check_limits(closure: LoopClosure) -> None:
         if bound is not None:
             raise DefinitionError(
                 'pose.inputs',
-                f'bring {quoted(bound.name)} to {bound.turned(joints[bound.number]):.6g} '
+                f'bring {quote(bound.name)} to {bound.turned(joints[bound.number]):.6g} '
                 f'{_joint_unit(linkage, bound)}, '
                 f'beyond its limits {_limits_text(closure, bound)}',
                 'start within the limits, or widen them',
@@ -617,7 +617,7 @@ def check_limits(closure: LoopClosure) -> None:
     if len(linkage.inputs) == 1:
         _check_single(closure)
     elif not (linkage.pose and joints) and not _met_on_grid(closure):
-        names = listed(map(quoted, linkage.limits))
+        names = list_names(map(quote, linkage.limits))
         raise DefinitionError(
             'input.limits',
             f'no state was found within the limits of {names}',
@@ -633,7 +633,7 @@ def _check_single(closure: LoopClosure) -> None:
         if not ranges:
             raise DefinitionError(
                 'input.limits',
-                f'{_limits_text(closure, bound)} of {quoted(bound.name)} never meet its range, '
+                f'{_limits_text(closure, bound)} of {quote(bound.name)} never meet its range, '
                 f'{describe_ranges(closure.closing_ranges)}',
                 'widen them',
             )
@@ -642,12 +642,12 @@ def _check_single(closure: LoopClosure) -> None:
             low, high = _joint_range(closure, ranges, bound)
             raise DefinitionError(
                 f'joints.{bound.name}.limits',
-                f'{_limits_text(closure, bound)} of {quoted(bound.name)} are never met: it goes from '
+                f'{_limits_text(closure, bound)} of {quote(bound.name)} are never met: it goes from '
                 f'{low:.6g} to {high:.6g} {_joint_unit(closure.linkage, bound)}',
                 'widen them',
             )
     if bounds.joints and not within_published(closure, ranges, bounds.joints):
-        names = listed(quoted(bound.name) for bound in bounds.joints)
+        names = list_names(quote(bound.name) for bound in bounds.joints)
         raise DefinitionError(
             'joints',
             f'the limits of {names} are met, but never together',

@@ -21,7 +21,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
-from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.linkage import (
     GROUND,
     Input,
@@ -510,7 +510,7 @@ def _same_pin(linkage: Linkage) -> str:
     }
     if len({*single.values()}) < 2:
         return ''
-    points = listed((f'{point} ({link})' for point, link in single.items()), ' and ')
+    points = list_names((f'{point} ({link})' for point, link in single.items()), ' and ')
     return f'{points} each stand on one link only; the same pin? then give it one name'
 
 

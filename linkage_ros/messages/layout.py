@@ -27,7 +27,7 @@ from struct import calcsize, pack, Struct, unpack
 from struct import error as StructError
 from typing import Any, NamedTuple
 
-from linkage_ros.generated_code import Lines, written
+from linkage_ros.generated_code import define_function, Lines
 
 NANOSECONDS = 1_000_000_000
 """A second, in [ns]."""
@@ -356,7 +356,7 @@ class ArrayWriter:
                 bound |= call.bound
         # Returns a message from its stamp in [ns] and, for each array, a number per joint. All
         # arrays but the first may be empty, which is their default.
-        self.write = written('\n'.join(lines), 'write', bound)
+        self.write = define_function('\n'.join(lines), 'write', bound)
 
     def message_expression(self, numbers: Mapping[str, str], name: str = 'pack') -> Lines:
         """

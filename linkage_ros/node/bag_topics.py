@@ -15,7 +15,7 @@ from contextlib import suppress
 from typing import Any
 
 from linkage_ros.bag.topic import INFINITE, QosProfile, Topic
-from linkage_ros.errors import LinkageError, quoted
+from linkage_ros.errors import LinkageError, quote
 from linkage_ros.replay.topic_description import describe_topic, message_type
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -102,7 +102,7 @@ def _create_publisher(node: Node, topic: Topic) -> Publisher:
     """Return a publisher for a topic; raise LinkageError if there can be none."""
     kind = _class_of(topic)
     unfit = LinkageError(
-        quoted(topic.name)[1:-1] or "''", 'is no name of a ROS 2 topic', 'convert the bag'
+        quote(topic.name)[1:-1] or "''", 'is no name of a ROS 2 topic', 'convert the bag'
     )
     if '\0' in topic.name:  # rclpy would publish on the part before it
         raise unfit

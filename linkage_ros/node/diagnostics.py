@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from linkage_ros.drives.drive import describe_chatter
-from linkage_ros.errors import listed
+from linkage_ros.errors import list_names
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe_ranges
 from linkage_ros.kinematics.results import Position
@@ -609,14 +609,14 @@ class Warnings:
             Returns the names of the other publishers on the topic.
 
         """
-        names = listed(inputs)
+        names = list_names(inputs)
         if counts.ignored and counts.ignored == counts.received:
             head = head_of(counts.last_ignored)
             held = sorted(name.decode(errors='replace') for name in head[0]) if head else ()
             self.warn(
                 'ignored',
-                f'messages on {crank_topic} hold {listed(map(repr, held))}; the linkage needs '
-                f'{listed(map(repr, inputs))}: name the joint so there, or remap the topic',
+                f'messages on {crank_topic} hold {list_names(map(repr, held))}; the linkage needs '
+                f'{list_names(map(repr, inputs))}: name the joint so there, or remap the topic',
                 period,
             )
         handled = counts.used + counts.superseded + counts.ignored + sum(counts.rejected.values())

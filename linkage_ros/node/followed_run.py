@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from linkage_ros.bag.run_events import read_run_metadata, RunMetadata
-from linkage_ros.errors import LinkageError, quoted
+from linkage_ros.errors import LinkageError, quote
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.messages.joint_state import CrankSample
@@ -135,7 +135,7 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
         closure = Closure(shown.linkage)
         model = model_of(closure, scene.name)
     except (ValueError, ArithmeticError, MalformedError) as error:
-        raise LinkageError(topic, f'is not valid: {quoted(str(error))}', 'name another') from None
+        raise LinkageError(topic, f'is not valid: {quote(str(error))}', 'name another') from None
     turned = next((each for each in scene.linkages if each.drive[0] in _BY_TOPIC), None)
     if not account.crank_topic:
         turned = None

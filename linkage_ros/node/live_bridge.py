@@ -33,7 +33,14 @@ from typing import Any, TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.srv import GetState
 from linkage_ros.drives.dependent_samples import DependentSampleReader, joint_of, sampled_inverse
-from linkage_ros.errors import clean, did_you_mean, LinkageError, listed, quoted, shortened
+from linkage_ros.errors import (
+    did_you_mean,
+    escape_unprintable,
+    LinkageError,
+    list_names,
+    quote,
+    shorten,
+)
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, JointStateWriter
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.followed_run import diagnostics_content, FollowedRun, read_run
@@ -280,7 +287,9 @@ class LiveBridge:
                 self._executor.spin_once(timeout_sec=0.1)
             except Exception as error:  # noqa: BLE001, PERF203 (rcl's have no base class)
                 # A message of the graph must not end the page.
-                self._trouble = f'{type(error).__name__}: {shortened(clean(str(error)), 200)}'
+                self._trouble = (
+                    f'{type(error).__name__}: {shorten(escape_unprintable(str(error)), 200)}'
+                )
                 self._ending.wait(0.01)
 
     # What the node says.
@@ -290,7 +299,7 @@ class LiveBridge:
         try:
             run = read_run(message, f'{self.name}/scene')
         except LinkageError as error:
-            self._trouble = f'has a scene that cannot be read ({clean(str(error))})'
+            self._trouble = f'has a scene that cannot be read ({escape_unprintable(str(error))})'
         else:
             self._trouble = ''
             self._run = run
@@ -436,7 +445,10 @@ class LiveBridge:
             except LinkageError as error:
                 _send_reply(future, str(error))
             except Exception as error:  # noqa: BLE001 (rcl's have no base class)
-                _send_reply(future, f'{type(error).__name__}: {shortened(clean(str(error)), 200)}')
+                _send_reply(
+                    future,
+                    f'{type(error).__name__}: {shorten(escape_unprintable(str(error)), 200)}',
+                )
 
     def _handle_request(self, content: Mapping[str, Any], future: Future[str]) -> None:
         """Do what a page asks for; the answer may come later."""
@@ -445,7 +457,7 @@ class LiveBridge:
             name = content.get('name')
             if not isinstance(name, str) or name not in self._faults:
                 raise LinkageError(
-                    'fault', f'{quoted(name)} is not in the scene', _choices_text(self._faults)
+                    'fault', f'{quote(name)} is not in the scene', _choices_text(self._faults)
                 )
             request = SetBool.Request(data=_read_flag(content))
             self._call_service(SetBool, f'inject/{name}', request, future)
@@ -459,7 +471,7 @@ class LiveBridge:
         elif do == 'effort':
             _send_reply(future, self._apply_effort(content))
         else:
-            raise LinkageError('do', f'{quoted(do)} is not known', _choices_text(_REQUESTS))
+            raise LinkageError('do', f'{quote(do)} is not known', _choices_text(_REQUESTS))
 
     def _call_service(self, kind: Any, service: str, request: Any, future: Future[str]) -> None:
         if not self._is_present:
@@ -499,7 +511,7 @@ class LiveBridge:
         number = content.get('input', 0)
         if type(number) is not int or not 0 <= number < len(run.topic_driven.input_names):
             count = len(run.topic_driven.input_names)
-            raise LinkageError('input', f'{quoted(number)} is none', f'name one of {count}')
+            raise LinkageError('input', f'{quote(number)} is none', f'name one of {count}')
         at = [0.0] * len(run.topic_driven.input_names)
         if self._cranks is not None and run.topic_driven is run.drawn_linkage:
             at = list(self._cranks.angles)
@@ -507,7 +519,7 @@ class LiveBridge:
             at[number] = target
         self._hand.set_target(number, target, at, monotonic())
         self._start_hand(run)
-        return f'{listed(run.topic_driven.sampled_joints)} on {run.crank_topic}, by hand'
+        return f'{list_names(run.topic_driven.sampled_joints)} on {run.crank_topic}, by hand'
 
     def _apply_effort(self, content: Mapping[str, Any]) -> str:
         run = self._require_drive('torque', 'effort')
@@ -575,14 +587,14 @@ def _take_all(subscription: Any) -> list[bytes]:
 def _read_number(content: Mapping[str, Any], key: str) -> float:
     value: Any = content.get(key)
     if type(value) not in (int, float) or not abs(value) <= _FARTHEST:
-        raise LinkageError(key, f'{quoted(value)} is not valid', 'send a number')
+        raise LinkageError(key, f'{quote(value)} is not valid', 'send a number')
     return float(value)
 
 
 def _read_flag(content: Mapping[str, Any]) -> bool:
     on = content.get('on')
     if not isinstance(on, bool):
-        raise LinkageError('on', f'{quoted(on)} is not valid', 'send true or false')
+        raise LinkageError('on', f'{quote(on)} is not valid', 'send true or false')
     return on
 
 
@@ -615,7 +627,7 @@ def _crank_writer(scene_linkage: SceneLinkage) -> Callable[[int, Floats, Floats]
 
 
 def _choices_text(names: Sequence[str] | Mapping[str, Any]) -> str:
-    return f'there are: {listed(names)}' if names else 'there is none'
+    return f'there are: {list_names(names)}' if names else 'there is none'
 
 
 def _send_reply(future: Future[str], line: str) -> None:
@@ -625,5 +637,5 @@ def _send_reply(future: Future[str], line: str) -> None:
 
 def _node_remedy(names: Sequence[str]) -> str:
     if names:
-        return f'name one of them: {listed(names)}'
+        return f'name one of them: {list_names(names)}'
     return 'start one, in the same ROS_DOMAIN_ID (linkage run says it)'

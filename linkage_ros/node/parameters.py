@@ -16,7 +16,7 @@ import sys
 from textwrap import fill
 from typing import Any, NamedTuple
 
-from linkage_ros.errors import did_you_mean, listed
+from linkage_ros.errors import did_you_mean, list_names
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -105,7 +105,7 @@ def declare_parameters(node: Node, parameters: Sequence[NodeParameter]) -> None:
     for name in given:
         # Qualities of service are declared with their publisher.
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
-            remedy = did_you_mean(name, names, f'known: {listed(names)}')
+            remedy = did_you_mean(name, names, f'known: {list_names(names)}')
             node.get_logger().warning(f'parameter {name}: unknown, and without effect; {remedy}')
 
 

@@ -31,7 +31,7 @@ import resource
 from threading import Event
 from typing import TYPE_CHECKING
 
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from rclpy.utilities import get_rmw_implementation_identifier
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def stay_on_this_machine() -> None:
     if _is_configured() or not fast_dds:
         os.environ[_RANGE] = 'LOCALHOST'
     else:
-        os.environ |= {_RANGE: 'SYSTEM_DEFAULT', _PROFILE: str(shipped('fastdds/local.xml'))}
+        os.environ |= {_RANGE: 'SYSTEM_DEFAULT', _PROFILE: str(shipped_path('fastdds/local.xml'))}
 
 
 def _is_configured() -> bool:

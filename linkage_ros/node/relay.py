@@ -30,7 +30,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from linkage_ros.drives.dependent_samples import sampled_inverse
-from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.inverse_closure import InverseClosure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.node.demo_nodes import run_demo_node
@@ -104,7 +104,9 @@ class CommandRelay:
         names = list(message.joint_names)
         strange = [name for name in names if name not in self._inverses]
         if strange:
-            raise RefusedError(f'names {listed(strange)}; send {listed(self.joint_names)} only')
+            raise RefusedError(
+                f'names {list_names(strange)}; send {list_names(self.joint_names)} only'
+            )
         points = []
         for number, point in enumerate(message.points, 1):
             try:
@@ -229,7 +231,7 @@ class RelayNode(Node):
 
 
 def _spin_relay(node: RelayNode, stop: Event, seconds: float) -> None:
-    print(f'relays commands of {listed(node.relay.joint_names)}', flush=True)
+    print(f'relays commands of {list_names(node.relay.joint_names)}', flush=True)
     end = monotonic() + (seconds or inf)
     executor = SingleThreadedExecutor()
     executor.add_node(node)

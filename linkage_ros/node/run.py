@@ -21,7 +21,7 @@ from typing import Any, Protocol
 
 from linkage_ros.node.node import LinkageNode
 from linkage_ros.node.real_time import leave_out_shared_memory
-from linkage_ros.signals import bounded_end, raising, StoppedError
+from linkage_ros.signals import bounded_end, raise_on_signals, StoppedError
 import rclpy
 from rclpy.executors import (
     ExternalShutdownException,
@@ -143,7 +143,7 @@ def _run_node(
     """Start the node, unless told otherwise, and run it to its end."""
     autostart = node.get_parameter('autostart').value
     if autostart:
-        with raising():
+        with raise_on_signals():
             if stop.is_set():  # by an earlier signal
                 raise StoppedError
             node.trigger_configure()

@@ -21,7 +21,7 @@ from importlib.resources import files
 import json
 from typing import Any
 
-from linkage_ros.errors import check_installed, clean
+from linkage_ros.errors import check_installed, escape_unprintable
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
@@ -80,7 +80,7 @@ def html_document(
             '<meta name="color-scheme" content="light dark">',
             # Without an icon, a browser asks the server for one.
             '<link rel="icon" href="data:,">',
-            f'<title>{escape(clean(title))}</title>',
+            f'<title>{escape(escape_unprintable(title))}</title>',
             f'<style>\n{_join_files("page.css", styles)}</style>',
             '</head>',
             '<body>',
@@ -133,7 +133,7 @@ def _clean_lines(text: str) -> str:
 
 def _escape_letters(letters: set[str], text: str, before: str = '') -> str:
     for letter in letters:
-        text = text.replace(letter, before + clean(letter))
+        text = text.replace(letter, before + escape_unprintable(letter))
     return text
 
 

@@ -31,7 +31,7 @@ from linkage_ros.effects.stage import (
     SensorStage,
     WriterStage,
 )
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import Position
@@ -558,7 +558,7 @@ class Pipeline:
         injection: Injection | None = None,
     ) -> None:
         if not isinstance(scene, Scene):
-            raise TypeError(f'scene: {quoted(scene)} is not a Scene; load_scene() reads files')
+            raise TypeError(f'scene: {quote(scene)} is not a Scene; load_scene() reads files')
         if injection is None and scene.faults:
             from linkage_ros.faults import Injection
 

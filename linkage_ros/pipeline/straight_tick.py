@@ -27,7 +27,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.effects.stage import SensorReading
-from linkage_ros.generated_code import Lines, written
+from linkage_ros.generated_code import define_function, Lines
 
 if TYPE_CHECKING:
     from linkage_ros.drives.drive import Drive
@@ -282,7 +282,7 @@ def _define_function(
     new = tuple.__new__
     types = {'new': new, 'CrankState': CrankState, 'Reading': SensorReading, 'Seen': CompiledState}
     source = '\n    '.join([f'def tick({", ".join(parameters)}):', *compiled.lines, *lines])
-    function: Callable[..., Any] = written(source, 'tick', compiled.bound | types | bound)
+    function: Callable[..., Any] = define_function(source, 'tick', compiled.bound | types | bound)
     return function
 
 

@@ -101,7 +101,7 @@ def _refuse_idle(scene_linkage: SceneLinkage, forced: bool) -> None:
             raise DefinitionError(
                 key,
                 'acts on nothing here: no effect and no drive asks for forces',
-                f'leave it out, drive by torque, or name one of {listed(FORCE_EFFECTS)}',
+                f'leave it out, drive by torque, or name one of {list_names(FORCE_EFFECTS)}',
             )
 
 
@@ -111,5 +111,5 @@ def _refuse_solver(scene_linkage: SceneLinkage, forced: bool) -> None:
         raise DefinitionError(
             'solver',
             f'{scene_linkage.solver[0]} finds no forces, and an effect or the drive asks for them',
-            f'write closed_form, or leave {listed(FORCE_EFFECTS)} and torque out',
+            f'write closed_form, or leave {list_names(FORCE_EFFECTS)} and torque out',
         )

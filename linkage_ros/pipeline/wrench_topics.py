@@ -16,7 +16,7 @@ from re import fullmatch
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.dynamics.loads import GREATEST_LOAD
-from linkage_ros.errors import FileError, quoted
+from linkage_ros.errors import FileError, quote
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.wrench import read_wrench
 
@@ -132,10 +132,10 @@ def make_wrench_topics(
             )
         if not fullmatch(_NAME, name) or len(name) > _LONGEST:
             raise one.refusal(
-                f'{quoted(name)} is no ROS topic', 'write a topic, as topic: wrenches/coupler'
+                f'{quote(name)} is no ROS topic', 'write a topic, as topic: wrenches/coupler'
             )
         name = name.removeprefix('/')
         if name in taken:
-            raise one.refusal(f'{quoted(name)} is the topic of {taken[name]}', 'write another')
+            raise one.refusal(f'{quote(name)} is the topic of {taken[name]}', 'write another')
         taken[name] = one.key
     return topics

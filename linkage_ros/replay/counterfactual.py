@@ -35,7 +35,7 @@ from linkage_ros.bag.run_events import (
     TickEvent,
     WrenchEvent,
 )
-from linkage_ros.errors import BagError, did_you_mean, LinkageError, listed
+from linkage_ros.errors import BagError, did_you_mean, LinkageError, list_names
 from linkage_ros.messages.joint_state import (
     head_of,
     JointEffortReader,
@@ -382,7 +382,7 @@ def find_crank_topic(
     if good:
         raise BagError(
             bag.path,
-            f'holds samples of {listed(inputs)} on {listed(good, " and ")}',
+            f'holds samples of {list_names(inputs)} on {list_names(good, " and ")}',
             'name one with --crank-topic',
         )
     if drive == 'torque' and not readers:
@@ -411,7 +411,7 @@ def _candidate_topics(
             raise BagError(
                 bag.path,
                 f'holds no topic {typed} of {JOINT_STATE}',
-                did_you_mean(typed, held, f'it holds {listed(held) or "none"}'),
+                did_you_mean(typed, held, f'it holds {list_names(held) or "none"}'),
             )
         return [typed]
     other = recorded is not None and any(member.drive[0] != drive for member in recorded.linkages)
@@ -429,10 +429,10 @@ def _no_samples_error(
 ) -> BagError:
     """Return an error message with the missing joints and the existing topics."""
     missing = [name for name in inputs if name not in names] or inputs
-    where = f' on {listed(topics)}' if topics else f'; it has no topic of {JOINT_STATE}'
-    there = f', which has {listed(names)}' if names else ''
+    where = f' on {list_names(topics)}' if topics else f'; it has no topic of {JOINT_STATE}'
+    there = f', which has {list_names(names)}' if names else ''
     return BagError(
         bag.path,
-        f'holds no samples of {listed(missing)}{where}{there}',
+        f'holds no samples of {list_names(missing)}{where}{there}',
         'name a scene whose inputs it holds, or another topic with --crank-topic',
     )

@@ -36,7 +36,7 @@ from linkage_ros.bag.run_events import (
     VERSIONS,
     WrenchEvent,
 )
-from linkage_ros.errors import BagError, listed
+from linkage_ros.errors import BagError, list_names
 from linkage_ros.messages.joint_state import OwnJointStates
 from linkage_ros.messages.single_values import text_of, TIME_END
 from linkage_ros.pipeline.pipeline import Pipeline, Tick
@@ -101,7 +101,7 @@ def recorded_scene(
     if missing:
         raise BagError(
             bag.path,
-            f'carries no {listed(sorted(missing))}',
+            f'carries no {list_names(sorted(missing))}',
             'name a bag that linkage_ros has recorded',
         )
     run = read_run_metadata(bag)

@@ -17,7 +17,7 @@ import re
 from typing import Any
 
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.errors import LinkageError, quoted, RecordingError
+from linkage_ros.errors import LinkageError, quote, RecordingError
 from linkage_ros.resources import share_folders
 
 _MESSAGE = re.compile(r'([a-z][a-z0-9_]{0,99})/msg/([A-Z][A-Za-z0-9]{0,99})', re.ASCII)
@@ -52,7 +52,7 @@ def message_type(name: str, key: str) -> Any:
     if matched is None:
         raise LinkageError(
             key,
-            f'its type {quoted(name)} is not a ROS 2 message',
+            f'its type {quote(name)} is not a ROS 2 message',
             'messages are named package/msg/Type',
         )
     package, kind = matched.groups()
@@ -63,7 +63,7 @@ def message_type(name: str, key: str) -> Any:
     except (ImportError, AttributeError):
         pass
     raise LinkageError(
-        key, f'{quoted(name)} is not installed', f'install the ROS package {package}'
+        key, f'{quote(name)} is not installed', f'install the ROS package {package}'
     )
 
 

@@ -17,7 +17,7 @@ from itertools import combinations, islice, product
 from math import hypot, inf, pi, remainder, tau
 from typing import NamedTuple
 
-from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed
+from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     AssemblyPose,
@@ -222,7 +222,7 @@ class _Import:
                     raise self._file_error(
                         f'{option} {name}',
                         'is not a moving joint',
-                        did_you_mean(name, moving, f'name one of {listed(moving)}'),
+                        did_you_mean(name, moving, f'name one of {list_names(moving)}'),
                     )
         self._inputs = tuple(inputs) or urdf.inputs
         self._loops = find_loops(urdf, self._closings, self._inputs)
@@ -230,7 +230,8 @@ class _Import:
         if not self._loops.joints or not (self._closings or {*followed} & {*self._inputs}):
             raise self._file_error(
                 '',
-                'closes no loop' + (f'; not read: {listed(urdf.unread)}' if urdf.unread else ''),
+                'closes no loop'
+                + (f'; not read: {list_names(urdf.unread)}' if urdf.unread else ''),
                 'name frames that meet: --close FRAME=FRAME, or call them PIN_on_LINK; or places: '
                 '--close LINK.x,y,z=LINK.x,y,z',
             )
@@ -266,7 +267,7 @@ class _Import:
             raise self._file_error(
                 '',
                 'does not say which joint drives it',
-                f'write --input JOINT, one of {listed(made.joints)}',
+                f'write --input JOINT, one of {list_names(made.joints)}',
             )
         frames = self._body_frames()
         self._check_met(frames)
@@ -325,7 +326,7 @@ class _Import:
         return Input(name, joint.parent, joint.child)
 
     def _one_of(self, but: str = '') -> str:
-        return f'name one of {listed(each for each in self._skeleton.joints if each != but)}'
+        return f'name one of {list_names(each for each in self._skeleton.joints if each != but)}'
 
     def _body_frames(self) -> dict[str, tuple[complex, float]]:
         """Return position and angle of every body in the pose, in the frame of the root."""

@@ -22,7 +22,7 @@ from math import atan2, cos, hypot, sin
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from linkage_ros.errors import FileError, listed, quoted
+from linkage_ros.errors import FileError, list_names, quote
 from linkage_ros.kinematics.linkage import GROUND, links_by_point, NO_LIMITS, SlideJoint
 from linkage_ros.robot_models.orientation import joint_spans, named_joints
 from linkage_ros.robot_models.part import (
@@ -113,7 +113,7 @@ class _Onto:
         names.links = {link: self._robot_link(link) for link in self._linkage.links}
         for body in names.links.values():
             if body not in self._planar.heights:
-                reason = f'has no link {quoted(body)} that its joints move'
+                reason = f'has no link {quote(body)} that its joints move'
                 raise self._file_error('', reason, _REMEDY)
         self._near = _SAME * part.closure.scale
         self._spans = joint_spans(part.closure)
@@ -171,12 +171,12 @@ class _Onto:
             if moves and (joint.name in named or (bare and joint.mimics in named)):
                 found[joint.name] = bodies[joint.parent]
         if not found:
-            reason = f'has none of the joints {listed(sorted(named))}'
+            reason = f'has none of the joints {list_names(sorted(named))}'
             raise self._file_error('', reason, _REMEDY)
         children = {self._robot.joints[name].child for name in found}
         roots = list(dict.fromkeys(body for body in found.values() if body not in children))
         if len(roots) > 1:
-            reason = f'has joints of the linkage on {listed(roots, " and ")}'
+            reason = f'has joints of the linkage on {list_names(roots, " and ")}'
             raise self._file_error('', reason, _REMEDY)
         return UrdfLoops(roots[0], frozenset(found), ())
 

@@ -14,7 +14,7 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from linkage_ros.dynamics.loads import Loads
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.robot_models.orientation import named_joints
@@ -72,7 +72,7 @@ class ModelNames:
                     raise PartError(
                         self._count,
                         'name',
-                        f'a second linkage has a {kind} {quoted(prefix + name)} with it',
+                        f'a second linkage has a {kind} {quote(prefix + name)} with it',
                         'give one of them another name',
                         of_linkage=False,
                     )

@@ -22,7 +22,7 @@ from math import cos, sin
 import re
 from typing import Any, NamedTuple
 
-from linkage_ros.errors import did_you_mean, FileError, listed, quoted
+from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics.linkage import Mass, NO_LIMITS
 from linkage_ros.robot_models.urdf_file import MOVING, UrdfFile, UrdfJoint, UrdfLink
 import numpy as np
@@ -67,8 +67,8 @@ def find_closings(
                 raise FileError(
                     urdf.file,
                     f'--close {"=".join(pair)}',
-                    f'there is no link {quoted(link)}',
-                    did_you_mean(link, urdf.links, f'name two of {listed(urdf.links)}'),
+                    f'there is no link {quote(link)}',
+                    did_you_mean(link, urdf.links, f'name two of {list_names(urdf.links)}'),
                 )
         if pair[0] == pair[1]:
             raise FileError(

@@ -23,7 +23,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
-from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.robot_models.orientation import named_joints, Orientations, Turn
 from linkage_ros.robot_models.part import free_name, ModelNames, PrefixedNames
@@ -284,6 +284,6 @@ def _missing_error(linkage: Linkage) -> DefinitionError:
     return DefinitionError(
         'joints',
         f'the published ones do not tell where link{"s" if several else ""} '
-        f'{listed(map(quoted, lost), " and ")} {"stand" if several else "stands"}',
+        f'{list_names(map(quote, lost), " and ")} {"stand" if several else "stands"}',
         f'add to joints: {", ".join(joint_text(name, joint) for name, joint in added.items())}',
     )

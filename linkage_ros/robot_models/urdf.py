@@ -22,7 +22,7 @@ import re
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     GROUND,
@@ -243,7 +243,7 @@ def _refuse_expressions(number: int, element: ET.Element, *, of_linkage: bool = 
                 raise PartError(
                     number,
                     '',
-                    f'xacro would evaluate the name {quoted(text)}',
+                    f'xacro would evaluate the name {quote(text)}',
                     'choose a name without ${ and $(',
                     of_linkage=of_linkage,
                 )

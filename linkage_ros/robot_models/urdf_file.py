@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.errors import FileError, LinkageError, listed, quoted
+from linkage_ros.errors import FileError, LinkageError, list_names, quote
 from linkage_ros.files.file_access import read_regular
 from linkage_ros.files.file_kinds import kind_of_bytes, kind_of_folder
 from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
@@ -207,7 +207,7 @@ class _Reader:
             for end, link in (('parent', parent), ('child', child)):
                 if link not in links:
                     raise self._file_error(
-                        where, f'its {end} {quoted(link)} is no link', 'name a link'
+                        where, f'its {end} {quote(link)} is no link', 'name a link'
                     )
             pose = {'pose': joint.findtext('pose') or '0 0 0 0 0 0'}
             values = self._read_values(ET.Element('joint', pose), 'pose', where, 6, '')
@@ -226,7 +226,7 @@ class _Reader:
     def _checked_name(self, element: ET.Element, taken: Mapping[str, object], kind: str) -> str:
         name = element.get('name', '')
         if not name or not name.isprintable():
-            raise self._file_error('', f'a {kind} has the name {quoted(name)}', 'give it a name')
+            raise self._file_error('', f'a {kind} has the name {quote(name)}', 'give it a name')
         if name in taken:
             raise self._file_error(f'{kind} {name}', 'is a duplicate name', 'rename one')
         return name
@@ -245,7 +245,7 @@ class _Reader:
             values = ()
         if len(values) != count or not all(isfinite(v) and abs(v) <= _FARTHEST for v in values):
             numbers = 'a finite number' if count == 1 else f'{count} finite numbers'
-            raise self._file_error(where, f'{key}={quoted(text)} is not {numbers}', 'correct it')
+            raise self._file_error(where, f'{key}={quote(text)} is not {numbers}', 'correct it')
         return values
 
     def _read_vector(
@@ -291,14 +291,14 @@ class _Reader:
         if kind not in _KINDS:
             raise self._file_error(
                 where,
-                f'type={quoted(kind)} is not a joint type',
-                f'write {listed(MOVING)} or fixed',
+                f'type={quote(kind)} is not a joint type',
+                f'write {list_names(MOVING)} or fixed',
             )
         if kind in ('floating', 'planar'):
             raise self._file_error(
                 where,
                 f'is {kind}, which no pin or slider of a planar linkage is',
-                f'write {listed(MOVING)} or fixed, or leave it out with what hangs on it',
+                f'write {list_names(MOVING)} or fixed, or leave it out with what hangs on it',
             )
         parent, child = (self._read_end(element, end, where, links) for end in ('parent', 'child'))
         axis = self._read_vector(element.find('axis'), 'xyz', where, '1 0 0')
@@ -361,7 +361,7 @@ class _Reader:
         found = element.find(end)
         link = found.get('link', '') if found is not None else ''
         if link not in links:
-            raise self._file_error(where, f'its {end} {quoted(link)} is no link', 'name a link')
+            raise self._file_error(where, f'its {end} {quote(link)} is no link', 'name a link')
         return link
 
     def _check_mimics(self, joints: Mapping[str, UrdfJoint]) -> None:
@@ -371,13 +371,13 @@ class _Reader:
             if joint.mimics not in joints:
                 raise self._file_error(
                     f'joint {joint.name}',
-                    f'mimics {quoted(joint.mimics)}, which is no joint',
+                    f'mimics {quote(joint.mimics)}, which is no joint',
                     'name a joint',
                 )
             if joints[joint.mimics].mimics or joints[joint.mimics].kind not in MOVING:
                 raise self._file_error(
                     f'joint {joint.name}',
-                    f'mimics {quoted(joint.mimics)}, which does not move by itself',
+                    f'mimics {quote(joint.mimics)}, which does not move by itself',
                     'name the joint that it follows in the end',
                 )
 
@@ -395,7 +395,7 @@ class _Reader:
             held[joint.child] = joint
         roots = [link for link in links if link not in held]
         if len(roots) != 1:
-            reason = f'has {len(roots)} roots ({listed(roots)})' if roots else 'has no root'
+            reason = f'has {len(roots)} roots ({list_names(roots)})' if roots else 'has no root'
             raise self._file_error(
                 '', reason, 'join all links by joints to one that is held by none'
             )

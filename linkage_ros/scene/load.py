@@ -24,7 +24,7 @@ from linkage_ros.drives.drive import DRIVES
 from linkage_ros.dynamics.loads import AppliedLoads, GREATEST_LOAD, Loads, Spring, STIFFEST
 from linkage_ros.effects.dispatch import in_order, module_of
 from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed, quoted
+from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 from linkage_ros.files.linkage_file import looks_like_linkage, read_closure
 from linkage_ros.files.parameters import declared_fields, is_required, Parts, read_parameters
 from linkage_ros.files.section import Section
@@ -113,7 +113,7 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
         if not isfile(linkage):  # noqa: PTH113 (Path's raises where a name is too long)
             raise where.error(
                 'linkage',
-                f'{quoted(str(linkage))} is not a file',
+                f'{quote(str(linkage))} is not a file',
                 did_you_mean(
                     linkage.name,
                     linkage_names(),
@@ -314,13 +314,13 @@ def _read_linkages(
         linkage_content, files[f'linkage_{index}.yaml'] = source.open_linkage(entry)
         name = entry.ros_name(entry.text('name'))
         if name in [member.name for member in members]:
-            raise entry.error('name', f'{quoted(name)} is taken', 'give each its own')
+            raise entry.error('name', f'{quote(name)} is taken', 'give each its own')
         taken = {joint for member in members for joint in member.joint_names}
         members.append(_read_scene_linkage(name, linkage_content, entry, content, source))
         if twice := taken.intersection(members[-1].joint_names):
             raise entry.error(
                 'prefix' if 'prefix' in entry else '',
-                f'a second linkage publishes {listed(sorted(twice))}',
+                f'a second linkage publishes {list_names(sorted(twice))}',
                 'give each linkage its own prefix, or its joints names of their own',
             )
         entry.finish(_LINKAGE_KEYS)
@@ -427,7 +427,7 @@ def _read_prefix(content: Section, default: str) -> str:
     prefix = content.text('prefix', '') if 'prefix' in content else default
     if not fullmatch('[A-Za-z0-9_/.-]*', prefix):
         raise content.error(
-            'prefix', f'{quoted(prefix)} begins no name of a joint', 'use letters, digits and _/.-'
+            'prefix', f'{quote(prefix)} begins no name of a joint', 'use letters, digits and _/.-'
         )
     return prefix
 
@@ -512,7 +512,7 @@ def _read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
         raise solvers.error(named[1], 'is a second solver', f'leave it, or {named[0]}, out')
     if not named or named[0] not in SOLVERS:
         solvers.finish(tuple(SOLVERS))
-        raise solvers.error('', 'names none', f'write one of {listed(SOLVERS)}')
+        raise solvers.error('', 'names none', f'write one of {list_names(SOLVERS)}')
     (name,) = named
     parameters = import_module(SOLVERS[name]).PARAMETERS
     return name, read_parameters(solvers.section(name), parameters, parts)
@@ -521,9 +521,9 @@ def _read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
 def _name_and_value(where: Section) -> tuple[str, Any]:
     name = where.text('solver')
     if name not in SOLVERS:
-        known = f'known: {listed(SOLVERS)}'
+        known = f'known: {list_names(SOLVERS)}'
         raise where.error(
-            'solver', f'there is no {quoted(name)}', did_you_mean(name, SOLVERS, known)
+            'solver', f'there is no {quote(name)}', did_you_mean(name, SOLVERS, known)
         )
     parameters = import_module(SOLVERS[name]).PARAMETERS
     for entry, _ in declared_fields(parameters):
@@ -591,12 +591,15 @@ def kinds_of_fault(name: str, kinds: Sequence[str]) -> tuple[str, str]:
     from linkage_ros.faults import FAULTS  # local import: only section_with a scene has faults
 
     if kinds:
-        return f'names {len(kinds)} kinds of fault', f'leave all but one of {listed(kinds)} out'
+        return (
+            f'names {len(kinds)} kinds of fault',
+            f'leave all but one of {list_names(kinds)} out',
+        )
     kind = name if name in FAULTS else 'freeze'
     needed = declared_fields(FAULTS[kind])
     parameters = ', '.join(f'{entry.name}: …' for entry, _ in needed if is_required(entry))
     shape = f'{name}: {{{kind}: {{{parameters}}}, at: [1], seconds: 2}}'
-    return 'names no kind of fault', f'write {shape}; kinds: {listed(FAULTS)}'
+    return 'names no kind of fault', f'write {shape}; kinds: {list_names(FAULTS)}'
 
 
 def _read_fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:

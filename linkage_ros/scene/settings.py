@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import re
 from typing import Any
 
-from linkage_ros.errors import did_you_mean, FileError, listed, quoted
+from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 from linkage_ros.files.section import LinedDict, Section
 from linkage_ros.files.yaml_file import BoundedLoader, parse_yaml
 import yaml
@@ -55,7 +55,7 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
         # On one line no value can add further keys.
         if not (equal and parts) or '.'.join(parts) != key or not setting.isprintable():
             raise _setting_error(
-                setting, f'{quoted(setting)} is no setting', 'write KEY=VALUE: rate=500'
+                setting, f'{quote(setting)} is no setting', 'write KEY=VALUE: rate=500'
             )
         within: Any = content.mapping
         outer = ''
@@ -90,8 +90,8 @@ def _inner_value(setting: str, within: Any, part: str) -> Any:
         if part not in names:
             raise _setting_error(
                 setting,
-                f'there is no linkage {quoted(part)}',
-                did_you_mean(part, names, f'there are: {listed(names)}'),
+                f'there is no linkage {quote(part)}',
+                did_you_mean(part, names, f'there are: {list_names(names)}'),
             )
         return within[names.index(part)]
     within.lines.setdefault(part, 0)
@@ -105,7 +105,7 @@ def _inner_value(setting: str, within: Any, part: str) -> Any:
 
 def _require_mapping(setting: str, part: str, inner: Any) -> LinedDict:
     if not isinstance(inner, LinedDict):
-        raise _setting_error(setting, f'{part} is {quoted(inner)}', 'name a key in a mapping')
+        raise _setting_error(setting, f'{part} is {quote(inner)}', 'name a key in a mapping')
     return inner
 
 

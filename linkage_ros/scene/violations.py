@@ -16,7 +16,7 @@ import sys
 from types import ModuleType
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.errors import did_you_mean, FileError, listed, quoted
+from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 from linkage_ros.files.parameters import Schema, under_part
 from linkage_ros.files.section import LinedDict, Section
 from linkage_ros.files.units import ANGLES, LENGTHS, most_in_one, unit_of, Units
@@ -127,7 +127,7 @@ def _describe_error(error: ValidationError, whole: Schema) -> Iterator[_Problem]
             yield path, f'the key {missing!r} is missing', f'add {missing}: {meaning or "…"}'
         case 'maxProperties':
             others = f'leave all but {wanted} out'
-            yield path, f'{listed(value)} stand beside each other', others
+            yield path, f'{list_names(value)} stand beside each other', others
         case 'minProperties':
             yield path, 'is empty', 'name one at least'
         case 'oneOf':
@@ -142,7 +142,7 @@ def _describe_error(error: ValidationError, whole: Schema) -> Iterator[_Problem]
         case _:
             meaning = schema.get('description', '')
             expected = f'write {_expected_text(error)}{meaning and f" ({meaning})"}'
-            yield path, f'{quoted(value)} {_reason_text(error)}', expected
+            yield path, f'{quote(value)} {_reason_text(error)}', expected
 
 
 def _reason_text(error: ValidationError) -> str:
@@ -206,7 +206,7 @@ def _misplaced_remedy(key: str, schema: Schema) -> str:
 
 
 def _near_key(key: str, known: Sequence[str]) -> str:
-    otherwise = f'known: {listed(sorted(known))}' if known else 'leave it out'
+    otherwise = f'known: {list_names(sorted(known))}' if known else 'leave it out'
     return did_you_mean(key, known, otherwise)
 
 

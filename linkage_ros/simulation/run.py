@@ -36,7 +36,7 @@ from linkage_ros.replay.replay import change_text
 from linkage_ros.replay.run_files import EXTRA, scene_files, to_attachments
 from linkage_ros.replay.topic_description import describe_topic, message_type
 from linkage_ros.scene.scene import Scene
-from linkage_ros.signals import heeded
+from linkage_ros.signals import heed_signals
 
 if TYPE_CHECKING:
     from linkage_ros.faults import FaultChange
@@ -148,7 +148,7 @@ def simulate_run(
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
     files = scene_files(scene, named, WITH_THE_RUN, first.linkages, folder)
     # A signal ends the run between two ticks: raised here, it would cut a record of the bag.
-    with heeded():
+    with heed_signals():
         writer = BagWriter(folder, [topic for _, topic in topics], to_attachments(files))
         recording = _Recording(writer, len(topics))
         loop.recorder = cast('Recorder', recording)

@@ -31,7 +31,7 @@ from threading import Thread
 from typing import NamedTuple
 
 from linkage_ros.effects.stage import SensorReading
-from linkage_ros.errors import clean, LinkageError, quoted
+from linkage_ros.errors import escape_unprintable, LinkageError, quote
 from linkage_ros.pipeline.pipeline import LinkageState, Pipeline
 from linkage_ros.pipeline.straight_tick import CompiledState, StateTuple
 from linkage_ros.scene.load import parse_scene
@@ -116,12 +116,12 @@ def sweep_of(text: str) -> ParameterSweep:
             raise ValueError
     except (ValueError, IndexError):
         raise LinkageError(
-            f'--sweep {quoted(text)}',
+            f'--sweep {quote(text)}',
             'is neither KEY=LOW:HIGH:N nor KEY=a,b,c',
             'write numbers, as rate=100,1000 or loads.drive_inertia=1e-4:1e-3:10',
         ) from None
     if len(set(found)) < len(found):
-        raise LinkageError(f'--sweep {quoted(text)}', 'names a value twice', 'name each once')
+        raise LinkageError(f'--sweep {quote(text)}', 'names a value twice', 'name each once')
     return ParameterSweep(key, found)
 
 
@@ -178,7 +178,7 @@ def run_one(study: Study, settings: Settings) -> Outcome:
         failure = str(error)
     except Exception as error:  # noqa: BLE001 (the other runs go on)
         failure = f'unexpected {error!r}'
-    return Outcome(clean(failure), 0, 0, {}, np.empty((0, 0)))
+    return Outcome(escape_unprintable(failure), 0, 0, {}, np.empty((0, 0)))
 
 
 def _reduce_run(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:

@@ -28,7 +28,7 @@ from typing import Any
 
 from linkage_ros.drives import topic as topic_drive
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.measuring import Contender, in_turn, Spread
+from linkage_ros.measuring import Candidate, Spread, time_in_turn
 from linkage_ros.messages.joint_state import CrankSample, JointStateWriter
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
@@ -190,7 +190,7 @@ def measure_age_of_command(
             return None
         rate = scene.rate or motion.sample_rate
         more = (factor - 1.0) * motion.sample_rate / rate
-        price = Price(offer.scaled(more), rate) if factor and factor != 1.0 else None
+        price = Price(offer.scale(more), rate) if factor and factor != 1.0 else None
         return Setting(
             label or f'{_rate_label(motion.sample_rate * factor)}, {_use_of(used)}',
             error,
@@ -233,8 +233,8 @@ def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
         for _ in range(_BLOCK):
             drive.offer(read(message), BEGIN)
 
-    (spread,) = in_turn([Contender(run, _BLOCK)], seconds)
-    return spread.scaled(1e6)
+    (spread,) = time_in_turn([Candidate(run, _BLOCK)], seconds)
+    return spread.scale(1e6)
 
 
 _BLOCK = 100

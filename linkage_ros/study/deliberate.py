@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 from linkage_ros.effects.dispatch import effects_requiring, in_order
 from linkage_ros.effects.stage import FORCE_EFFECTS
-from linkage_ros.errors import FileError, listed
+from linkage_ros.errors import FileError, list_names
 from linkage_ros.measuring import Progress
 from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues, POSITION
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -157,7 +157,7 @@ def _list_variants(scene: Scene) -> Iterator[_Variant]:
     named = {name for member in scene.linkages for name in member.effects}
     for name in in_order(named):
         needed_by = effects_requiring(name, named)
-        note = f'computed for {listed(needed_by)} without it, too' if needed_by else ''
+        note = f'computed for {list_names(needed_by)} without it, too' if needed_by else ''
         # Friction without a force effect acts on nothing, and is refused.
         for others in ((), ('friction',)):
             less = leave_out(scene, frozenset({name, *others}))

@@ -29,7 +29,7 @@ from typing import Any
 from linkage_ros.drives.torque import TorqueParameters
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.errors import DefinitionError
-from linkage_ros.measuring import Contender, in_turn, Progress
+from linkage_ros.measuring import Candidate, Progress, time_in_turn
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.study.joint_errors import error_of, joint_distances, joints_at
@@ -149,8 +149,8 @@ def _measure_price(motion: LinkageMotion, rate: float, horizon: float, seconds: 
     def run() -> None:
         cranks_at(motion, ticks)
 
-    (spread,) = in_turn([Contender(run, len(ticks))], seconds)
-    return Price(spread.scaled(1e6), rate)
+    (spread,) = time_in_turn([Candidate(run, len(ticks))], seconds)
+    return Price(spread.scale(1e6), rate)
 
 
 def exact_cranks(

@@ -18,7 +18,7 @@ from linkage_ros.bag.run_events import read_raw_metadata
 from linkage_ros.drives import topic as topic_drive
 from linkage_ros.drives import torque as torque_drive
 from linkage_ros.dynamics.motion import LARGEST
-from linkage_ros.errors import BagError, listed
+from linkage_ros.errors import BagError, list_names
 from linkage_ros.messages.joint_state import JointStateReader, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.study.member_motion import Command, Crank, LinkageMotion
@@ -112,7 +112,7 @@ def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
             if not found or stamp > found[-1].stamp:
                 found.append(_Sample(stamp, log_time, values, rates))
     if len(found) < 2:
-        names = listed(motion.context.inputs_in_messages)
+        names = list_names(motion.context.inputs_in_messages)
         raise BagError(
             bag.path, f'holds no motion of {names}', 'name a bag with samples of the crank'
         )

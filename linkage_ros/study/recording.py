@@ -34,7 +34,7 @@ from linkage_ros.bag.storage import FLUSH_AFTER, Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
-from linkage_ros.measuring import alternating, Progress, spread_of
+from linkage_ros.measuring import alternate_order, Progress, spread_of
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import LEAST_FLUSH_PERIOD, Scene
@@ -77,7 +77,7 @@ def measure_recording(
     lengths = [max(_SHORTEST, _LONGER * each.flush_period) for each in settings]
     done, whole = 0.0, rounds * sum(lengths)
     with tempfile.TemporaryDirectory(prefix='recording_', dir=folder) as temporary:
-        for index in alternating(range(len(settings)), rounds):
+        for index in alternate_order(range(len(settings)), rounds):
             progress(done / whole)
             bag = Path(temporary, f'{index}_{len(runs[index])}')
             pipeline = Pipeline(scene, closures)

@@ -30,8 +30,8 @@ from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint
 from linkage_ros.kinematics.ranges import slide_bound
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep
-from linkage_ros.measuring import Contender, in_turn, Progress
-from linkage_ros.resources import shipped
+from linkage_ros.measuring import Candidate, Progress, time_in_turn
+from linkage_ros.resources import shipped_path
 from linkage_ros.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.study.budget_text import error_text
 from linkage_ros.study.four_bar_formulas import (
@@ -106,7 +106,7 @@ def measure_solving(
     count = _QUICK_STATES if quick else _STATES
     times = tick_times(rate, horizon, count)
     errors: list[JointError] = []
-    candidates: list[tuple[str, JointError, Contender]] = []
+    candidates: list[tuple[str, JointError, Candidate]] = []
     unproved = 0
     for number, motion in enumerate(motions):
         linkage = motion.closure.linkage
@@ -138,9 +138,9 @@ def measure_solving(
     worst = JointError(
         sqrt(sum(e.rms**2 for e in errors) / len(errors)), max(e.worst for e in errors)
     )
-    times_of = in_turn([one for _, _, one in candidates], seconds, progress)
+    times_of = time_in_turn([one for _, _, one in candidates], seconds, progress)
     settings = [
-        Setting(label, error, Price(spread.scaled(1e6), rate), None)
+        Setting(label, error, Price(spread.scale(1e6), rate), None)
         for (label, error, _), spread in zip(candidates, times_of, strict=True)
     ]
     settings[0] = settings[0]._replace(error=worst, changes=())
@@ -287,7 +287,7 @@ def _solve_by_spline(closure: Closure, knots: int) -> Solve | None:
     return position
 
 
-def _timed_candidate(solve: Solve, states: Sequence[Sequence[float]]) -> Contender:
+def _timed_candidate(solve: Solve, states: Sequence[Sequence[float]]) -> Candidate:
     # In an order that ends next to the first, so that a method finds its start near by.
     forward_and_backward = [*states[::2], *states[1::2][::-1]]
 
@@ -295,7 +295,7 @@ def _timed_candidate(solve: Solve, states: Sequence[Sequence[float]]) -> Contend
         for state in forward_and_backward:
             solve(*state)
 
-    return Contender(run, len(forward_and_backward))
+    return Candidate(run, len(forward_and_backward))
 
 
 class HardCase(NamedTuple):
@@ -315,7 +315,7 @@ def compare_hard_cases() -> Iterator[HardCase]:
         ('double_rocker', 'toggle', _near_toggle),
         ('parallelogram', 'change point', _near_change_point),
     ):
-        linkage = read_linkage(read_yaml(shipped(f'linkages/{name}.yaml'))[0])
+        linkage = read_linkage(read_yaml(shipped_path(f'linkages/{name}.yaml'))[0])
         closure = Closure(linkage)
         states, distances = near(closure)
         known, exact = exact_joints(linkage, states)

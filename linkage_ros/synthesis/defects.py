@@ -21,7 +21,7 @@ from collections.abc import Iterable
 from math import degrees, inf, log, pi, remainder, tau
 from typing import NamedTuple
 
-from linkage_ros.errors import did_you_mean, listed, SynthesisError
+from linkage_ros.errors import did_you_mean, list_names, SynthesisError
 from linkage_ros.kinematics.grashof import (
     CHANGE_POINTS,
     four_bar_type,
@@ -274,7 +274,7 @@ class Needs(NamedTuple):
             raise SynthesisError(
                 self.kind,
                 'is no kind of four-bar',
-                did_you_mean(self.kind, _WORDS, f'name one of {listed(_WORDS)}'),
+                did_you_mean(self.kind, _WORDS, f'name one of {list_names(_WORDS)}'),
             )
 
 

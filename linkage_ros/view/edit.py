@@ -29,8 +29,8 @@ from linkage_ros.errors import (
     did_you_mean,
     FileError,
     LinkageError,
-    listed,
-    quoted,
+    list_names,
+    quote,
 )
 from linkage_ros.files.linkage_file import FARTHEST, written_linkage
 from linkage_ros.files.linkage_rewriting import rewrite_linkage
@@ -100,7 +100,7 @@ def edit_text(text: str, edit: Mapping[str, Any], name: str = _NAME) -> EditResu
     """
     kind = next((key for key in edit if key in _KINDS), None)
     if kind is None:
-        raise LinkageError('edit', f'{quoted(dict(edit))} is no edit', f'send {listed(_KINDS)}')
+        raise LinkageError('edit', f'{quote(dict(edit))} is no edit', f'send {list_names(_KINDS)}')
     written, _ = written_linkage(parse_yaml(text.encode(), name))
     closure = Closure(written)
     shown = _shown_linkage(closure, edit.get('inputs'))
@@ -307,7 +307,7 @@ def _trace_point(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChang
     free = (f'P{number or ""}' for number in range(len(taken) + 1))
     name = given.get('name', next(name for name in free if name not in taken))
     if not isinstance(name, str) or name in taken:
-        raise LinkageError('name', f'{quoted(name)} is taken, or no name', 'send another name')
+        raise LinkageError('name', f'{quote(name)} is taken, or no name', 'send another name')
     points = {**points, name: (_rounded_value(shown, x), _rounded_value(shown, y))}
     links = {**linkage.links, link: points}
     return _LinkageChange(replace(linkage, links=links, traced=(*linkage.traced, name)))
@@ -367,7 +367,7 @@ def _choose_side(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChang
         _checked_name('side', key, possible)
         if side not in possible[key]:
             remedy = f'choose {" or ".join(possible[key])}'
-            raise LinkageError(f'assembly.{key}', f'{quoted(side)} is no side of it', remedy)
+            raise LinkageError(f'assembly.{key}', f'{quote(side)} is no side of it', remedy)
     sides: Any = {**written_sides(shown.closure), **given}
     return _LinkageChange(
         replace(without_drawn_pose(linkage, shown.closure.structure), assembly=sides)
@@ -424,7 +424,7 @@ def _in_pose(
 def _read_mapping(key: str, edit: Mapping[str, Any]) -> Mapping[str, Any]:
     given = edit[key]
     if not isinstance(given, dict):
-        raise LinkageError(key, f'{quoted(given)} is no object', 'send an object')
+        raise LinkageError(key, f'{quote(given)} is no object', 'send an object')
     return given
 
 
@@ -439,8 +439,8 @@ def _checked_name(key: str, name: Any, names: Any) -> str:
     if not isinstance(name, str) or name not in names:
         raise LinkageError(
             key,
-            f'{quoted(name)} is not there',
-            did_you_mean(str(name), list(names), f'send one of {listed(names)}'),
+            f'{quote(name)} is not there',
+            did_you_mean(str(name), list(names), f'send one of {list_names(names)}'),
         )
     return name
 
@@ -457,5 +457,5 @@ def _read_numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
             for value in values
         )
     ):
-        raise LinkageError(key, f'{quoted(values)} is not {count} numbers', 'send finite ones')
+        raise LinkageError(key, f'{quote(values)} is not {count} numbers', 'send finite ones')
     return tuple(map(float, values))

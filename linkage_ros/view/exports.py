@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from linkage_ros.drawing.animation import animate, range_motion
 from linkage_ros.drawing.figure import paint_picture
-from linkage_ros.errors import did_you_mean, LinkageError, listed, quoted
+from linkage_ros.errors import did_you_mean, LinkageError, list_names, quote
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.languages import c_name, LANGUAGES
 from linkage_ros.kinematics.compiling.source import Subject, write_source
@@ -74,8 +74,8 @@ def export_linkage(
 
     """
     if kind not in KINDS:
-        remedy = did_you_mean(kind, KINDS, f'ask for one of {listed(KINDS)}')
-        raise LinkageError('kind', f'{quoted(kind)} cannot be written', remedy)
+        remedy = did_you_mean(kind, KINDS, f'ask for one of {list_names(KINDS)}')
+        raise LinkageError('kind', f'{quote(kind)} cannot be written', remedy)
     media_type, write = KINDS[kind]
     shown = usual_inputs(closure) if inputs is None else tuple(inputs)
     data = write(_ExportedLinkage(closure, text, name, shown))

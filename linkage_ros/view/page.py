@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
-from linkage_ros.errors import clean
+from linkage_ros.errors import escape_unprintable
 from linkage_ros.kinematics.shapes import COLOURS, FACES, INK
 from linkage_ros.pages.document import html_document, POLICY
 
@@ -93,7 +93,7 @@ def page_html(
         'scene': scene,
         'node': node,
     }
-    title = clean(node or model['name'])
+    title = escape_unprintable(node or model['name'])
     scripts = [('linkage_ros.pages', f'{name}.js') for name in _SHARED]
     scripts += [(_PACKAGE, f'{name}.js') for name in _SCRIPTS]
     styles = [(_PACKAGE, 'view.css')]

@@ -23,18 +23,18 @@ import json
 from typing import Any, NamedTuple, NoReturn
 
 from linkage_ros.errors import (
-    clean,
     did_you_mean,
+    escape_unprintable,
     FileError,
     LinkageError,
-    listed,
-    quoted,
-    shortened,
+    list_names,
+    quote,
+    shorten,
 )
 from linkage_ros.files.linkage_file import FARTHEST, read_closure
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.resources import linkage_names, shipped
+from linkage_ros.resources import linkage_names, shipped_path
 from linkage_ros.view.edit import edit_text, pin_of
 from linkage_ros.view.exports import export_linkage
 from linkage_ros.view.model import build_model, compute_pose, ViewState
@@ -90,7 +90,7 @@ def read_request(message: str) -> Request:
         raise RequestError('has no id', 'send a number as id')
     do = content.get('do')
     if not isinstance(do, str) or do not in _HANDLERS:
-        raise RequestError(f'asks for {quoted(do)}', f'ask for {listed(_HANDLERS)}', number)
+        raise RequestError(f'asks for {quote(do)}', f'ask for {list_names(_HANDLERS)}', number)
     return Request(number, do, content)
 
 
@@ -186,7 +186,7 @@ class _RequestFields(NamedTuple):
         name = self.content.get('name', self.opened)
         if not isinstance(name, str) or not 0 < len(name) <= _LONGEST_NAME or '/' in name:
             raise _invalid_value('name', name, f'a name of at most {_LONGEST_NAME} letters')
-        return clean(name)
+        return escape_unprintable(name)
 
     @property
     def is_whole(self) -> bool:
@@ -231,9 +231,9 @@ def _answer_edit(fields: _RequestFields) -> dict[str, Any]:
 def _answer_open(fields: _RequestFields) -> dict[str, Any]:
     name, names = fields.content.get('name'), linkage_names()
     if not isinstance(name, str) or name not in names:
-        remedy = did_you_mean(str(name), names, f'name one of {listed(names)}')
-        raise LinkageError('name', f'{quoted(name)} is no shipped linkage', remedy)
-    return build_model(shipped(f'linkages/{name}.yaml').read_text('utf-8'), name, whole=True)
+        remedy = did_you_mean(str(name), names, f'name one of {list_names(names)}')
+        raise LinkageError('name', f'{quote(name)} is no shipped linkage', remedy)
+    return build_model(shipped_path(f'linkages/{name}.yaml').read_text('utf-8'), name, whole=True)
 
 
 def _answer_names(_fields: _RequestFields) -> dict[str, Any]:
@@ -243,7 +243,7 @@ def _answer_names(_fields: _RequestFields) -> dict[str, Any]:
 def _answer_save(fields: _RequestFields) -> dict[str, Any]:
     """Check that a text is a linkage; the server then saves it."""
     if fields.name != fields.opened:
-        reason = f'{quoted(fields.name)} is not the file with which this page was opened'
+        reason = f'{quote(fields.name)} is not the file with which this page was opened'
         raise LinkageError('save', reason, 'download the linkage')
     read_closure(parse_yaml(encode_text(fields.text, fields.name), fields.name), fields.name)
     return {}
@@ -319,7 +319,7 @@ def encode_text(text: str, name: str) -> bytes:
 
 def defect_error(where: str, error: BaseException) -> LinkageError:
     """Return a defect of this package as an error of one line."""
-    reason = f'failed by {type(error).__name__} ({shortened(str(error), 300)})'
+    reason = f'failed by {type(error).__name__} ({shorten(str(error), 300)})'
     return LinkageError(where, reason, 'please report it with the linkage file')
 
 
@@ -372,4 +372,4 @@ def _read_numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
 
 
 def _invalid_value(key: str, value: Any, expected: str) -> LinkageError:
-    return LinkageError(key, f'{quoted(value)} is not valid', f'send {expected}')
+    return LinkageError(key, f'{quote(value)} is not valid', f'send {expected}')

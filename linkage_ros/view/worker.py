@@ -29,7 +29,7 @@ import sys
 from typing import BinaryIO
 import warnings
 
-from linkage_ros.errors import clean, LinkageError
+from linkage_ros.errors import escape_unprintable, LinkageError
 from linkage_ros.view.requests import read_request, RequestHandler
 from linkage_ros.view.sensors import SceneFiles
 
@@ -165,7 +165,7 @@ def main() -> None:
 
 def report_line(line: str) -> None:
     """Write a line to the terminal of the server."""
-    sys.stderr.write(f'linkage view: {clean(line)}\n')
+    sys.stderr.write(f'linkage view: {escape_unprintable(line)}\n')
     sys.stderr.flush()
 
 

@@ -38,7 +38,7 @@ from linkage_ros.messages.joint_values import (
     TRAJECTORY,
     WRENCHES,
 )
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 import numpy as np
 import pytest
 
@@ -67,7 +67,8 @@ else:
 needs_pyarrow = pytest.mark.skipif(parquet is None, reason=why)
 
 FOUR_BAR, SLIDER_CRANK = (
-    shipped(f'linkages/{name}.yaml').read_text('utf-8') for name in ('four_bar', 'slider_crank')
+    shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
+    for name in ('four_bar', 'slider_crank')
 )
 FIRST = ['time [s]', 'stamp [ns]', 'publish time [ns]', 'log time [ns]']
 EVERYTHING = """

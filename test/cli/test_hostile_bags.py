@@ -26,7 +26,7 @@ from linkage_ros.cli import export, info, plot, replay, report
 from linkage_ros.cli.main import COMMANDS as ALL_COMMANDS
 from linkage_ros.cli.main import module_of, parser_of
 from linkage_ros.cli.terminal import PrintableStream
-from linkage_ros.errors import BagError, clean, FileError, LinkageError
+from linkage_ros.errors import BagError, escape_unprintable, FileError, LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import text_message
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -258,7 +258,7 @@ def test_an_error_is_a_printable_line_with_an_end(name: str) -> None:
     ],
 )
 def test_only_what_is_not_printable_is_written_otherwise(text: str, expected: str) -> None:
-    assert clean(text) == expected
+    assert escape_unprintable(text) == expected
 
 
 def test_lines_stay_lines(capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,7 +17,7 @@ from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 import numpy as np
 import pytest
 
@@ -27,7 +27,7 @@ pytest.importorskip('matplotlib')
 
 
 def closure_of(name: str) -> Closure:
-    return Closure(read_linkage(read_yaml(str(shipped(f'linkages/{name}.yaml')))[0]))
+    return Closure(read_linkage(read_yaml(str(shipped_path(f'linkages/{name}.yaml')))[0]))
 
 
 def pieces(curve):

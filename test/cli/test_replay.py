@@ -33,7 +33,7 @@ from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.replay.compare import Comparison, TickPlace, ulp_distance
 from linkage_ros.replay.replay import recorded_scene, versions_here
 from linkage_ros.replay.replay import replay_ticks as replayed
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.scene.load import load_scene
 import pytest
 
@@ -618,7 +618,7 @@ def test_a_solver_that_was_chosen_is_not_chosen_again(
 ) -> None:
     # Choosing takes times, and another machine, or another hour, has others.
     (tmp_path / 'scene.yaml').write_text(
-        f'linkage: {shipped("linkages/class_3.yaml")}\ndrive: {{constant_rate: {{rate: 2.0}}}}\n'
+        f'linkage: {shipped_path("linkages/class_3.yaml")}\ndrive: {{constant_rate: {{rate: 2.0}}}}\n'
         'accuracy: 1.0e-6\nrecord: {name: run}\n'
     )
     ran = linkage('run', 'scene.yaml', '--seconds', '1', '--plain')

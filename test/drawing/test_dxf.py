@@ -18,7 +18,7 @@ from typing import Any
 from linkage_ros.drawing.dxf import links_dxf
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import load
-from linkage_ros.resources import linkage_names, shipped
+from linkage_ros.resources import linkage_names, shipped_path
 import pytest
 import yaml
 
@@ -46,7 +46,9 @@ def box(outline: Any) -> tuple[float, float, float, float]:
 
 
 WRITTEN_OUT = [
-    name for name in linkage_names() if 'links:' in shipped(f'linkages/{name}.yaml').read_text()
+    name
+    for name in linkage_names()
+    if 'links:' in shipped_path(f'linkages/{name}.yaml').read_text()
 ]
 """Linkages whose files have points, from which distances are known; the others have lengths."""
 
@@ -56,7 +58,7 @@ def test_every_link_is_a_part_with_holes_at_its_pins(name: str, tmp_path: Path) 
     document = read(links_dxf(load(name)), tmp_path)
     assert document.header['$INSUNITS'] == 4  # millimetres
     space = document.modelspace()
-    links = yaml.safe_load(shipped(f'linkages/{name}.yaml').read_text('utf-8'))
+    links = yaml.safe_load(shipped_path(f'linkages/{name}.yaml').read_text('utf-8'))
     points = links['links']
     pins = {
         point

@@ -21,7 +21,7 @@ import subprocess
 import sys
 
 from linkage_ros.node.real_time import leave_out_shared_memory, stay_on_this_machine
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 import pytest
 from sensor_msgs.msg import JointState
 
@@ -174,7 +174,7 @@ def test_the_profile_that_comes_with_the_package_has_discovery_local_without_sha
     graph, start, write_scene, monkeypatch
 ):
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SYSTEM_DEFAULT')
-    monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(shipped('fastdds/local.xml')))
+    monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(shipped_path('fastdds/local.xml')))
     heard = graph.listen(JointState, 'joint_states')
     node = start(write_scene('profile', TURNING))
     wait_for(lambda: len(heard) > 100, 'joint states')

@@ -15,7 +15,7 @@ import importlib.util
 import sys
 from types import ModuleType, SimpleNamespace
 
-from linkage_ros.errors import LinkageError, quoted
+from linkage_ros.errors import LinkageError, quote
 import pytest
 
 from ..support.messages import joint_state, read_joint_state
@@ -138,7 +138,7 @@ def test_a_description_that_cannot_be_read(start, tmp_path, file, reason):
     with pytest.raises(LinkageError) as caught:
         start(robot_description_file=str(path))
     assert str(caught.value) == (
-        f'robot_description_file {quoted(str(path))}: cannot be read ({reason}); name a URDF file'
+        f'robot_description_file {quote(str(path))}: cannot be read ({reason}); name a URDF file'
     )
 
 

@@ -19,7 +19,7 @@ from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.scene.load import load_scene
 from mcap.reader import make_reader
 import numpy as np
@@ -337,7 +337,7 @@ def pushed(folder: Path) -> Path:
     scene = scene_file(
         folder,
         'rate: 100\ndrive: {torque: {start: 1.0}}\nloads: {wrenches: {coupler: {}, rocker: {}}}\n',
-        shipped('linkages/four_bar.yaml').read_text('utf-8'),
+        shipped_path('linkages/four_bar.yaml').read_text('utf-8'),
     )
     writer = JointStateWriter(['coupler_joint', 'rocker_joint'])
 

@@ -58,7 +58,7 @@ from linkage_ros.report.run import (
     ReportedRun,
     Window,
 )
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 import numpy as np
 import pytest
 
@@ -176,12 +176,12 @@ def full_lane(**options):
 
 def closures():
     names = ('klann_leg', 'jansen_leg', 'four_bar')
-    files = [shipped(f'linkages/{name}.yaml') for name in names if _is_there(name)]
+    files = [shipped_path(f'linkages/{name}.yaml') for name in names if _is_there(name)]
     return [Closure(read_linkage(read_yaml(str(file))[0])) for file in files]
 
 
 def _is_there(name):
-    return (shipped('linkages/four_bar.yaml').parent / f'{name}.yaml').exists()
+    return (shipped_path('linkages/four_bar.yaml').parent / f'{name}.yaml').exists()
 
 
 def worst_run():

@@ -14,7 +14,7 @@ from linkage_ros.report.curves import LATER_PINS, PinForces
 from linkage_ros.report.data import time_plots, zero_plots
 from linkage_ros.report.html import ReportHeader, run_html
 from linkage_ros.report.run import Window
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 import numpy as np
 import pytest
 
@@ -32,7 +32,7 @@ PINS = ('O2', 'A', 'B', 'cylinder')
 @pytest.fixture(scope='module')
 def press(tmp_path_factory):
     """Return the bag of a slider-crank with the masses of its links."""
-    linkage = shipped('linkages/slider_crank.yaml').read_text()
+    linkage = shipped_path('linkages/slider_crank.yaml').read_text()
     moments = but(200, lambda _tick, moment: moment._replace(messages=()))
     return recorded(tmp_path_factory.mktemp('press'), SCENE, moments, linkage)
 
@@ -76,7 +76,7 @@ linkages:
 - {{name: left, linkage: l.yaml, {SCENE.replace(chr(10), ', ')}}}
 - {{name: right, linkage: l.yaml, {SCENE.replace(chr(10), ', ')}}}
 """
-    linkage = shipped('linkages/slider_crank.yaml').read_text()
+    linkage = shipped_path('linkages/slider_crank.yaml').read_text()
     moments = but(20, lambda _tick, moment: moment._replace(messages=()))
     found = read(recorded(tmp_path, scene, moments, linkage))
     (plot,) = (each for each in time_plots(found) if each['key'] == 'pin_forces')

@@ -24,7 +24,7 @@ from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usu
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.report.data import link_poses, page_data
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.scene.load import load_scene
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ from ..node.ticked import Moment, run
 # Links are at the closure's poses, from the published joints alone, in the whole gallery.
 
 
-FILES = sorted(shipped('linkages/four_bar.yaml').parent.glob('*.yaml'))
+FILES = sorted(shipped_path('linkages/four_bar.yaml').parent.glob('*.yaml'))
 GROUND, CRANK, COUPLER, ROCKER = 0.10, 0.04, 0.12, 0.08
 
 
@@ -108,7 +108,7 @@ def test_shapes_in_frames_are_those_of_the_drawing(file):
 
 
 def four_bar():
-    return closure_of(shipped('linkages/four_bar.yaml'))
+    return closure_of(shipped_path('linkages/four_bar.yaml'))
 
 
 def test_a_wrong_sensor_lets_links_come_apart_by_what_it_is_wrong():

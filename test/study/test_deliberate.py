@@ -14,7 +14,7 @@ from itertools import islice
 from math import cos, hypot, sqrt, tau
 
 from linkage_ros.errors import FileError
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.scene.load import parse_scene
 from linkage_ros.scene.scene import Scene
 from linkage_ros.study.budget_text import ALL_TOGETHER
@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 
 RATE, TICKS = 1000.0, 2000
-FILE = shipped('linkages/four_bar.yaml').read_bytes()
+FILE = shipped_path('linkages/four_bar.yaml').read_bytes()
 # Lengths of that file, in [m].
 CRANK, COUPLER, ROCKER, GROUND = 0.04, 0.12, 0.08, 0.1
 

@@ -21,7 +21,7 @@ from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.study.enclosure import prove, SingularError, solve
 from mpmath import mp, mpf
 import pytest
@@ -33,7 +33,7 @@ FAMILIES = ('RRR', 'RRP', 'RPR', 'PRP', 'RPP', 'RRR-RRR-RRR', 'any three')
 
 
 def linkage_of(name: str) -> Linkage:
-    return read_linkage(read_yaml(shipped(f'linkages/{name}.yaml'))[0])
+    return read_linkage(read_yaml(shipped_path(f'linkages/{name}.yaml'))[0])
 
 
 def number_of(ball: Any) -> mpf:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.scene.load import load_scene
 from linkage_ros.study.tuned_scene import tuned_scene
 import pytest
@@ -23,7 +23,7 @@ NAMED = {
     'a name': 'demo',
     'several linkages': 'two_fingers',
     'a linkage by name': 'four_bar',
-    'a file of the package': str(shipped('scenes/torque_crank.yaml')),
+    'a file of the package': str(shipped_path('scenes/torque_crank.yaml')),
     'a file with a linkage beside it': 'mine/scene.yaml',
     'a linkage file': 'mine/odd.yaml',
 }
@@ -36,7 +36,7 @@ def test_it_loads_from_another_folder(
     mine, other = tmp_path / 'mine', tmp_path / 'other' / 'deep'
     mine.mkdir()
     other.mkdir(parents=True)
-    (mine / 'odd.yaml').write_bytes(shipped('linkages/slider_crank.yaml').read_bytes())
+    (mine / 'odd.yaml').write_bytes(shipped_path('linkages/slider_crank.yaml').read_bytes())
     (mine / 'scene.yaml').write_text('linkage: odd.yaml\nrate: 100\neffects: {velocity: {}}\n')
     monkeypatch.chdir(tmp_path)
     scene = load_scene(NAMED[what])

@@ -19,7 +19,7 @@ from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.resources import linkage_names, shipped
+from linkage_ros.resources import linkage_names, shipped_path
 from linkage_ros.view.edit import edit_text, EditResult, pin_of
 from linkage_ros.view.model import build_model
 import pytest
@@ -30,7 +30,7 @@ MOVES = 12
 
 
 def text_of(name: str) -> str:
-    return shipped(f'linkages/{name}.yaml').read_text('utf-8')
+    return shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
 
 
 FOUR_BAR = text_of('four_bar')

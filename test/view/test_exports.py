@@ -22,7 +22,7 @@ from xml.etree import ElementTree as ET
 import linkage_ros as lr
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.view import exports
 from linkage_ros.view.exports import export_linkage, KINDS
 from linkage_ros.view.requests import read_request, RequestHandler
@@ -34,7 +34,7 @@ NAMES = ('four_bar', 'slider_crank', 'five_bar')
 
 def exported(kind: str, name: str, inputs: list[float] | None = None) -> bytes:
     """Return a file as a page gets it."""
-    text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
+    text = shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
     content = {'id': 1, 'do': 'export', 'kind': kind, 'text': text, 'name': name}
     request = read_request(json.dumps(content | ({'inputs': inputs} if inputs else {})))
     answer = json.loads(RequestHandler('mine', None, pytest.fail).answer_request(1, request))
@@ -49,7 +49,7 @@ def inputs_of(closure: Closure) -> list[float]:
 
 @pytest.mark.parametrize('name', NAMES)
 def test_yaml_is_the_text_itself(name: str) -> None:
-    assert exported('yaml', name) == shipped(f'linkages/{name}.yaml').read_bytes()
+    assert exported('yaml', name) == shipped_path(f'linkages/{name}.yaml').read_bytes()
 
 
 @pytest.mark.parametrize('name', NAMES)
@@ -123,7 +123,7 @@ def test_other_kinds_are_refused(kind: str, inputs: Any, line: str) -> None:
 
 
 def test_a_linkage_that_is_iterated_has_no_source_and_the_error_says_so() -> None:
-    text = shipped('linkages/class_3.yaml').read_text('utf-8')
+    text = shipped_path('linkages/class_3.yaml').read_text('utf-8')
     request = read_request(json.dumps({'id': 1, 'do': 'export', 'kind': 'c', 'text': text}))
     answer = json.loads(RequestHandler('class_3', None, pytest.fail).answer_request(1, request))
     assert 'compile' in answer['error']['text']

@@ -44,15 +44,15 @@ class Script:
         for heard in self.heard:
             heard()
 
-    def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
+    def add_listener(self, heard: Callable[[], None]) -> Callable[[], None]:
         self.heard.append(heard)
         return lambda: self.heard.remove(heard)
 
-    def newest(self, kind: str) -> tuple[int, str]:
+    def newest_message(self, kind: str) -> tuple[int, str]:
         self.taken += kind == 'state'
         return self.said[kind]
 
-    def ask(self, content: Mapping[str, Any]) -> Future[str]:
+    def send_request(self, content: Mapping[str, Any]) -> Future[str]:
         self.asked.append(content)
         future: Future[str] = Future()
         if content['do'] != 'wait':

@@ -23,7 +23,7 @@ from linkage_ros.errors import FileError
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.resources import linkage_names, shipped
+from linkage_ros.resources import linkage_names, shipped_path
 from linkage_ros.view.model import build_model, model_of, ViewState
 import pytest
 
@@ -41,7 +41,7 @@ writeFileSync('told', JSON.stringify(states.map((state) => motion(...state))));
 
 
 def text_of(name: str) -> str:
-    return shipped(f'linkages/{name}.yaml').read_text('utf-8')
+    return shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
 
 
 def run(program: str, states: Sequence[Any], folder: Path) -> list[dict[str, Any]]:

@@ -20,7 +20,7 @@ import linkage_ros as lr
 from linkage_ros.files.linkage_file import load, read_closure
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.resources import linkage_names, shipped
+from linkage_ros.resources import linkage_names, shipped_path
 from linkage_ros.view.conversation import Conversation, UserFile
 from linkage_ros.view.model import build_model
 from linkage_ros.view.page import page_html as page_of
@@ -31,7 +31,7 @@ from ..browser.opened import opened
 
 NEAR = 1e-12
 READY = "() => typeof View !== 'undefined' && View.board"
-FOUR_BAR = shipped('linkages/four_bar.yaml').read_text('utf-8')
+FOUR_BAR = shipped_path('linkages/four_bar.yaml').read_text('utf-8')
 QUIET = "() => typeof View !== 'undefined' && !View.state().busy && View.state().there"
 
 
@@ -43,7 +43,7 @@ def stills(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     def written(name: str) -> Path:
         file = folder / f'{name}.html'
         if not file.exists():
-            text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
+            text = shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
             file.write_text(page_of(build_model(text, name), mode='still'), 'utf-8')
         return file
 

@@ -17,7 +17,7 @@ import linkage_ros as lr
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.shapes import link_frames
-from linkage_ros.resources import shipped
+from linkage_ros.resources import shipped_path
 from linkage_ros.view import requests
 from linkage_ros.view.requests import LARGEST, read_request, RequestError, RequestHandler
 import pytest
@@ -106,7 +106,7 @@ def test_a_shipped_linkage_is_opened_by_its_name() -> None:
     assert names == lr.linkage_names()
     found = ok('open', name='jansen_leg')
     assert found['name'] == 'jansen_leg'
-    assert found['text'] == shipped('linkages/jansen_leg.yaml').read_text('utf-8')
+    assert found['text'] == shipped_path('linkages/jansen_leg.yaml').read_text('utf-8')
 
 
 @pytest.mark.parametrize('name', ['jansen_legs', '../scenes/demo', '/etc/passwd', '', None, 3, []])
@@ -124,7 +124,7 @@ def frames_of(closure: Closure, position: Position) -> list[tuple[float, float, 
 
 @pytest.mark.parametrize('name', ['four_bar', 'class_3', 'elliptic_trammel', 'five_bar'])
 def test_poses_are_those_of_the_closure(name: str) -> None:
-    text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
+    text = shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
     closure: Closure = lr.load(name)
     pose = closure.linkage.pose
     first = list(pose.inputs) if pose else [1.0] * len(closure.linkage.inputs)
@@ -205,7 +205,7 @@ def test_the_error_of_an_edit_names_its_pin(edit: dict[str, Any], pin: str | Non
 def test_an_edit_of_what_closes_nowhere_is_an_error_and_no_defect(
     name: str, old: str, new: str
 ) -> None:
-    text = shipped(f'linkages/{name}.yaml').read_text('utf-8')
+    text = shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
     far = text.replace(old, new)
     assert far != text
     for inputs in (None, [1.0] * len(lr.load(name).linkage.inputs)):

@@ -17,7 +17,7 @@ from pathlib import Path
 import linkage_ros as lr
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.shapes import link_frames
-from linkage_ros.resources import scene_names, shipped
+from linkage_ros.resources import scene_names, shipped_path
 from linkage_ros.scene.load import load_scene, SCENE_FILE
 from linkage_ros.view.sensors import SceneFiles, Sensors
 import pytest
@@ -29,7 +29,7 @@ RATE = 2.0
 def sensors(effects: str, rate: str = '1000', text: str | None = None) -> Sensors:
     """Return the sensors of a four-bar's scene."""
     scene = f'linkage: four_bar.yaml\nrate: {rate}\npublish_input: true\neffects: {effects}\n'
-    linkage = shipped('linkages/four_bar.yaml').read_text('utf-8')
+    linkage = shipped_path('linkages/four_bar.yaml').read_text('utf-8')
     return Sensors(SceneFiles('scene', {SCENE_FILE: scene, 'linkage.yaml': linkage}, '.'), text)
 
 
@@ -87,7 +87,7 @@ def test_frames_are_where_the_readings_put_the_links(closure: Closure) -> None:
 
 
 def test_where_the_loops_do_not_close_nothing_is_read() -> None:
-    text = shipped('linkages/double_rocker.yaml').read_text('utf-8')
+    text = shipped_path('linkages/double_rocker.yaml').read_text('utf-8')
     low = lr.load('double_rocker').closing_ranges[0].lowest
     of = Sensors(
         SceneFiles('scene', {SCENE_FILE: 'linkage: x\nrate: 60\n', 'linkage.yaml': text}, '.')
@@ -105,7 +105,7 @@ def test_a_step_back_in_time_or_a_long_pause_begins_again() -> None:
 
 
 def test_the_linkage_as_the_page_has_edited_it_is_read() -> None:
-    text = shipped('linkages/four_bar.yaml').read_text('utf-8')
+    text = shipped_path('linkages/four_bar.yaml').read_text('utf-8')
     longer = text.replace('0.120', '0.125')
     assert longer != text
     assert turned(sensors('{}', '60', longer), 3) != turned(sensors('{}', '60'), 3)
@@ -131,6 +131,6 @@ def test_a_torque_drive_gives_its_crank_to_the_page(tmp_path: Path) -> None:
         'linkage: x\nrate: 1000\ndrive: {torque: {}}\neffects: {velocity: {}}\n'
         'loads: {gravity: [0, -9.81]}\n'
     )
-    linkage = shipped('linkages/four_bar.yaml').read_text('utf-8')
+    linkage = shipped_path('linkages/four_bar.yaml').read_text('utf-8')
     of = Sensors(SceneFiles('x', {SCENE_FILE: scene, 'linkage.yaml': linkage}, str(tmp_path)))
     assert of.read(0.0, [1.0], [0.5])['read']['crank_joint'] == 1.0

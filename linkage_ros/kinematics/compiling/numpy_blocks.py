@@ -21,7 +21,7 @@ from math import inf, nan, tan
 import operator
 from typing import Any, Final, NamedTuple
 
-from linkage_ros.generated_code import written
+from linkage_ros.generated_code import define_function
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.batch import Array, Mask
 from linkage_ros.kinematics.compiling.tape import Kind, Operation, rewrite_operations
@@ -427,7 +427,7 @@ class BlockFunction:
         functions = (*_FUNCTIONS.values(), np.copyto, np.count_nonzero)
         namespace: dict[str, Any] = {'inf': inf, 'nan': nan}
         namespace |= {function.__name__: function for function in functions}
-        self._run = written(self.source, 'run', namespace)
+        self._run = define_function(self.source, 'run', namespace)
 
     def __call__(
         self, given: Sequence[Array | float], out: Sequence[Array], rows: Array, masks: Mask

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 import math
 from typing import Any, NamedTuple
 
-from linkage_ros.generated_code import written
+from linkage_ros.generated_code import define_function
 from linkage_ros.kinematics.compiling.tape import Operation, Tape
 from linkage_ros.kinematics.compiling.trace import number_of, Path
 from linkage_ros.kinematics.compiling.writer import TextWriter
@@ -128,7 +128,7 @@ def python_body(path: Path, bail_out: str) -> PythonBody:
 def python_function(path: Path) -> Callable[..., Values | None]:
     """Return a path as a function from its inputs to its outputs; None if it is not valid."""
     source, bound = python_source(path)
-    solve: Callable[..., Values | None] = written(source, 'solve', bound)
+    solve: Callable[..., Values | None] = define_function(source, 'solve', bound)
     return solve
 
 

@@ -24,7 +24,7 @@ from math import e, isfinite, pi, tau
 import re
 from typing import cast, NamedTuple, overload
 
-from linkage_ros.errors import did_you_mean, listed, quoted, SynthesisError
+from linkage_ros.errors import did_you_mean, list_names, quote, SynthesisError
 import numpy as np
 from numpy.typing import NDArray
 
@@ -205,7 +205,7 @@ def _as_python(text: str) -> str:
                 opened.pop()
                 depths.pop()
             elif token.kind != 'operator' or token.text == '(':
-                reason = f'follows {quoted(before.text)} with nothing between'
+                reason = f'follows {quote(before.text)} with nothing between'
                 raise _token_error(text, token, reason, 'write * between the two')
             else:
                 has_value = False
@@ -264,14 +264,14 @@ def _is_value(text: str, token: _Token, after: _Token | None) -> bool:
         return False
     known = [_X, *CONSTANTS, *FUNCTIONS]
     if token.text not in known:
-        remedy = did_you_mean(token.text.lower(), known, f'there are {listed(known)}')
+        remedy = did_you_mean(token.text.lower(), known, f'there are {list_names(known)}')
         raise _token_error(text, token, 'is not known', remedy)
     return True
 
 
 def _token_error(text: str, token: _Token, reason: str, remedy: str) -> SynthesisError:
     return _formula_error(
-        text, f'{quoted(token.text)} at character {token.at + 1} {reason}', remedy
+        text, f'{quote(token.text)} at character {token.at + 1} {reason}', remedy
     )
 
 
@@ -281,4 +281,4 @@ def _formula_error(text: str, reason: str, remedy: str) -> SynthesisError:
 
 def formula_name(text: str) -> str:
     """Return the name of a formula in errors."""
-    return f'function {quoted(text)}'
+    return f'function {quote(text)}'

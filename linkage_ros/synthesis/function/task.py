@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from math import degrees, floor, isfinite, log10, nan, tau
 from typing import NamedTuple
 
-from linkage_ros.errors import quoted, SynthesisError
+from linkage_ros.errors import quote, SynthesisError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.synthesis.design import Design, ROCKER
@@ -370,7 +370,7 @@ def generate_function(
 
     """
     if not isinstance(function, str):
-        raise TypeError(f"function: {quoted(function)} is not a text; write it as 'log10(x)'")
+        raise TypeError(f"function: {quote(function)} is not a text; write it as 'log10(x)'")
     if points < 3:
         raise SynthesisError('points', f'there are {points}', 'ask for 3 or more')
     task = FunctionTask(Expression(function), x_range, crank_range, rocker_range)
