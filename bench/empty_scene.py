@@ -44,7 +44,7 @@ def measure_empty_scene(rounds: int, ticks: int) -> Table:
         raise MeasurementError('empty scene: publishes nothing')
     if not all(map(isclose, joints.angles, look.reading.joints)):
         raise MeasurementError('empty scene: publishes other angles than the hand-written code')
-    times = [BEGIN + PERIOD * number for number in range(ticks)]
+    times = [BEGIN + PERIOD * index for index in range(ticks)]
 
     def all_of(tick: Callable[[int], object]) -> Callable[[], None]:
         def run() -> None:

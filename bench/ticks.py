@@ -52,11 +52,11 @@ def write_turning(folder: Path, rate: float) -> Path:
 def write_many(folder: Path, rate: float, count: int) -> Path:
     """Write a scene of four-bars that turn at different constant rates; return its file."""
     lines = ['linkages:']
-    for number in range(count):
+    for index in range(count):
         lines += [
-            f'  - name: bar_{number}',
+            f'  - name: bar_{index}',
             f'    linkage: {_FOUR_BAR}',
-            f'    drive: {{constant_rate: {{rate: {1.0 + 0.01 * number:g}}}}}',
+            f'    drive: {{constant_rate: {{rate: {1.0 + 0.01 * index:g}}}}}',
         ]
     return _write(folder / f'{count}_four_bars.yaml', rate, lines)
 

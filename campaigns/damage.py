@@ -75,10 +75,10 @@ def make(kind: str, folder: Path, seed: int, size: int) -> Subject:
     random = Random(f'{seed} {kind}')
     count = max(size // 240, 20)
     messages = []
-    for number in range(count):
-        stamp = START + number * 1_000_000
+    for index in range(count):
+        stamp = START + index * 1_000_000
         data = b'\x00\x01\x00\x00' + random.randbytes(random.randrange(60, 300))
-        messages.append((number % 2, stamp + random.randrange(-9999, 9999), stamp, data))
+        messages.append((index % 2, stamp + random.randrange(-9999, 9999), stamp, data))
     topics = (
         Topic('/crank', TYPE, DEFINITION, 'RIHS01_' + '0a' * 32, QosProfile(depth=5)),
         Topic('/arm/joint_states', TYPE, DEFINITION, 'RIHS01_' + '0a' * 32),
@@ -95,9 +95,9 @@ def _by_linkage_ros(
     folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, int, int, bytes]]
 ):
     writer = BagWriter(folder, topics, ATTACHMENTS)
-    for number, message in enumerate(messages):
+    for index, message in enumerate(messages):
         writer.write(*message)
-        if number % 50 == 49:
+        if index % 50 == 49:
             writer.flush()
     writer.close({'seed': '7'})
     return folder / f'{folder.name}_0.mcap'

@@ -476,7 +476,8 @@ def _show_case(seed: int, family: str, index: int) -> None:
     say(f'crank {case.crank}')
     say(f'rocker {case.truth.rocker}')
     say(
-        f'assemblies {case.sides}; condition {result.condition:.3g}, doubt {result.system_sensitivity}'
+        f'assemblies {case.sides}; condition {result.condition:.3g}, doubt '
+        f'{result.system_sensitivity}'
     )
 
 

@@ -177,8 +177,8 @@ def _head(file: Path) -> str:
 def _sequence(closure: Closure) -> str:
     steps = []
     sides = sides_at(closure, closure.position(*usual_inputs(closure)))
-    for number, group in enumerate(closure.structure.groups):
-        kind, links, how, assembly = describe_group(closure, number, sides)
+    for index, group in enumerate(closure.structure.groups):
+        kind, links, how, assembly = describe_group(closure, index, sides)
         if isinstance(group, Driven):
             driven = closure.linkage.driven_joints[group.index].joint
             steps.append(f'{kind} {driven}')

@@ -159,7 +159,7 @@ pipeline = lr.Pipeline(lr.load_scene('scene.yaml'))
 pipeline.linkages[0].effect_names
 
 # %%
-ticks = [pipeline.tick(number * 10_000_000) for number in range(101)]
+ticks = [pipeline.tick(index * 10_000_000) for index in range(101)]
 ticks[0].message[:12].hex(' ')  # the bytes that the node would publish, header first
 
 # %% [markdown]
@@ -184,7 +184,7 @@ figure.tight_layout()
 
 # %%
 again = lr.Pipeline(lr.load_scene('scene.yaml'))
-assert [again.tick(number * 10_000_000).message for number in range(101)] == [
+assert [again.tick(index * 10_000_000).message for index in range(101)] == [
     tick.message for tick in ticks
 ]
 

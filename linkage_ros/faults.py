@@ -33,8 +33,8 @@ from math import nan
 from typing import Any, NamedTuple
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import restamped, Sensor, SensorReading
-from linkage_ros.files.parameters import name, number
+from linkage_ros.effects.stage import restamp, Sensor, SensorReading
+from linkage_ros.files.parameters import number, part_name
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import with_every_number
@@ -260,7 +260,7 @@ class Injection:
         # At the same instant an end comes before a begin: windows that touch stay two.
         self._timeline = sorted(changes, key=lambda entry: (entry[0], entry[2]))
         self._next = 0
-        self._clocks = self.build('clock')
+        self._clocks = self.build_functions('clock')
 
     def request_change(self, name: str, on: bool) -> None:
         """Let a fault begin or end at the next tick; callable from any thread."""

@@ -62,8 +62,8 @@ def percentile(values: Sequence[float], percent: float) -> float:
 
 def alternate_order(items: Sequence[Item], rounds: int) -> Iterator[Item]:
     """Yield items forward in one round and backward in the next, so that drift favours none."""
-    for number in range(rounds):
-        yield from items if number % 2 == 0 else reversed(items)
+    for index in range(rounds):
+        yield from items if index % 2 == 0 else reversed(items)
 
 
 def spread_of(values: Sequence[float]) -> Spread:
@@ -99,7 +99,7 @@ def time_in_turn(
 
     Parameters
     ----------
-    contenders
+    candidates
         The contenders; each is run once before.
     seconds
         Approximate duration of all; the minimum number of rounds is made even if it takes longer.

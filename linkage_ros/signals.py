@@ -137,7 +137,7 @@ def raise_on_signals() -> Iterator[None]:
 
 
 def has_raised() -> bool:
-    """Return whether a signal has raised `StoppedError` in the last `raising` context."""
+    """Return whether a signal has raised `StoppedError` in the last `raise_on_signals` context."""
     return _Raising.last > -inf
 
 

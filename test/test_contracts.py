@@ -375,7 +375,7 @@ def test_each_fault_has_its_type_and_one_place():
     places = {'clock', 'message', 'mechanism', 'sensor'}
     for name, kind in FAULTS.items():
         assert kind.__name__.lower() == name.replace('_', '')
-        assert declared(kind) is not None
+        assert declared_fields(kind) is not None
         assert len(places.intersection(vars(kind))) == 1
 
 

@@ -51,7 +51,7 @@ def test_every_error_comes_back_from_another_process():
 def test_a_list_of_names_is_short_and_says_how_many_more_there_are():
     assert list_names(['a', 'b\n', 'c']) == 'a, b\\n, c'
     assert list_names([]) == ''
-    names = [f'joint_{number:03}' for number in range(1000)]
+    names = [f'joint_{index:03}' for index in range(1000)]
     text = list_names(names)
     assert len(text) < 1000
     shown = text.partition(' and ')[0].split(', ')
@@ -61,7 +61,7 @@ def test_a_list_of_names_is_short_and_says_how_many_more_there_are():
 
 
 def test_an_error_that_lists_the_names_of_a_file_can_be_read():
-    names = [f'{number:04}_{"x" * 60}' for number in range(300)]
+    names = [f'{index:04}_{"x" * 60}' for index in range(300)]
     links = '\n'.join(f'  {name}: {{A: [0, 0], P{name}: [1, 0]}}' for name in names)
     text = f"""
 links:

@@ -56,9 +56,9 @@ def test_each_is_as_it_would_be_alone(load):
         pipeline_of('effects: {velocity: {}}', FOUR_BAR),
         pipeline_of('effects: {velocity: {}}', HALF_OPEN),
     )
-    for number in range(200):
-        now = BEGIN + number * MS
-        one, two = 0.03 * number, 0.001 * number
+    for index in range(200):
+        now = BEGIN + index * MS
+        one, two = 0.03 * index, 0.001 * index
         assert both.offer(crank(now, right_crank_joint=two, left_crank_joint=one), now) is None
         assert left.offer(crank(now, crank_joint=one), now) is None
         assert right.offer(crank(now, crank_joint=two), now) is None
@@ -79,11 +79,11 @@ linkages:
   - {{name: right, linkage: half_open.yaml, {turning}, effects: {{velocity: {{}}}}}}
 """)
     whole = Pipeline(scene)
-    monkeypatch.setattr('linkage_ros.pipeline.pipeline.LinkagePipeline.whole', None)
+    monkeypatch.setattr('linkage_ros.pipeline.pipeline.LinkagePipeline.whole_tick', None)
     apart = Pipeline(scene)
     usual = 0
-    for number in range(400):
-        one, other = (work.tick(BEGIN + number * MS) for work in (whole, apart))
+    for index in range(400):
+        one, other = (work.tick(BEGIN + index * MS) for work in (whole, apart))
         usual += isinstance(one.states, list) and not any(
             hasattr(s, 'reading') for s in one.states
         )
@@ -125,8 +125,8 @@ def test_a_message_for_nobody_is_refused(load):
 
 def test_ever_new_names_do_not_fill_the_memory(load):
     both = Pipeline(load(TWO))
-    for number in range(3000):
-        both.offer(crank(BEGIN, **{f'joint_{number}': 0.1}), BEGIN)
+    for index in range(3000):
+        both.offer(crank(BEGIN, **{f'joint_{index}': 0.1}), BEGIN)
     assert len(both._router._found) <= 1000
     assert both.offer(crank(BEGIN, left_crank_joint=0.1), BEGIN) is None
 
@@ -288,8 +288,8 @@ effects: {{delay: {{seconds: 0.002, spread: 0.01, stamp: measured}}}}
 """)
     )
     together = 0
-    for number in range(400):
-        message = pipeline.tick(BEGIN + number * MS).message
+    for index in range(400):
+        message = pipeline.tick(BEGIN + index * MS).message
         if not message:
             continue
         state = read(message)
@@ -348,7 +348,7 @@ def test_a_prefix_is_as_it_is_written(load, kind):
     text, joint = PREFIXES[kind]
     scene = load(f'linkage: four_bar.yaml\n{text}\n')
     assert scene.joints[0] == joint
-    assert scene.members[0].inputs == (joint.replace('coupler', 'crank'),)
+    assert scene.linkages[0].input_names == (joint.replace('coupler', 'crank'),)
 
 
 @pytest.mark.parametrize(

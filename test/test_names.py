@@ -127,9 +127,9 @@ def test_names_in_c_are_comments(suffix: str, tmp_path: Path) -> None:
         (tmp_path / f'a{count}{suffix}').write_text(text, 'utf-8')
         count += 1
     for kind, standard in COMPILERS.items():
-        for number in range(count):
-            file = tmp_path / f'one{number}'
-            file.write_text(f'#include "a{number}{suffix}"\nint injected;\n')
+        for index in range(count):
+            file = tmp_path / f'one{index}'
+            file.write_text(f'#include "a{index}{suffix}"\nint injected;\n')
             typed = [
                 *standard, '-trigraphs', '-Wall', '-Wextra', '-Wpedantic', '-Werror',
                 '-Wno-unused-function', '-fsyntax-only', str(file),
@@ -157,10 +157,10 @@ def run_python(*files: Path) -> None:
 
 def test_names_in_python_are_comments(tmp_path: Path) -> None:
     files = []
-    for number, closure in enumerate(linkages(2)):
+    for index, closure in enumerate(linkages(2)):
         text = code(closure, '.py')
         check_comment(text, closure)
-        files.append(tmp_path / f'a{number}.py')
+        files.append(tmp_path / f'a{index}.py')
         files[-1].write_text(text, 'utf-8')
     run_python(*files)
 

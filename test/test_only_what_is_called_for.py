@@ -109,7 +109,8 @@ sys.setprofile(None)
 print(json.dumps({
     'modules': modules, 'after': sorted(sys.modules), 'files': sorted(seen),
     'messages': [tick.message.hex() for tick in ticks if tick.message],
-    'stages': pipeline.lines[0].stages, 'topics': [extra.topic for extra in pipeline.extras],
+    'stages': pipeline.linkages[0].effect_names,
+    'topics': [extra.topic for extra in pipeline.extras],
 }))
 """
 

@@ -41,9 +41,9 @@ def pipeline(scene=b'effects: {velocity: {}}', linkage=FOUR_BAR):
 def turn(pipeline, angle_at, seconds=3.0, wrap=False):
     """Return the messages of ticks at 500 Hz, with a crank message for every third of them."""
     messages = []
-    for number in range(int(500 * seconds)):
-        now = BEGIN + number * 2 * MS
-        if number % 3 == 0:
+    for index in range(int(500 * seconds)):
+        now = BEGIN + index * 2 * MS
+        if index % 3 == 0:
             angle = angle_at((now - BEGIN) * 1e-9)
             rate = (angle_at((now - BEGIN) * 1e-9 + 1e-6) - angle) / 1e-6
             angle = remainder(angle, tau) if wrap else angle
@@ -144,7 +144,7 @@ def test_before_the_first_sample_and_after_the_last_there_is_silence():
 
 
 def assert_silent(tick):
-    assert tick.looks == (LinkageState(None, None, None, None),)
+    assert tick.full_states == (LinkageState(None, None, None, None),)
     assert (tick.message, tick.extras) == (b'', ())
 
 
@@ -196,8 +196,8 @@ def test_a_trajectory_says_what_the_joint_state_says_and_accelerations(effects):
     # To name acceleration is to name velocity; turns are added to both messages.
     both, velocity = pipeline(b'effects: ' + effects), pipeline(b'effects: {velocity: {}}')
     assert [extra.topic for extra in both.extras] == ['~/motion']
-    for number in range(300):
-        now, angle = BEGIN + number * 2 * MS, 0.1 * number
+    for index in range(300):
+        now, angle = BEGIN + index * 2 * MS, 0.1 * index
         message = CRANK.write(now, [remainder(angle, tau)], [50.0])
         assert both.offer(message, now) is velocity.offer(message, now) is None
         tick = both.tick(now)

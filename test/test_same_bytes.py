@@ -27,7 +27,7 @@ from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 scene = load_scene(sys.argv[1])
 pipeline = Pipeline(scene)
-names = [name for member in scene.members for name in member.inputs]
+names = [name for linkage in scene.linkages for name in linkage.input_names]
 write = JointStateWriter(names).write
 begin, digest, published = 1_700_000_000_000_000_000, hashlib.sha256(), 0
 for number in range(3000):

@@ -49,12 +49,12 @@ def pipeline(linkage, scene):
 
 def ticks(work):
     """Yield ticks of a crank that turns, and of one that falls silent for a while."""
-    names = work.lines[0].member.inputs
+    names = work.linkages[0].scene_linkage.input_names
     write = JointStateWriter(names).write
-    for number in range(TICKS):
-        now = BEGIN + number * MS
-        if work.topic and number % 3 == 0 and not 200 < number < 230:
-            angles = [0.04 * number + 0.3 * i for i in range(len(names))]
+    for index in range(TICKS):
+        now = BEGIN + index * MS
+        if work.topic and index % 3 == 0 and not 200 < index < 230:
+            angles = [0.04 * index + 0.3 * i for i in range(len(names))]
             assert work.offer(write(now, angles, [40.0] * len(names)), now) is None
         yield work.tick(now)
 
@@ -63,8 +63,8 @@ def with_masses(file):
     """Return a linkage whose links all have masses, and its file."""
     linkage = read_linkage(parse_yaml(file.read_bytes(), file.name))
     masses = {
-        link: Mass(0.1 * number, (0.01, 0.001 * number), 1.0e-5 * number)
-        for number, link in enumerate(linkage.links)
+        link: Mass(0.1 * index, (0.01, 0.001 * index), 1.0e-5 * index)
+        for index, link in enumerate(linkage.links)
         if link != GROUND
     }
     linkage = replace(linkage, masses=linkage.masses or masses)
@@ -106,9 +106,9 @@ def check(linkage, scene, looked=1):
     # A fault of the mechanism, though it never begins, wants the plain steps.
     link = next(name for name in straight.closures[0].linkage.links if name != 'ground')
     plain = pipeline(linkage, f'{scene}\nfaults: {{x: {{broken_link: {{link: {link}}}}}}}')
-    for number, (one, other) in enumerate(zip(ticks(straight), ticks(plain), strict=True)):
+    for index, (one, other) in enumerate(zip(ticks(straight), ticks(plain), strict=True)):
         assert (one.message, one.extras) == (other.message, other.extras)
-        if number % looked:
+        if index % looked:
             continue
         for look, beside in zip(one.full_states, other.full_states, strict=True):
             assert (look.crank, look.reading) == (beside.crank, beside.reading)
@@ -177,9 +177,7 @@ def test_the_usual_tick_is_straight(effects):
         f'{DRIVES["turning"]}\neffects: {effects}',
     )
     plain = [
-        number
-        for number, tick in enumerate(ticks(work))
-        if isinstance(tick.states[0], LinkageState)
+        index for index, tick in enumerate(ticks(work)) if isinstance(tick.states[0], LinkageState)
     ]
     # The first, and those at which an angle passes half a turn.
     assert plain[0] == 0
@@ -195,7 +193,7 @@ def test_a_reset_compiles_nothing(effects, monkeypatch):
     scene = parse_scene('s', 's', files)
     first = Pipeline(scene)
     message = first.tick(BEGIN).message
-    monkeypatch.setattr('linkage_ros.kinematics.compiling.linkage.traced', None)
+    monkeypatch.setattr('linkage_ros.kinematics.compiling.linkage.trace_path', None)
     monkeypatch.setattr('linkage_ros.kinematics.compiling.linkage.python_body', None)
     monkeypatch.setattr('builtins.exec', None)
     assert Pipeline(scene, first.closures).tick(BEGIN).message == message
@@ -204,8 +202,13 @@ def test_a_reset_compiles_nothing(effects, monkeypatch):
 def test_a_pose_is_worked_out_for_a_message_that_is_due_and_no_other(monkeypatch):
     file = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
     work = pipeline(file.read_bytes(), f'{DRIVES["turning"]}\neffects: {{markers: {{rate: 50}}}}')
-    (line,) = work.linkages
-    looked, worked_out = line.complete_state, []
-    monkeypatch.setattr(line, 'looked', lambda seen: worked_out.append(seen) or looked(seen))
+    (linkage,) = work.linkages
+    complete, worked_out = linkage.complete_state, []
+
+    def count(state):
+        worked_out.append(state)
+        return complete(state)
+
+    monkeypatch.setattr(linkage, 'complete_state', count)
     drawn = sum(any(tick.extras) for tick in ticks(work))
     assert drawn == len(worked_out) == TICKS * 50 // 1000

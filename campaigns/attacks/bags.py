@@ -84,14 +84,14 @@ def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
     seed, begin, end = part
     tried, findings = Counter[str](), []
     with confined():
-        for number in range(begin, end):
+        for index in range(begin, end):
             Path('bag').mkdir()
-            changes = change_bag(Path('bag'), Random(f'{seed} {number}'))
+            changes = change_bag(Path('bag'), Random(f'{seed} {index}'))
             for command, arguments in COMMANDS.items():
                 ended = in_process([command, 'bag', *arguments], _SECONDS)
                 tried[f'{command}: {ended.code}'] += 1
                 if fault := fault_of(ended):
-                    findings.append(f'bag {seed} {number}: {changes}: {command}: {fault}')
+                    findings.append(f'bag {seed} {index}: {changes}: {command}: {fault}')
             for file in Path('bag').iterdir():
                 file.unlink()
             Path('bag').rmdir()
@@ -174,11 +174,11 @@ def _record(folder: Path, edit: Callable[[str, bytes], bytes], random: Random) -
         {name: ('', edit(name, text)) for name, text in texts.items()},
         Storage(compression=random.choice(('none', 'lz4', 'zstd'))),
     )
-    for number in range(40):
-        stamp = _BEGIN + number * _PERIOD
+    for index in range(40):
+        stamp = _BEGIN + index * _PERIOD
         if message := pipeline.tick(stamp).message:
             writer.write(0, stamp, stamp, message)
-        if number % 15 == 0:
+        if index % 15 == 0:
             writer.flush()
     writer.close({})
     for file in (folder / 'made').iterdir():

@@ -212,11 +212,11 @@ def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
     with warnings.catch_warnings(), confined() as folder:
         warnings.simplefilter('default')
         originals = _originals(folder)
-        for number in range(begin, end):
-            outcome, finding = _try(originals, f'{seed} {number}')
+        for index in range(begin, end):
+            outcome, finding = _try(originals, f'{seed} {index}')
             tried[outcome] += 1
             if finding:
-                findings.append(f'file {seed} {number}: {finding}')
+                findings.append(f'file {seed} {index}: {finding}')
     return tried, findings
 
 
@@ -251,9 +251,9 @@ def _record(linkages: Mapping[str, bytes]) -> None:
     write = JointStateWriter([*inputs]).write
     topic = Topic('/crank_states', 'sensor_msgs/msg/JointState', 'text', 'RIHS01_' + '0a' * 32)
     bag = BagWriter(Path('bag'), [topic], {})
-    for number in range(20):
-        stamp = 1_700_000_000_000_000_000 + 1_000_000 * number
-        angles = [0.01 * number] * len(inputs)
+    for index in range(20):
+        stamp = 1_700_000_000_000_000_000 + 1_000_000 * index
+        angles = [0.01 * index] * len(inputs)
         bag.write(0, stamp, stamp, write(stamp, angles, [10.0] * len(inputs)))
     bag.close()
 

@@ -204,7 +204,7 @@ def _faults_in(log: str, tried: dict[str, int]) -> list[str]:
 
 def crank(angle: float, *, joints: int = 1, rate: float = 0.0) -> bytes:
     """Return a serialized message of the crank with a number of joints, stamped now."""
-    names = [_CRANK, *(f'joint_with_a_long_name_{number}' for number in range(1, joints))]
+    names = [_CRANK, *(f'joint_with_a_long_name_{index}' for index in range(1, joints))]
     return JointStateWriter(names).write(time.time_ns(), [angle] * joints, [rate] * joints)
 
 
@@ -231,7 +231,7 @@ def malformed(random: Random) -> bytes:
         return crank(random.choice((nan, inf, -inf, 1e11, 1.7e308)), joints=joints)
     if kind == 5:
         return crank(BAD, joints=joints, rate=random.choice((inf, -inf, 1e300)))
-    names = [f'of_somebody_else_{number}' for number in range(joints)]
+    names = [f'of_somebody_else_{index}' for index in range(joints)]
     return JointStateWriter(names).write(time.time_ns(), [BAD] * joints, [0.0] * joints)
 
 

@@ -55,11 +55,11 @@ def attack(count: int, seed: int) -> tuple[dict[str, int], list[str]]:
     """Send signals; return the number of each kind of end, and the violations, one line each."""
     tried: Counter[str] = Counter()
     findings = []
-    for number in range(count):
-        end, finding = _try(random.Random(f'{seed} {number}'))
+    for index in range(count):
+        end, finding = _try(random.Random(f'{seed} {index}'))
         tried[end] += 1
         if finding:
-            findings.append(f'signal {seed} {number}: {finding}')
+            findings.append(f'signal {seed} {index}: {finding}')
     return dict(sorted(tried.items())), findings
 
 

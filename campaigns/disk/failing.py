@@ -71,11 +71,11 @@ def attempt(part: Part) -> list[Tried]:
 
 def injections(calls: Sequence[SeenCall]) -> Iterator[Injection]:
     """Yield all possible injections for the calls of a recording without faults."""
-    for number, call in enumerate(calls):
+    for index, call in enumerate(calls):
         for fault in FAULTS:
             if can_befall(fault, call.name, call.target):
-                yield Injection(number, fault, lasting=False)
-                yield Injection(number, fault, lasting=True)
+                yield Injection(index, fault, lasting=False)
+                yield Injection(index, fault, lasting=True)
 
 
 def parts(setting: str, every: int = 1, first: int = 0) -> list[Part]:

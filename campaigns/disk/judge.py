@@ -81,8 +81,8 @@ def record(folder: Path, storage: Storage, enter_phase: Callable[[str], None]) -
         return done
     try:
         recorder = Recorder(writer, flush_period=storage.flush_period)
-        for number in range(MESSAGES):
-            offered = message(number, time_of(number))
+        for index in range(MESSAGES):
+            offered = message(index, time_of(index))
             begin = monotonic_ns()
             recorder.offer(*offered)
             done.longest_offer = max(done.longest_offer, monotonic_ns() - begin)
@@ -104,8 +104,8 @@ def offer_all(folder: Path, storage: Storage, count: int) -> Recorded:
     try:
         recorder = Recorder(writer, flush_period=storage.flush_period)
         while done.offered < count and recorder.failure is None:
-            for number in range(done.offered, done.offered + _BURST):
-                recorder.offer(*message(number, time_of(number)))
+            for index in range(done.offered, done.offered + _BURST):
+                recorder.offer(*message(index, time_of(index)))
             done.offered += _BURST
             # Wait until the recorder's thread has caught up.
             while not recorder.failure and _waiting(recorder) > _MOST_WAITING:
@@ -135,7 +135,7 @@ def time_of(number: int) -> int:
 
 def expected_messages(count: int) -> list[BagMessage]:
     """Return the first messages, as they have to be in the bag."""
-    return [expected(number, time_of(number)) for number in range(count)]
+    return [expected(index, time_of(index)) for index in range(count)]
 
 
 class _ByCount(BagWriter):
@@ -275,12 +275,12 @@ def _is_line(error: str, folder: Path) -> bool:
 def _counts(done: Recorded) -> list[str]:
     """Return the faults of the counts, topic by topic."""
     faults = []
-    for number, (received, recorded, dropped, let_go, waiting) in enumerate(done.counts):
-        offered = len(range(number, done.offered, len(TOPICS)))
+    for index, (received, recorded, dropped, let_go, waiting) in enumerate(done.counts):
+        offered = len(range(index, done.offered, len(TOPICS)))
         if received != offered:
             faults.append(f'{offered} offered, {received} received')
         if received != recorded + dropped + let_go or waiting or min(recorded, dropped) < 0:
-            faults.append(f'the counts do not add up: {done.counts[number]}')
+            faults.append(f'the counts do not add up: {done.counts[index]}')
     return faults
 
 

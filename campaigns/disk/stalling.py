@@ -262,8 +262,8 @@ def _lateness(times: Sequence[int], period: int) -> list[int]:
     """
     found: list[int] = []
     stretch: list[int] = []
-    for number, time in enumerate(times):
-        if stretch and (time - times[number - 1] > _GAP or time - stretch[0] > _SECOND):
+    for index, time in enumerate(times):
+        if stretch and (time - times[index - 1] > _GAP or time - stretch[0] > _SECOND):
             found += _behind(stretch, period)
             stretch = []
         stretch.append(time)
@@ -271,5 +271,5 @@ def _lateness(times: Sequence[int], period: int) -> list[int]:
 
 
 def _behind(times: Sequence[int], period: int) -> list[int]:
-    offsets = [time - number * period for number, time in enumerate(times)]
+    offsets = [time - index * period for index, time in enumerate(times)]
     return [offset - min(offsets) for offset in offsets]

@@ -72,9 +72,9 @@ def accelerated_tables(runs: Sequence[Run]) -> list[Table]:
         ('hour', *(f'{run.plan.name} ({run.plan.hours:g} h)' for run in runs)),
     )
     step = first.hours / 24.0
-    for number in range(25):
+    for index in range(25):
         memory.rows.append(
-            [f'{number * step:.3g}', *(_at(run.samples, 3600.0 * number * step) for run in runs)]
+            [f'{index * step:.3g}', *(_at(run.samples, 3600.0 * index * step) for run in runs)]
         )
     verdicts = _verdicts(f'{title}, verdicts')
     for run in runs:
@@ -107,8 +107,8 @@ def dds_tables(run: DdsRun) -> list[Table]:
     """Return the memory by the minute, its verdict, the counts of messages, and the ticks."""
     title = f'Over DDS: {run.minutes:g} min'
     memory = Table(f'{title}, memory of the node', ('minute', 'kB', 'open files', 'threads'))
-    for number in range(11):
-        time = 6.0 * run.minutes * number
+    for index in range(11):
+        time = 6.0 * run.minutes * index
         if run.samples:
             sample = _nearest(run.samples, time)
             memory.rows.append(

@@ -93,9 +93,9 @@ def main() -> int:
         if wait > 0:
             sleep(wait * 1e-9)
         now = marks.begin_tick()
-        for number in range(2 * tick, 2 * tick + 2):
-            offered = message(number, now)
-            marks.offered = number + 1
+        for index in range(2 * tick, 2 * tick + 2):
+            offered = message(index, now)
+            marks.offered = index + 1
             recorder.offer(*offered)
     summary = recorder.stop(timeout=60.0)
     if summary.failure or any(counts.dropped for counts in summary.topics):

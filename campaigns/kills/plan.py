@@ -101,8 +101,8 @@ AIMS: Mapping[Phase, float] = {
 def plans(seed: int, kills: int, aimed: int, seconds: tuple[float, float]) -> list[Plan]:
     """Return kills at random instants, then kills aimed at short phases; runs last ``seconds``."""
     return [
-        _plan(Random(f'{seed} {number}'), number, aimed=number >= kills, seconds=seconds)
-        for number in range(kills + aimed)
+        _plan(Random(f'{seed} {index}'), index, aimed=index >= kills, seconds=seconds)
+        for index in range(kills + aimed)
     ]
 
 

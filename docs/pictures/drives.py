@@ -119,7 +119,7 @@ def torque(scene: Scene) -> Figure:
 def motor(scene: Scene) -> Figure:
     """Draw a crank that a voltage accelerates, with the inductance and without."""
     figure, (upper, lower) = sheet(2, 1, sharex=True)
-    commands = [(0.05 * number, 12.0) for number in range(1, 6)]
+    commands = [(0.05 * index, 12.0) for index in range(1, 6)]
     at_once = changed(scene, ('drive.torque.motor.inductance', None))
     for given, style in (
         (at_once, {'color': VERMILLION, 'linestyle': '--', 'label': 'without inductance'}),
@@ -163,7 +163,9 @@ def _span_of_potential(scene: Scene) -> float:
     creeping = {**scene, 'drive': {'constant_rate': {'rate': tau}}, 'effects': {'effort': {}}}
     moving = run(creeping, 1.0)
     potential = moving.pipeline.linkages[0].context.mechanics.potential_energy
-    values = [potential(look.position) for look in moving.looks if look.position is not None]
+    values = [
+        potential(state.position) for state in moving.full_states if state.position is not None
+    ]
     return max(values) - min(values)
 
 
@@ -191,7 +193,7 @@ def _dots(axes: Any, samples: list[Sample], label: str) -> None:
 
 def _swinging(interval: float, count: int) -> list[Sample]:
     """Return samples of a crank that oscillates at 1 Hz with an amplitude of 1 rad."""
-    times = [number * interval for number in range(count)]
+    times = [index * interval for index in range(count)]
     return [(time, sin(tau * time), tau * cos(tau * time)) for time in times]
 
 

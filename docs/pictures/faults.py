@@ -33,7 +33,7 @@ def faults(scene: Scene) -> Figure:
         for at in fault['at']
     ]
     seconds = max(end for _, end, _ in spans) + _BESIDE
-    times = [number * 0.005 for number in range(round(seconds / 0.005))]
+    times = [index * 0.005 for index in range(round(seconds / 0.005))]
     samples = [(time, sin(pi * time), pi * cos(pi * time)) for time in times]
     ideal = run(changed(scene, ('faults', None)), seconds, samples)
     faulty = run(scene, seconds, samples)

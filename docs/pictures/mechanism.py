@@ -150,8 +150,8 @@ def pin_forces(scene: Scene) -> Figure:
     force = moving.force('A')
     right.plot(*force, color=VERMILLION, linestyle='--')
     beside = (('0', (-11, -3)), ('π/2', (-9, -13)), ('π', (7, -3)), ('3π/2', (-25, 3)))
-    for number, (turned, offset) in enumerate(beside):
-        at = int(np.argmin(abs(crank - number * tau / 4)))
+    for index, (turned, offset) in enumerate(beside):
+        at = int(np.argmin(abs(crank - index * tau / 4)))
         right.plot(*force[:, at], 'o', color='black', markersize=4)
         right.annotate(turned, force[:, at], xytext=offset, textcoords='offset points')
     right.set_title('A, at these crank angles')

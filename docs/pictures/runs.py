@@ -49,7 +49,7 @@ class Run(NamedTuple):
 
     pipeline: Pipeline
     times: Values
-    looks: list[LinkageState]
+    full_states: list[LinkageState]
 
     def position(self, joint: str) -> Values:
         """Return the published positions of a joint, in [rad] or [m]; nan without a message."""
@@ -70,8 +70,8 @@ class Run(NamedTuple):
     def stamps(self) -> Values:
         """Return the stamps of the published messages, in [s] since the first tick."""
         return np.array(
-            [nan if look.reading is None else (look.reading.stamp - START) * 1e-9
-             for look in self.looks]
+            [nan if state.reading is None else (state.reading.stamp - START) * 1e-9
+             for state in self.full_states]
         )  # fmt: skip
 
     def crank(self) -> Values:
@@ -80,7 +80,7 @@ class Run(NamedTuple):
             [
                 (nan, nan, nan) if crank is None else
                 (crank.angles[0], crank.rates[0], crank.accelerations[0])
-                for crank, _, _, _ in self.looks
+                for crank, _, _, _ in self.full_states
             ]
         ).T  # fmt: skip
 
@@ -88,7 +88,7 @@ class Run(NamedTuple):
         """Return the force in a pin, in [N]: a row of x and a row of y."""
         names = self.pipeline.linkages[0].context.reactions.names
         place = names.index(pin)
-        motions = [look.motion for look in self.looks]
+        motions = [state.motion for state in self.full_states]
         return np.array([m.reactions[place][:2] for m in motions if m is not None]).T
 
     def energy(self) -> Values:
@@ -97,14 +97,14 @@ class Run(NamedTuple):
         return np.array(
             [
                 energy(position, *crank.rates)
-                for crank, position, _, _ in self.looks
+                for crank, position, _, _ in self.full_states
                 if crank is not None and position is not None
             ]
         )
 
     def _read(self, joint: str, values: Callable[[SensorReading], Sequence[float]]) -> Values:
         place = self.pipeline.linkages[0].scene_linkage.joint_names.index(joint)
-        read = [look.reading and values(look.reading) for look in self.looks]
+        read = [state.reading and values(state.reading) for state in self.full_states]
         return np.array([each[place] if each else nan for each in read])
 
 
@@ -125,7 +125,7 @@ def run(
         listens = bool(pipeline.topic)
         due = [*messages(samples), *_commands(commands)] if listens else []
         times = ticks(scene, seconds)
-        looks = []
+        full_states = []
         last = START
         for time in times:
             now = START + time
@@ -137,8 +137,8 @@ def run(
             last = now
             while due and due[0][0] <= START + time:
                 pipeline.offer(due.pop(0)[1], now)
-            looks.append(pipeline.tick(now).full_states[0])
-    return Run(pipeline, np.array(times) * 1e-9, looks)
+            full_states.append(pipeline.tick(now).full_states[0])
+    return Run(pipeline, np.array(times) * 1e-9, full_states)
 
 
 def extra_messages(scene: Scene, message_type: str, seconds: float) -> list[bytes]:
@@ -153,7 +153,7 @@ def extra_messages(scene: Scene, message_type: str, seconds: float) -> list[byte
 def ticks(scene: Scene, seconds: float) -> list[int]:
     """Return the times of the ticks, in [ns] since the first."""
     rate = scene.get('rate', 1000)
-    return [round(number * 1e9 / rate) for number in range(round(seconds * rate) + 1)]
+    return [round(index * 1e9 / rate) for index in range(round(seconds * rate) + 1)]
 
 
 def messages(samples: Sequence[Sample]) -> list[tuple[int, bytes]]:

@@ -119,10 +119,10 @@ def dropout(scene: Scene) -> Figure:
     half = 0.5 * (read.times[1] - read.times[0])
     lost = np.isnan(values).astype(int)
     edges = np.flatnonzero(np.diff(lost, prepend=0, append=0))
-    for number, (begin, end) in enumerate(edges.reshape(-1, 2)):
+    for index, (begin, end) in enumerate(edges.reshape(-1, 2)):
         axes.axvspan(
             read.times[begin] - half, read.times[end - 1] + half,
-            color=ORANGE, alpha=0.4, linewidth=0.0, label='' if number else 'lost',
+            color=ORANGE, alpha=0.4, linewidth=0.0, label='' if index else 'lost',
         )  # fmt: skip
     axes.set_xlabel('time [s]')
     axes.set_ylabel('rocker [rad]')

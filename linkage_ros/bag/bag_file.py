@@ -126,7 +126,7 @@ class BagFile:
         Log time of the first message [ns]; None before it.
     finished
         Whether its end is written.
-    forgotten
+    removed
         Whether another process has removed it.
 
     Raises

@@ -59,8 +59,8 @@ class RecordFile:
     """
     File of whole records; writing to it never raises but stores the failure in `error`.
 
-    After the first error, records wait in memory for `drain`. Each write first checks the file: if
-    another process has truncated it, the write would leave a hole of zeros.
+    After the first error, records wait in memory for `write_waiting`. Each write first checks the
+    file: if another process has truncated it, the write would leave a hole of zeros.
     """
 
     def __init__(self, path: Path) -> None:

@@ -107,8 +107,8 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
         names = mcap_names(path) or _file_names(path, BAG_SUFFIXES)
     if not names:
         raise BagError(path, 'holds no .mcap file', "name a bag's folder")
-    for number, name in enumerate(names):
-        if name in names[:number]:
+    for index, name in enumerate(names):
+        if name in names[:index]:
             raise BagError(path / METADATA_FILE, f'names {quote(name)} twice', _WITHOUT)
         within = os.path.realpath(path)
         if os.path.commonpath([within, os.path.realpath(path / name)]) != within:

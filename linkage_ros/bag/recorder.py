@@ -214,12 +214,12 @@ class Recorder:
         discarded = self._writer.discarded
         opened = self._writer.opening_counts
         taken, lost = self._taken_and_lost
-        for number, topic in enumerate(self._writer.topics):
-            gone = discarded[number]
-            recorded = taken[number] + opened[number] - gone
-            dropped = self._queue.dropped[number].read_count() + lost[number]
+        for index, topic in enumerate(self._writer.topics):
+            gone = discarded[index]
+            recorded = taken[index] + opened[index] - gone
+            dropped = self._queue.dropped[index].read_count() + lost[index]
             # Read last, so that a message in transit counts as waiting, and never twice.
-            received = self._queue.received[number].read_count() + opened[number]
+            received = self._queue.received[index].read_count() + opened[index]
             waiting = received - recorded - dropped - gone
             counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting, gone))
         return tuple(counts)
@@ -253,10 +253,10 @@ class Recorder:
                 'what was flushed before is readable; check the disk',
             )
         topics = []
-        for number, counts in enumerate(self.read_counts()):
+        for index, counts in enumerate(self.read_counts()):
             recorded = counts.recorded
             if stuck:
-                recorded = max(0, self._flushed_counts[number] - counts.discarded)
+                recorded = max(0, self._flushed_counts[index] - counts.discarded)
             dropped = counts.received - recorded - counts.discarded
             topics.append(replace(counts, recorded=recorded, dropped=dropped, waiting=0))
         self._summary = RecordingSummary(

@@ -127,7 +127,7 @@ class RecoveredBag:
     OSError
         As the system raises it, here and in all methods that write.
     BagError
-        From `add` and `describe`: more than `MOST_CHANNELS` channels.
+        From `add_item` and `add_channels`: more than `MOST_CHANNELS` channels.
 
     """
 
@@ -311,8 +311,8 @@ def recover_bag(
     with _new_folder(target):
         bag = RecoveredBag(target, profile, compression)
         try:
-            for number, file in enumerate(files):
-                before, of = sum(sizes[:number]), sum(sizes)
+            for index, file in enumerate(files):
+                before, of = sum(sizes[:index]), sum(sizes)
                 for done in _copy_file(file, bag, findings):
                     progress(before + done, of)
                     if stopped():

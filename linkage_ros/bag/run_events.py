@@ -179,7 +179,7 @@ _TEXTS = (
     'withheld_topic',
     'resets_topic',
 )
-"""Keys of the account that are also fields of `RunAccount`."""
+"""Keys of the account that are also fields of `RunMetadata`."""
 
 
 def _are_names(values: Any) -> bool:
@@ -212,7 +212,7 @@ def recorded_events(
     ----------
     run
         The run's account of itself.
-    own
+    is_own
         Recognises the run's own joint states where they share a topic with crank samples.
     messages
         Messages of the bag.
@@ -223,9 +223,9 @@ def recorded_events(
     crank = run.crank_topic if crank_topic is None else crank_topic
     shared = run.crank_topic == run.joint_states_topic
     topics = (run.joint_states_topic, *run.extras) if run.joint_states_topic else ()
-    outputs = {topic: number for number, topic in enumerate(topics)}
+    outputs = {topic: index for index, topic in enumerate(topics)}
     others = {run.faults_topic, run.withheld_topic, run.resets_topic} - {''}
-    wrenches = {topic: number for number, topic in enumerate(run.wrenches)}
+    wrenches = {topic: index for index, topic in enumerate(run.wrenches)}
     others |= set(wrenches)
     open_tick: tuple[int, int, list[bytes]] | None = None  # may get further messages
     withheld: tuple[int, int] | None = None

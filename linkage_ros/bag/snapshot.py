@@ -253,13 +253,13 @@ class SnapshotMemory:
     def read_counts(self) -> tuple[KeptCounts, ...]:
         """Return the current counts; messages that wait for the thread count as kept."""
         counts = []
-        for number, topic in enumerate(self.topics):
+        for index, topic in enumerate(self.topics):
             discarded, dropped = (
-                self._last.discarded[number],
-                self._queue.dropped[number].read_count(),
+                self._last.discarded[index],
+                self._queue.dropped[index].read_count(),
             )
             # Read last, so that a message in transit counts as kept, and never twice.
-            received = self._queue.received[number].read_count()
+            received = self._queue.received[index].read_count()
             kept = received - discarded - dropped
             counts.append(KeptCounts(topic.name, received, kept, discarded, dropped))
         return tuple(counts)
@@ -323,8 +323,8 @@ class SnapshotMemory:
         self.failure = RecordingError(
             _WHERE, f'has ended early: {type(error).__name__}: {error}', 'please report this'
         )
-        for number, counts in enumerate(self.read_counts()):
-            self._last.discarded[number] += counts.kept
+        for index, counts in enumerate(self.read_counts()):
+            self._last.discarded[index] += counts.kept
 
 
 _AHEAD = 5000
@@ -342,9 +342,9 @@ class SnapshotWriting:
     ----------
     kept
         Content of the bag.
-    make
+    make_writer
         Creates the bag; called on the writing thread.
-    done
+    on_done
         Called on the writing thread when the outcome is ready.
 
     """
@@ -384,8 +384,8 @@ class SnapshotWriting:
     def _write_bag(self, writer: BagWriter) -> RecordingSummary:
         recorder = Recorder(writer, capacity=_AHEAD + BATCH)
         writer.make_statistics = partial(self._final_statistics, writer)
-        for number, message in enumerate(self.kept.messages()):
-            if number % BATCH == 0:
+        for index, message in enumerate(self.kept.messages()):
+            if index % BATCH == 0:
                 time.sleep(NAP)
                 if not self._wait_for_recorder(recorder, _AHEAD):
                     break

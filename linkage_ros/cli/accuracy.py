@@ -175,7 +175,7 @@ def _check_options(arguments: argparse.Namespace, parts: Sequence[str]) -> None:
 
 def _check_content(scene: Scene, parts: Sequence[str]) -> None:
     """Raise if a scene has nothing of what alone is to be measured."""
-    has_effects = scene.faults or any(member.effects for member in scene.linkages)
+    has_effects = scene.faults or any(scene_linkage.effects for scene_linkage in scene.linkages)
     if parts == [EFFECTS] and not has_effects:
         raise LinkageError('--only effects', 'the scene has none, and no fault', 'leave it out')
     if parts == [RECORDING] and scene.record is None:

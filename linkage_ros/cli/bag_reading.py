@@ -262,7 +262,7 @@ def scene_json(scene: Scene) -> dict[str, Any]:
         'rate_hz': scene.rate,
         'seed': scene.seed,
         'faults': list(scene.faults),
-        'linkages': [_linkage_json(member) for member in scene.linkages],
+        'linkages': [_linkage_json(scene_linkage) for scene_linkage in scene.linkages],
     }
 
 

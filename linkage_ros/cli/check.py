@@ -112,8 +112,8 @@ def linkage_json(
     )
     sides = sides_at(closure, closure.close_unlimited(*usual_inputs(closure)))
     examined: dict[str, Any] = {}
-    for number, part in enumerate(parts):
-        advance(number, len(parts))
+    for index, part in enumerate(parts):
+        advance(index, len(parts))
         examined |= part(closure, sweep)
     return {
         'moving_links': len(linkage.links) - 1,
@@ -145,7 +145,7 @@ def linkage_json(
             for name, limits in linkage.limits.items()
         ],
         'unwrapped': _counts_turns(closure),
-        'groups': [_group_json(closure, number, sides) for number in range(len(structure.groups))],
+        'groups': [_group_json(closure, index, sides) for index in range(len(structure.groups))],
         'four_bars': [
             {
                 'group': bar.group + 1,
@@ -248,7 +248,7 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
     """Return for each iterated group the other assemblies that a pose could name."""
     pose = closure.linkage.pose
     groups = []
-    for number, group in enumerate(closure.structure.groups):
+    for index, group in enumerate(closure.structure.groups):
         if not isinstance(group, Iterated) or pose is None:
             continue
         # local import: it loads numpy
@@ -256,7 +256,7 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
 
         groups.append(
             {
-                'group': number + 1,
+                'group': index + 1,
                 'starts': STARTS,
                 'inputs': list(pose.inputs),
                 'assemblies': [
@@ -267,7 +267,7 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
                         },
                         'turns': one.turns,
                     }
-                    for one in other_assemblies(closure, number)
+                    for one in other_assemblies(closure, index)
                 ],
             }
         )

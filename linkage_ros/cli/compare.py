@@ -61,7 +61,7 @@ class BagDifferences:
         self.end = 0
         """Time of the last of them, in [ns]."""
         self.positions: list[str] = []
-        """The joints of `curves`, once a state was compared."""
+        """The joints of `difference_curves`, once a state was compared."""
         self._turning, self._wrapped = turning, wrapped
         self._curves: DecimatedCurves | None = None
         self._rows: list[tuple[int, list[float]]] = []
@@ -240,8 +240,8 @@ def _draw_differences(
         for turns, unit, scale in kinds
         if (
             columns := [
-                number
-                for number, name in enumerate(differences.positions)
+                index
+                for index, name in enumerate(differences.positions)
                 if turning.get(name, True) == turns
             ]
         )

@@ -122,8 +122,8 @@ def _run_companions(scene: Scene, seconds: float) -> Iterator[None]:
             command,
             start_new_session=True,  # Ctrl-C goes to this process only, which ends the others
         )
-        for member in scene.linkages
-        if (command := _companion_command(member, seconds))
+        for scene_linkage in scene.linkages
+        if (command := _companion_command(scene_linkage, seconds))
     ]
     try:
         yield
@@ -157,5 +157,7 @@ def _fault_text(name: str, fault: Fault) -> str:
 def _scene_row(file: Path) -> tuple[str, ...]:
     """Return the list's text on a scene: its drives, and its own description."""
     scene = load_scene(file)
-    drives = ' and '.join(dict.fromkeys(member.drive[0] for member in scene.linkages))
+    drives = ' and '.join(
+        dict.fromkeys(scene_linkage.drive[0] for scene_linkage in scene.linkages)
+    )
     return scene.name, drives, 'yes' if scene.record else 'no', first_sentence(file)

@@ -103,7 +103,7 @@ def _draw_assemblies(arguments: argparse.Namespace) -> int:
     if arguments.at:
         pose = read_inputs(first.linkage, arguments.at[0], '--at')
         closed = [each for each in found if each.position(*pose).joints]
-        # If it closes in no assembly there, `view` says so.
+        # If it closes in no assembly there, `prepare_view` says so.
         views = [prepare_view(each, pose) for each in closed or [first]]
     else:
         pose = usual_inputs(first)

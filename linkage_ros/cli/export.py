@@ -162,7 +162,7 @@ def rows_of(
     source: ExportSource, keys: Sequence[Key], report_progress: ProgressCallback
 ) -> Iterator[Row]:
     """Yield the rows of a bag: the first four columns, and the numbers under these keys."""
-    places = {key: 4 + number for number, key in enumerate(keys)}
+    places = {key: 4 + index for index, key in enumerate(keys)}
     placed: dict[tuple[Key, ...], tuple[int, ...]] = {}
     blank: Row = [None] * len(keys)
     begin: int | None = None

@@ -222,7 +222,10 @@ def _input_text(value: float, given: dict[str, str], angles: AngleUnit) -> str:
 def _compression_text(found: dict[str, Any]) -> str:
     if found['name'] == 'none':
         return 'none'
-    return f'{escape_unprintable(found["name"])}, {found["content_bytes"]} bytes in {found["stored_bytes"]}'
+    return (
+        f'{escape_unprintable(found["name"])}, {found["content_bytes"]} bytes in '
+        f'{found["stored_bytes"]}'
+    )
 
 
 def _version_texts(versions: dict[str, Any]) -> Iterator[str]:

@@ -135,7 +135,7 @@ class ReplayBag:
         if counterfactual.suppresses_ticks:
             topics.append(('withheld_topic', names.withheld, _TIME, QosProfile()))
         self._counterfactual = counterfactual
-        self._numbers = {key: number for number, (key, *_) in enumerate(topics)}
+        self._numbers = {key: index for index, (key, *_) in enumerate(topics)}
         self._first_extra = len(topics)
         named = {key: name for key, name, _, _ in topics}
         described = [_describe_topic(bag, name, kind, qos) for _, name, kind, qos in topics]

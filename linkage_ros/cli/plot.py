@@ -99,8 +99,8 @@ def draw_bag(
     bag = open_bag(bag_path, stop)
     scene = scene_of(bag, trust_effects=trust_effects)
     # The x axis is the crank of the first linkage; its joints are drawn.
-    member = scene.linkages[0]
-    reader = JointStateReader(member.joint_names)
+    scene_linkage = scene.linkages[0]
+    reader = JointStateReader(scene_linkage.joint_names)
     times: list[int] = []
     cranks: list[Values] = []
     positions: list[Values] = []
@@ -126,13 +126,15 @@ def draw_bag(
     gaps = is_after_gap(seconds, steady=scene.rate > 0.0)
     if over_time:
         recorded_joints = cranks, positions, rates
-        joints, joint_rates = curves_over_time(member.linkage, seconds, *recorded_joints, gaps)
+        joints, joint_rates = curves_over_time(
+            scene_linkage.linkage, seconds, *recorded_joints, gaps
+        )
     else:
-        joints, joint_rates = crank_curves(member.linkage, cranks, positions, rates, gaps)
+        joints, joint_rates = crank_curves(scene_linkage.linkage, cranks, positions, rates, gaps)
     if not joints:
         raise BagError(bag_path, 'holds no joint but its crank', 'name another bag')
     title = f'{scene.name}: {len(positions)} joint states'
-    driven = None if over_time else member.linkage.inputs[0]
+    driven = None if over_time else scene_linkage.linkage.inputs[0]
     _paint_curves(title, driven, joints, joint_rates, picture)
 
 
@@ -162,7 +164,7 @@ def curves_over_time(
     rates: Sequence[Values],
     gaps: Bools,
 ) -> tuple[list[Curve], list[Curve]]:
-    """Return crank and joints over the times, and the joints' rates; see `curves`."""
+    """Return crank and joints over the times, and the joints' rates; see `crank_curves`."""
     driven = linkage.inputs[0]
     named = {
         name: (isinstance(joint, RevoluteJoint), [values[place] for values in positions])
@@ -285,8 +287,8 @@ def _paint_curves(
         grid = figure.add_gridspec(len(parts), 1)
         drawn = []
         in_degrees = driven is not None and not driven.slider
-        for number, part in enumerate(parts):
-            panels = joint_axes(grid[number], part)
+        for index, part in enumerate(parts):
+            panels = joint_axes(grid[index], part)
             drawn.append((panels, part, plot_joints(panels, part, degrees_x=in_degrees)))
             for axes in panels.values() if part is rates else ():
                 axes.yaxis.set_major_locator(AutoLocator())

@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Recover the bag; return 0 without loss, 3 with losses, 1 if stopped."""
-    # A signal within a record would cut it; `recover` asks the event.
+    # A signal within a record would cut it; `recover_bag` asks the event.
     with heed_signals(), show_progress('bytes') as advance:
         folder = output_or(arguments, recovered_name(arguments.bag))
         remove_bag(folder, force=arguments.force)

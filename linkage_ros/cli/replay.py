@@ -395,7 +395,8 @@ def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path |
         return
     raise LinkageError(
         scene.linkages[0].content.file,
-        f'publishes {list_names(scene.joint_names)}, and {bag.path} holds {list_names(recorded.joint_names)}: '
+        f'publishes {list_names(scene.joint_names)}, and {bag.path} holds '
+        f'{list_names(recorded.joint_names)}: '
         'nothing to compare',
         'write a new bag with -o',
     )

@@ -128,7 +128,7 @@ def _current_state(
     tick = loop.counts.last_tick
     age = 'no crank'
     values: list[tuple[str, float, float | None]] = []
-    for line, (crank, position, _, reading) in zip(
+    for linkage, (crank, position, _, reading) in zip(
         loop.pipeline.linkages, tick.full_states if tick else (), strict=False
     ):
         if crank is None or position is None:
@@ -138,13 +138,13 @@ def _current_state(
             if position.status is Status.OPEN:
                 age += f', gap {position.gap:.3g} m'
             continue
-        member = line.scene_linkage
+        scene_linkage = linkage.scene_linkage
         age = f'{crank.age * 1e-6:.2f} ms'
-        if not set(member.input_names) <= set(member.joint_names):
-            values += zip(member.input_names, crank.angles, crank.rates, strict=True)
+        if not set(scene_linkage.input_names) <= set(scene_linkage.joint_names):
+            values += zip(scene_linkage.input_names, crank.angles, crank.rates, strict=True)
         if reading is not None:
             rates = reading.rates or [None] * len(reading.joints)
-            values += zip(member.joint_names, reading.joints, rates, strict=True)
+            values += zip(scene_linkage.joint_names, reading.joints, rates, strict=True)
     return age, [_shown_joint(*each, turning[each[0]], angles) for each in values[:_MOST_SHOWN]]
 
 

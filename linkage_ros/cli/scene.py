@@ -85,7 +85,7 @@ def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Termi
 
 def _scene_facts(scene: Scene) -> Iterator[tuple[str, str]]:
     if scene.linkages[0].name:
-        yield 'linkages', _shorten_list([member.name for member in scene.linkages])
+        yield 'linkages', _shorten_list([scene_linkage.name for scene_linkage in scene.linkages])
     joints = list(scene.joint_names)
     yield 'joints', _shorten_list(joints)
     rate = f'{scene.rate:g} a second' if scene.rate else 'one for every crank sample'
@@ -106,7 +106,10 @@ def _solver_facts(linkages: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
         if line.solver_choice is not None:
             yield (
                 'solver',
-                f'{name}for an accuracy of {line.scene_linkage.accuracy:g}: {line.solver_choice.why}',
+                (
+                    f'{name}for an accuracy of {line.scene_linkage.accuracy:g}: '
+                    f'{line.solver_choice.why}'
+                ),
             )
         elif line.scene_linkage.solver is not None:
             solver, parameters = line.scene_linkage.solver
@@ -150,9 +153,9 @@ def _list_stages(linkage: LinkagePipeline) -> Iterator[Stage]:
 
 
 def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
-    for number, stage in enumerate(_list_stages(line)):
+    for index, stage in enumerate(_list_stages(line)):
         yield (
-            str(number),
+            str(index),
             stage.name,
             stage.where,
             first_docstring_line(type(stage.parameters)),

@@ -269,8 +269,10 @@ def _revolute_joints(scene: Scene) -> dict[str, bool]:
     """Return whether each joint turns, by its name in messages."""
     return {
         joint: turns
-        for member in scene.linkages
-        for joint, turns in zip(member.joint_names, member.closure.turning, strict=True)
+        for scene_linkage in scene.linkages
+        for joint, turns in zip(
+            scene_linkage.joint_names, scene_linkage.closure.turning, strict=True
+        )
     }
 
 
@@ -283,9 +285,9 @@ def _runs_table(
     heads = ['run', *keys, 'ticks', 'messages', *_statistics_headings(scene, columns)]
     nothing = Statistics(nan, nan, nan, nan)
     rows: list[list[float | int | None]] = []
-    for number, settings in enumerate(runs):
-        outcome = found[number]
-        row: list[float | int | None] = [number + 1, *(value for _, value in settings)]
+    for index, settings in enumerate(runs):
+        outcome = found[index]
+        row: list[float | int | None] = [index + 1, *(value for _, value in settings)]
         row += [outcome.ticks, outcome.messages]
         for column in columns:
             row += outcome.statistics.get(column, nothing)
@@ -316,9 +318,9 @@ def _draw_runs(scene: Scene, seconds: float, found: Mapping[int, Outcome], pictu
         spread.JointSpread(
             joint,
             'rad' if turning[joint] else 'm',
-            np.array([outcome.positions[number] for outcome in good]),
+            np.array([outcome.positions[index] for outcome in good]),
         )
-        for number, joint in enumerate(scene.joint_names)
+        for index, joint in enumerate(scene.joint_names)
     ]
     title = f'{scene.name}: {len(good)} runs of {seconds:g} s'
     spread.draw_spread(title, seconds, joints, picture)

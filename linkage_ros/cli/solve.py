@@ -172,9 +172,9 @@ def _forward_table(
     question = _read_question(closure, arguments)
     rows = []
     with show_progress('states solved') as advance:
-        for number, given in enumerate(question.inputs):
-            if number % _TOLD == 0:
-                advance(number, len(question.inputs))
+        for index, given in enumerate(question.inputs):
+            if index % _TOLD == 0:
+                advance(index, len(question.inputs))
             rows.append(_state_row(closure, question, given))
     _show_reach(closure, question.inputs[: len(arguments.at)], arguments.angles)
     return list(_output_columns(closure, question)), rows

@@ -56,8 +56,8 @@ def print_tables(*tables: TerminalTable) -> None:
         for table in map(_clean_table, tables)
         for part in (fold_table(table, width) if width else [table])
     ]
-    for number, table in enumerate(shown):
-        if number:
+    for index, table in enumerate(shown):
+        if index:
             print()
         _print_table(table, width)
 
@@ -93,12 +93,12 @@ def fold_table(table: TerminalTable, width: int) -> list[TerminalTable]:
     columns = list(zip(_column_heads(table), *table.rows, strict=True))
     narrow = [_column_width(cells, _NARROWEST) for cells in columns]
     blocks: list[list[int]] = [[0]]
-    for number in range(1, len(columns)):
+    for index in range(1, len(columns)):
         block = blocks[-1]
-        if len(block) > 1 and _framed_width([narrow[i] for i in [*block, number]]) > width:
+        if len(block) > 1 and _framed_width([narrow[i] for i in [*block, index]]) > width:
             block = [0]
             blocks.append(block)
-        block.append(number)
+        block.append(index)
     tables: list[TerminalTable] = []
     for block in blocks:
         most = max(_column_width(columns[i]) for i in block)
@@ -252,11 +252,11 @@ def clean_output() -> None:
 
     What the encoding of a terminal cannot show is escaped. A stream that is closed shows nothing.
     """
-    for number, name in enumerate(('stdin', 'stdout', 'stderr')):
+    for index, name in enumerate(('stdin', 'stdout', 'stderr')):
         if getattr(sys, name) is None:
             # A file that is opened later must not get the number of a standard stream.
             os.open(os.devnull, os.O_RDWR)
-            opened = open(number, 'w' if number else 'r', closefd=False)  # noqa: SIM115
+            opened = open(index, 'w' if index else 'r', closefd=False)  # noqa: SIM115
             setattr(sys, name, opened)
             setattr(sys, f'__{name}__', opened)
     for stream in (sys.stdout, sys.stderr):

@@ -161,7 +161,7 @@ class _Pages:
         if data != self._data:
             found = build_model(data.decode(), self._shown.name)
             scene = self._shown.scene[0] if self._shown.scene else None
-            can_save = self._file is not None and self._file.writable
+            can_save = self._file is not None and self._file.is_writable
             self._page = page_html(found, mode='edit', can_save=can_save, scene=scene)
             self._data = data
         return self._page
@@ -193,7 +193,7 @@ def _serve_page(
     arguments: argparse.Namespace, stop: Event, name: str, page: Any, *routes: Any
 ) -> int:
     from linkage_ros.view.server import serve
-    from linkage_ros.view.worker import report_line as report_line
+    from linkage_ros.view.worker import report_line
 
     def announce_address(address: str) -> None:
         print(escape_unprintable(f'{name}: {address}'), flush=True)

@@ -154,9 +154,9 @@ def range_motion(shown: LinkageView, title: str, seconds: float) -> AnimatedMoti
         if not position.joints:
             continue
         found = link_frames(shown.closure, position)
-        for number, link in enumerate(links):
+        for index, link in enumerate(links):
             place, angle = found[link]
-            frames[i, number] = place.real, place.imag, angle
+            frames[i, index] = place.real, place.imag, angle
     joints = shown.sweep.joints
     return AnimatedMotion(
         title,
@@ -265,10 +265,10 @@ class _MovingPicture:
         ]
         self.dots = [
             self.panels[joint.turning].plot(
-                [self.mark_x(0)], [self.joint_y(0, number)], 'o', markersize=4.0,
+                [self.mark_x(0)], [self.joint_y(0, index)], 'o', markersize=4.0,
                 color=lines[joint.name].get_color(), clip_on=False, zorder=LAYERS['label'],
             )[0]
-            for number, joint in enumerate(motion.joints)
+            for index, joint in enumerate(motion.joints)
         ]  # fmt: skip
         self.figure.draw_without_rendering()  # only now the axes have a size
         label_joints(self.panels, motion.joints, lines)
@@ -300,8 +300,8 @@ class _MovingPicture:
         from matplotlib.transforms import Affine2D
 
         moves = {}
-        for number, link in enumerate(self.motion.links):
-            x, y, angle = self.motion.frames[i, number]
+        for index, link in enumerate(self.motion.links):
+            x, y, angle = self.motion.frames[i, index]
             if isnan(x):
                 continue
             place, made = self.origin[link]
@@ -315,8 +315,8 @@ class _MovingPicture:
                 artist.set_transform(moves[link] + self.plane.transData)
         for mark in self.marks:
             mark.set_xdata([self.mark_x(i)] * 2)
-        for number, dot in enumerate(self.dots):
-            dot.set_data([self.mark_x(i)], [self.joint_y(i, number)])
+        for index, dot in enumerate(self.dots):
+            dot.set_data([self.mark_x(i)], [self.joint_y(i, index)])
 
     def render_pixels(self) -> Any:
         """
@@ -404,10 +404,10 @@ def _encode_svg(scene: _MovingPicture, advance: Advance) -> bytes:
     motion = scene.motion
     moving = [(link, artist) for link, artist in scene.parts if link != GROUND]
     marks = (*scene.marks, *scene.dots)
-    for number, (_, artist) in enumerate(moving):
-        artist.set_gid(f'part{number}')
-    for number, artist in enumerate(marks):
-        artist.set_gid(f'mark{number}')
+    for index, (_, artist) in enumerate(moving):
+        artist.set_gid(f'part{index}')
+    for index, artist in enumerate(marks):
+        artist.set_gid(f'mark{index}')
     buffer = BytesIO()
     scene.figure.savefig(buffer, format='svg', metadata={'Date': None})
     ET.register_namespace('', _SVG[1:-1])
@@ -420,16 +420,16 @@ def _encode_svg(scene: _MovingPicture, advance: Advance) -> bytes:
     keys, times = [*keys, 0 if motion.repeats else count - 1], [*times, 100.0]
     rules = [_STYLE.format(seconds=count / RATE)]
     firsts = {}
-    for number, link in enumerate(motion.links):
-        x, y, angle = motion.frames[keys, number].T
+    for index, link in enumerate(motion.links):
+        x, y, angle = motion.frames[keys, index].T
         turns = np.full(len(keys), nan)
         known = np.isfinite(angle)
         turns[known] = -np.degrees(np.unwrap(angle[known] - scene.origin[link].angle))
         places = scene.svg_places(scene.plane, x, y)
-        rule, firsts[link] = _keyframe_rules(f'link{number}', times, places, turns)
+        rule, firsts[link] = _keyframe_rules(f'link{index}', times, places, turns)
         rules.append(rule)
-    for number, (link, _) in enumerate(moving):
-        group = groups[f'part{number}']
+    for index, (link, _) in enumerate(moving):
+        group = groups[f'part{index}']
         origin = scene.origin[link].place
         ((x, y),) = scene.svg_places(scene.plane, [origin.real], [origin.imag])
         inner = ET.Element(f'{_SVG}g')
@@ -438,21 +438,21 @@ def _encode_svg(scene: _MovingPicture, advance: Advance) -> bytes:
         group[:] = [inner]
         group.set('class', f'moving link{motion.links.index(link)}')
         group.set('transform', firsts[link])
-        advance(number + 1, len(moving))
+        advance(index + 1, len(moving))
     across = [scene.mark_x(key) for key in keys]
     # The mark does not run back when the next turn begins.
     jumps = np.abs(np.diff(across, append=across[-1])) > 0.5 * np.ptp(across)
     panels = [*scene.panels.values(), *(scene.panels[joint.turning] for joint in motion.joints)]
-    for number, (panel, mark) in enumerate(zip(panels, marks, strict=True)):
-        joint = number - len(scene.marks)
+    for index, (panel, mark) in enumerate(zip(panels, marks, strict=True)):
+        joint = index - len(scene.marks)
         up = [scene.joint_y(key, joint) if joint >= 0 else 0.0 for key in keys]
         places = scene.svg_places(panel, across, up)
         x, y = mark.get_data()
         places -= scene.svg_places(panel, [x[0]], [y[0] if joint >= 0 else 0.0])
-        rule, first = _keyframe_rules(f'at{number}', times, places, np.zeros(len(keys)), jumps)
+        rule, first = _keyframe_rules(f'at{index}', times, places, np.zeros(len(keys)), jumps)
         rules.append(rule)
-        groups[f'mark{number}'].set('class', f'moving at{number}')
-        groups[f'mark{number}'].set('transform', first)
+        groups[f'mark{index}'].set('class', f'moving at{index}')
+        groups[f'mark{index}'].set('transform', first)
     style = ET.SubElement(tree, f'{_SVG}style')
     style.text = ''.join(rules)
     return bytes(ET.tostring(tree, encoding='utf-8', xml_declaration=True))

@@ -88,9 +88,9 @@ def links_dxf(closure: Closure, *, width: float | None = None, hole: float | Non
     boxes = [bounding_corners(part.corners) for part in parts]
     sizes = [top - low + 2.0 * margin for low, top in boxes]
     place = 0j
-    for number, (part, (low, _), size) in enumerate(zip(parts, boxes, sizes, strict=True)):
-        if number % _ROW == 0:
-            tallest = max(each.imag for each in islice(sizes, number, number + _ROW))
+    for index, (part, (low, _), size) in enumerate(zip(parts, boxes, sizes, strict=True)):
+        if index % _ROW == 0:
+            tallest = max(each.imag for each in islice(sizes, index, index + _ROW))
             place = complex(0.0, place.imag - tallest - 2.0 * wide)
         _draw_part(space, part, place - low + margin, 0.0, wide, bore)
         text = space.add_text(dxf_text(part.name), height=wide / 3.0, dxfattribs={'layer': 'NAME'})
@@ -141,19 +141,15 @@ def _draw_part(
         return place + point * rect(1.0, angle)
 
     attributes = {'layer': layer or 'CUT'}
-    space.add_lwpolyline(
-        _part_outline([place_point(corner) for corner in part.corners], wide / 2.0), format='xyb', close=True,
-        dxfattribs=attributes,
-    )  # fmt: skip
+    outline = _part_outline([place_point(corner) for corner in part.corners], wide / 2.0)
+    space.add_lwpolyline(outline, format='xyb', close=True, dxfattribs=attributes)
     attributes = {'layer': layer or 'HOLE'}
     for hole in part.holes:
         centre = place_point(hole)
         space.add_circle((centre.real, centre.imag), bore / 2.0, dxfattribs=attributes)
     for start, end in part.slots:
-        space.add_lwpolyline(
-            _part_outline(convex_hull([place_point(start), place_point(end)]), bore / 2.0), format='xyb', close=True,
-            dxfattribs=attributes,
-        )  # fmt: skip
+        outline = _part_outline(convex_hull([place_point(start), place_point(end)]), bore / 2.0)
+        space.add_lwpolyline(outline, format='xyb', close=True, dxfattribs=attributes)
 
 
 def _part_outline(places: Sequence[complex], radius: float) -> list[tuple[float, float, float]]:
@@ -162,9 +158,9 @@ def _part_outline(places: Sequence[complex], radius: float) -> list[tuple[float,
         centre = places[0]
         return [(centre.real - radius, centre.imag, 1.0), (centre.real + radius, centre.imag, 1.0)]
     vertices = []
-    for number, corner in enumerate(places):
-        coming = phase(corner - places[number - 1])
-        going = phase(places[(number + 1) % len(places)] - corner)
+    for index, corner in enumerate(places):
+        coming = phase(corner - places[index - 1])
+        going = phase(places[(index + 1) % len(places)] - corner)
         turn = (going - coming) % tau
         if turn < _FLATTEST:
             turn = 0.0

@@ -32,7 +32,13 @@ from linkage_ros.drawing.painting import (
 )
 from linkage_ros.kinematics.curves import Curve
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.pose_view import all_places, pose_text, SAME_ANGLE, symbol_size, View
+from linkage_ros.kinematics.pose_view import (
+    all_places,
+    LinkageView,
+    pose_text,
+    SAME_ANGLE,
+    symbol_size,
+)
 from linkage_ros.kinematics.shapes import (
     bounding_corners,
     Circle,
@@ -144,21 +150,21 @@ def assemblies_picture(views: Mapping[str, LinkageView], file: Path) -> None:
 
 def paint_background(axes: Any, shown: LinkageView) -> None:
     """Paint poses in light grey, and the paths of the traced points dashed."""
-    for number, position in enumerate(shown.ghosts):
+    for index, position in enumerate(shown.ghosts):
         for line in draw_skeleton(shown.closure, position):
             plot_places(
                 axes,
                 (line.start, line.end),
                 color=GHOST,
-                alpha=1.0 - 0.75 * number / len(shown.ghosts),  # the later, the paler
+                alpha=1.0 - 0.75 * index / len(shown.ghosts),  # the later, the paler
                 linewidth=1.0,
                 marker='o',
                 markersize=2.0,
                 zorder=LAYERS['ghost'],
             )
     points = shown.closure.points(shown.position)
-    for number, (name, path) in enumerate(shown.sweep.paths.items()):
-        colour = COLOURS[number % len(COLOURS)]
+    for index, (name, path) in enumerate(shown.sweep.paths.items()):
+        colour = COLOURS[index % len(COLOURS)]
         plot_places(
             axes,
             path,
@@ -185,11 +191,11 @@ def plot_joints(
     from matplotlib.ticker import MultipleLocator  # local import: an extra, and slow to load
 
     lines = {}
-    for number, joint in enumerate(joints):
+    for index, joint in enumerate(joints):
         (lines[joint.name],) = panels[joint.turning].plot(
             [degrees(x) for x in joint.x] if degrees_x else joint.x,
             [degrees(y) for y in joint.y] if joint.turning else joint.y,
-            color=COLOURS[number % len(COLOURS)],
+            color=COLOURS[index % len(COLOURS)],
             linewidth=1.3,
             label=picture_text(joint.name, 40),
         )

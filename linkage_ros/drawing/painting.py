@@ -75,10 +75,10 @@ def place_labels(
         )
     # The first ones did not know the others.
     for _ in range(_ROUNDS):
-        for number, label in enumerate(labels):
+        for index, label in enumerate(labels):
             pairs = enumerate(zip(labels, placed, strict=True))
-            others = [pair for other, pair in pairs if other != number]
-            placed[number] = _best_place(label, obstacles, frame, others)
+            others = [pair for other, pair in pairs if other != index]
+            placed[index] = _best_place(label, obstacles, frame, others)
     return placed
 
 

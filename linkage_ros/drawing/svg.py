@@ -85,8 +85,8 @@ def svg(shown: Closure | Position) -> str:
         for ghost in seen.ghosts
         for bar in draw_skeleton(closure, ghost)
     ]
-    for number, path in enumerate(seen.sweep.paths.values()):
-        colour = COLOURS[number % len(COLOURS)]
+    for index, path in enumerate(seen.sweep.paths.values()):
+        colour = COLOURS[index % len(COLOURS)]
         lines.append(polyline_svg(path, f'stroke="{colour}" stroke-dasharray="5 2"'))
     for shape in drawn:
         if isinstance(shape, Polygon):

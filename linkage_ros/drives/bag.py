@@ -83,7 +83,7 @@ class BagSamples:
         self.rejected = Counter()
 
     def add(self, log_time: int, message: bytes) -> None:
-        """Add a serialized message, or count the reason for its rejection; see `settle`."""
+        """Add a message, or count the reason for its rejection; see `sort_and_check`."""
         sample = self._read(message)
         if isinstance(sample, Rejection):
             self.rejected[sample] += 1
@@ -138,7 +138,7 @@ def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -
         The topic; '' for the topic that the run's account in the bag names or, without an account,
         for the only topic with good samples.
     use, context
-        As for `Samples`.
+        As for `BagSamples`.
 
     Raises
     ------
@@ -172,7 +172,8 @@ def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -
         )
     raise BagError(
         bag.path,
-        f'holds no crank sample of {list_names(context.inputs_in_messages)}{_rejection_text(samples_of)}',
+        'holds no crank sample of '
+        f'{list_names(context.inputs_in_messages)}{_rejection_text(samples_of)}',
         'name another bag, or its topic as drive.bag.topic',
     )
 

@@ -187,11 +187,11 @@ def build_clocked(
             f'leave one of them out: it then takes the values beside {where}.inputs',
         )
     curves = []
-    for number, name in enumerate(names):
+    for index, name in enumerate(names):
         of, key = (inputs[name], f'{where}.inputs.{name}') if name in inputs else (use, where)
         curves.append(curve(of, key))
         if context.hard_limited.bounds:
-            refuse_beyond(context.hard_limited, number, key, curves[-1](0)[0], extent(of))
+            refuse_beyond(context.hard_limited, index, key, curves[-1](0)[0], extent(of))
     return ClockedDrive(tuple(curves))
 
 

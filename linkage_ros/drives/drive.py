@@ -124,7 +124,7 @@ class Drive(Protocol):
         ----------
         inputs
             Number of inputs of the linkage.
-        leave
+        bail_out
             Statement that leaves the lines where there is no crank state.
 
         """
@@ -133,7 +133,7 @@ class Drive(Protocol):
 
 
 def describe_chatter(steps: int) -> str:
-    """Return a line on the steps that `Drive.chattered` counts."""
+    """Return a line on the steps that `Drive.chatter_count` counts."""
     return (
         f'drive.torque.play: motor and crank met and parted too often in {steps} steps, at whose '
         'ends the play was closed; shorten the step, or look at the controller'

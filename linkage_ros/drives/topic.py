@@ -185,7 +185,7 @@ class TopicDrive(Drive):
         self._estimate = use.acceleration == 'differenced'
         self._bend = -tau * use.cutoff
         self._needs_rate = needs_rate or use.carry_forward or self._estimate
-        self._sliding = {number for number, given in enumerate(inputs) if given.slider}
+        self._sliding = {index for index, given in enumerate(inputs) if given.slider}
         self._last: tuple[int, _Values] | None = None
         """Stamp and angles of the newest good sample."""
         self.sample = None
@@ -257,8 +257,8 @@ class TopicDrive(Drive):
         seconds = (stamp - before) * 1e-9
         return tuple(
             [
-                (way if number in self._sliding else remainder(way, tau)) / seconds
-                for number, way in enumerate(ways)
+                (way if index in self._sliding else remainder(way, tau)) / seconds
+                for index, way in enumerate(ways)
             ]
         )
 

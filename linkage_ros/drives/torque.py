@@ -218,7 +218,7 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         motion = motor.mount_on(motion)
         if parameters.motor.command != 'effort':
             most = LARGEST
-    start = motion.at(parameters.start, parameters.rate)
+    start = motion.state_at(parameters.start, parameters.rate)
     if start is None:
         raise DefinitionError(
             'drive.torque.start',
@@ -396,7 +396,7 @@ class TorqueDrive(Drive):
     Parameters
     ----------
     mechanism
-        What moves: `OneFreedom`, or `linkage_ros.dynamics.two_masses.TwoMasses`.
+        What moves: `SingleDofMechanism`, or `linkage_ros.dynamics.two_masses.TwoMasses`.
     start
         Its state at the first tick.
     use

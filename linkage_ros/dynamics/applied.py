@@ -72,11 +72,11 @@ class JointCoordinate(NamedTuple):
 def joint_coordinate(closure: Closure, name: str) -> JointCoordinate:
     """Return a driven or published joint of a linkage by its name."""
     linkage = closure.linkage
-    for number, given in enumerate(linkage.inputs):
+    for index, given in enumerate(linkage.inputs):
         if given.joint == name:
             unit = closure.scale if given.slider else 1.0
             names = (given.slider, '', '') if given.slider else ('', given.child, given.parent)
-            return JointCoordinate(number, True, not given.slider, *names, 1 + number, 0, unit)
+            return JointCoordinate(index, True, not given.slider, *names, 1 + index, 0, unit)
     joint = linkage.joints[name]
     place = list(linkage.joints).index(name)
     if isinstance(joint, RevoluteJoint):
@@ -281,8 +281,8 @@ class AppliedForces:
         """Yield inertia, and the lever of each spring and of each touched stop, over the range."""
         low, high = between
         before: dict[str, float] = {}
-        for number in range(_SAMPLES + 1):
-            value = low + (high - low) * number / _SAMPLES
+        for index in range(_SAMPLES + 1):
+            value = low + (high - low) * index / _SAMPLES
             inert, position = inertia(value), self._closure.position(value)
             if not (inert > 0.0 and position.status.has_rates):
                 continue
@@ -343,7 +343,7 @@ class AppliedForces:
         return energy
 
     def _joined_law(self, law: Law) -> Callable[..., tuple[float]]:
-        """Return a law as one function of value, rate and perhaps time, which may be `called`."""
+        """Return a law as one function of value, rate and perhaps time, which may be `call`."""
 
         def force(value: float, rate: float, time: float | None = None) -> tuple[float]:
             now = self.seconds if time is None else time

@@ -110,7 +110,7 @@ class Contact:
     high: float
     stiffness: float  # k, in [N·m/rad] or [N/m]
     damping: float  # c, in [N·m·s/rad] or [N·s/m]
-    middle: float | None = None  # As in `Table`
+    middle: float | None = None  # As in `TorqueTable`
 
     def segment(self, value: float, rate: float, _time: float) -> int:
         """Return -1 at the lower stop, 1 at the upper one, or 0."""
@@ -174,7 +174,7 @@ class Stribeck:
         return self.excess / self.rate * sqrt(2.0 / e)
 
     def force_at(self, rate: float) -> tuple[float]:
-        """Return the force at a rate, for `linkage_ros.kinematics.arithmetic.called`."""
+        """Return the force at a rate, for `linkage_ros.kinematics.arithmetic.call`."""
         return (self.force(self.segment(0.0, rate, 0.0), 0.0, rate, 0.0),)
 
 

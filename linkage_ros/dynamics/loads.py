@@ -339,7 +339,8 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
     if friction and friction.holds and friction.load_dependent_joint:
         raise DefinitionError(
             'effects.friction.holds',
-            f'at rest the force in {quote(friction.load_dependent_joint)} has no certain value, and neither '
+            f'at rest the force in {quote(friction.load_dependent_joint)} has no certain value, '
+            'and neither '
             'has its friction',
             'leave it out, or write breakaway instead of coefficient',
         )

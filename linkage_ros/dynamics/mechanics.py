@@ -225,7 +225,7 @@ class Mechanics:
         """
         Return the equation of motion of a linkage with one input, as a function of the input.
 
-        Its results equal `terms` at the position to the last bit; it is straight-line code.
+        Its results equal `motion_terms` at the position to the last bit; it is straight-line code.
         """
         compiled = Compiled(self.closure, 0, self._wanted_terms, within_limits=False)
         fast, position, terms = compiled.fast, self.closure.position, self.motion_terms
@@ -422,7 +422,7 @@ class Mechanics:
 
     def _find_friction_joints(self) -> Iterator[FrictionJoint]:
         closure = self.closure
-        for number, joint in enumerate(closure.structure.joints):
+        for index, joint in enumerate(closure.structure.joints):
             friction = self.friction.joints.get(joint.name)
             if friction is None:
                 continue
@@ -436,7 +436,7 @@ class Mechanics:
                 from linkage_ros.dynamics.laws import Stribeck  # local import: only with it
 
                 law = Stribeck(friction.breakaway_excess, friction.stribeck)
-            yield FrictionJoint(number, friction, one, other, factor, law)
+            yield FrictionJoint(index, friction, one, other, factor, law)
 
 
 def _make_applied(closure: Closure, loads: Loads) -> AppliedForces | None:

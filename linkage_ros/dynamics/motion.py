@@ -464,9 +464,9 @@ class SingleDofMechanism:
     ) -> float:
         """Return the force of the laws on the input, in given segments or in the present ones."""
         force = 0.0
-        for number, (law, at) in enumerate(zip(self.laws, terms.laws, strict=True)):
+        for index, (law, at) in enumerate(zip(self.laws, terms.laws, strict=True)):
             moving = at.factor * rate
-            segment = segments[number] if segments else law.segment(at.value, moving, time)
+            segment = segments[index] if segments else law.segment(at.value, moving, time)
             force += at.lever * law.force(segment, at.value, moving, time)
         return force
 

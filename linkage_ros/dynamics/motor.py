@@ -145,7 +145,7 @@ class Motor:
 
     @staticmethod
     def at_rest(mechanism: Any, _motion: Any) -> tuple[float, float]:
-        """Return the effort at rest, and what the gear holds beyond that of `driven`."""
+        """Return the effort at rest, and what the gear holds beyond that of `drive_by`."""
         *_, law = getattr(mechanism, 'motor', mechanism).laws
         return law.resting, 0.0
 

@@ -118,7 +118,7 @@ def friction_effort(
     levers
         |ψ'| of each joint.
     pull, mobility
-        As of `frictions`.
+        As of `solve_frictions`.
 
     """
     count, numbers = len(unknowns), iter(forces)

@@ -23,8 +23,8 @@ Friction that grows with the force in its joint changes the forces: see
 
 A column of A is the effect of one unknown on each link (`JointMatrix`). By virtual work, a row of
 Aᵀ gives the displacement δ in a joint that small displacements Δ of the links cause: Aᵀ·Δ = δ.
-`Reactions.shift` solves this for Δ with the inputs held: how far play in a pin or the stretch of
-a link moves the linkage, to first order.
+`Reactions.joint_deflections` solves this for Δ with the inputs held: how far play in a pin or the
+stretch of a link moves the linkage, to first order.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ class JointMatrix:
     closure
         The linkage.
     centers
-        For each link that moves the index, among the places given to `at`, of the reference point
-        of its moments.
+        For each link that moves the index, among the places given to `matrix_at`, of the reference
+        point of its moments.
     places
         For each joint of the structure the index of its place; of a slider, of its point.
 
@@ -182,8 +182,8 @@ class JointMatrix:
     ) -> list[tuple[int, int, float]]:
         """Fill in the constant entries of the pins; return places, centres and factors."""
         pins = []
-        for number, (joint, sides) in enumerate(zip(joints, self.sides, strict=True)):
-            column = 2 * number
+        for index, (joint, sides) in enumerate(zip(joints, self.sides, strict=True)):
+            column = 2 * index
             if joint.kind == 'P':
                 self._fill_moment(sides, column + 1)
                 continue
@@ -193,7 +193,7 @@ class JointMatrix:
                     self._entry_index(row + 2, column),
                     self._entry_index(row + 2, column + 1),
                 )
-                pins.append((places[number], center, sign / self._scale))
+                pins.append((places[index], center, sign / self._scale))
         return pins
 
     def _plan_thrust(
@@ -277,7 +277,8 @@ class Reactions:
         if linkage.ratios:
             raise DefinitionError(
                 'effects',
-                f'forces in pins are not known with ratios ({list_names(linkage.ratios)}): the force '
+                f'forces in pins are not known with ratios ({list_names(linkage.ratios)}): the '
+                'force '
                 'between teeth, on a belt or a rack, is not computed',
                 'leave out pin forces, clearance, compliance, and friction by coefficient',
             )
@@ -364,11 +365,11 @@ class Reactions:
         forces, resistances = balance
         x, lines = position.state.coordinates, self._matrix.lines
         reactions: tuple[Reaction, ...] = ()
-        for number in range(len(self.joints)):
-            one, other = forces[2 * number], forces[2 * number + 1]
-            resisting = resistances[number]
-            if number in lines:
-                force = make_vector(-resisting, one) * lines[number].direction(x)
+        for index in range(len(self.joints)):
+            one, other = forces[2 * index], forces[2 * index + 1]
+            resisting = resistances[index]
+            if index in lines:
+                force = make_vector(-resisting, one) * lines[index].direction(x)
                 reaction = Reaction(force.real, force.imag, other * self._scale)
             else:
                 reaction = Reaction(one, other, 0.0 - resisting)
@@ -416,7 +417,7 @@ class Reactions:
         seconds
             Time since the first tick.
         pull, mobility
-            As of `linkage_ros.dynamics.pressed_joints.frictions`.
+            As of `linkage_ros.dynamics.pressed_joints.solve_frictions`.
 
         Returns
         -------
@@ -501,12 +502,12 @@ class Reactions:
         places, x = self._follower.places(position), position.state.coordinates
         matrix, lines = self._matrix.matrix_at(x, places), self._matrix.lines
         gaps = [0.0] * self._matrix.size
-        for number, offset in enumerate(offsets):
-            if number in lines:
-                across = 1j * lines[number].direction(x)
-                gaps[2 * number] = offset.real * across.real + offset.imag * across.imag
+        for index, offset in enumerate(offsets):
+            if index in lines:
+                across = 1j * lines[index].direction(x)
+                gaps[2 * index] = offset.real * across.real + offset.imag * across.imag
             else:
-                gaps[2 * number], gaps[2 * number + 1] = offset.real, offset.imag
+                gaps[2 * index], gaps[2 * index + 1] = offset.real, offset.imag
         moved = call(_solve_transposed, matrix, *gaps)
         if not has_result(moved):
             return None

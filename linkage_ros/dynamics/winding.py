@@ -170,7 +170,7 @@ class WoundMechanism:
 
     def state_at(self, value: float, rate: float) -> WoundMotion | None:
         """Return a state without a current, or None if there is none."""
-        moved = self.mechanism.at(value, rate)
+        moved = self.mechanism.state_at(value, rate)
         return None if moved is None else WoundMotion(moved, 0.0)
 
     def acceleration(

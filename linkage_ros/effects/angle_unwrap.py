@@ -11,7 +11,7 @@ Unwrap published angles beyond a turn, or wrap them.
 
 The closure gives an angle up to whole turns. `Continuous` adds the turns that bring it nearest to
 the last one, so an angle must move less than half a turn per tick. It comes before the sensors,
-which may then mix and quantise angles without regard to wrapping; `all_wrapped` comes after them.
+which may then mix and quantise angles without regard to wrapping; `wrap_all` comes after them.
 """
 
 from __future__ import annotations

@@ -79,8 +79,8 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
                 f'name pins: {list_names(sorted(pins))}',
             )
     plays = tuple(
-        (number, parameters.pins[joint.name])
-        for number, joint in enumerate(joints)
+        (index, parameters.pins[joint.name])
+        for index, joint in enumerate(joints)
         if joint.kind == 'R' and joint.name in parameters.pins
     )
     centred = (0j,) * len(joints)

@@ -105,10 +105,10 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
 def _make_bar(context: Context, link: str, stiffness: float) -> _Bar:
     closure = context.closure
     ends: dict[str, list[tuple[int, float]]] = {}
-    for number, joint in enumerate(closure.structure.joints):
+    for index, joint in enumerate(closure.structure.joints):
         if link in (joint.link, joint.to):
             _check_joint(link, joint)
-            ends.setdefault(joint.name, []).append((number, 1.0 if joint.link == link else -1.0))
+            ends.setdefault(joint.name, []).append((index, 1.0 if joint.link == link else -1.0))
     if len(ends) != 2:
         raise _bar_error(link, f'has the pins {list_names(ends)}')
     near, far = ends

@@ -218,7 +218,8 @@ class Encoder:
     Attributes
     ----------
     read_at_ticks
-        Whether the driver reads the counts at every tick; else only when `differenced` is called.
+        Whether the driver reads the counts at every tick; else only when `difference_rates` is
+        called.
 
     """
 

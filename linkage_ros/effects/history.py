@@ -152,7 +152,7 @@ class History:
         return _mix_readings(time, begin, before, self._times[at], after, self._with_rates)
 
     def arriving_reading(self, time: int, since: int) -> SensorReading | None:
-        """Return as `between`, and also the last reading before a gap, unchanged and once."""
+        """Return as `interpolate`, and also the last reading before a gap, unchanged and once."""
         return self.interpolate(time) or self._before_gap(time, since)
 
     def _before_gap(self, time: int, since: int) -> SensorReading | None:
@@ -197,7 +197,7 @@ def _mix_readings(
 
 
 def _interpolate_cubic(s: float, x0: float, x1: float, tangent0: float, tangent1: float) -> float:
-    """Return the value at s; `way0` and `way1` are the rates at the ends times the interval."""
+    """Return the value at s; the tangents are the rates at the ends times the interval."""
     step = x1 - x0
     more0, more1 = tangent0 - step, tangent1 - step
     line = x0 + s * step

@@ -146,14 +146,14 @@ def marker_shapes(
     pins = _pin_markers(pile, len(pin_places))
     traced = _traced_points(closure)
     trails = []
-    for number, name in enumerate(traced):
-        colour, scale = rgba(COLOURS[number % len(COLOURS)]), (0.35 * size, 0.0, 0.0)
+    for index, name in enumerate(traced):
+        colour, scale = rgba(COLOURS[index % len(COLOURS)]), (0.35 * size, 0.0, 0.0)
         if trail:
-            marker = Marker('traces', number, LINE_STRIP, scale, colour, _NOWHERE * trail)
+            marker = Marker('traces', index, LINE_STRIP, scale, colour, _NOWHERE * trail)
             trails.append(pile.add(marker._replace(z=pile.z)))
         elif len(closure.linkage.inputs) == 1:
             curve = [_flat_point(place) for place in shown.sweep.paths[name]]
-            marker = Marker('traces', number, LINE_STRIP, scale, colour, curve)
+            marker = Marker('traces', index, LINE_STRIP, scale, colour, curve)
             still.append(marker._replace(lifetime=stays))
     top = pile.z + size
     thick, line = (0.6 * size, 1.5 * size, 2.2 * size), (0.5 * size, 0.0, 0.0)

@@ -196,9 +196,9 @@ class Markers:
         shapes = self._shapes
         markers = [
             marker._replace(text=said)
-            if number == shapes.status
+            if index == shapes.status
             else marker._replace(points=(), action=DELETE)
-            for number, marker in enumerate(shapes.moving)
+            for index, marker in enumerate(shapes.moving)
         ]
         if self._still_due(now):
             markers += shapes.still

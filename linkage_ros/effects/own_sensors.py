@@ -155,9 +155,9 @@ class OwnSensors:
     def _newest_reading(self, found: Sequence[SensorReading | None]) -> SensorReading | None:
         """Return what is held of all joints; None if no reading is new, or one is missing."""
         stamp = None
-        for number, part in enumerate(found):
+        for index, part in enumerate(found):
             if part is not None:
-                self._held[number], stamp = part, part.stamp
+                self._held[index], stamp = part, part.stamp
         held = [part for part in self._held if part is not None]
         if stamp is None or len(held) < len(found):
             return None

@@ -128,7 +128,7 @@ class MechanismState(NamedTuple):
         Of the inputs, in [N·m] or [N]; empty if no stage computes them, or at a toggle.
     reactions
         In pins and sliders; empty as the efforts are.
-    shift
+    deflection
         Displacement of the published joints under load, in [rad] or [m]; empty for none.
     seconds
         Time since the first pose, in [s]; 0 if no load changes with it.
@@ -241,7 +241,9 @@ def restamp(reading: SensorReading, stamp: int) -> SensorReading:
 def with_deflection(motion: MechanismState, deflection: tuple[float, ...]) -> MechanismState:
     """Return a motion whose published joints have moved further, in [rad] or [m]."""
     return motion._replace(
-        shift=tuple(map(add, motion.deflection, deflection)) if motion.deflection else deflection
+        deflection=tuple(map(add, motion.deflection, deflection))
+        if motion.deflection
+        else deflection
     )
 
 

@@ -486,7 +486,7 @@ def find_assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
 
 
 def find_closures(content: Section, name: str) -> dict[str, Closure]:
-    """Return the closures of a linkage file by name, as `assemblies` does."""
+    """Return the closures of a linkage file by name, as `find_assemblies` does."""
     written, shorthand = written_linkage(content)
     try:
         structure = assur_groups(written)

@@ -226,7 +226,8 @@ def _entry_lines(
 
 def _flow_text(value: Content) -> str:
     if isinstance(value, dict):
-        return f'{{{", ".join(f"{_name_text(key)}: {_flow_text(part)}" for key, part in value.items())}}}'
+        entries = (f'{_name_text(key)}: {_flow_text(part)}' for key, part in value.items())
+        return f'{{{", ".join(entries)}}}'
     if isinstance(value, list):
         return f'[{", ".join(map(_flow_text, value))}]'
     return _name_text(value) if isinstance(value, str) else number_text(value)

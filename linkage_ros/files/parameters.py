@@ -309,7 +309,7 @@ class Each(Name):
         return values
 
     def json_schema(self) -> Schema:
-        of = parameters_schema(self.of) if isinstance(self.of, type) else self.of.schema()
+        of = parameters_schema(self.of) if isinstance(self.of, type) else self.of.json_schema()
         return named_mapping(f'{self.meaning} (by the name of a {KINDS[self.kind]})', of)
 
     @property

@@ -221,7 +221,7 @@ class SceneSlave(GuardedSlave):
         variability: Fmi3Variability = Fmi3Variability.discrete,
     ) -> None:
         settable = causality is Fmi3Causality.input
-        for number, (name, unit, text) in enumerate(variables):
+        for index, (name, unit, text) in enumerate(variables):
             self._add_variable(
                 Float64(
                     name,
@@ -229,8 +229,8 @@ class SceneSlave(GuardedSlave):
                     variability=variability,
                     unit=unit,
                     description=text,
-                    getter=partial(values.__getitem__, number),
-                    setter=partial(values.__setitem__, number) if settable else None,
+                    getter=partial(values.__getitem__, index),
+                    setter=partial(values.__setitem__, index) if settable else None,
                 )
             )
 

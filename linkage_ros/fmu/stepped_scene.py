@@ -83,18 +83,18 @@ class _Sender:
     """
 
     def __init__(self, line: LinkagePipeline) -> None:
-        member = line.scene_linkage
-        drive, parameters = member.drive
+        scene_linkage = line.scene_linkage
+        drive, parameters = scene_linkage.drive
         self._fields = _INPUT_FIELDS[drive]
         # A motor may be commanded by another quantity, which the message calls an effort too.
         command = getattr(getattr(parameters, 'motor', None), 'command', 'effort')
         quantities = {field: command if field == 'effort' else field for field in self._fields}
-        self._count = len(member.sampled_joints)
-        self._write = JointStateWriter(member.sampled_joints).write
+        self._count = len(scene_linkage.sampled_joints)
+        self._write = JointStateWriter(scene_linkage.sampled_joints).write
         parts = (
-            [member.linkage.joints[member.dependent_joint]]
-            if member.dependent_joint
-            else (member.linkage.inputs)
+            [scene_linkage.linkage.joints[scene_linkage.dependent_joint]]
+            if scene_linkage.dependent_joint
+            else (scene_linkage.linkage.inputs)
         )
         self.variables = [
             Variable(
@@ -105,7 +105,7 @@ class _Sender:
                 else f'{quantity} that is commanded to the motor of {joint}',
             )
             for field, quantity in quantities.items()
-            for joint, given in zip(member.sampled_joints, parts, strict=True)
+            for joint, given in zip(scene_linkage.sampled_joints, parts, strict=True)
         ]
 
     def write_message(self, stamp: int, values: Sequence[float]) -> bytes:
@@ -125,8 +125,8 @@ class LinkageOutputs:
     """The newest reading of a linkage, and whether it is of the last tick."""
 
     def __init__(self, line: LinkagePipeline) -> None:
-        member = line.scene_linkage
-        self.prefix = f'{member.name}.' if member.name else ''
+        scene_linkage = line.scene_linkage
+        self.prefix = f'{scene_linkage.name}.' if scene_linkage.name else ''
         """What its variables that belong to no joint begin with."""
         turning = line.closure.turning
         self.variables = {
@@ -136,9 +136,9 @@ class LinkageOutputs:
                     _UNITS[field][not turns],
                     f'{field} of {joint}, as its sensor reads it',
                 )
-                for joint, turns in zip(member.joint_names, turning, strict=True)
+                for joint, turns in zip(scene_linkage.joint_names, turning, strict=True)
             ]
-            for field in _published_fields(member)
+            for field in _published_fields(scene_linkage)
         }
         """The variables of each field."""
         self.values = {field: [0.0] * len(of) for field, of in self.variables.items()}
@@ -170,10 +170,10 @@ _READ_AS = {
 """Name of each field in a `SensorReading`."""
 
 
-def _published_fields(member: SceneLinkage) -> list[str]:
+def _published_fields(scene_linkage: SceneLinkage) -> list[str]:
     """Return the fields that a linkage publishes."""
-    named = {also for effect in member.effects for also in PUBLISHED_WITH.get(effect, ())}
-    named |= {'position', *member.effects}
+    named = {also for effect in scene_linkage.effects for also in PUBLISHED_WITH.get(effect, ())}
+    named |= {'position', *scene_linkage.effects}
     return [field for field in _READ_AS if field in named]
 
 
@@ -191,9 +191,9 @@ class MotorOutputs:
     """
 
     def __init__(self, line: LinkagePipeline, writer: int) -> None:
-        member = line.scene_linkage
-        (joint,), (given,) = member.input_names, member.linkage.inputs
-        _, parameters = member.drive
+        scene_linkage = line.scene_linkage
+        (joint,), (given,) = scene_linkage.input_names, scene_linkage.linkage.inputs
+        _, parameters = scene_linkage.drive
         # Without a motor at the input, the reading is of what is commanded: the input itself.
         slides = bool(given.slider) and parameters.motor is None
         fields = ('position', 'velocity', 'effort')[: 2 if parameters.motor is None else 3]
@@ -238,15 +238,17 @@ class SteppedScene:
         self._scene = scene
         self._pipeline = Pipeline(scene)
         self._ticks = 0
-        self._senders = [_Sender(line) for line in self._pipeline.linkages if line.topic]
+        self._senders = [_Sender(linkage) for linkage in self._pipeline.linkages if linkage.topic]
         self.inputs = [variable for sender in self._senders for variable in sender.variables]
         """What goes in, in order."""
-        self.outputs = [LinkageOutputs(line) for line in self._pipeline.linkages]
+        self.outputs = [LinkageOutputs(linkage) for linkage in self._pipeline.linkages]
         """What comes out of each linkage."""
-        extras = [(line, extra) for line in self._pipeline.linkages for extra in line.extras]
+        extras = [
+            (linkage, extra) for linkage in self._pipeline.linkages for extra in linkage.extras
+        ]
         self.motors = [
-            MotorOutputs(line, number)
-            for number, (line, extra) in enumerate(extras)
+            MotorOutputs(line, index)
+            for index, (line, extra) in enumerate(extras)
             if extra.effect in DRIVES
         ]
         """What comes out of each motor that has an encoder."""
@@ -260,7 +262,7 @@ class SteppedScene:
 
     def start(self, seed: int, inputs: Sequence[float]) -> None:
         """
-        Do the first tick, with a seed of all random numbers, and values of `inputs` at that time.
+        Do the first tick, with a seed of all random numbers, and the inputs at that time.
 
         A LinkageError says that the seed is out of bounds, or that no linkage can be made of it.
         """
@@ -353,36 +355,36 @@ def _refuse_scene(scene: Scene) -> None:
             raise content.error(
                 f'faults.{name}', 'sets the clock, which is that of the importer', 'leave it out'
             )
-    for member in scene.linkages:
-        drive, _ = member.drive
+    for scene_linkage in scene.linkages:
+        drive, _ = scene_linkage.drive
         if drive == 'bag':
-            raise member.content.error(
+            raise scene_linkage.content.error(
                 'drive.bag',
                 'the bag does not travel with the scene',
                 'name another drive; topic takes the crank as an input',
             )
         topic = getattr(import_module(DRIVES[drive]), 'TOPIC', '')
         if topic and drive not in _INPUT_FIELDS:
-            raise member.content.error(
+            raise scene_linkage.content.error(
                 f'drive.{drive}',
                 f'listens to {topic}, for which an FMU has no inputs',
                 f'name one of {list_names(_INPUT_FIELDS)}, or a drive that moves by itself',
             )
-        if member.loads is not None and member.loads.applied.wrenches:
-            raise member.content.error(
+        if scene_linkage.loads is not None and scene_linkage.loads.applied.wrenches:
+            raise scene_linkage.content.error(
                 'loads.wrenches',
                 'come on topics, for which an FMU has no inputs',
                 'leave them out',
             )
-        if member.accuracy is not None:
-            raise member.content.error(
+        if scene_linkage.accuracy is not None:
+            raise scene_linkage.content.error(
                 'accuracy',
                 'lets every machine choose its own solver',
                 'name a solver instead',
             )
-        for effect in member.effects:
+        for effect in scene_linkage.effects:
             if '.' in effect:
-                raise member.content.error(
+                raise scene_linkage.content.error(
                     f'effects.{effect}',
                     'is a module of your own, which does not travel with the scene',
                     'leave it out',

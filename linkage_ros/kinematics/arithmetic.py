@@ -134,7 +134,7 @@ def call(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def has_result(result: Any) -> bool:
-    """Return whether the result of a function that was `called` is not None."""
+    """Return whether the result of a function that was `call` is not None."""
     return bool(_real_symbol(result, 'found')) if hasattr(result, 'apply') else result is not None
 
 
@@ -209,7 +209,7 @@ def signed_root(constant: float, part: float, square: float) -> Root:
 
 
 def root_of(total: float, size: float) -> Root:
-    """Return the root as `reach` does, of a sum; ``size`` is the sum of its absolute terms."""
+    """Return `signed_root` of a sum; ``size`` is the sum of its absolute terms."""
     rounding = ROUNDING * size
     if total > rounding:
         return Root(sqrt(total))

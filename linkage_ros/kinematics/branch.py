@@ -431,8 +431,8 @@ class _BranchSide:
     """
     One side of the pose, followed as far as was needed.
 
-    ``inputs`` are the inputs at the ends of the ``cells``, times the sign; ``end`` is the input at
-    which the branch ends, or None until it is known.
+    ``inputs`` are the inputs at the ends of the ``follow_cells``, times the sign; ``end`` is the
+    input at which the branch ends, or None until it is known.
     """
 
     __slots__ = ('cells', 'end', 'inputs', 'laps', 'node', 'sign')

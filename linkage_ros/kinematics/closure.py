@@ -159,7 +159,8 @@ class Closure:
     def __repr__(self) -> str:
         counts = ((len(self.input_names), 'input'), (len(self.joint_names), 'joint'))
         has = ', '.join(f'{n} {what}{"s" * (n != 1)}' for n, what in counts)
-        return f'<{" ".join(filter(None, (type(self).__name__, escape_unprintable(self.name))))}: {has}>'
+        named = ' '.join(filter(None, (type(self).__name__, escape_unprintable(self.name))))
+        return f'<{named}: {has}>'
 
     def _repr_svg_(self) -> str:
         from linkage_ros import svg  # local import: only a notebook asks for pictures
@@ -420,8 +421,8 @@ class Closure:
             As many joints as there are inputs: published ones; with one input also a coordinate
             of a traced point, such as ``P.x``; with several also inputs that stay.
         branch
-            With one input, the number of the branch on which the crank is, as `cranks` returns
-            it. If there is only one branch within the limits, it need not be named.
+            With one input, the number of the branch on which the crank is, as `cranks`
+            returns it. If there is only one branch within the limits, it need not be named.
         near
             Instead of the branch a crank on it, in [rad] or [m].
 

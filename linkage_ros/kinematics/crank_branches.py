@@ -211,13 +211,13 @@ class CrankBranch:
         self.cranks.append(self.last)
         slopes.append(0.0)
         both = all(self.turns_back)
-        for number, i in enumerate((0, cells)):
-            far, nearer = near[number]
-            if self.turns_back[number]:
+        for index, i in enumerate((0, cells)):
+            far, nearer = near[index]
+            if self.turns_back[index]:
                 # y = end ± k·s², and it bends by f″ = slope/distance: dθ/ds = √(2k/f″).
                 bend = far / (_NEAR * (self.most - self.least))
                 slopes[i] = sqrt((0.5 * pi * pi if both else 2.0) * height / bend)
-            elif not self.steep[number]:
+            elif not self.steep[index]:
                 slopes[i] = self._output_at(i / cells)[1] / nearer if nearer else inf
         tangents = []
         for i, slope in enumerate(slopes):

@@ -62,8 +62,8 @@ class DiagonalRate(NamedTuple):
     The rates of a diagonal: ṡ/s = swing·growth; the rate of its direction is base + swing·turn.
 
     Growth and turn may be huge where A is next to D. A dyad multiplies them by factors that are
-    as small there, and forms that product first. ``lean`` is growth/(fold·stretch): at a change
-    point growth, fold and stretch are 0, but lean is not.
+    as small there, and forms that product first. ``growth_over_height`` is growth/(fold·stretch):
+    at a change point growth, fold and stretch are 0, but lean is not.
     """
 
     log_length_rate: float
@@ -80,9 +80,10 @@ class DiagonalAcceleration(NamedTuple):
     s̈/s = change·growth + swing²·pull, which is no difference of large numbers where A is next to
     D; the second derivative of the direction is base + change·turn + swing²·swirl.
 
-    ``bend`` is the pull minus a term of the dyad (e in its derivation is ġ + g² minus that term),
-    divided by fold·stretch. Near a change point it would be a difference of large numbers, so a
-    `CrankDiagonal` gives it in closed form; for all others it is None and the dyad computes it.
+    ``curvature_over_height`` is the pull minus a term of the dyad (e in its derivation is ġ + g²
+    minus that term), divided by fold·stretch. Near a change point it would be a difference of
+    large numbers, so a `CrankDiagonal` gives it in closed form; for all others it is None and the
+    dyad computes it.
     """
 
     length_curvature: float

@@ -200,7 +200,7 @@ def _closing_assemblies(
     )
     found = [_DrawnAssembly(LinkState([0.0, *inputs], []))]
     both = len(ways) <= _MOST_EXPLORED
-    numbers = {one.step: number for number, one in enumerate(ways)}
+    numbers = {one.step: index for index, one in enumerate(ways)}
     closed: Sequence[_Target] = ()
     for step, way in enumerate(plan.steps):
         if step not in numbers:
@@ -258,9 +258,9 @@ def _ambiguity_error(
     """Return the error for a pose that fits several assemblies."""
     first = alike[0]
     differ = [
-        number
-        for number in range(len(ways))
-        if any(one.signs[number] != first.signs[number] for one in alike)
+        index
+        for index in range(len(ways))
+        if any(one.signs[index] != first.signs[index] for one in alike)
     ]
     sides = []
     for one in alike[:_MOST_LISTED]:

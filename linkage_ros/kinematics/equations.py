@@ -169,8 +169,8 @@ def bound_jacobian_change(
 
     Parameters
     ----------
-    constraints, unknowns, known
-        As in `equations`.
+    constraints, unknowns, solved
+        As in `evaluate_constraints`.
     moved
         Largest change of each unknown, in either direction.
     known_moved

@@ -154,9 +154,9 @@ class FourBarLengths(NamedTuple):
 def four_bars(structure: Structure) -> Iterator[FourBarLengths]:
     """Yield the four-bars of a linkage, in the order in which they are solved."""
     known = [GROUND]
-    for number, group in enumerate(structure.groups):
+    for index, group in enumerate(structure.groups):
         if isinstance(group, Dyad):
-            four_bar = _four_bar(structure, known, number, group)
+            four_bar = _four_bar(structure, known, index, group)
             if four_bar is not None:
                 yield four_bar
         known += links_of(group)

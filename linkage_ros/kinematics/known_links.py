@@ -73,7 +73,7 @@ class Slide:
 @dataclass(frozen=True, slots=True)
 class Attachment:
     """
-    How a link is held: its ``point``, in its own frame, coincides with ``at`` of ``link``.
+    How a link is held: its ``point``, in its own frame, coincides with ``link_point`` of ``link``.
 
     With a ``slide``, the point lies that far along a line from there, whose ``direction`` is a
     unit vector in the frame of ``link``. ``pin`` is the index of a pin that an iteration placed.
@@ -143,8 +143,9 @@ class SolvedLinks:
         self.turns_with = {
             k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)
         }
-        # The coordinates of the joints that follow others, by number among `Linkage.driven`, and
-        # the whole turns of a single input after which they repeat; 0 if they never do.
+        # The coordinates of the joints that follow others, by number among
+        # `Linkage.driven_joints`, and the whole turns of a single input after which they repeat; 0
+        # if they never do.
         self._followers: dict[int, int] = {}
         self.ratio_turns = 1
         self.pin_count = 0
@@ -240,7 +241,7 @@ class SolvedLinks:
         self.add_step(step)
 
     def _number_of(self, joint: str) -> int:
-        """Return the number of a joint among `Linkage.driven`; -1 if it is not driven."""
+        """Return the number of a joint among `Linkage.driven_joints`; -1 if it is not driven."""
         names = [given.joint for given in self._linkage.driven_joints]
         return names.index(joint) if joint in names else -1
 

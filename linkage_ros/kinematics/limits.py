@@ -77,13 +77,13 @@ class Bounds:
         limits = {name: of for name, of in linkage.limits.items() if of.is_bounded}
         driven = [given.joint for given in linkage.inputs]
         self.inputs = tuple(
-            _make_bound(name, number, limits[name])
-            for number, name in enumerate(driven)
+            _make_bound(name, index, limits[name])
+            for index, name in enumerate(driven)
             if name in limits
         )
         self.joints = tuple(
-            _make_bound(name, number, limits[name], turning=isinstance(joint, RevoluteJoint))
-            for number, (name, joint) in enumerate(linkage.joints.items())
+            _make_bound(name, index, limits[name], turning=isinstance(joint, RevoluteJoint))
+            for index, (name, joint) in enumerate(linkage.joints.items())
             if name in limits and name not in driven
         )
 

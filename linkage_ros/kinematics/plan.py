@@ -475,7 +475,7 @@ class SolutionPlan(SolvedLinks):
         """
         Add the step of a dyad that closes in two ways, on the side that the file writes.
 
-        ``part`` is its diagonal or rail, ``upright`` its sign there on the side +1.
+        ``part`` is its diagonal or rail, ``upright_sign`` its sign there on the side +1.
         """
         name, sides = closing_name(dyad), SIDES[dyad.kind]
         crosses = any(getattr(part, 'crosses', ()))

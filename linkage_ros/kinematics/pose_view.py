@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.curves import Sweep, sweep
+from linkage_ros.kinematics.curves import RangeSweep, sweep_range
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.results import InputRange, Position
-from linkage_ros.kinematics.shapes import bar_size, corners, skeleton
+from linkage_ros.kinematics.shapes import bar_size, bounding_corners, draw_skeleton
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _GHOSTS = 5

@@ -139,7 +139,8 @@ class CrankRail:
         self._below, self._above = below, above
         self._root_length = math.sqrt(2.0 * a)
         self._changes_over = not (below and above)
-        # For `across`: these sums would cancel for a short crank beside a long link.
+        # For `unsigned_link_acceleration`: these sums would cancel for a short crank beside a long
+        # link.
         self._products = (
             (0.0, 0.0)
             if link == inf

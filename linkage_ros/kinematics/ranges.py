@@ -136,7 +136,7 @@ def through_the_end(
 
 def _iterating_steps(closure: LoopClosure) -> dict[int, Any]:
     """Return the steps that iterate, by their numbers."""
-    return {number: step for number, step in enumerate(closure.steps) if hasattr(step, 'branch')}
+    return {index: step for index, step in enumerate(closure.steps) if hasattr(step, 'branch')}
 
 
 def is_iterated(closure: LoopClosure) -> bool:

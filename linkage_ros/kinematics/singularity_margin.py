@@ -95,16 +95,16 @@ def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
     found = [SingularInput(end, Status.TOGGLE) for end in ends]
     # All dyads are evaluated at the same states.
     posed = lru_cache(_STATES)(closure.close_unlimited)
-    for number, step in enumerate(closure.steps):
+    for index, step in enumerate(closure.steps):
         if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
             continue
         places = _turned_by_input(closure, step)
         if places is None:
             places = find_zeros(
-                partial(_singular_distance, step, number, posed), closure.closing_ranges
+                partial(_singular_distance, step, index, posed), closure.closing_ranges
             )
         for place in places:
-            status = _singular_status(closure, number, place)
+            status = _singular_status(closure, index, place)
             distances = (abs(signed_distance(closure, place, one.value)) for one in found)
             if status is not None and all(apart > _SAME for apart in distances):
                 found.append(SingularInput(place, status))

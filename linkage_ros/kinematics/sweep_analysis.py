@@ -190,7 +190,9 @@ class InputSweep:
         inputs = self.inputs_at(value)
         position = self.closure.position(*inputs)
         bounds = self.closure.bounds
-        return bool(position.joints) and not (bounds and bounds.exceeded(inputs, position.joints))
+        return bool(position.joints) and not (
+            bounds and bounds.first_exceeded(inputs, position.joints)
+        )
 
     @BuiltProperty
     def ranges(self) -> tuple[InputRange, ...]:
@@ -280,7 +282,7 @@ class InputSweep:
         for end, outwards in ((low, low - high), (high, high - low)):
             beyond = self.inputs_at(end + 1e-9 * outwards)
             joints = () if whole else self.closure.position(*beyond).joints
-            bound = self.closure.bounds.exceeded(beyond, joints) if joints else None
+            bound = self.closure.bounds.first_exceeded(beyond, joints) if joints else None
             by.append(bound.name if bound else '')
         return InputRange(low, high, self.turning, by=(by[0], by[1]))
 
@@ -469,8 +471,8 @@ def _step_extremes(sweep: InputSweep, name: str, count: int) -> dict[int, SweptC
     """Return the extremes of a method of the steps, applied to their poses, by group."""
     closure = sweep.closure
     told = {
-        number: getattr(step, name)
-        for number, step in enumerate(closure.steps)
+        index: getattr(step, name)
+        for index, step in enumerate(closure.steps)
         if hasattr(step, name)
     }
     if not told:
@@ -567,7 +569,8 @@ def check_closes(closure: LoopClosure) -> None:
         links.append('the rest')
     raise DefinitionError(
         'links',
-        f'the loops close at no value of the input; {list_names(links, " and ")} miss each other by '
+        f'the loops close at no value of the input; {list_names(links, " and ")} miss each '
+        'other by '
         f'{nearest.gap:.3g} m or more',
         'the longest link of a loop must be shorter than its others together',
     )
@@ -605,7 +608,7 @@ def check_limits(closure: LoopClosure) -> None:
         return
     if linkage.pose:
         joints = closure.position(*linkage.pose.inputs).joints
-        bound = bounds.exceeded(linkage.pose.inputs, joints) if joints else None
+        bound = bounds.first_exceeded(linkage.pose.inputs, joints) if joints else None
         if bound is not None:
             raise DefinitionError(
                 'pose.inputs',
@@ -642,7 +645,8 @@ def _check_single(closure: LoopClosure) -> None:
             low, high = _joint_range(closure, ranges, bound)
             raise DefinitionError(
                 f'joints.{bound.name}.limits',
-                f'{_limits_text(closure, bound)} of {quote(bound.name)} are never met: it goes from '
+                f'{_limits_text(closure, bound)} of {quote(bound.name)} are never met: it goes '
+                'from '
                 f'{low:.6g} to {high:.6g} {_joint_unit(closure.linkage, bound)}',
                 'widen them',
             )
@@ -667,7 +671,7 @@ def _joint_range(
 
 def _met_on_grid(closure: LoopClosure) -> bool:
     return any(
-        position.joints and closure.bounds.exceeded(inputs, position.joints) is None
+        position.joints and closure.bounds.first_exceeded(inputs, position.joints) is None
         for inputs, position in grid_positions(closure)
     )
 

@@ -52,7 +52,8 @@ class Driven:
     """
     A driven joint that places ``joint.link`` once ``joint.to`` is known.
 
-    ``index`` is its number among `Linkage.driven`: an input, or a joint that follows another.
+    ``index`` is its number among `Linkage.driven_joints`: an input, or a joint that follows
+    another.
     """
 
     joint: Joint
@@ -391,7 +392,8 @@ class _GroupSearch:
             if len(inner) > 1:
                 raise DefinitionError(
                     _file_key(other, self._linkage),
-                    f'is joined to {one[0]!r} twice: by {" and ".join(_joint_text(j) for j in inner)}',
+                    f'is joined to {one[0]!r} twice: by '
+                    f'{" and ".join(_joint_text(j) for j in inner)}',
                     'take one of them away, or make one link of the two',
                 )
             if inner:

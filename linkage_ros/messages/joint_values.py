@@ -119,9 +119,9 @@ class MessageValues:
         if len(set(names)) != len(names):
             return TWICE
         places = {
-            (name, quantity): array.first + 8 * (width * number + place)
+            (name, quantity): array.first + 8 * (width * index + place)
             for array, listed, quantities in columns
-            for number, name in enumerate(listed if array.length else ())
+            for index, name in enumerate(listed if array.length else ())
             for place, quantity in quantities
         }
         arrays = [array for array, _, _ in columns]

@@ -10,9 +10,10 @@
 Compiler for CDR version 1: each message is declared once, for reading and writing.
 
 Numbers are aligned to multiples of their size, counted after the four bytes of the encapsulation;
-a sequence or a string is a count followed by its content. `packed` and `parsed` process a message
-field by field. For many messages of the same layout, one is compiled: `pattern` then reads the
-numbers of the next ones in one call of `struct`, and `packing` writes them in one call.
+a sequence or a string is a count followed by its content. `pack_message` and `parse_message`
+process a message field by field. For many messages of the same layout, one is compiled:
+`compile_pattern` then reads the numbers of the next ones in one call of `struct`, and
+`compile_packing` writes them in one call.
 
 Source: OMG, DDS-XTypes 1.3, section 7.4.1.
 """
@@ -348,9 +349,9 @@ class ArrayWriter:
         ]
         bound: dict[str, Any] = {}
         for size in range(len(others), -1, -1):
-            for number, filled in enumerate(combinations(others, size)):
+            for index, filled in enumerate(combinations(others, size)):
                 numbers = {name: f'*{name}' for name in (first, *filled)}
-                call = self.message_expression(numbers, f'pack{size}{number}_')
+                call = self.message_expression(numbers, f'pack{size}{index}_')
                 condition = f'if {" and ".join(filled)}: ' if filled else ''
                 lines.append(f'    {condition}return {call.lines[0]}')
                 bound |= call.bound

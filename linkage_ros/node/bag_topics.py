@@ -23,7 +23,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 
 def bag_topic(name: str, message_class: Any, qos: QoSProfile) -> Topic:
-    """Describe a topic for a bag, as `described` does, with the QoS of a publisher."""
+    """Describe a topic for a bag, as `describe_topic` does, with the QoS of a publisher."""
     return describe_topic(name, message_class, _recorded_qos(qos))
 
 

@@ -480,10 +480,10 @@ def _rates_and_efforts(
     linkage, reading = pipeline.scene_linkage.linkage, state.reading
     exertions: dict[str, tuple[float | None, float | None]] = {}
     if reading is not None:
-        for number, name in enumerate(linkage.joints):
+        for index, name in enumerate(linkage.joints):
             # A reading has rates, and efforts, for all of its joints or for none.
-            rate = reading.rates[number] if reading.rates else None
-            exertions[name] = rate, reading.efforts[number] if reading.efforts else None
+            rate = reading.rates[index] if reading.rates else None
+            exertions[name] = rate, reading.efforts[index] if reading.efforts else None
     driven = state.crank.rates if state.crank is not None else ()
     for given, rate in zip(linkage.inputs, driven, strict=False):
         exertions[given.joint] = rate, exertions.get(given.joint, (None, None))[1]

@@ -162,8 +162,10 @@ def _beside_model(
     return {
         'joints': [
             [name, 'rad' if turning else 'm']
-            for member in scene.linkages
-            for name, turning in zip(member.joint_names, member.closure.turning, strict=True)
+            for scene_linkage in scene.linkages
+            for name, turning in zip(
+                scene_linkage.joint_names, scene_linkage.closure.turning, strict=True
+            )
         ],
         'inputs': list(shown.input_names),
         'cranks': cranks,

@@ -211,11 +211,11 @@ class LinkageNode(LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         for note in scene_notes(scene):
             self.get_logger().warning(str(note))
-        for line in pipeline.linkages:
-            if line.solver_choice is not None:
-                name = f'{line.scene_linkage.name}: ' if line.scene_linkage.name else ''
-                accuracy = f'accuracy {line.scene_linkage.accuracy:g}'
-                self.get_logger().info(f'{name}{accuracy}: {line.solver_choice.why}')
+        for linkage in pipeline.linkages:
+            if linkage.solver_choice is not None:
+                name = f'{linkage.scene_linkage.name}: ' if linkage.scene_linkage.name else ''
+                accuracy = f'accuracy {linkage.scene_linkage.accuracy:g}'
+                self.get_logger().info(f'{name}{accuracy}: {linkage.solver_choice.why}')
         self.failure, self.scene, self._closures = None, scene, pipeline.closures
         return TransitionCallbackReturn.SUCCESS
 
@@ -241,9 +241,13 @@ class LinkageNode(LifecycleNode):
             self.get_logger().info(STANDSTILL)
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
         cranks = ', '.join(
-            joint for member in self.scene.linkages for joint in member.sampled_joints
+            joint
+            for scene_linkage in self.scene.linkages
+            for joint in scene_linkage.sampled_joints
         )
-        drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.linkages))
+        drives = ' and '.join(
+            dict.fromkeys(scene_linkage.drive[0] for scene_linkage in self.scene.linkages)
+        )
         source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
         wrenches = [each.topic_name for each in self._scene_topics.wrenches]
         source += f'; wrenches from {" and ".join(wrenches)}' if wrenches else ''
@@ -442,11 +446,11 @@ class LinkageNode(LifecycleNode):
             self._warnings.warn('clock', f'{no_clock(silence)}: {remedy}', period)
         while self._real_time.refused:
             self.get_logger().warning(self._real_time.refused.pop(0))
-        listening = [line.scene_linkage for line in loop.pipeline.linkages if line.topic]
+        listening = [linkage.scene_linkage for linkage in loop.pipeline.linkages if linkage.topic]
         # Without /clock messages no tick has taken crank messages yet.
         assert self.scene is not None
         if listening and (loop.counts.ticks or not self.scene.rate):
-            inputs = [name for member in listening for name in member.sampled_joints]
+            inputs = [name for scene_linkage in listening for name in scene_linkage.sampled_joints]
             simulated = self.scene.rate and self.get_parameter('use_sim_time').value
             self._warnings.check_silence(
                 loop.counts,

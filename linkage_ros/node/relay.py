@@ -68,11 +68,16 @@ class CommandRelay:
 
     def __init__(self, scene: Scene) -> None:
         self._inverses: dict[str, tuple[InverseClosure, str]] = {}
-        for member in scene.linkages:
-            if member.dependent_joint:
-                number = member.drive[1].branch
-                inverse = sampled_inverse(member.closure, member.dependent_joint, number)
-                self._inverses[member.sampled_joints[0]] = inverse, member.input_names[0]
+        for scene_linkage in scene.linkages:
+            if scene_linkage.dependent_joint:
+                number = scene_linkage.drive[1].branch
+                inverse = sampled_inverse(
+                    scene_linkage.closure, scene_linkage.dependent_joint, number
+                )
+                self._inverses[scene_linkage.sampled_joints[0]] = (
+                    inverse,
+                    scene_linkage.input_names[0],
+                )
         if not self._inverses:
             raise DefinitionError(
                 'drive.topic.joint', 'names no dependent joint', 'name the one that is commanded'

@@ -99,8 +99,8 @@ class RunRecording:
             folder = _new_folder(runs, record.name, scene.name)
             files = _make_attachments(scene, described, begun, loop.pipeline.linkages, folder)
             opening = [
-                (number, description)
-                for number, (key, _) in enumerate(described)
+                (index, description)
+                for index, (key, _) in enumerate(described)
                 if key == DESCRIPTION
             ]
             return BagWriter(folder, [t for _, t in described], files, storage, opening)
@@ -138,7 +138,7 @@ class RunRecording:
         return self.snapshots is None and loop.recorder is not None and loop.recorder.has_ended
 
     def begin_snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
-        """Begin to write the memory to a bag; as `RunSnapshots.begin`."""
+        """Begin to write the memory to a bag; as `RunSnapshots.begin_snapshot`."""
         if self.snapshots is None:
             return (
                 'nothing is kept in memory; write record.snapshot_seconds in the scene, or call '
@@ -332,7 +332,7 @@ class RunSnapshots:
         Parameters
         ----------
         answer
-            Called by `collect` with the outcome.
+            Called by `collect_snapshot` with the outcome.
         wake
             Called on the writing thread when the outcome is ready.
 

@@ -93,9 +93,9 @@ class Tick(NamedTuple):
     extras
         One serialized message for each auxiliary topic, b'' where that topic has none; an empty
         tuple where no auxiliary topic has a message.
-    seen
+    states
         State of each linkage, as far as the message needed it.
-    lines
+    linkages
         The linkage pipelines.
 
     """
@@ -109,8 +109,8 @@ class Tick(NamedTuple):
     def full_states(self) -> tuple[LinkageState, ...]:
         """State of each linkage in full; computes here what the message did not need."""
         return tuple(
-            line.complete_state(seen)
-            for line, seen in zip(self.linkages, self.states, strict=True)
+            linkage.complete_state(seen)
+            for linkage, seen in zip(self.linkages, self.states, strict=True)
         )
 
 
@@ -145,7 +145,7 @@ class LinkagePipeline:
     ----------
     scene
         The scene.
-    member
+    scene_linkage
         Its linkage, drive and effects.
     closure
         The closure of the linkage, if there is one already. It has no state, so resets reuse it.
@@ -162,38 +162,38 @@ class LinkagePipeline:
     def __init__(
         self,
         scene: Scene,
-        member: SceneLinkage,
+        scene_linkage: SceneLinkage,
         closure: Closure | None,
         injection: Injection | None,
     ) -> None:
-        self.scene_linkage = member
+        self.scene_linkage = scene_linkage
         try:
             self._build_stages(scene, closure, injection)
         except DefinitionError as error:
             of_linkage = error.where.startswith('masses')
-            content = member.linkage_content if of_linkage else member.content
+            content = scene_linkage.linkage_content if of_linkage else scene_linkage.content
             raise content.locate_error(error) from None
 
     def _build_stages(
         self, scene: Scene, closure: Closure | None, injection: Injection | None
     ) -> None:
-        member = self.scene_linkage
-        wanted = choose_effects(member)
+        scene_linkage = self.scene_linkage
+        wanted = choose_effects(scene_linkage)
         self.effect_names = tuple(effect.name for effect in wanted.effects)
         """Names of the computed effects, in physical order."""
-        seed = f'{scene.seed}/{member.name}'
-        self.closure = closure or _make_closure(member, wanted, seed)
+        seed = f'{scene.seed}/{scene_linkage.name}'
+        self.closure = closure or _make_closure(scene_linkage, wanted, seed)
         friction = wanted.parameters.get('friction')
         self.context = Context(
             closure=self.closure,
             rate=scene.rate,
             needs_rate='velocity' in self.effect_names,
             seed=seed,
-            loads=member.loads,
+            loads=scene_linkage.loads,
             friction=friction.friction if friction is not None else None,
-            prefix=member.prefix,
+            prefix=scene_linkage.prefix,
             dependent=scene.dependent_joints,
-            effects=frozenset(member.effects),
+            effects=frozenset(scene_linkage.effects),
             moves_by_rates=wanted.moves_by_rates,
         )
         self._build_drive(wanted, injection)
@@ -204,7 +204,7 @@ class LinkagePipeline:
 
     def _build_drive(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the crank state: the drive, its messages and the effects on it."""
-        drive, parameters = self.member.drive
+        drive, parameters = self.scene_linkage.drive
         module = import_module(DRIVES[drive])
         self.topic: str = getattr(module, 'TOPIC', '')
         """Topic of the drive; '' for none."""
@@ -221,7 +221,7 @@ class LinkagePipeline:
 
     def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
-        loads = self.member.loads if wanted.computes_forces else None
+        loads = self.scene_linkage.loads if wanted.computes_forces else None
         self._has_timed_loads = loads is not None and loads.applied.changes_with_time
         self._first_time = -1
         self.wrenches: dict[str, HeldWrench] = {}
@@ -231,10 +231,10 @@ class LinkagePipeline:
             assert applied is not None
             self.wrenches = applied.wrenches
         self._solve_loops = self.closure.position
-        if self.member.silent_beyond_limits and self.closure.bounds:
+        if self.scene_linkage.silent_beyond_limits and self.closure.bounds:
             self._solve_loops = _suppress_beyond_limits(self._solve_loops, self.closure)
         self._mechanism_faults = (
-            injection.build('mechanism', self.context) if injection is not None else []
+            injection.build_functions('mechanism', self.context) if injection is not None else []
         )
         self._mechanism_stages = [*wanted.build('stage', self.context).values()]
 
@@ -245,8 +245,8 @@ class LinkagePipeline:
         sensors = wanted.build('sensor', self.context)
         if {'encoder', 'rate_limit'} <= set(sensors):
             sensors['rate_limit'].read_by(sensors['encoder'])
-        joints = self.member.joint_names
-        broken = injection.build('sensor', joints) if injection is not None else []
+        joints = self.scene_linkage.joint_names
+        broken = injection.build_functions('sensor', joints) if injection is not None else []
         angles = Continuous(self.closure.turning, first_values(self.closure))
         behind = [*sensors.values(), *broken]
         self._running = angles if behind or not wrapped else None
@@ -265,7 +265,7 @@ class LinkagePipeline:
 
     def _build_outputs(self, wanted: WantedEffects) -> None:
         """Build the messages beside the joint states: of the effects, and of the drive."""
-        member = self.member
+        scene_linkage = self.scene_linkage
         writers = wanted.build('writer', self.context, wanted.named)
         self.extras = [
             _make_output(
@@ -273,21 +273,23 @@ class LinkagePipeline:
                 effect.topic,
                 effect.message,
                 writers[effect.name],
-                member.name,
+                scene_linkage.name,
                 of_reading=effect.of_reading,
             )
             for effect in wanted.effects
             if effect.name in writers
         ]
         """The topics beside the joint states."""
-        drive, parameters = member.drive
+        drive, parameters = scene_linkage.drive
         module = import_module(DRIVES[drive])
         if (of_drive := getattr(module, 'writer', None)) is not None:
             written = of_drive(parameters, self.context, self.drive)
             if written is not None:
                 topic, message = module.EXTRA_TOPIC, module.EXTRA_MESSAGE
                 self.extras.append(
-                    _make_output(drive, topic, message, written, member.name, of_reading=True)
+                    _make_output(
+                        drive, topic, message, written, scene_linkage.name, of_reading=True
+                    )
                 )
 
     def _compile_tick(self, wanted: WantedEffects) -> CompiledTick | None:
@@ -509,7 +511,7 @@ def _suppress_beyond_limits(
     return close_within
 
 
-def _make_closure(member: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
+def _make_closure(scene_linkage: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
     """Return the closure of a linkage as its effects alter it, by the solver that it names."""
     linkage = scene_linkage.linkage
     for effect in wanted.effects:
@@ -566,12 +568,12 @@ class Pipeline:
         self.injection = injection
         """The faults; None if the scene has none."""
         self.linkages = [
-            LinkagePipeline(scene, member, closures[number] if closures else None, injection)
-            for number, member in enumerate(scene.linkages)
+            LinkagePipeline(scene, scene_linkage, closures[index] if closures else None, injection)
+            for index, scene_linkage in enumerate(scene.linkages)
         ]
-        self.extras = [extra for line in self.linkages for extra in line.extras]
+        self.extras = [extra for linkage in self.linkages for extra in linkage.extras]
         """The topics beside the joint states."""
-        topics = sorted({line.topic for line in self.linkages} - {''})
+        topics = sorted({linkage.topic for linkage in self.linkages} - {''})
         if len(topics) > 1:
             raise scene.linkages[0].content.error(
                 'drive', f'{" and ".join(topics)} are listened to', 'drive all by one of them'
@@ -581,25 +583,28 @@ class Pipeline:
         """The topic of the drives; '' for none."""
         self.wrenches: tuple[WrenchTopic, ...] = ()
         """The topics of wrenches on links."""
-        if any(line.wrenches for line in self.linkages):
+        if any(linkage.wrenches for linkage in self.linkages):
             from linkage_ros.pipeline.wrench_topics import make_wrench_topics
 
-            linkages = [(line.scene_linkage, line.drive, line.wrenches) for line in self.linkages]
+            linkages = [
+                (linkage.scene_linkage, linkage.drive, linkage.wrenches)
+                for linkage in self.linkages
+            ]
             self.wrenches = make_wrench_topics(linkages, self.topic)
         # Among the drives, only the topic drive keeps no state from earlier ticks.
         self._has_state = any(
-            line.scene_linkage.drive[0] != 'topic'
-            or not _RUNNING_IN_GAPS.isdisjoint(line.effect_names)
-            for line in self.linkages
+            linkage.scene_linkage.drive[0] != 'topic'
+            or not _RUNNING_IN_GAPS.isdisjoint(linkage.effect_names)
+            for linkage in self.linkages
         )
         self.suppresses_ticks = (
             self._has_state
             or injection is not None
-            or any(not _SUPPRESSING.isdisjoint(line.effect_names) for line in self.linkages)
+            or any(not _SUPPRESSING.isdisjoint(linkage.effect_names) for linkage in self.linkages)
         )
         """Whether ticks without a message may matter to a replay."""
         self._router = SampleRouter(
-            {line: line.scene_linkage.sampled_joints for line in self.linkages}
+            {linkage: linkage.scene_linkage.sampled_joints for linkage in self.linkages}
         )
         self.addressed_linkages: tuple[LinkagePipeline, ...] = ()
         """Of several linkages, those whose inputs the last message named."""
@@ -662,21 +667,21 @@ class Pipeline:
 
     def _build_tick(self) -> Callable[[int], Tick]:
         """Return the tick as a function of the time, in [ns]; generated text if possible."""
-        wholes = [whole for line in self.linkages if (whole := line.whole_tick) is not None]
+        wholes = [whole for linkage in self.linkages if (whole := linkage.whole_tick) is not None]
         several = len(self.linkages) > 1
         if len(wholes) < len(self.linkages) or (several and self.extras):
-            see = [line.compute_state for line in self.linkages]
+            see = [linkage.compute_state for linkage in self.linkages]
             return lambda now: self._make_tick(now, [look(now) for look in see])
         if several:
             return self._combine_ticks(wholes)
-        (line,), (whole,) = self.linkages, wholes
+        (linkage,), (whole,) = self.linkages, wholes
         return compile_scene_tick(
             whole,
             self._make_writer((True,)),
             [extra.writer for extra in self.extras],
             Tick,
             self.linkages,
-            lambda now, crank: self._make_tick(now, [line.interpret_from_crank(now, crank)]),
+            lambda now, crank: self._make_tick(now, [linkage.interpret_from_crank(now, crank)]),
         )
 
     def _combine_ticks(self, compiled_ticks: Sequence[CompiledTick]) -> Callable[[int], Tick]:
@@ -707,17 +712,17 @@ class Pipeline:
         """Return whether a tick without a message changes the state of the pipeline."""
         return any(
             not isinstance(seen, LinkageState)
-            or line.gap_begins
+            or linkage.gap_begins
             or (seen.position is not None and (bool(seen.position.joints) or self._has_state))
-            for line, seen in zip(self.linkages, tick.states, strict=True)
+            for linkage, seen in zip(self.linkages, tick.states, strict=True)
         )
 
     def _make_writer(self, present: tuple[bool, ...]) -> JointStateWriter:
         joints = [
             joint
-            for line, there in zip(self.linkages, present, strict=True)
+            for linkage, there in zip(self.linkages, present, strict=True)
             if there
-            for joint in line.scene_linkage.joint_names
+            for joint in linkage.scene_linkage.joint_names
         ]
         self._writers[present] = writer = JointStateWriter(joints)
         return writer
@@ -725,25 +730,25 @@ class Pipeline:
     @property
     def closures(self) -> list[Closure]:
         """Closures of the linkages."""
-        return [line.closure for line in self.linkages]
+        return [linkage.closure for linkage in self.linkages]
 
     @property
     def newest_stamp(self) -> int:
         """Stamp of the newest good sample, in [ns]; 0 before the first."""
-        return max(line.drive.stamp for line in self.linkages)
+        return max(linkage.drive.stamp for linkage in self.linkages)
 
     @property
     def max_age(self) -> int:
         """Age of the newest sample beyond which something is amiss, in [ns]; 0 for never."""
-        return max(line.drive.max_age for line in self.linkages)
+        return max(linkage.drive.max_age for linkage in self.linkages)
 
 
 def _refuse_stamps(scene: Scene) -> None:
     """Refuse measurement stamps that cannot share one message of several linkages."""
-    delays = [member.effects.get('delay') for member in scene.linkages]
-    for member, delay in zip(scene.linkages, delays, strict=True):
+    delays = [scene_linkage.effects.get('delay') for scene_linkage in scene.linkages]
+    for scene_linkage, delay in zip(scene.linkages, delays, strict=True):
         if delay is not None and delay.stamp == 'measured' and delays.count(delay) < len(delays):
-            raise member.content.error(
+            raise scene_linkage.content.error(
                 'effects.delay.stamp',
                 'measured is a stamp of its own, and all linkages share one message',
                 'give all linkages the same delay, or write arrival',

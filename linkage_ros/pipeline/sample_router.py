@@ -31,7 +31,7 @@ class SampleRouter(Generic[Receiver]):
 
     Parameters
     ----------
-    wanted
+    required_joints
         The joints that each receiver needs; a message must name all of them.
 
     """

@@ -70,7 +70,7 @@ class CompiledTick(NamedTuple):
     """The usual tick up to its reading, as lines of Python."""
 
     # Lines that compute from ``now``, and the objects that they use. They define the fields of
-    # `CrankState` by name, or return through ``plain``.
+    # `CrankState` by name, or return through ``interpret``.
     lines: list[str]
     bound: dict[str, Any]
     crank: str  # The crank state, as an expression
@@ -91,26 +91,26 @@ def compile_tick(
     """
     Write the usual tick of a linkage.
 
-    The compiled linkage closes for at least one input; it returns the values of a `Straight`, as
-    far as the scene asks for them. ``angles`` unwraps the published angles; None if not needed.
+    The compiled linkage closes for at least one input; it returns the values of a `CompiledTick`,
+    as far as the scene asks for them. ``angles`` unwraps the published angles; None if not needed.
     """
-    crank = drive.compile_state(compiled_linkage.driven, 'return plain(now, None)')
+    crank = drive.compile_state(compiled_linkage.driven, 'return interpret(now, None)')
     lines, bound = [*crank.lines], {**crank.bound}
     # The state of a drive that exerts an effort holds more than its fields.
     exerts = getattr(drive, 'exerts_effort', False)
     state = 'crank' if exerts else f'CrankState({_CRANK_FIELDS})'
-    for number, stage in enumerate(drive_stages):
-        bound[f'stage{number}'] = stage
-        lines.append(f'crank = {_CRANK_FIELDS}, = stage{number}({state})')
+    for index, stage in enumerate(drive_stages):
+        bound[f'stage{index}'] = stage
+        lines.append(f'crank = {_CRANK_FIELDS}, = stage{index}({state})')
         state = 'crank'
-    leave = f'return plain(now, {state})'
-    mechanism, groups = _mechanism_lines(compiled, leave)
+    leave = f'return interpret(now, {state})'
+    mechanism, groups = _mechanism_lines(compiled_linkage, leave)
     lines += mechanism.lines
     bound |= mechanism.bound
     joints, rates, accelerations, efforts, reactions = groups + [[]] * (5 - len(groups))
     if efforts and drive_stages:
         # Within its play, the motor moves alone and carries only itself.
-        lines += _leave_unless("{*getattr(crank, 'free_motors', ())} <= {None}", leave)
+        lines += _fall_back_unless("{*getattr(crank, 'free_motors', ())} <= {None}", leave)
     if efforts and exerts:
         # As `linkage_ros.effects.effort` for an input at rest.
         effort = efforts[0]
@@ -123,7 +123,7 @@ def compile_tick(
     return CompiledTick(lines, bound, crank_text, joints, rates, accelerations, efforts, reactions)
 
 
-def _mechanism_lines(compiled: Compiled, leave: str) -> tuple[Lines, list[list[str]]]:
+def _mechanism_lines(compiled_linkage: Compiled, leave: str) -> tuple[Lines, list[list[str]]]:
     """Write the motion of a compiled linkage; also return the names of its values, in groups."""
     path, *more_paths = compiled_linkage.paths
     inputs = [one.name for one in path.inputs]
@@ -138,9 +138,9 @@ def _mechanism_lines(compiled: Compiled, leave: str) -> tuple[Lines, list[list[s
     ]
     numbers = [*chain(*groups)]
     if more_paths:
-        bound = {'solve': compiled.fast, 'chain': chain}
+        bound = {'solve': compiled_linkage.fast, 'chain': chain}
         lines.append(f'values = solve({", ".join(inputs)})')
-        lines += _leave_unless('values is not None', leave)
+        lines += _fall_back_unless('values is not None', leave)
         lines.append(f'{", ".join(numbers)}, = chain(*values)')
         return Lines(lines, bound), groups
     body = compiled_linkage.first_path_body(leave)
@@ -157,16 +157,16 @@ def _unwrap_lines(places: Sequence[int], joints: Sequence[str], leave: str) -> l
     near = [f'{-pi!r} < {lasts[i]} - {joints[i]} < {pi!r}' for i in places]
     return [
         'last = running.raw',
-        *_leave_unless('last', leave),
+        *_fall_back_unless('last', leave),
         f'{", ".join(lasts)}, = last',
-        *(_leave_unless(' and '.join(near), leave) if near else ()),
+        *(_fall_back_unless(' and '.join(near), leave) if near else ()),
         f'running.raw = {_tuple_text(joints)}',
         f'{", ".join(turns)}, = running.added',
         *[f'{joint} += {turn}' for joint, turn in zip(joints, turns, strict=True)],
     ]
 
 
-def _leave_unless(condition: str, leave: str) -> tuple[str, str]:
+def _fall_back_unless(condition: str, leave: str) -> tuple[str, str]:
     return f'if not ({condition}):', f'    {leave}'
 
 
@@ -180,20 +180,22 @@ def compile_linkage_state(
 
     Parameters
     ----------
-    usual
+    compiled
         Its usual tick.
-    read
+    apply_sensors
         Applies further sensor stages; None where there are none.
-    plain
+    interpret
         Computes all other ticks.
 
     """
     lines = [f'reading = new(Reading, {_reading_text(compiled)})']
     if apply_sensors is not None:
-        lines.append('reading = read(now, reading)')
+        lines.append('reading = apply_sensors(now, reading)')
     crank = compiled.crank if compiled.crank == 'crank' else f'new(CrankState, {compiled.crank})'
-    lines.append(f'return new(Seen, ({crank}, reading, {_reactions_text(compiled)}))')
-    return _define_function(compiled, lines, {'read': apply_sensors, 'plain': interpret})
+    lines.append(f'return new(CompiledState, ({crank}, reading, {_reactions_text(compiled)}))')
+    return _define_function(
+        compiled, lines, {'apply_sensors': apply_sensors, 'interpret': interpret}
+    )
 
 
 def compile_contribution(compiled: CompiledTick, interpret: InterpretedTick) -> Callable[..., Any]:
@@ -202,17 +204,17 @@ def compile_contribution(compiled: CompiledTick, interpret: InterpretedTick) -> 
 
     Parameters
     ----------
-    usual
+    compiled
         Its usual tick; its reading is what is published.
-    plain
+    interpret
         Computes all other ticks.
 
     Returns
     -------
-    share
+    contribute
         A function of the time, in [ns], and of the lists of positions, rates and efforts, which
-        it extends. It returns the state of the linkage. A tick computed by ``plain`` extends none
-        of the lists.
+        it extends. It returns the state of the linkage. A tick computed by ``interpret`` extends
+        none of the lists.
 
     """
     groups = {'positions': compiled.joints, 'rates': compiled.rates, 'efforts': compiled.efforts}
@@ -222,7 +224,7 @@ def compile_contribution(compiled: CompiledTick, interpret: InterpretedTick) -> 
         f'return ({compiled.crank}, reading, {_reactions_text(compiled)})',
     ]
     return _define_function(
-        compiled, lines, {'plain': interpret}, ['now', *(f'all_{name}' for name in groups)]
+        compiled, lines, {'interpret': interpret}, ['now', *(f'all_{name}' for name in groups)]
     )
 
 
@@ -239,35 +241,35 @@ def compile_scene_tick(
 
     Parameters
     ----------
-    usual
+    compiled
         The linkage's usual tick; its reading is what is published.
     writer
         Serializes the joint states.
     extras
-        Serialize the other messages, from the reading alone or from a `Seen`.
-    tick, linkages
+        Serialize the other messages, from the reading alone or from a `CompiledState`.
+    tick_type, linkages
         The type of the result, and the linkages that it refers to.
-    plain
+    interpret
         Computes all other ticks.
 
     """
-    bound: dict[str, Any] = {'Tick': tick_type, 'linkages': linkages, 'plain': interpret}
-    bound |= {f'write{number}': extra.write for number, extra in enumerate(extras)}
+    bound: dict[str, Any] = {'Tick': tick_type, 'linkages': linkages, 'interpret': interpret}
+    bound |= {f'write{index}': extra.write for index, extra in enumerate(extras)}
     packed = writer.compile_write('now', compiled.joints, compiled.rates, compiled.efforts)
     lines = [f'reading = {_reading_text(compiled)}', *packed.lines]
     if extras:
         lines.append('reading = new(Reading, reading)')
-    seen = f'({compiled.crank}, reading, {_reactions_text(compiled)})'
+    state = f'({compiled.crank}, reading, {_reactions_text(compiled)})'
     messages = _tuple_text(
         [
-            f'write{number}(now, {"None" if extra.of_reading else "seen"}, reading)'
-            for number, extra in enumerate(extras)
+            f'write{index}(now, {"None" if extra.of_reading else "state"}, reading)'
+            for index, extra in enumerate(extras)
         ]
     )
-    if 'seen' in messages:
-        lines.append(f'seen = new(Seen, {seen})')
-        seen = 'seen'
-    lines.append(f'return new(Tick, (message, {messages}, ({seen},), linkages))')
+    if 'state' in messages:
+        lines.append(f'state = new(CompiledState, {state})')
+        state = 'state'
+    lines.append(f'return new(Tick, (message, {messages}, ({state},), linkages))')
     return _define_function(compiled, lines, bound | packed.bound)
 
 
@@ -280,7 +282,12 @@ def _define_function(
     # The constructor of a named tuple is a Python function; `tuple.__new__` is a C function.
 
     new = tuple.__new__
-    types = {'new': new, 'CrankState': CrankState, 'Reading': SensorReading, 'Seen': CompiledState}
+    types = {
+        'new': new,
+        'CrankState': CrankState,
+        'Reading': SensorReading,
+        'CompiledState': CompiledState,
+    }
     source = '\n    '.join([f'def tick({", ".join(parameters)}):', *compiled.lines, *lines])
     function: Callable[..., Any] = define_function(source, 'tick', compiled.bound | types | bound)
     return function

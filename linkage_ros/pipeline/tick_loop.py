@@ -195,12 +195,12 @@ class TickLoop:
     ----------
     build
         Builds the pipeline; a reset calls it again.
-    take
+    take_sample
         Takes the next message for the drives, as bytes and message info; returns None if there is
         no message. None if the drives have no topic.
     publish
         Publishes a serialized JointState.
-    own
+    is_own
         Recognises the node's own messages where they come back on the crank's topic.
     publish_extras
         Publish the serialized messages of the auxiliary topics, one function each.
@@ -209,7 +209,7 @@ class TickLoop:
     depth
         Most messages that one tick takes: the depth of the queue in front of it.
     take_wrenches
-        Take the next message of each topic with a wrench, as ``take`` does.
+        Take the next message of each topic with a wrench, as ``take_sample`` does.
 
     """
 
@@ -466,7 +466,7 @@ class TickLoop:
         return now
 
     def _run_tick(self, now: int, solve_time: int) -> None:
-        """Solve at time ``now`` for time ``at``, in [ns]; publish, record and count."""
+        """Solve at time ``now`` for time ``solve_time``, in [ns]; publish, record and count."""
         counts = self.counts
         counts.last_tick = tick = self._pipeline.tick(solve_time)
         message, extras = tick.message, tick.extras
@@ -491,7 +491,7 @@ class TickLoop:
         ):
             recorder.offer(withheld, now, solve_time, time_message(solve_time))
         counts.ticks += 1
-        for number, one in enumerate(tick.states):
+        for index, one in enumerate(tick.states):
             if not isinstance(one, LinkageState):
                 _, reading, _ = one
                 counts.suppressed += reading is None
@@ -502,7 +502,7 @@ class TickLoop:
                 continue
             if position.status is not Status.CLOSED:
                 counts.unclosed[position.status] += 1
-                counts.last_unclosed[position.status] = number, position
+                counts.last_unclosed[position.status] = index, position
             if one.reading is None and position.joints:
                 counts.suppressed += 1
 

@@ -17,7 +17,7 @@ from typing import Any
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.dispatch import Effect, effect_of, in_order, module_of, needed_effects
 from linkage_ros.effects.stage import FORCE_EFFECTS, PUBLISHED_WITH
-from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.scene.scene import SceneLinkage
 
 
@@ -43,34 +43,35 @@ class WantedEffects:
         }
 
 
-def choose_effects(member: SceneLinkage) -> WantedEffects:
+def choose_effects(scene_linkage: SceneLinkage) -> WantedEffects:
     """Return the effects of a linkage, and those that they start from."""
-    _refuse_not_imported(member)
-    drive, drive_parameters = member.drive
-    named = frozenset(member.effects)
+    _refuse_not_imported(scene_linkage)
+    drive, drive_parameters = scene_linkage.drive
+    named = frozenset(scene_linkage.effects)
     named |= {also for effect in named for also in PUBLISHED_WITH.get(effect, ())}
     moves_by_rates = getattr(drive_parameters, 'carry_forward', True)
-    starting = named - _rate_free_effects(member, named, moves_by_rates)
+    starting = named - _rate_free_effects(scene_linkage, named, moves_by_rates)
     computed = named | {need for effect in starting for need in needed_effects(effect)}
     effects = [effect_of(name) for name in in_order(computed)]
     computes_forces = drive == 'torque' or not computed.isdisjoint(FORCE_EFFECTS)
-    _refuse_idle(member, computes_forces)
-    _refuse_solver(member, computes_forces)
+    _refuse_idle(scene_linkage, computes_forces)
+    _refuse_solver(scene_linkage, computes_forces)
     parameters = {
-        effect.name: member.effects.get(effect.name) or effect.parameters() for effect in effects
+        effect.name: scene_linkage.effects.get(effect.name) or effect.parameters()
+        for effect in effects
     }
     return WantedEffects(named, effects, parameters, computes_forces, moves_by_rates)
 
 
-def _between_readings(
-    member: SceneLinkage, named: frozenset[str], moves_by_rates: bool
+def _rate_free_effects(
+    scene_linkage: SceneLinkage, named: frozenset[str], moves_by_rates: bool
 ) -> set[str]:
     """Return 'jitter' and 'delay' where this scene lets them work without the crank's rates."""
     mixing = {'jitter', 'delay'} & named
     if moves_by_rates and 'delay' in mixing:
         delay = module_of('delay')
         parameters = scene_linkage.effects.get('delay') or delay.PARAMETERS()
-        return set() if delay.interpolates(parameters, named) else {'delay'}
+        return set() if delay.interpolates_readings(parameters, named) else {'delay'}
     return set() if moves_by_rates else mixing
 
 

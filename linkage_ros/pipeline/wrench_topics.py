@@ -39,7 +39,7 @@ class WrenchTopic:
 
     Parameters
     ----------
-    member, link
+    scene_linkage, link
         The linkage, and its link.
     drive
         The drive of the linkage; it learns of each wrench if it has ``load``.
@@ -109,7 +109,7 @@ def make_wrench_topics(
     ----------
     linkages
         Each linkage with its drive, and its wrenches by the name of the link.
-    of_drives
+    drive_topic
         Topic of the drives; '' for none.
 
     Raises
@@ -119,14 +119,14 @@ def make_wrench_topics(
 
     """
     topics = tuple(
-        WrenchTopic(member, link, drive, held)
-        for member, drive, wrenches in linkages
+        WrenchTopic(scene_linkage, link, drive, held)
+        for scene_linkage, drive, wrenches in linkages
         for link, held in wrenches.items()
     )
     taken = {drive_topic: 'the drive', 'joint_states': 'the joint states'}
-    for number, one in enumerate(topics):
+    for index, one in enumerate(topics):
         name = one.topic
-        if number == MOST_WRENCHES:
+        if index == MOST_WRENCHES:
             raise one.refusal(
                 f'is one of {len(topics)}, more than {MOST_WRENCHES}', 'leave some out'
             )

@@ -78,17 +78,18 @@ ReplayEvent = SampleEvent | FaultEvent | ResetEvent | CounterfactualTick
 
 def check_drives(scene: Scene, where: str) -> None:
     """Raise LinkageError if a scene does not take crank angles, or efforts, from one topic."""
-    drives = [member.drive[0] for member in scene.linkages]
-    for member, drive in zip(scene.linkages, drives, strict=True):
+    drives = [scene_linkage.drive[0] for scene_linkage in scene.linkages]
+    for scene_linkage, drive in zip(scene.linkages, drives, strict=True):
         if drive not in _TOPICS or drive != drives[0]:
             beside = f' beside {drives[0]}' if drive in _TOPICS else ''
             raise LinkageError(
                 where,
-                f'{f"{member.name}: " if member.name else ""}its drive is {drive}{beside}, which '
+                f'{f"{scene_linkage.name}: " if scene_linkage.name else ""}its drive is '
+                f'{drive}{beside}, which '
                 "takes no samples of a bag's",
                 f'write drive: {{{drives[0] if beside else "topic"}: {{}}}}',
             )
-        if member.loads is not None and member.loads.applied.wrenches:
+        if scene_linkage.loads is not None and scene_linkage.loads.applied.wrenches:
             raise LinkageError(
                 where,
                 'its loads.wrenches come on topics, of which another scene takes no messages',
@@ -350,7 +351,10 @@ def find_crank_topic(
     """
     drive = scene.linkages[0].drive[0]
     readers = {
-        topic: [_sample_reader(member, scene.dependent_joints) for member in scene.linkages]
+        topic: [
+            _sample_reader(scene_linkage, scene.dependent_joints)
+            for scene_linkage in scene.linkages
+        ]
         for topic in _candidate_topics(bag, drive, run, recorded, typed)
     }
     if drive == 'torque' and len(readers) == 1:
@@ -377,7 +381,9 @@ def find_crank_topic(
     if len(good) == 1:
         return good[0]
     inputs = list(
-        dict.fromkeys(name for member in scene.linkages for name in member.sampled_joints)
+        dict.fromkeys(
+            name for scene_linkage in scene.linkages for name in scene_linkage.sampled_joints
+        )
     )
     if good:
         raise BagError(
@@ -414,7 +420,9 @@ def _candidate_topics(
                 did_you_mean(typed, held, f'it holds {list_names(held) or "none"}'),
             )
         return [typed]
-    other = recorded is not None and any(member.drive[0] != drive for member in recorded.linkages)
+    other = recorded is not None and any(
+        scene_linkage.drive[0] != drive for scene_linkage in recorded.linkages
+    )
     if run.crank_topic in held and not other:
         return [run.crank_topic]
     if _TOPICS[drive] in held and not other:

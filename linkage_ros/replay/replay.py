@@ -213,7 +213,7 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
 
 def own_joint_states(scene: Scene) -> OwnJointStates:
     """Return a predicate for the joint states of a scene among others on their topic."""
-    return OwnJointStates(member.joint_names for member in scene.linkages)
+    return OwnJointStates(scene_linkage.joint_names for scene_linkage in scene.linkages)
 
 
 def change_text(change: FaultChange, kind: str) -> str:
@@ -261,7 +261,9 @@ def versions_here() -> dict[str, str]:
 
 def user_effects_here(scene: Scene) -> dict[str, str]:
     """Return the modules of the user-defined effects of a scene."""
-    names = {name for member in scene.linkages for name in member.effects if '.' in name}
+    names = {
+        name for scene_linkage in scene.linkages for name in scene_linkage.effects if '.' in name
+    }
     if not names:
         return {}
     from linkage_ros.effects.user_effects import (

@@ -70,7 +70,7 @@ def scene_files(
 
 def _scene_folder(scene: Scene, bag: Path | None) -> dict[str, str]:
     """Return the folder for the paths in a scene, relative to the bag: bags are passed on."""
-    if all(member.drive[0] != 'bag' for member in scene.linkages):
+    if all(scene_linkage.drive[0] != 'bag' for scene_linkage in scene.linkages):
         return {}
     folder = Path(scene.folder).resolve()
     return {'scene_folder': str(folder if bag is None else os.path.relpath(folder, bag.resolve()))}

@@ -135,33 +135,35 @@ def beginning_text(proof: ReplayVerification) -> str:
 def turning_joints(scene: Scene) -> dict[str, bool]:
     """Return for each joint of a scene, published or driven, whether it is a revolute joint."""
     revolute: dict[str, bool] = {}
-    for member in scene.linkages:
-        driven = [not given.slider for given in member.linkage.inputs]
-        revolute |= dict(zip(member.input_names, driven, strict=True))
-        kinds = [isinstance(joint, RevoluteJoint) for joint in member.linkage.joints.values()]
-        revolute |= dict(zip(member.joint_names, kinds, strict=True))
+    for scene_linkage in scene.linkages:
+        driven = [not given.slider for given in scene_linkage.linkage.inputs]
+        revolute |= dict(zip(scene_linkage.input_names, driven, strict=True))
+        kinds = [
+            isinstance(joint, RevoluteJoint) for joint in scene_linkage.linkage.joints.values()
+        ]
+        revolute |= dict(zip(scene_linkage.joint_names, kinds, strict=True))
     return revolute
 
 
 def _lost_state(scene: Scene) -> tuple[str, ...]:
     named = []
-    for member in scene.linkages:
-        drive, parameters = member.drive
+    for scene_linkage in scene.linkages:
+        drive, parameters = scene_linkage.drive
         if drive != 'topic' or parameters.cutoff:
             named.append(drive)
-    for member in scene.linkages:
-        if member.loads is not None and member.loads.applied.changes_with_time:
+    for scene_linkage in scene.linkages:
+        if scene_linkage.loads is not None and scene_linkage.loads.applied.changes_with_time:
             named.append('loads')
-        named += [effect for effect in member.effects if effect in _NEVER_FOUND_AGAIN]
-        encoder = member.effects.get('encoder')
+        named += [effect for effect in scene_linkage.effects if effect in _NEVER_FOUND_AGAIN]
+        encoder = scene_linkage.effects.get('encoder')
         if encoder and (
             encoder.cutoff or any(each.incremental for each in encoder.joints.values())
         ):
             named.append('encoder')
-        delay = member.effects.get('delay')
+        delay = scene_linkage.effects.get('delay')
         if delay and any(line.random for line in delay.lines):
             named.append('delay')
-        markers = member.effects.get('markers')
+        markers = scene_linkage.effects.get('markers')
         if markers and markers.trace:
             named.append('markers')
     return tuple(dict.fromkeys(named))
@@ -212,7 +214,7 @@ def examine_states(
     Parameters
     ----------
     bag, scene
-        As for `replay`.
+        As for `replay_ticks`.
     progress
         Progress callback; receives the number of examined ticks, now and then.
     stopped
@@ -262,8 +264,8 @@ class _Watch:
         'of',
     )
 
-    def __init__(self, member: SceneLinkage, closure: Closure) -> None:
-        self.of, self.closure = member, closure
+    def __init__(self, scene_linkage: SceneLinkage, closure: Closure) -> None:
+        self.of, self.closure = scene_linkage, closure
         self._states = self._toggles = self._limited = 0
         self._worst, self._least = -1.0, inf
         self._place: StatePlace | None = None

@@ -88,7 +88,7 @@ class RunClock:
         logged
             Their log times, in [ns]; they may deviate a little from those of the first thread.
         behind
-            How many messages of the last call of `passed` precede each.
+            How many messages of the last call of `run_times` precede each.
 
         """
         since = np.maximum(logged - self._logged[behind], 0)

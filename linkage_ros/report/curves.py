@@ -205,7 +205,9 @@ class SceneCurves:
 
     def __init__(self, scene: Scene, topics: tuple[str, str], bodies: int, window: Window) -> None:
         turning = turning_joints(scene)
-        inputs = [name for member in scene.linkages for name in member.sampled_joints]
+        inputs = [
+            name for scene_linkage in scene.linkages for name in scene_linkage.sampled_joints
+        ]
         states, crank = topics
         self._window = window
         self._states = BoundedCurves(
@@ -322,7 +324,7 @@ class LinkWrenches:
 
     def build_curves(self) -> list[Curves]:
         """Return the curves of each topic with messages."""
-        found = (kept.curves() for kept in self._kept.values())
+        found = (kept.build_curves() for kept in self._kept.values())
         return [each for each in found if each is not None]
 
 

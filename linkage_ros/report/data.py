@@ -101,11 +101,11 @@ def link_poses(
     links = tuple(link for link in found if link != GROUND)
     count = len(next(iter(values.values()), np.empty(0)))
     frames = np.full((count, len(links), 3), np.nan)
-    for number, link in enumerate(links):
+    for index, link in enumerate(links):
         place, way = found[link]
-        frames[:, number, 0] = place.real
-        frames[:, number, 1] = place.imag
-        frames[:, number, 2] = np.angle(way)
+        frames[:, index, 0] = place.real
+        frames[:, index, 1] = place.imag
+        frames[:, index, 2] = np.angle(way)
     # If one link of a linkage is unknown, none is drawn.
     frames[np.isnan(frames).any(axis=(1, 2))] = np.nan
     apart = _loop_gaps(closure, found, count)
@@ -252,8 +252,8 @@ def _all_plots(run: ReportedRun) -> list[Plot]:
     driven = {name for linkage in run.linkages for name in linkage.inputs}
     order = sorted(
         (
-            (number, place, column)
-            for number, curves in enumerate(run.curves)
+            (index, place, column)
+            for index, curves in enumerate(run.curves)
             for place, column in enumerate(curves.columns)
         ),
         key=lambda each: (each[2].name not in driven, each[0]),

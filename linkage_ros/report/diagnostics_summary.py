@@ -91,7 +91,7 @@ class RecordedDiagnostics:
 
     Parameters
     ----------
-    lanes
+    event_tracks
         Lanes of the events, by kind: lost, told_open, told_toggle, told_limited, dropped and
         health.
     from_beginning

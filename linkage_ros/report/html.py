@@ -61,12 +61,12 @@ class TableOf(NamedTuple):
 def tables_html(tables: Sequence[TableOf]) -> Iterator[str]:
     """Yield tables as HTML within the size limit; say how much is left out."""
     space = TABLE_BYTES
-    for number, table in enumerate(tables):
+    for index, table in enumerate(tables):
         if not table.rows:
             continue
         space -= _BESIDE_TABLE + _row_size([shorten_text(table.title), *table.columns])
         if space < 0:
-            yield f'<p class="note">No room for {len(tables) - number} more tables.</p>'
+            yield f'<p class="note">No room for {len(tables) - index} more tables.</p>'
             return
         rows = []
         for row in table.rows:
@@ -137,9 +137,9 @@ def run_tables(run: ReportedRun) -> Iterator[TableOf]:
 
 def _curve_ranges(curves: Curves) -> Iterator[tuple[str, ...]]:
     found = curves.intervals
-    for number, (name, quantity, unit) in enumerate(curves.columns):
-        least = np.nanmin(np.fmin(found.first[:, number], found.second[:, number]))
-        greatest = np.nanmax(np.fmax(found.first[:, number], found.second[:, number]))
+    for index, (name, quantity, unit) in enumerate(curves.columns):
+        least = np.nanmin(np.fmin(found.first[:, index], found.second[:, index]))
+        greatest = np.nanmax(np.fmax(found.first[:, index], found.second[:, index]))
         yield name, quantity, f'{least:.9g}', f'{greatest:.9g}', unit, curves.title
 
 
@@ -219,14 +219,14 @@ def _player_html(linkages: Sequence[LinkageRun], data: dict[str, object]) -> Ite
     drawn = data['linkages']
     assert isinstance(drawn, list)
     yield '<section class="player" aria-label="The linkage, moving"><div class="pictures">'
-    for number, linkage in enumerate(linkages):
+    for index, linkage in enumerate(linkages):
         name = escape(linkage.name or 'linkage')
-        yield f'<figure data-linkage="{number}">'
+        yield f'<figure data-linkage="{index}">'
         if linkage.name:
             yield f'<figcaption>{name}</figcaption>'
         yield f'<canvas role="img" aria-label="{name} in its recorded pose"></canvas>'
-        if drawn[number]['undrawn']:
-            yield f'<p class="note">Not drawn: {escape(drawn[number]["undrawn"])}</p>'
+        if drawn[index]['undrawn']:
+            yield f'<p class="note">Not drawn: {escape(drawn[index]["undrawn"])}</p>'
         yield '</figure>'
     yield '</div>'
     yield '<div class="controls">'
@@ -311,9 +311,9 @@ def _plots_html(run: ReportedRun) -> Iterator[str]:
     if crossed:
         yield '<section><h2>Over the crank</h2>'
         yield '<p class="note">The instants of the moving picture that are within the zoom.</p>'
-        for number, linkage in enumerate(run.linkages):
+        for index, linkage in enumerate(run.linkages):
             over = f'Joints over {linkage.inputs[0]}'
-            yield _plot_html(f'crossed_{number}', over)
+            yield _plot_html(f'crossed_{index}', over)
         yield '</section>'
 
 

@@ -262,30 +262,32 @@ class SceneRun:
         self._own = own_joint_states(scene) if shared else None
         self._linkages = [
             LinkageRun(
-                member.name,
-                member.prefix,
-                line.closure,
-                member.input_names,
-                member.joint_names,
-                tuple(given.unit for given in member.linkage.inputs),
+                scene_linkage.name,
+                scene_linkage.prefix,
+                linkage.closure,
+                scene_linkage.input_names,
+                scene_linkage.joint_names,
+                tuple(given.unit for given in scene_linkage.linkage.inputs),
                 EventTrack(APART, longest=True, most=_MOST_SILENCES, window=window),
             )
-            for member, line in zip(scene.linkages, pipeline.linkages, strict=True)
+            for scene_linkage, linkage in zip(scene.linkages, pipeline.linkages, strict=True)
         ]
-        inputs = [name for member in scene.linkages for name in member.sampled_joints]
+        inputs = [
+            name for scene_linkage in scene.linkages for name in scene_linkage.sampled_joints
+        ]
         self._states = JointStates(scene.joint_names, others=False)
         self._samples = JointStates(inputs, others=False)
         self._cranks = {
-            number: CrankHistory(
-                line, [inputs.index(name) for name in line.scene_linkage.sampled_joints]
+            index: CrankHistory(
+                linkage, [inputs.index(name) for name in linkage.scene_linkage.sampled_joints]
             )
-            for number, line in enumerate(pipeline.linkages)
-            if line.scene_linkage.drive[0] == 'topic'
+            for index, linkage in enumerate(pipeline.linkages)
+            if linkage.scene_linkage.drive[0] == 'topic'
         }
         self._first_joints = [
             scene.joint_names.index(linkage.joints[0]) for linkage in self._linkages
         ]
-        self._has_limits = any(member.linkage.limits for member in scene.linkages)
+        self._has_limits = any(scene_linkage.linkage.limits for scene_linkage in scene.linkages)
         self._tells_toggles = len(scene.linkages) == 1 and 'velocity' in scene.linkages[0].effects
         self._health = RecordedDiagnostics(self._event_tracks, from_beginning)
         bodies = sum(len(each.closure.structure.links) for each in self._linkages[:MOST_LINKAGES])

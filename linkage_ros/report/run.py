@@ -150,7 +150,7 @@ class Silences:
 
     Parameters
     ----------
-    lane
+    track
         The lane that receives them.
     period
         Period of the messages, in [ns]; 0 if unknown.

@@ -38,7 +38,7 @@ class CrankHistory:
 
     Parameters
     ----------
-    line
+    linkage
         The pipeline of the linkage, driven from a topic.
     columns
         Columns of the joints that its samples name, among those of all samples.

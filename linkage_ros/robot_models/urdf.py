@@ -218,7 +218,7 @@ def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
         ET.SubElement(robot, 'link', name=root)
         for model in models:
             mount = TreeJoint(
-                model.names.joint('mount'), 'fixed', root, model.names.own(GROUND), 0j
+                model.names.free_joint('mount'), 'fixed', root, model.names.own_name(GROUND), 0j
             )
             add_joint(robot, mount, None, NO_LIMITS)
     _refuse_expressions(0, robot, of_linkage=False)

@@ -145,9 +145,9 @@ class Points:
 
     def find_point(self, body: str, place: complex) -> int | None:
         """Return the number of the point at a position, or None."""
-        for number, (other, there) in enumerate(self._found):
+        for index, (other, there) in enumerate(self._found):
             if other == body and abs(there - place) <= self._near:
-                return number
+                return index
         return None
 
     def suggest_name(self, number: int, name: str, rank: int) -> None:

@@ -231,15 +231,15 @@ def parse_scene(
     scene = _build_scene(content, files[SCENE_FILE], source, settings)
     if not solvers or any(setting.startswith('accuracy=') for setting in settings):
         return scene
-    return replace(scene, members=tuple(_as_chosen(one, solvers) for one in scene.linkages))
+    return replace(scene, linkages=tuple(_as_chosen(one, solvers) for one in scene.linkages))
 
 
-def _as_chosen(member: SceneLinkage, solvers: Mapping[str, Any]) -> SceneLinkage:
+def _as_chosen(scene_linkage: SceneLinkage, solvers: Mapping[str, Any]) -> SceneLinkage:
     """Return a linkage with its chosen solver, if there is one."""
-    if member.accuracy is None or member.name not in solvers:
-        return member
-    where = Section(member.content.file, '', {'solver': solvers[member.name]})
-    return replace(member, solver=_read_solver(where, {}), accuracy=None)
+    if scene_linkage.accuracy is None or scene_linkage.name not in solvers:
+        return scene_linkage
+    where = Section(scene_linkage.content.file, '', {'solver': solvers[scene_linkage.name]})
+    return replace(scene_linkage, solver=_read_solver(where, {}), accuracy=None)
 
 
 def seed_of(name: str) -> int:
@@ -282,8 +282,8 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
         if key in content:
             content.remove_key(key)
     content.finish(('record', 'linkages', *_LINKAGE_KEYS))
-    for member in members:
-        drive, _ = member.drive
+    for scene_linkage in members:
+        drive, _ = scene_linkage.drive
         if scene.rate == 0.0 and drive != 'topic':
             raise content.error(
                 'rate',
@@ -299,8 +299,10 @@ def _read_linkages(
     """Return the linkages of a scene, and their files."""
     if 'linkages' not in content:
         linkage_content, data = source.open_linkage(content)
-        member = _read_scene_linkage('', linkage_content, content, content, source, source.closed)
-        return [member], {LINKAGE_FILE: data}
+        scene_linkage = _read_scene_linkage(
+            '', linkage_content, content, content, source, source.closed
+        )
+        return [scene_linkage], {LINKAGE_FILE: data}
     if 'linkage' in content:
         raise content.error('linkage', 'stands beside linkages', 'write one of the two')
     entries = content.sections('linkages')
@@ -313,9 +315,9 @@ def _read_linkages(
     for index, entry in enumerate(entries, 1):
         linkage_content, files[f'linkage_{index}.yaml'] = source.open_linkage(entry)
         name = entry.ros_name(entry.text('name'))
-        if name in [member.name for member in members]:
+        if name in [scene_linkage.name for scene_linkage in members]:
             raise entry.error('name', f'{quote(name)} is taken', 'give each its own')
-        taken = {joint for member in members for joint in member.joint_names}
+        taken = {joint for scene_linkage in members for joint in scene_linkage.joint_names}
         members.append(_read_scene_linkage(name, linkage_content, entry, content, source))
         if twice := taken.intersection(members[-1].joint_names):
             raise entry.error(
@@ -359,7 +361,7 @@ def _read_scene_linkage(
     effects = section_with('effects').section('effects', required=False)
     loads = section_with('loads').section('loads') if 'loads' in section_with('loads') else None
     default = drive != 'topic' or 'effort' in effects
-    published = where('publish_input').flag('publish_input', default)
+    published = section_with('publish_input').flag('publish_input', default)
     if closure is None:
         closure = read_closure(linkage_content, publish_inputs=published)
     linkage = closure.linkage
@@ -372,7 +374,7 @@ def _read_scene_linkage(
     types = _effect_types(effects, not_imported)
     parameters = import_module(DRIVES[drive]).PARAMETERS
     driven = drives.section(drive, required=False)
-    member = SceneLinkage(
+    scene_linkage = SceneLinkage(
         name=name,
         linkage=linkage,
         closure=closure,
@@ -387,7 +389,7 @@ def _read_scene_linkage(
         **_read_solving(own, scene, parts),
     )
     effects.finish(tuple(EFFECTS))
-    return member
+    return scene_linkage
 
 
 def _drive_name(drives: Section) -> str:
@@ -578,9 +580,9 @@ def _read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str,
     """Return the faults of a scene, by name."""
     section = content.section('faults', required=False)
     parts: dict[str, tuple[str, ...]] = {}
-    for member in members:
-        for kind, names in parts_of(member.linkage).items():
-            parts[kind] = (*parts.get(kind, ()), *(member.prefix + name for name in names))
+    for scene_linkage in members:
+        for kind, names in parts_of(scene_linkage.linkage).items():
+            parts[kind] = (*parts.get(kind, ()), *(scene_linkage.prefix + name for name in names))
     return {
         section.ros_name(name): _read_fault(name, section.section(name), parts) for name in section
     }

@@ -38,11 +38,11 @@ _WEAK = 0.1
 
 def scene_notes(scene: Scene) -> Iterator[FileError]:
     """Yield the notes on a scene and its linkages."""
-    for member in scene.linkages:
-        content = member.linkage_content
-        notes = linkage_notes(member.linkage, content.units, scene.rate)
+    for scene_linkage in scene.linkages:
+        content = scene_linkage.linkage_content
+        notes = linkage_notes(scene_linkage.linkage, content.units, scene.rate)
         yield from map(content.locate_error, notes)
-        yield from map(member.content.locate_error, _linkage_notes(member))
+        yield from map(scene_linkage.content.locate_error, _linkage_notes(scene_linkage))
 
 
 def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator[DefinitionError]:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.robot_models.part import ModelPart, PartError
-from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.urdf import urdf_model
 from linkage_ros.scene.scene import Scene
 
 Write = Callable[[str, Sequence[ModelPart]], bytes]
@@ -23,7 +23,7 @@ Write = Callable[[str, Sequence[ModelPart]], bytes]
 
 def scene_urdf(scene: Scene, closures: Sequence[Closure]) -> bytes:
     """Return the URDF of a scene; see `scene_model`."""
-    return scene_model(scene, closures, urdf)
+    return scene_model(scene, closures, urdf_model)
 
 
 def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> bytes:
@@ -37,7 +37,7 @@ def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> byte
     closures
         Closures of its linkages, with the deviations of their parts.
     write
-        `urdf` or `mjcf`.
+        `urdf_model` or the writer of MJCF.
 
     Raises
     ------
@@ -46,12 +46,12 @@ def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> byte
 
     """
     parts = [
-        ModelPart(closure, member.prefix, member.loads, scene.wrapped)
-        for member, closure in zip(scene.linkages, closures, strict=True)
+        ModelPart(closure, scene_linkage.prefix, scene_linkage.loads, scene.wrapped)
+        for scene_linkage, closure in zip(scene.linkages, closures, strict=True)
     ]
     try:
         return write(scene.name, parts)
     except PartError as error:
-        member = scene.linkages[error.number]
-        content = member.linkage_content if error.of_linkage else member.content
+        scene_linkage = scene.linkages[error.number]
+        content = scene_linkage.linkage_content if error.of_linkage else scene_linkage.content
         raise content.locate_error(error) from None

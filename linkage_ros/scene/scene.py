@@ -172,7 +172,7 @@ class Scene:
     ----------
     name
         Name of the scene file without its suffix.
-    members
+    linkages
         The linkages; most scenes have one.
     rate
         Tick rate, in [Hz]; 0 for one tick per crank sample.
@@ -211,19 +211,23 @@ class Scene:
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Return the names of all published joints, in order."""
-        return tuple(joint for member in self.linkages for joint in member.joint_names)
+        return tuple(
+            joint for scene_linkage in self.linkages for joint in scene_linkage.joint_names
+        )
 
     @property
     def dependent_joints(self) -> frozenset[str]:
         """Return the names of the published joints that depend on others."""
         return frozenset(self.joint_names).difference(
-            *(member.input_names for member in self.linkages)
+            *(scene_linkage.input_names for scene_linkage in self.linkages)
         )
 
     @property
     def not_imported(self) -> tuple[str, ...]:
         """Return the names of the user-defined effects that were not imported."""
-        named = (effect for member in self.linkages for effect in member.not_imported)
+        named = (
+            effect for scene_linkage in self.linkages for effect in scene_linkage.not_imported
+        )
         return tuple(dict.fromkeys(named))
 
 

@@ -65,15 +65,15 @@ def check_simulated(scene: Scene, seconds: float) -> int:
         There would be too many ticks.
 
     """
-    for member in scene.linkages:
-        if member.drive[0] == 'topic':
-            raise member.content.error(
+    for scene_linkage in scene.linkages:
+        if scene_linkage.drive[0] == 'topic':
+            raise scene_linkage.content.error(
                 'drive',
                 'topic waits for samples, and there are none',
                 'write another drive, such as constant_rate; bag takes the samples of a run',
             )
-        if member.loads is not None and member.loads.applied.wrenches:
-            raise member.content.error(
+        if scene_linkage.loads is not None and scene_linkage.loads.applied.wrenches:
+            raise scene_linkage.content.error(
                 'loads.wrenches',
                 'wait for messages, and there are none',
                 'leave them out, or write forces and efforts over_time instead',
@@ -88,7 +88,7 @@ def check_simulated(scene: Scene, seconds: float) -> int:
 
 def tick_times(scene: Scene, ticks: int) -> Sequence[int]:
     """Return the times of ticks, in [ns]."""
-    return [BEGIN + round(number * 1e9 / scene.rate) for number in range(ticks)]
+    return [BEGIN + round(index * 1e9 / scene.rate) for index in range(ticks)]
 
 
 def simulate_run(
@@ -109,7 +109,7 @@ def simulate_run(
         Folder of the bag, which does not exist yet.
     ticks
         Number of ticks.
-    goes_on
+    keep_going
         Called now and then with the number of ticks so far; if it returns False, the run ends and
         the bag is complete up to there. Signals only set the stop event: it has to look at that.
     warn
@@ -153,16 +153,16 @@ def simulate_run(
         recording = _Recording(writer, len(topics))
         loop.recorder = cast('Recorder', recording)
         try:
-            for number, now in enumerate(tick_times(scene, ticks)):
-                if not number % _ASKED_EVERY and not keep_going(number):
+            for index, now in enumerate(tick_times(scene, ticks)):
+                if not index % _ASKED_EVERY and not keep_going(index):
                     break
                 loop.tick_at(now)
         finally:
             counts = dict(zip((topic.name for _, topic in topics), recording.written, strict=True))
             writer.close({'linkage_ros.dropped': json.dumps(dict.fromkeys(counts, 0))})
-    for line in loop.pipeline.linkages:
-        if line.drive.chatter_count:
-            warn(describe_chatter(line.drive.chatter_count))
+    for linkage in loop.pipeline.linkages:
+        if linkage.drive.chatter_count:
+            warn(describe_chatter(linkage.drive.chatter_count))
     return counts
 
 

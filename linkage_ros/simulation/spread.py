@@ -46,8 +46,8 @@ def draw_spread(title: str, seconds: float, joints: Sequence[JointSpread], file:
         figure = Figure(figsize=(8.0, 0.6 + 2.0 * len(joints)), dpi=110, layout='constrained')
         figure.suptitle(picture_text(title, 120), x=0.01, ha='left', fontsize=9)
         grid = figure.subplots(len(joints), 2, sharex=True, squeeze=False)
-        for number, ((left, right), joint) in enumerate(zip(grid, joints, strict=True)):
-            colour = COLOURS[number % len(COLOURS)]
+        for index, ((left, right), joint) in enumerate(zip(grid, joints, strict=True)):
+            colour = COLOURS[index % len(COLOURS)]
             times = np.linspace(0.0, seconds, joint.values.shape[1])
             levels = _percentile_levels(joint.values)
             _draw_band(left, times, levels, colour)

@@ -109,7 +109,7 @@ def sweep_of(text: str) -> ParameterSweep:
                 raise _too_many(count)
             first = float(low)
             step = (high - first) / (count - 1)
-            found = (*(first + step * number for number in range(count - 1)), high)
+            found = (*(first + step * index for index in range(count - 1)), high)
         else:
             found = tuple(map(float, values.split(',')))
         if not all(map(isfinite, found)):
@@ -150,7 +150,7 @@ def runs_of(sweeps: Sequence[ParameterSweep], seeds: int, seed: int) -> list[Set
         count *= len(sweep.values)
     if count > MOST_RUNS:
         raise _too_many(count)
-    drawn = [('seed', [seed + number for number in range(seeds)])] if seeds > 1 else []
+    drawn = [('seed', [seed + index for index in range(seeds)])] if seeds > 1 else []
     axes = [*((sweep.key, sweep.values) for sweep in sweeps), *drawn]
     return [
         tuple(zip([key for key, _ in axes], values, strict=True))
@@ -185,24 +185,24 @@ def _reduce_run(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome
     """Tick a pipeline, and keep of it what a study needs."""
     lines, injection = pipeline.linkages, pipeline.injection
     joints = [line.scene_linkage.joint_names for line in lines]
-    firsts = [sum(map(len, joints[:number])) for number in range(len(joints))]
+    firsts = [sum(map(len, joints[:index])) for index in range(len(joints))]
     reduced = {
-        (number, quantity): _Reduction(len(joints[number]))
-        for number in range(len(lines))
+        (index, quantity): _Reduction(len(joints[index]))
+        for index in range(len(lines))
         for quantity in QUANTITIES
     }
     kept = np.full((sum(map(len, joints)), instants), np.nan)
     last = max(1, instants - 1)
-    wanted = {round(number * (len(at) - 1) / last): number for number in range(instants)}
+    wanted = {round(index * (len(at) - 1) / last): index for index in range(instants)}
     messages = 0
-    for number, time in enumerate(at):
+    for index, time in enumerate(at):
         now = time
         if injection is not None:
             injection.advance(time)
             now = injection.tick_time(time)
         tick = pipeline.tick(now)
         messages += bool(tick.message)
-        place = wanted.get(number)
+        place = wanted.get(index)
         for which, seen in enumerate(tick.states):
             reading = _reading_of(seen)
             if reading is None:

@@ -88,7 +88,7 @@ class LoopFinder:
         return (*self.expand_coordinate(arm), turn)
 
     def expand_difference(self, one: int, other: int) -> Turns:
-        """Return the difference of two coordinates as `turns` does."""
+        """Return the difference of two coordinates as `expand_coordinate` does."""
         return (
             *self.expand_coordinate(one),
             *((k, -sign) for k, sign in self.expand_coordinate(other)),

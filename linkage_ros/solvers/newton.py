@@ -425,7 +425,7 @@ class NewtonClosure(Solver):
         self._given_warm = warm
         self._warm = warm is True
         self._last: list[float] | None = None
-        self._plan, self._iterates = self._plan(tolerance)
+        self._plan, self._iterates = self._plan_steps(tolerance)
         self._dyads = [one for one in self._plan if isinstance(one, NewtonDyad)]
         self._knots = Knots(self.closed, self._dyad_orientations, repeats=not self._iterates)
         self._pose: list[float] | None = None
@@ -529,7 +529,7 @@ class NewtonClosure(Solver):
             self._last = position.state.coordinates
         return position
 
-    def _plan(self, tolerance: float) -> tuple[tuple[NewtonDyad | Step, ...], bool]:
+    def _plan_steps(self, tolerance: float) -> tuple[tuple[NewtonDyad | Step, ...], bool]:
         """Return the dyads and other steps, in order, and whether any group is iterated."""
         finder = LoopFinder(self.linkage, self.structure, self._known)
         loops = iter(finder.find_loops())

@@ -178,8 +178,8 @@ class TableClosure(Solver):
         self.knots = knots
         self._degree = ORDERS[order]
         self._parts = [
-            _TablePart(low, high, number * knots, knots / (high - low))
-            for number, (low, high) in enumerate(intervals)
+            _TablePart(low, high, index * knots, knots / (high - low))
+            for index, (low, high) in enumerate(intervals)
         ]
         self._first = self._parts[0]
         self._coefficients = np.concatenate(

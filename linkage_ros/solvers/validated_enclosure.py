@@ -242,8 +242,8 @@ class _EnclosedGroup:
         for column, k in enumerate(coordinates):
             jet = self._jets.setdefault(k, [ZERO])
             jet[order] = Disc(middle[:, column], radius[:, column])
-        for number, k in enumerate(pins):
-            column = len(coordinates) + 2 * number
+        for index, k in enumerate(pins):
+            column = len(coordinates) + 2 * index
             jet = self._pins.setdefault(k, [ZERO])
             place = middle[:, column] + 1j * middle[:, column + 1]
             jet[order] = Disc(place, radius[:, column] + radius[:, column + 1])
@@ -290,8 +290,8 @@ class _EnclosedGroup:
         coordinates, pins = self._loops.coordinates, self._loops.pins
         n = self._middle.shape[1]
         middle, radius = np.zeros((2, self._count, n, n))
-        for number, equation in enumerate(self._loops.equations):
-            row = 2 * number
+        for index, equation in enumerate(self._loops.equations):
+            row = 2 * index
             for vector in equation:
                 for column, slope in self._by_unknowns(vector, coordinates, pins):
                     middle[:, row, column] += np.real(slope.center)

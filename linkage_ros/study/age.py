@@ -129,13 +129,13 @@ def errors_in_use(
     carried: list[list[Any]] = [[] for _ in rates]
     for motion in motions:
         joints, speeds = joints_at(motion.closure, cranks_at(motion, times))
-        for number, (rate, block) in enumerate(zip(rates, blocks, strict=True)):
+        for index, (rate, block) in enumerate(zip(rates, blocks, strict=True)):
             indices = np.searchsorted(times, block)
             exact = joints[:, indices[:, 1:]]
             first, speed = joints[:, indices[:, :1]], speeds[:, indices[:, :1]]
             ahead = speed * (np.array(_PARTS) / rate)
-            held[number].append(joint_distances(motion.closure, first + 0.0 * ahead, exact))
-            carried[number].append(joint_distances(motion.closure, first + ahead, exact))
+            held[index].append(joint_distances(motion.closure, first + 0.0 * ahead, exact))
+            carried[index].append(joint_distances(motion.closure, first + ahead, exact))
     found = []
     for one, other in zip(held, carried, strict=True):
         errors = _over_periods(one), _over_periods(other)
@@ -257,8 +257,8 @@ class _CommandSamples:
             cranks = self._crank_states(use, self._recorded_samples(factor > 0.0), self._ticks)
             return error_of([self._distances_to_exact(cranks, slice(None))])
         apart = []
-        for number, phase in enumerate(_PHASES):
-            chosen = slice(number, None, len(_PHASES))
+        for index, phase in enumerate(_PHASES):
+            chosen = slice(index, None, len(_PHASES))
             ticks = self._ticks[chosen]
             cranks = self._crank_states(use, self._exact_samples(factor, phase, ticks), ticks)
             apart.append(self._distances_to_exact(cranks, chosen))
@@ -287,8 +287,8 @@ class _CommandSamples:
         period = 1e9 / (self._motion.sample_rate * factor)
 
         def samples_before(tick: int) -> Iterator[tuple[int, int]]:
-            for number in range(_BEFORE - 1, -1, -1):
-                stamp = tick - round((phase + number) * period)
+            for index in range(_BEFORE - 1, -1, -1):
+                stamp = tick - round((phase + index) * period)
                 if stamp >= 0:
                     yield stamp, stamp
 
@@ -317,9 +317,9 @@ class _CommandSamples:
 def _rates_missing(scene: Scene) -> list[str]:
     """Return the keys of the effects that publish rates, where they are missing."""
     missing = {
-        scene_key(member, 'effects')
-        for member in scene.linkages
-        if not {'velocity', 'acceleration'} & set(member.effects)
+        scene_key(scene_linkage, 'effects')
+        for scene_linkage in scene.linkages
+        if not {'velocity', 'acceleration'} & set(scene_linkage.effects)
     }
     return [f'{key}.velocity' for key in sorted(missing)]
 

@@ -305,7 +305,8 @@ def _recording_row(losses: Sequence[RecordingLoss]) -> Row:
         time_text(own.price.tick),
         share_text(own.price.core_share),
         *(
-            f'{each.instruction} ({seconds_text(each.seconds)}, {_more_text(each.price, own.price)})'
+            f'{each.instruction} ({seconds_text(each.seconds)}, '
+            f'{_more_text(each.price, own.price)})'
             if each
             else '–'
             for each in (cheaper, better)

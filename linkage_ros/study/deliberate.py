@@ -87,7 +87,9 @@ def compare_runs(
     """Return how far the published joints of a scene are from those of each of the others."""
     turning = turning_joints(scene)
     sizes = {
-        joint: member.closure.scale for member in scene.linkages for joint in member.joint_names
+        joint: scene_linkage.closure.scale
+        for scene_linkage in scene.linkages
+        for joint in scene_linkage.joint_names
     }
     compared = [_RunDifference() for _ in others]
     own, *runs = (published_states(each, feed, ticks) for each in (scene, *others))
@@ -128,7 +130,7 @@ def leave_out(scene: Scene, names: frozenset[str]) -> Scene:
     """Return a scene without these effects, and without loads where no force is left."""
     return replace(
         scene,
-        members=tuple(_without_effects(member, names) for member in scene.linkages),
+        linkages=tuple(_without_effects(scene_linkage, names) for scene_linkage in scene.linkages),
         record=None,
     )
 
@@ -154,7 +156,7 @@ class _Variant(NamedTuple):
 
 def _list_variants(scene: Scene) -> Iterator[_Variant]:
     """Yield the scene without each effect, without each fault, and without all."""
-    named = {name for member in scene.linkages for name in member.effects}
+    named = {name for scene_linkage in scene.linkages for name in scene_linkage.effects}
     for name in in_order(named):
         needed_by = effects_requiring(name, named)
         note = f'computed for {list_names(needed_by)} without it, too' if needed_by else ''
@@ -211,7 +213,7 @@ def measure_deliberate(
         feed,
         lambda share: progress(0.5 + 0.5 * share),
     )
-    drifts = any(member.drive[0] == 'torque' for member in scene.linkages)
+    drifts = any(scene_linkage.drive[0] == 'torque' for scene_linkage in scene.linkages)
     after = ticks / (scene.rate or USUAL_RATE) if drifts else None
     knobs = [
         Knob(

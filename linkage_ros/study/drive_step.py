@@ -109,8 +109,8 @@ def measure_drive_step(
     ]
     left_out: list[str] = []
     wanted = list(_other_settings(use, quick))
-    for number, (method, step) in enumerate(wanted):
-        progress((number + 1) / (len(wanted) + 1))
+    for index, (method, step) in enumerate(wanted):
+        progress((index + 1) / (len(wanted) + 1))
         work = taken * _EVALUATIONS[method] / _EVALUATIONS[use.method] * use.step / step
         if process_time() - begun + work > seconds:
             left_out.append(_setting_label(method, step))
@@ -144,7 +144,7 @@ _EVALUATIONS = {'semi_implicit_euler': 1.0, 'rk4': 4.0, 'gauss_legendre': 14.0}
 def _measure_price(motion: LinkageMotion, rate: float, horizon: float, seconds: float) -> Price:
     """Return what the drive takes of a tick, with its commands."""
     period = NANOSECONDS / rate
-    ticks = [round(number * period) for number in range(1, max(2, int(min(horizon, 1.0) * rate)))]
+    ticks = [round(index * period) for index in range(1, max(2, int(min(horizon, 1.0) * rate)))]
 
     def run() -> None:
         cranks_at(motion, ticks)

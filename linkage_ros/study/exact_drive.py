@@ -295,9 +295,9 @@ class _ExactRun:
         self, bodies: list[_MovingMass], acting: AppliedEffort
     ) -> Iterator[tuple[Margin, Callable[[], None]]]:
         """Yield what may happen, each with what it does."""
-        for number, body in enumerate(bodies):
+        for index, body in enumerate(bodies):
             if body.sense and not body.rests:
-                yield self._reversal_event(body.sense, number)
+                yield self._reversal_event(body.sense, index)
         # Only the crank has stops, and it comes first.
         low, high = bodies[0].of.stops
         if not bodies[0].rests:
@@ -395,15 +395,15 @@ def _first_event(
         at = before + (now - before) * part / _LOOKS
         state = dense(at)
         found: list[tuple[float, int]] = []
-        for number, (margin, _) in enumerate(events):
+        for index, (margin, _) in enumerate(events):
             value = margin(at, state)
             if value >= 0.0:
-                armed[number] |= value > 0.0
-            elif armed[number] and margin(low, dense(low)) > 0.0:
+                armed[index] |= value > 0.0
+            elif armed[index] and margin(low, dense(low)) > 0.0:
                 root = brentq(lambda t, m=margin: m(t, dense(t)), low, at, xtol=1e-15, rtol=1e-14)
-                found.append((root, number))
+                found.append((root, index))
             else:
-                found.append((low, number))
+                found.append((low, index))
         if found:
             return min(found)
         low = at

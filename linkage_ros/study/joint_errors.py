@@ -57,11 +57,11 @@ def joint_distances(closure: Closure, joints: Any, exact: Any) -> Any:
     It is in [rad]; slides in parts of the linkage's size. NaN where either does not exist.
     """
     apart = joints - exact
-    for number, joint in enumerate(closure.linkage.joints.values()):
+    for index, joint in enumerate(closure.linkage.joints.values()):
         if isinstance(joint, RevoluteJoint):
-            apart[number] -= tau * np.round(apart[number] / tau)
+            apart[index] -= tau * np.round(apart[index] / tau)
         else:
-            apart[number] /= size_of(closure.linkage)
+            apart[index] /= size_of(closure.linkage)
     return np.abs(apart).max(axis=0)
 
 

@@ -168,8 +168,8 @@ class _Picture:
         ]
         segments.append(((self.own_x, self.top), (self.own_x, self.bottom)))
         named = [
-            (mark, COLOURS[number % len(COLOURS)])
-            for number, marks in enumerate(self.curves)
+            (mark, COLOURS[index % len(COLOURS)])
+            for index, marks in enumerate(self.curves)
             for mark in marks
         ]
         named.sort(key=lambda each: (not each[0].is_own, each[0].is_pale))
@@ -225,10 +225,10 @@ class _Picture:
         )  # fmt: skip
 
     def _draw_legend(self) -> Iterator[str]:
-        for number, (knob, (x, row)) in enumerate(zip(self.knobs, self.names, strict=True)):
+        for index, (knob, (x, row)) in enumerate(zip(self.knobs, self.names, strict=True)):
             y = 16.0 + row * 1.5 * _TEXT
-            colour = COLOURS[number % len(COLOURS)]
-            yield _mark_svg(number, x + _MARK, y - 4.0, f'fill="{colour}"')
+            colour = COLOURS[index % len(COLOURS)]
+            yield _mark_svg(index, x + _MARK, y - 4.0, f'fill="{colour}"')
             yield _text_svg(x + 2.0 * _MARK + 5.0, y, knob.name, fill=colour)
 
     def _draw_axes(self) -> Iterator[str]:
@@ -260,8 +260,8 @@ class _Picture:
         )
 
     def _draw_curves(self) -> Iterator[str]:
-        for number, (marks, line) in enumerate(zip(self.curves, self.curve_marks(), strict=True)):
-            colour = COLOURS[number % len(COLOURS)]
+        for index, (marks, line) in enumerate(zip(self.curves, self.curve_marks(), strict=True)):
+            colour = COLOURS[index % len(COLOURS)]
             points = ' '.join(f'{mark.x:.1f},{mark.y:.1f}' for mark in line)
             yield f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5"/>'
             for mark in marks:
@@ -273,7 +273,7 @@ class _Picture:
                         f'<circle cx="{mark.x:.1f}" cy="{mark.y:.1f}" r="{_MARK + 3.5:g}" '
                         f'fill="#ffffff" stroke="{colour}" stroke-width="1.5"/>'
                     )
-                yield f'{_mark_svg(number, mark.x, mark.y, style)}</g>'
+                yield f'{_mark_svg(index, mark.x, mark.y, style)}</g>'
 
 
 def _drawn_error(setting: Setting) -> float:

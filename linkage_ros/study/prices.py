@@ -86,10 +86,10 @@ def change_scene(scene: Scene, changes: Sequence[Change]) -> Scene:
 def turn_crank(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
     """Yield times and messages: each input turns, or oscillates within the range it closes in."""
     period = 1e9 / (scene.rate or USUAL_RATE)
-    names = [name for member in scene.linkages for name in member.sampled_joints]
+    names = [name for scene_linkage in scene.linkages for name in scene_linkage.sampled_joints]
     write = JointStateWriter(names).write
     paths = (
-        [path for line in pipeline.linkages for path in _input_paths(line)]
+        [path for linkage in pipeline.linkages for path in _input_paths(linkage)]
         if pipeline.topic
         else []
     )

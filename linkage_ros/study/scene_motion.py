@@ -79,30 +79,30 @@ def motions_of(scene: Scene, like: str | None, horizon: float) -> list[LinkageMo
     scene = without_deliberate(scene)
     pipeline = Pipeline(scene)
     bag = None if like in (None, SINE) else read_bag(str(like))
-    return [_linkage_motion(scene, line, like, bag, horizon) for line in pipeline.linkages]
+    return [_linkage_motion(scene, linkage, like, bag, horizon) for linkage in pipeline.linkages]
 
 
 def without_deliberate(scene: Scene) -> Scene:
     """Return a scene without recording, faults and what its sensors and wear change."""
     members = []
-    for member in scene.linkages:
-        forced = member.drive[0] == 'torque'
+    for scene_linkage in scene.linkages:
+        forced = scene_linkage.drive[0] == 'torque'
         kept = {'velocity', 'tolerance', *(('friction',) if forced else ())}
-        effects = {name: use for name, use in member.effects.items() if name in kept}
-        loads = member.loads if forced else None
-        members.append(replace(member, effects=effects, loads=loads))
-    return replace(scene, members=tuple(members), faults={}, record=None)
+        effects = {name: use for name, use in scene_linkage.effects.items() if name in kept}
+        loads = scene_linkage.loads if forced else None
+        members.append(replace(scene_linkage, effects=effects, loads=loads))
+    return replace(scene, linkages=tuple(members), faults={}, record=None)
 
 
 def _linkage_motion(
     scene: Scene, linkage: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
 ) -> LinkageMotion:
-    member, context = linkage.scene_linkage, linkage.context
+    scene_linkage, context = linkage.scene_linkage, linkage.context
     closure = linkage.closure
     if type(closure) is not Closure:
         closure = Closure(closure.linkage)
-    motion = LinkageMotion(member, closure, context, linkage.closure, None)
-    drive, parameters = member.drive
+    motion = LinkageMotion(scene_linkage, closure, context, linkage.closure, None)
+    drive, parameters = scene_linkage.drive
     if drive == 'torque':
         return _commanded_motion(motion, like, bag, horizon)
     if drive == 'bag':
@@ -114,7 +114,7 @@ def _linkage_motion(
     if bag is not None:
         return follow_samples(motion, bag)
     if like is None:
-        raise member.content.error(
+        raise scene_linkage.content.error(
             'drive',
             'topic has no motion of its own',
             'say what its crank does: --like sine, or --like BAG with its samples',
@@ -188,8 +188,8 @@ def moves_without_commands(motion: LinkageMotion, horizon: float) -> bool:
     """Return whether a torque drive moves without commands."""
     drive = build_drive(motion)
     begin = drive.state(BEGIN).angles[0]
-    for number in range(1, 2 + int(horizon / _LOOK)):
-        time = BEGIN + round(number * _LOOK * NANOSECONDS)
+    for index in range(1, 2 + int(horizon / _LOOK)):
+        time = BEGIN + round(index * _LOOK * NANOSECONDS)
         if abs(drive.state(time).angles[0] - begin) > _STANDS:
             return True
     return False

@@ -108,7 +108,7 @@ def measure_solving(
     errors: list[JointError] = []
     candidates: list[tuple[str, JointError, Candidate]] = []
     unproved = 0
-    for number, motion in enumerate(motions):
+    for index, motion in enumerate(motions):
         linkage = motion.closure.linkage
         states = [
             crank[0]
@@ -122,7 +122,7 @@ def measure_solving(
         own = _scene_solver(motion.solution)
         errors.append(compare_solver(linkage, own.solve, known, exact)[0])
         progress(0.2)
-        if number:
+        if index:
             continue
         candidates.append((own.label, errors[0], _timed_candidate(own.solve, known)))
         for solver in comparison_solvers(motion.closure):

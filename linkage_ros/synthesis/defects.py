@@ -147,7 +147,8 @@ def _find_defects(
         return (
             Defect(
                 'open',
-                f'{_positions_text(number for number, _ in missed)} cannot be assembled, the links '
+                f'{_positions_text(number for number, _ in missed)} cannot be assembled, the '
+                'links '
                 f'miss each other by up to {worst:.3g} m',
             ),
         )
@@ -179,7 +180,8 @@ def _branch_defect(design: Design, met: tuple[AchievedPosition, ...]) -> Defect:
     where = ' and '.join(sorted({_degrees_text(remainder(one, tau)) for one in between}))
     return Defect(
         'branch',
-        f'{_sides_text(met)}; they meet only where coupler and rocker are in line, at crank angles of '
+        f'{_sides_text(met)}; they meet only where coupler and rocker are in line, at crank '
+        'angles of '
         f'{where}, and a crank does not lead from one to the other',
     )
 
@@ -310,7 +312,7 @@ def _missed_needs(assessment: Assessment, needs: Needs) -> list[tuple[str, float
 
 def needs_penalties(lengths: Array, transmission: Array, needs: Needs) -> Array:
     """
-    Return `distance` for many four-bars without defects.
+    Return `needs_penalty` for many four-bars without defects.
 
     Parameters
     ----------

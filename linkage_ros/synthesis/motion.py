@@ -318,8 +318,8 @@ def from_moving_pivots(
     check_task(poses, {'A': a, 'B': b})
     pins = np.array((a, b))
     links = fixed_pivots(*split_poses(poses), pins)
-    for number, name in enumerate('AB'):
-        _check_link(poses, name, links, number, 'fixed', np.abs(pins[number]))
+    for index, name in enumerate('AB'):
+        _check_link(poses, name, links, index, 'fixed', np.abs(pins[index]))
     _check_distance(links, 'A and B', 'fixed', 'ground')
     return _build_design(poses, links, links.pivots, pins), links
 
@@ -346,8 +346,8 @@ def from_fixed_pivots(
     check_task(poses, {'O2': o2, 'O4': o4})
     pivots = np.array((o2, o4))
     links = moving_pivots(*split_poses(poses), pivots)
-    for number, name in enumerate(('O2', 'O4')):
-        _check_link(poses, name, links, number, 'moving', np.abs(pivots[number]))
+    for index, name in enumerate(('O2', 'O4')):
+        _check_link(poses, name, links, index, 'moving', np.abs(pivots[index]))
     _check_distance(links, 'O2 and O4', 'moving', 'coupler')
     return _build_design(poses, links, pivots, links.pivots), links
 

@@ -110,7 +110,7 @@ def traverse_positions(lengths: Array, directions: Array, left: Flags) -> Traver
 
 
 def lift_directions(lengths: Array, directions: Array) -> Array:
-    """Return the directions with the turns between them, as `course` does."""
+    """Return the directions with the turns between them, as `traverse_positions` does."""
     return _lift_between(lengths, directions, mobility(lengths).turns)[0]
 
 

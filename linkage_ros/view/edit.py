@@ -304,7 +304,7 @@ def _trace_point(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChang
     link, points = _read_link(linkage, given)
     x, y = _read_numbers('at', given.get('at'), 2)
     taken = {*links_by_point(linkage.links), *linkage.sliders, *linkage.links}
-    free = (f'P{number or ""}' for number in range(len(taken) + 1))
+    free = (f'P{index or ""}' for index in range(len(taken) + 1))
     name = given.get('name', next(name for name in free if name not in taken))
     if not isinstance(name, str) or name in taken:
         raise LinkageError('name', f'{quote(name)} is taken, or no name', 'send another name')

@@ -102,14 +102,14 @@ def _to_dxf(linkage: _ExportedLinkage) -> bytes:
 
 
 def _compile_for(suffix: str) -> Callable[[_ExportedLinkage], bytes]:
-    def write_source(linkage: _ExportedLinkage) -> bytes:
+    def write_subject(linkage: _ExportedLinkage) -> bytes:
         closure, name = linkage.closure, linkage.name
         in_c = (c_name(name) or 'linkage') if suffix in ('.c', '.h') else name
         joints = tuple(closure.linkage.joints)
         subject = Subject(closure, in_c, f'{name}.yaml', _DERIVATIVES, joints)
         return write_source(subject, LANGUAGES[suffix](subject)).encode()
 
-    return write_source
+    return write_subject
 
 
 def _written_bytes(kind: str, write: Callable[[Path], None]) -> bytes:

@@ -37,7 +37,7 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.scene.notes import linkage_notes
 
-_STATUSES = {name: number for number, name in enumerate(STATUSES)}
+_STATUSES = {name: index for index, name in enumerate(STATUSES)}
 
 _SAMPLES = 180
 """Number of inputs at which transmission angle and margin are told."""

@@ -61,7 +61,7 @@ class Sensors:
         scene = parse_scene(files.name, files.name, data, files.folder, trust_effects=True)
         self.text = text
         self._scene_linkage = _driven_by_hand(scene.linkages[0])
-        self._scene = replace(scene, members=(self._scene_linkage,), faults={})
+        self._scene = replace(scene, linkages=(self._scene_linkage,), faults={})
         self._rate = min(scene.rate, _FASTEST)
         self.count = len(self._scene_linkage.linkage.inputs)
         self._closure: Closure | None = None
@@ -115,17 +115,19 @@ class Sensors:
         if self._rate == 0.0:  # a tick for each sample
             yield until
             return
-        for number in range(floor(since * self._rate) + 1, floor(until * self._rate) + 1):
-            yield number / self._rate
+        for index in range(floor(since * self._rate) + 1, floor(until * self._rate) + 1):
+            yield index / self._rate
 
     def _readings_content(self, inputs: Sequence[float]) -> dict[str, Any]:
         if self._reading is None:
             return {'read': {}, 'frames': []}
-        member = self._scene_linkage
-        read = dict(zip(member.joint_names, self._reading.joints, strict=True))
-        values = dict(zip(member.input_names, inputs, strict=True)) | read
+        scene_linkage = self._scene_linkage
+        read = dict(zip(scene_linkage.joint_names, self._reading.joints, strict=True))
+        values = dict(zip(scene_linkage.input_names, inputs, strict=True)) | read
         arrays = {name: np.array([value]) for name, value in values.items()}
-        frames = link_poses(member.closure, member.prefix, arrays, member.input_names).frames[0]
+        frames = link_poses(
+            scene_linkage.closure, scene_linkage.prefix, arrays, scene_linkage.input_names
+        ).frames[0]
         finite = bool(np.isfinite(frames).all())
         # A fault of a sensor may publish NaN, which JSON does not hold.
         read = {name: value for name, value in read.items() if np.isfinite(value)}

@@ -56,13 +56,13 @@ def messages():
     header = STORE.types['std_msgs/msg/Header']
     time = STORE.types['builtin_interfaces/msg/Time']
     written = []
-    for number in range(12_000):
-        tick, topic = divmod(number, 2)
+    for index in range(12_000):
+        tick, topic = divmod(index, 2)
         stamp = START + tick * 1_000_000
         message = joint_state(
-            header(time(stamp // 10**9, stamp % 10**9), f'frame {number}'),
+            header(time(stamp // 10**9, stamp % 10**9), f'frame {index}'),
             ['coupler_joint', 'rocker_joint'],
-            np.array([0.001 * tick, -0.002 * number]),
+            np.array([0.001 * tick, -0.002 * index]),
             np.array([1.0, -2.0]),
             np.array([]),
         )

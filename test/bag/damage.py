@@ -26,9 +26,9 @@ EACH = 100  # messages in a chunk
 def write_run(folder: Path, topics, messages) -> Path:
     """Write a finished bag of six chunks of a hundred messages; return its folder."""
     writer = BagWriter(folder, topics, ATTACHMENTS)
-    for number, message in enumerate(messages[:COUNT]):
+    for index, message in enumerate(messages[:COUNT]):
         writer.write(*message)
-        if number % EACH == EACH - 1:
+        if index % EACH == EACH - 1:
             writer.flush()
     writer.close({'seed': '7'})
     return folder
@@ -56,7 +56,7 @@ def damaged(run: Path, change) -> Path:
 
 
 def without(messages, lost: range) -> list[bytes]:
-    return [m.data for number, m in enumerate(messages[:COUNT]) if number not in lost]
+    return [m.data for index, m in enumerate(messages[:COUNT]) if index not in lost]
 
 
 def flip(at: int, bit: int = 0):

@@ -34,14 +34,14 @@ def folder(tmp_path, topics, messages):
 
 def test_each_topic_has_its_own_count_bytes_and_times(folder, topics, messages):
     found = contents_of(read_bag(folder))
-    for number, topic in enumerate(topics):
-        own = [message for message in messages if message.topic == number]
+    for index, topic in enumerate(topics):
+        own = [message for message in messages if message.topic == index]
         times = [message.log_time for message in own]
-        assert found.topics[number] == (
+        assert found.topics[index] == (
             topic, len(own), sum(len(message.data) for message in own), min(times), max(times)
         )  # fmt: skip
         rate = (len(own) - 1) / ((max(times) - min(times)) / 1e9)
-        assert found.topics[number].mean_rate == pytest.approx(rate, rel=1e-12)
+        assert found.topics[index].mean_rate == pytest.approx(rate, rel=1e-12)
     times = [message.log_time for message in messages]
     assert (found.begin, found.end) == (min(times), max(times))
     assert (found.damage, found.stopped) == ('', False)
@@ -101,8 +101,8 @@ def write(file: Path, compression: CompressionType, *, chunked: bool = True) -> 
         writer.start(library='somebody else 1.0')
         schema = writer.register_schema('a/msg/B', 'ros2msg', b'')
         channel = writer.register_channel('/b', 'cdr', schema)
-        for number in range(200):
-            writer.add_message(channel, number, PAYLOAD, number)
+        for index in range(200):
+            writer.add_message(channel, index, PAYLOAD, index)
         writer.add_metadata('other', {'serialized_metadata': 'version: 1'})
         writer.finish()
 

@@ -76,11 +76,11 @@ def test_each_bit_of_the_lengths_of_an_empty_attachment(tmp_path, topics):
     content = (tmp_path / 'run' / 'run_0.mcap').read_bytes()
     # Behind it no checksum of nothing, but the head of the next record, which ends in zeros.
     place = content.index(b'text/plain') + 10
-    for number in range(64):
-        damaged(tmp_path / 'run', flip(place + number // 8, number % 8))
+    for index in range(64):
+        damaged(tmp_path / 'run', flip(place + index // 8, index % 8))
         with pytest.raises(BagError, match='is damaged'):
             read_bag(tmp_path / 'run')
-        damaged(tmp_path / 'run', flip(place + number // 8, number % 8))
+        damaged(tmp_path / 'run', flip(place + index // 8, index % 8))
     assert read_bag(tmp_path / 'run').attachments == {'empty': b''}
 
 
@@ -285,7 +285,7 @@ def test_of_a_ring_the_older_files_that_a_kill_has_left_come_first(tmp_path, top
     recovery = recover_bag(killed)
     assert recovery is not None
     times = [message.log_time for message in read_bag(recovery.folder).messages()]
-    assert times == [number * SECOND // 10 for number in range(1, 30)]
+    assert times == [index * SECOND // 10 for index in range(1, 30)]
 
 
 def test_what_a_file_says_holds_where_the_metadata_are_lost(tmp_path, topics):

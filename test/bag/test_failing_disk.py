@@ -45,9 +45,9 @@ def write(writer, messages):
 
 
 def write_and_flush(writer, messages, every):
-    for number, message in enumerate(messages):
+    for index, message in enumerate(messages):
         writer.write(*message)
-        if every and number % every == 0:
+        if every and index % every == 0:
             writer.flush()
 
 

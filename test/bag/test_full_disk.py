@@ -285,7 +285,7 @@ said = False
 for message in messages:
     recorder.offer(*message)
     time.sleep(0.001)
-    if not said and sum(recorder._safe) >= 200:
+    if not said and sum(recorder._flushed_counts) >= 200:
         said = True
         print('flushed', flush=True)
 time.sleep(60)
@@ -383,8 +383,8 @@ def offered(recorder, messages):
     """Offer messages, and wait until they are flushed."""
     for message in messages:
         recorder.offer(*message)
-    received = sum(counts.received for counts in recorder.inspect())
-    wait_for(lambda: recorder.failure or sum(recorder._safe) == received, 'a flush')
+    received = sum(counts.received for counts in recorder.read_counts())
+    wait_for(lambda: recorder.failure or sum(recorder._flushed_counts) == received, 'a flush')
 
 
 def readable(folder, beside):

@@ -110,7 +110,7 @@ def test_the_file_says_what_rosbag2_says(summary, topics, monkeypatch):
 def test_its_text_is_that_of_a_yaml_library(summary, root, custom, files, with_topics):
     if not with_topics:
         summary = replace(summary, topics=(), counts=(), refused=())
-    parts = [replace(summary, file=f'run: {number}.mcap') for number in range(files)]
+    parts = [replace(summary, file=f'run: {index}.mcap') for index in range(files)]
     text = metadata_text(replace(summary, parts=tuple(parts)), custom, root=root)
     content = yaml.safe_load(text)
     written = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=1000)

@@ -42,8 +42,8 @@ INFORMATION = 'rosbag2_bagfile_information'
 def plain(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp('bags') / 'plain'
     writer = BagWriter(folder, [Topic('/t', 'std_msgs/msg/Empty', '', '')])
-    for number in range(1000):
-        writer.write(0, number, number, b'\0\1\0\0\0')
+    for index in range(1000):
+        writer.write(0, index, index, b'\0\1\0\0\0')
     writer.close()
     return folder
 

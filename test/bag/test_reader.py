@@ -201,10 +201,10 @@ def write(file, messages, chunk_size=64, compression=CompressionType.NONE, **opt
         writer.start(profile='ros2')
         schema = writer.register_schema('std_msgs/msg/Empty', 'ros2msg', b'')
         channels = {}
-        for number, (topic, log_time) in enumerate(messages):
+        for index, (topic, log_time) in enumerate(messages):
             if topic not in channels:
                 channels[topic] = writer.register_channel(topic, 'cdr', schema)
-            writer.add_message(channels[topic], log_time, b'%6d' % number, number)
+            writer.add_message(channels[topic], log_time, b'%6d' % index, index)
         writer.finish()
 
 
@@ -270,7 +270,7 @@ def test_files_of_a_split_bag_are_one_timeline(tmp_path):
 
 
 def test_a_killed_recording_comes_as_far_as_it_goes(tmp_path):
-    messages = [('/a', number ^ 3) for number in range(1, 400)]
+    messages = [('/a', index ^ 3) for index in range(1, 400)]
     write(tmp_path / 'whole.mcap', messages)
     content = (tmp_path / 'whole.mcap').read_bytes()
     (tmp_path / 'cut.mcap').write_bytes(content[: len(content) // 2])
@@ -288,7 +288,7 @@ def test_an_empty_bag_has_no_beginning(tmp_path):
 
 def test_damage_is_met_where_it_is_and_not_before(tmp_path):
     file = tmp_path / 'run.mcap'
-    write(file, [('/a', number) for number in range(1000)], chunk_size=1000)
+    write(file, [('/a', index) for index in range(1000)], chunk_size=1000)
     content = bytearray(file.read_bytes())
     content[content.index(b'   500')] ^= 1
     file.write_bytes(content)

@@ -395,7 +395,7 @@ def test_a_flush_begins_nearly_a_period_after_the_last_or_where_that_takes_longe
         time.sleep(0.001)
     recorder.stop()
     begun = [begin for begin, _ in writer.flushes[:20]]
-    assert begun == pytest.approx([BETWEEN + number * between for number in range(20)])
+    assert begun == pytest.approx([BETWEEN + index * between for index in range(20)])
 
 
 def test_a_backlog_is_written_before_a_slow_disk_is_waited_for_again(tmp_path, clock):
@@ -411,8 +411,8 @@ def test_a_backlog_is_written_before_a_slow_disk_is_waited_for_again(tmp_path, c
     writer.flush = stalled  # type: ignore[method-assign]
     recorder = Recorder(writer, flush_period=PERIOD)
     assert begun.wait(10)
-    for number in range(5000):
-        recorder.offer(0, number, number, b'\0\1\0\0')
+    for index in range(5000):
+        recorder.offer(0, index, index, b'\0\1\0\0')
     go_on.set()
     while len(writer.flushes) < 2 and recorder.failure is None:
         time.sleep(0.001)
@@ -431,8 +431,8 @@ def test_what_comes_without_end_is_flushed_all_the_same(tmp_path, clock):
         return write(*message)  # type: ignore[arg-type]
 
     writer.write = write_and_offer  # type: ignore[method-assign]
-    for number in range(100):
-        recorder.offer(0, number, number, b'\0\1\0\0')
+    for index in range(100):
+        recorder.offer(0, index, index, b'\0\1\0\0')
     while writer.written < 20_000 and recorder.failure is None:
         time.sleep(0.001)
     recorder.stop()

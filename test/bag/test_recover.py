@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-`recover` on bags that are cut, flipped, holed and forged.
+`recover_bag` on bags that are cut, flipped, holed and forged.
 
 Whatever the damage: what is saved is true, in order, and read by our reader, mcap's and rosbags;
 the damaged bag stays as it was.
@@ -165,7 +165,7 @@ SOME_LOSS = {
 @pytest.mark.parametrize(('change', 'lost'), SOME_LOSS.values(), ids=SOME_LOSS.keys())
 def test_only_what_is_damaged_is_lost(run, topics, messages, readers, change, lost):
     recovery = recover_bag(damaged(run, change))
-    kept = [m for number, m in enumerate(messages[:COUNT]) if number not in lost]
+    kept = [m for index, m in enumerate(messages[:COUNT]) if index not in lost]
     readers.agree(recovery.folder, topics, kept)
     assert data_of(recovery.folder) == without(messages, lost)
     assert not recovery.is_whole
@@ -265,7 +265,7 @@ def test_what_was_killed_and_is_recovered_is_finished(run):
     assert found['seed'] == '7'
 
 
-# `recover` where everything is against it: any damage, bad disks, full ones, no bag at all.
+# `recover_bag` where everything is against it: any damage, bad disks, full ones, no bag at all.
 
 
 @settings(

@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""`recover` on bags that others wrote, or forged: packed, split, without checksums, bombs."""
+"""`recover_bag` on bags that others wrote, or forged: packed, split, without checksums, bombs."""
 
 from pathlib import Path
 import struct
@@ -40,8 +40,8 @@ def written(file: Path, messages, *, count: int = 90, chunk_size: int = 5000, **
         writer.start(profile='ros2')
         schema = writer.register_schema('std_msgs/msg/String', 'ros2msg', b'string data')
         channel = writer.register_channel('/text', 'cdr', schema)
-        for number, message in enumerate(messages[:count]):
-            writer.add_message(channel, number, message.data, number, number)
+        for index, message in enumerate(messages[:count]):
+            writer.add_message(channel, index, message.data, index, index)
         writer.finish()
     return file
 
@@ -53,12 +53,12 @@ def with_channels(file: Path, count: int) -> Path:
     Schema(id=1, name='std_msgs/msg/String', encoding='ros2msg', data=b'string data').write(
         builder
     )
-    for number in range(count):
+    for index in range(count):
         Channel(
-            id=number, topic=f'/topic_{number}', message_encoding='cdr', metadata={}, schema_id=1
+            id=index, topic=f'/topic_{index}', message_encoding='cdr', metadata={}, schema_id=1
         ).write(builder)
         Message(
-            channel_id=number, log_time=1, publish_time=1, sequence=1, data=b'\0\1\0\0\1\0\0\0\0'
+            channel_id=index, log_time=1, publish_time=1, sequence=1, data=b'\0\1\0\0\1\0\0\0\0'
         ).write(builder)
     DataEnd(0).write(builder)
     Footer(0, 0, 0).write(builder)
@@ -78,8 +78,8 @@ def test_too_many_channels_are_refused_in_a_line(tmp_path, count, capsys):
 
 def test_as_many_channels_as_may_be_are_saved_over_all_files(tmp_path, monkeypatch):
     monkeypatch.setattr('linkage_ros.bag.recover.MOST_CHANNELS', 20)
-    for number, count in enumerate((15, 20)):
-        with_channels(tmp_path / 'bag' / f'bag_{number}.mcap', count)
+    for index, count in enumerate((15, 20)):
+        with_channels(tmp_path / 'bag' / f'bag_{index}.mcap', count)
     recovery = recover_bag(tmp_path / 'bag')
     assert [topic.saved for topic in recovery.topics] == 15 * [2] + 5 * [1]
     with_channels(tmp_path / 'bag' / 'bag_2.mcap', 21)
@@ -228,10 +228,10 @@ class TestSplit:
     def split(self, tmp_path, messages):
         folder = tmp_path / 'split'
         dealt = messages[:30], messages[30:60], messages[60:90]
-        for number in range(3):
+        for index in range(3):
             written(
-                folder / f'split_{number}.mcap',
-                dealt[number],
+                folder / f'split_{index}.mcap',
+                dealt[index],
                 chunk_size=1000,
                 compression=CompressionType.NONE,
             )

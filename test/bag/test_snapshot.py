@@ -37,8 +37,8 @@ A_BLOCK = 64 * 1024 + 1000
 def kept_of(offers, seconds, most=PLENTY):
     """Return what is kept of (topic, log time in s), as such pairs, and how many have gone."""
     last = LastSeconds(3, round(seconds * NS), most)
-    for number, (topic, time) in enumerate(offers):
-        last.add(topic, round(time * NS), number, b'%d' % number)
+    for index, (topic, time) in enumerate(offers):
+        last.add(topic, round(time * NS), index, b'%d' % index)
     while last.discard_old(7):
         pass
     kept = last.kept_content()
@@ -126,11 +126,11 @@ def test_where_room_is_scarce_the_oldest_ticks_go_as_a_whole():
 
 def test_what_was_taken_stays_as_it_was_while_the_memory_goes_on():
     last = LastSeconds(1, NS, PLENTY)
-    for number in range(1000):
-        last.add(0, number * 1_000_000, number, b'before')
+    for index in range(1000):
+        last.add(0, index * 1_000_000, index, b'before')
     kept = last.kept_content()
-    for number in range(1000, 9000):
-        last.add(0, number * 1_000_000, number, b'since')
+    for index in range(1000, 9000):
+        last.add(0, index * 1_000_000, index, b'since')
         last.discard_old(10)
     assert [number for _, _, number, _ in kept.messages()] == list(range(1000))
     assert min(number for _, _, number, _ in last.kept_content().messages()) == 7999
@@ -173,7 +173,7 @@ def test_a_memory_that_has_let_go_is_not_whole(memory, messages):
         memory.offer(*message)
     kept = memory.take()
     assert not kept.whole
-    counts = memory.inspect()
+    counts = memory.read_counts()
     assert closes(counts)
     assert tuple(c.kept for c in counts) == kept.counts
     assert all(c.discarded > 4000 for c in counts)
@@ -196,7 +196,7 @@ def test_threads_that_offer_at_once_lose_no_count(memory, messages):
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):
-        assert closes(memory.inspect())
+        assert closes(memory.read_counts())
         kept = memory.take()
         assert len(list(kept.messages())) == sum(kept.counts)
     kept = memory.take()
@@ -221,7 +221,7 @@ def test_where_the_thread_does_not_keep_up_messages_are_dropped_and_counted(memo
     with memory._lock:  # as if the machine had no time for it
         for message in messages[:1000]:
             memory.offer(*message)
-        assert closes(memory.inspect())
+        assert closes(memory.read_counts())
     # A message of the thread's own batch may have been on its way.
     counts = memory.stop()
     assert closes(counts)
@@ -233,7 +233,7 @@ def test_what_waits_for_the_thread_is_bounded_in_bytes(memory, messages):
     with memory._lock:
         for _ in range(200):
             memory.offer(*messages[0]._replace(data=bytes(10 * PLACE)))
-        counts = memory.inspect()
+        counts = memory.read_counts()
         # Ten of eleven places each; the thread may have been at one of the first 50 places.
         assert closes(counts)
         assert 10 <= counts[0].kept <= 15
@@ -267,7 +267,7 @@ def test_after_the_end_nothing_is_kept(memory, messages):
     memory.offer(*messages[0])
     assert [c.kept for c in memory.stop()] == [1, 0]
     memory.offer(*messages[0])
-    assert [c.dropped for c in memory.inspect()] == [1, 0]
+    assert [c.dropped for c in memory.read_counts()] == [1, 0]
     with pytest.raises(RecordingError, match='has ended; ask while the node is active'):
         memory.take()
 
@@ -292,10 +292,10 @@ def said_in(folder):
 
 def test_two_snapshots_are_two_bags_that_overlap(tmp_path, topics, messages, memory, readers):
     memory = memory(3.0)
-    for number, (begin, end) in enumerate(((0, 8000), (8000, 12_000))):
+    for index, (begin, end) in enumerate(((0, 8000), (8000, 12_000))):
         for message in messages[begin:end]:
             memory.offer(*message)
-        folder = tmp_path / f'run_{number}'
+        folder = tmp_path / f'run_{index}'
         kept = memory.take()
         done = threading.Event()
         make = partial(BagWriter, folder, topics)

@@ -45,9 +45,9 @@ SPLITS = {
 
 def record(folder, topics, messages, storage, flush_every=1000):
     writer = BagWriter(folder, topics, ATTACHMENTS, storage)
-    for number, message in enumerate(messages):
+    for index, message in enumerate(messages):
         assert writer.write(*message)
-        if number % flush_every == 500:
+        if index % flush_every == 500:
             writer.flush()
     return writer.close({'seed': '7'})
 
@@ -68,7 +68,7 @@ def test_every_reader_finds_every_message_in_the_folder_and_in_the_files(
     summary = record(tmp_path / 'run', topics, messages, storage)
     names = [part.file for part in summary.parts or (summary,)]
     assert len(names) > 2 or storage in (SPLITS['one file'], SPLITS['lz4'])
-    assert names == [f'run_{number}.mcap' for number in range(len(names))]
+    assert names == [f'run_{index}.mcap' for index in range(len(names))]
     assert sorted(p.name for p in (tmp_path / 'run').iterdir()) == sorted(
         [*names, 'metadata.yaml']
     )
@@ -176,7 +176,7 @@ def test_a_ring_keeps_the_last_files_and_counts_what_it_let_go(
     summary = recorder.stop()
     there = [message.data for message in read_bag(tmp_path / 'run').messages()]
     kept = min(keep, 6)
-    names = [f'run_{number}.mcap' for number in range(6 - kept, 6)]
+    names = [f'run_{index}.mcap' for index in range(6 - kept, 6)]
     assert information(tmp_path / 'run')['relative_file_paths'] == names
     assert sorted(p.name for p in (tmp_path / 'run').iterdir()) == ['metadata.yaml', *names]
     last = len(messages) - len(there)
@@ -205,8 +205,8 @@ def account_of(file):
 def test_the_account_is_in_the_last_file_and_closes(tmp_path, topics, messages):
     storage = Storage(split_seconds=1.0, keep_files=2)
     recorder = Recorder(BagWriter(tmp_path / 'run', topics, ATTACHMENTS, storage), capacity=10**6)
-    for number, message in enumerate(messages):
-        recorder.offer(*(message._replace(log_time=-1) if number % 100 == 0 else message))
+    for index, message in enumerate(messages):
+        recorder.offer(*(message._replace(log_time=-1) if index % 100 == 0 else message))
     summary = recorder.stop()
     first, last = read_bag(tmp_path / 'run').files
     account = account_of(last)
@@ -303,7 +303,7 @@ def test_a_kill_at_any_step_leaves_all_that_was_flushed(tmp_path, topics, messag
     subprocess.run(script, cwd=ROOT, check=True)
     folders = sorted((p for p in (tmp_path / 'bags').iterdir() if p.is_dir()), key=_number)
     assert len(folders) > 100
-    place = {data: number for number, (*_, data) in enumerate(messages)}
+    place = {data: index for index, (*_, data) in enumerate(messages)}
     killed_while_finished = 0
     for folder in folders[:-1]:
         flushed = folder.with_name(f'{folder.name}.flushed')

@@ -40,9 +40,9 @@ ATTACHMENTS = {
 def bag(tmp_path, topics, messages):
     """Return a finished bag of all messages, flushed now and then, and its summary."""
     writer = BagWriter(tmp_path / 'run', topics, ATTACHMENTS)
-    for number, message in enumerate(messages):
+    for index, message in enumerate(messages):
         assert writer.write(*message)
-        if number % 1000 == 500:
+        if index % 1000 == 500:
             writer.flush()
     return writer.close({'seed': '7'})
 

@@ -65,7 +65,7 @@ def test_signals_end_commands() -> None:
 
 def test_files_are_changed_in_many_ways() -> None:
     original = b'links: {ground: {A: [0, 0], B: [0.1, 0]}}\ninput: {joint: j}\n'
-    files_ = {mutated(original, random.Random(number))[1] for number in range(300)}
+    files_ = {mutated(original, random.Random(index))[1] for index in range(300)}
     assert len(files_) > 200
     assert sum(b'5e-324' in file for file in files_) > 1
 

@@ -72,8 +72,8 @@ def marks(tmp_path: Path) -> Marks:
 def record(folder: Path, marks: Marks, count: int, storage: Storage | None = None) -> BagWriter:
     """Write and flush a number of messages, as a recording before its kill."""
     writer = BagWriter(folder, TOPICS, {}, storage)
-    for number in range(count):
-        writer.write(*message(number, marks.times[number // 2]))
+    for index in range(count):
+        writer.write(*message(index, marks.times[index // 2]))
     writer.flush()
     return writer
 
@@ -178,7 +178,7 @@ def test_the_judge_detects_a_wrong_recovery(
     def recover(_: Path, target: Path) -> None:
         record(target, marks, 119).close()
 
-    monkeypatch.setattr(judge_module, 'recover', recover)
+    monkeypatch.setattr(judge_module, 'recover_bag', recover)
     outcome = judge(PLAN, tmp_path / 'bag', marks, 1100 * MS)
     assert outcome.faults == [f'recovered: {FAULT}other messages']
 

@@ -112,7 +112,7 @@ class Recorded:
         if resets:
             run['resets_topic'] = '/linkage/resets'
             topics.append(topic('/linkage/resets', 'builtin_interfaces/msg/Time'))
-        self._numbers = {each.name: number for number, each in enumerate(topics)}
+        self._numbers = {each.name: index for index, each in enumerate(topics)}
         self._writer = BagWriter(
             folder,
             topics,
@@ -122,25 +122,25 @@ class Recorded:
 
     def run(self, ticks: int, dropped: Mapping[str, int] | None = None) -> Path:
         """Tick, and close the bag; return its folder."""
-        for number in range(ticks):
-            stamp = BEGIN + round(number * SECOND / self.rate)
+        for index in range(ticks):
+            stamp = BEGIN + round(index * SECOND / self.rate)
             now = stamp + MS // 4  # when the tick takes its sample
-            if number in self._resets:
+            if index in self._resets:
                 self.pipeline = Pipeline(self._scene)
-                self._write(number, '/linkage/resets', now, now, time_message(now))
+                self._write(index, '/linkage/resets', now, now, time_message(now))
             if self._crank:
-                states = self._crank(number)
+                states = self._crank(index)
                 message = self._sample(stamp, states)
-                self._write(number, self._crank_topic, now, stamp + MS // 8, message)
+                self._write(index, self._crank_topic, now, stamp + MS // 8, message)
                 self.pipeline.offer(message, now)
             tick = self.pipeline.tick(stamp)
             if tick.message:
-                self._write(number, '/joint_states', now, stamp, tick.message)
+                self._write(index, '/joint_states', now, stamp, tick.message)
                 for name, message in zip(self._extras, tick.extras, strict=bool(tick.extras)):
                     if message:
-                        self._write(number, name, now, stamp, message)
+                        self._write(index, name, now, stamp, message)
             elif any(look.position for look in tick.full_states):
-                self._write(number, '/linkage/withheld', now, stamp, time_message(stamp))
+                self._write(index, '/linkage/withheld', now, stamp, time_message(stamp))
         counts = dict.fromkeys(self._numbers, 0) | dict(dropped or {})
         self._writer.close({'linkage_ros.dropped': json.dumps(counts)})
         return self.folder

@@ -26,8 +26,8 @@ SECOND = 1_000_000_000
 def bag(folder, values, *, rate=100, begin=5, seconds=2.0, topic='/joint_states'):
     """Write a bag of joint states, made by functions of the time in [s]; without a scene."""
     writer = BagWriter(folder, [Topic(topic, JOINT_STATE, '', '')])
-    for number in range(round(seconds * rate) + 1):
-        time = number / rate
+    for index in range(round(seconds * rate) + 1):
+        time = index / rate
         stamp = begin * SECOND + round(time * SECOND)
         data = joint_state(
             values,

@@ -56,10 +56,10 @@ def joint_message(joint: str, stamp: int, value: float, rate: float) -> bytes:
 def test_scene_publishes_what_the_scene_driven_by_the_crank_does() -> None:
     by_crank = pipeline_of(RATES, FILE)
     by_rocker = pipeline_of(RATES + BY_ROCKER, FILE)
-    for number in range(1, 800):
-        now = SECOND + number * MS
-        if number % 3 == 1:
-            crank, rocker = samples(number * 1e-3)
+    for index in range(1, 800):
+        now = SECOND + index * MS
+        if index % 3 == 1:
+            crank, rocker = samples(index * 1e-3)
             assert by_crank.offer(joint_message('crank_joint', now, *crank), now) is None
             assert by_rocker.offer(joint_message('rocker_joint', now, *rocker), now) is None
         one, other = (each.tick(now) for each in (by_crank, by_rocker))
@@ -145,8 +145,8 @@ def test_linkages_of_one_scene_get_their_own_samples(tmp_path: Path) -> None:
 
 def test_cost_and_fmu_feed_the_dependent_joint() -> None:
     pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
-    (line,) = pipeline.linkages
-    names = [variable.name for variable in _Sender(line).variables]
+    (linkage,) = pipeline.linkages
+    names = [variable.name for variable in _Sender(linkage).variables]
     assert names == ['crank_states.rocker_joint.position', 'crank_states.rocker_joint.velocity']
     for now, message in islice(turn_crank(scene_of(RATES + BY_ROCKER, FILE), pipeline), 50):
         assert pipeline.offer(message, now) is None

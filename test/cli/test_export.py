@@ -237,7 +237,7 @@ def test_a_linkage_without_a_reading_leaves_its_cells_empty(
     ]
     # Where crank and joint states share the topic, the samples make no rows.
     assert len(rows) == 20
-    assert [row[4] is None for row in rows] == [number < 4 for number in range(20)]
+    assert [row[4] is None for row in rows] == [index < 4 for index in range(20)]
     assert [row[4] for row in rows if row[4] is not None] == [
         message.position[message.name.index('left_coupler_joint')]
         for _, _, message in told(tmp_path / 'bag')
@@ -326,8 +326,8 @@ def joint_state(
 def foreign(folder: Path, *messages: bytes, topics: Sequence[str] = ('/js',)) -> Path:
     """Write a bag without a scene, its messages on the first topic."""
     writer = BagWriter(folder, [topic(name, JOINT_STATE) for name in topics])
-    for number, message in enumerate(messages):
-        writer.write(0, BEGIN + number, BEGIN + number, message)
+    for index, message in enumerate(messages):
+        writer.write(0, BEGIN + index, BEGIN + index, message)
     writer.close()
     return folder
 

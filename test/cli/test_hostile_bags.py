@@ -84,7 +84,7 @@ def rewritten(
     """Write a bag once more with another account of its run, and more messages at its end."""
     bag = read_bag(bag_path)
     files = {name: ('', data) for name, data in bag.attachments.items()}
-    numbers = {each.name: number for number, each in enumerate(bag.topics)}
+    numbers = {each.name: index for index, each in enumerate(bag.topics)}
     writer = BagWriter(folder / 'odd', bag.topics, files | {RUN_FILE: ('', account)})
     for message in (*bag.messages(), *more):
         writer.write(numbers[message.topic], *message[1:])
@@ -210,12 +210,12 @@ def odd_bag(folder: Path, odd: str) -> Path:
     files[f'{odd}.txt'] = ('', b'')
     strange = [Topic(f'/{odd}', odd, odd, odd), Topic(f'/{odd}/joints', JOINT_STATE, '', '')]
     topics = [*whole.topics, *strange]
-    numbers = {each.name: number for number, each in enumerate(topics)}
+    numbers = {each.name: index for index, each in enumerate(topics)}
     writer = BagWriter(folder / 'odd', topics, files)
     for message in whole.messages():
         writer.write(numbers[message.topic], *message[1:])
-    for number in range(3):
-        time = BEGIN + number * MS
+    for index in range(3):
+        time = BEGIN + index * MS
         writer.write(len(topics) - 2, time, time, text_message(odd))
         states = JointStateWriter([odd, 'rocker_joint']).write(time, (0.1, 0.2), ())
         writer.write(len(topics) - 1, time, time, states)
@@ -338,7 +338,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert EFFECT in text
     files[SCENE_FILE] = ('', text.encode())
     writer = BagWriter(folder / 'strange', whole.topics, files)
-    numbers = {each.name: number for number, each in enumerate(whole.topics)}
+    numbers = {each.name: index for index, each in enumerate(whole.topics)}
     for message in whole.messages():
         writer.write(numbers[message.topic], *message[1:])
     writer.close()

@@ -129,7 +129,7 @@ def test_the_nearest_approach_to_a_toggle_is_that_of_the_law_of_cosines(
     bag: Path, tell: Any
 ) -> None:
     (linkage,) = tell(bag)['scene']['linkages']
-    angles = [1.0 + 0.007 * number for number in range(1500)]
+    angles = [1.0 + 0.007 * index for index in range(1500)]
     least = min(range(1500), key=lambda number: transmission(angles[number], A, B, C, D))
     near = linkage['nearest_to_toggle']
     mu = transmission(angles[least], A, B, C, D)
@@ -206,7 +206,7 @@ def test_each_of_several_linkages_has_its_own_account(tmp_path: Path, tell: Any)
     assert (left['name'], right['name']) == ('left', 'right')
     assert left['inputs'] == [{'joint': 'left_crank_joint', 'unit': 'rad'}]
     for linkage, start, rate in ((left, 0.0, 5.0), (right, 2.0, -3.0)):
-        angles = [start + rate * number * 1e-3 for number in range(400)]
+        angles = [start + rate * index * 1e-3 for index in range(400)]
         least = min(transmission(angle, A, B, C, D) for angle in angles)
         near = linkage['nearest_to_toggle']
         assert near['transmission_angle_rad'] == pytest.approx(least, abs=1e-12)
@@ -258,9 +258,9 @@ def foreign(tmp_path: Path) -> Path:
     text = STORE.types['std_msgs/msg/String']
     with writer:
         chatter = writer.add_connection('/chatter', 'std_msgs/msg/String', typestore=STORE)
-        for number in range(30):
+        for index in range(30):
             data = STORE.serialize_cdr(text('again ' * 1000), 'std_msgs/msg/String')
-            writer.write(chatter, BEGIN + number * SECOND // 10, data)
+            writer.write(chatter, BEGIN + index * SECOND // 10, data)
     return tmp_path / 'foreign'
 
 
@@ -412,8 +412,8 @@ def test_joint_states_that_come_out_otherwise_are_counted(
     names = [topic.name for topic in original.topics]
     attached = {name: ('', data) for name, data in original.attachments.items()}
     writer = BagWriter(tmp_path / 'bag', original.topics, attached)
-    for number, (name, log, publish, data) in enumerate(original.messages()):
-        changed = name == '/joint_states' and 300 < number < 400
+    for index, (name, log, publish, data) in enumerate(original.messages()):
+        changed = name == '/joint_states' and 300 < index < 400
         writer.write(names.index(name), log, publish, data[:-16] + bytes(16) if changed else data)
     writer.close()
     assert tell(tmp_path / 'bag')['replay'] == {'joint_states': 1500, 'same_bytes': 1467}

@@ -265,15 +265,15 @@ def test_every_shipped_linkage_is_drawn(linkage: Run, tmp_path: Path, name: str)
 def test_a_picture_is_the_same_each_time(tmp_path: Path) -> None:
     for kind in ('svg', 'png'):
         drawn = []
-        for number in range(2):
-            file = tmp_path / f'{number}.{kind}'
+        for index in range(2):
+            file = tmp_path / f'{index}.{kind}'
             subprocess.run(
                 [
                     *(sys.executable, '-m', 'linkage_ros.cli.main'),
                     *('draw', FOUR_BAR, '-o', str(file), '--at', '40'),
                 ],
                 cwd=tmp_path,
-                env=environment(tmp_path) | {'PYTHONHASHSEED': str(number)},
+                env=environment(tmp_path) | {'PYTHONHASHSEED': str(index)},
                 check=True,
             )
             drawn.append(file.read_bytes())
@@ -407,8 +407,8 @@ def test_each_assembly_that_check_lists_is_a_pose_to_paste(linkage: Run, tmp_pat
     listed = re.findall(r'^\{inputs: .*\}\}', answer.stdout, re.MULTILINE)
     assert len(listed) == 3
     joints = []
-    for number, pose in enumerate(['', *listed]):
-        file = tmp_path / f'{number}.yaml'
+    for index, pose in enumerate(['', *listed]):
+        file = tmp_path / f'{index}.yaml'
         # The line `pose: …` of the file in the place of that which it has.
         changed = re.sub('^pose: .*$', f'pose: {pose}', text, flags=re.MULTILINE)
         file.write_text(changed if pose else text, 'utf-8')

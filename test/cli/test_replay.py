@@ -109,10 +109,10 @@ def rewritten(
     files = {key: ('', data) for key, data in bag.attachments.items()}
     account = json.loads(bag.attachments[RUN_FILE]) | said
     files[RUN_FILE] = ('', json.dumps(account).encode())
-    numbers = {each.name: number for number, each in enumerate(bag.topics)}
+    numbers = {each.name: index for index, each in enumerate(bag.topics)}
     writer = BagWriter(bag_path.with_name(name), bag.topics, files, storage)
-    for number, message in enumerate(bag.messages()):
-        edited = edit(number, message)
+    for index, message in enumerate(bag.messages()):
+        edited = edit(index, message)
         for _ in range(1 + (message.topic == twice) if edited else 0):
             writer.write(numbers[edited.topic], *edited[1:])
     writer.close(custom)
@@ -283,7 +283,7 @@ def test_a_tick_that_withheld_and_would_not_now_is_a_difference(tmp_path, capsys
         found = read_bag(bag)
         files = {key: ('', value) for key, value in found.attachments.items()}
         files['scene.yaml'] = ('', data)
-        numbers = {each.name: number for number, each in enumerate(found.topics)}
+        numbers = {each.name: index for index, each in enumerate(found.topics)}
         writer = BagWriter(tmp_path / name, found.topics, files)
         for message in found.messages():
             writer.write(numbers[message.topic], *message[1:])
@@ -373,7 +373,8 @@ def test_a_bit_is_found_in_a_bag_of_mid_run_too(tmp_path, capsys):
 @pytest.mark.parametrize(('running', 'said'), [(True, 'mid-run'), (False, 'with the run')])
 def test_a_recording_says_when_it_was_begun(tmp_path, running, said):
     logger = SimpleNamespace(info=lambda _: None, error=lambda _: None)
-    loop = SimpleNamespace(running=running, recorder=None, pipeline=SimpleNamespace(lines=[]))
+    pipeline = SimpleNamespace(linkages=[])
+    loop = SimpleNamespace(is_running=running, recorder=None, pipeline=pipeline)
     recording = RunRecording(logger)
     scene = load_scene(scene_file(tmp_path, ''))
     states = topic('/joint_states', JOINT_STATE)
@@ -618,7 +619,8 @@ def test_a_solver_that_was_chosen_is_not_chosen_again(
 ) -> None:
     # Choosing takes times, and another machine, or another hour, has others.
     (tmp_path / 'scene.yaml').write_text(
-        f'linkage: {shipped_path("linkages/class_3.yaml")}\ndrive: {{constant_rate: {{rate: 2.0}}}}\n'
+        f'linkage: {shipped_path("linkages/class_3.yaml")}\ndrive: '
+        f'{{constant_rate: {{rate: 2.0}}}}\n'
         'accuracy: 1.0e-6\nrecord: {name: run}\n'
     )
     ran = linkage('run', 'scene.yaml', '--seconds', '1', '--plain')
@@ -630,7 +632,7 @@ def test_a_solver_that_was_chosen_is_not_chosen_again(
     def again(*_: object) -> None:
         pytest.fail('chosen again')
 
-    monkeypatch.setattr('linkage_ros.solvers.choose.choose', again)
+    monkeypatch.setattr('linkage_ros.solvers.choose.choose_solver', again)
     ticks = list(replayed(bag, recorded_scene(bag)))
     assert len(ticks) > 100
     assert [tick.tick.message for tick in ticks] == [tick.recorded for tick in ticks]

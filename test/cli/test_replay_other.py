@@ -235,7 +235,7 @@ def test_times_that_are_nonsense_do_not_ask_for_years_of_ticks(tmp_path, capsys)
 
     found = read_bag(bag)
     files = {name: ('', data) for name, data in found.attachments.items()}
-    numbers = {each.name: number for number, each in enumerate(found.topics)}
+    numbers = {each.name: index for index, each in enumerate(found.topics)}
     writer = BagWriter(tmp_path / 'odd', found.topics, files)
     for message in found.messages():
         odd = message.log_time == BEGIN + 100 * MS + MS // 4
@@ -280,10 +280,10 @@ def foreign(
     """Write a bag that nothing of ours has recorded."""
     writer = BagWriter(folder / 'foreign', [topic(name, JOINT_STATE) for name in topics])
     write = JointStateWriter(joints).write
-    for number in range(count):
-        stamp = BEGIN + number * 5 * MS
+    for index in range(count):
+        stamp = BEGIN + index * 5 * MS
         for each in range(len(topics)):
-            numbers = [0.1, angle(number)][: len(joints)]
+            numbers = [0.1, angle(index)][: len(joints)]
             writer.write(each, stamp + MS, stamp, write(stamp, numbers, [0.0] * len(joints)))
     writer.close()
     return writer.folder
@@ -329,9 +329,9 @@ def test_time_that_jumps_back_begins_anew(tmp_path, capsys, rate, each):
     writer = BagWriter(tmp_path / 'jump', [topic('/motor', JOINT_STATE)])
     write = JointStateWriter(['crank_joint']).write
     for begin in (BEGIN + 5 * SECOND, BEGIN + 2 * SECOND):
-        for number in range(100):
-            stamp = begin + number * 5 * MS
-            writer.write(0, stamp, stamp, write(stamp, [angle(number)], [4.0]))
+        for index in range(100):
+            stamp = begin + index * 5 * MS
+            writer.write(0, stamp, stamp, write(stamp, [angle(index)], [4.0]))
     writer.close()
     scene = other(tmp_path, f'rate: {rate}\neffects: {{{NOISE}}}\n')
     account = told(capsys, tmp_path / 'jump', '--scene', scene, '-o', tmp_path / 'new')
@@ -348,7 +348,7 @@ def test_a_run_that_was_silent_has_ticked_where_it_took_samples(tmp_path, capsys
     topics = [topic('/joint_states', JOINT_STATE), topic('/crank_states', JOINT_STATE)]
     writer = BagWriter(tmp_path / 'open', topics, files)
     write = JointStateWriter(['crank_joint']).write
-    times = [BEGIN + number * MS + number * number * 37_000 % 300_000 for number in range(100)]
+    times = [BEGIN + index * MS + index * index * 37_000 % 300_000 for index in range(100)]
     for time in times:  # the pins of SWINGING are too far apart here
         writer.write(1, time, time, write(time, [3.0], [0.0]))
     writer.close()

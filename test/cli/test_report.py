@@ -198,7 +198,7 @@ def test_a_part_beyond_the_end_says_so(bag: Path, tmp_path: Path) -> None:
 
 def test_a_bag_without_our_scene(bag: Path, tmp_path: Path) -> None:
     read = read_bag(bag)
-    numbers = {each.name: number for number, each in enumerate(read.topics)}
+    numbers = {each.name: index for index, each in enumerate(read.topics)}
     writer = BagWriter(tmp_path / 'foreign', read.topics)
     for message in read.messages():
         writer.write(numbers[message.topic], *message[1:])
@@ -292,7 +292,7 @@ def test_a_scene_that_cannot_be_read_here_is_told_and_the_rest_is_shown(
     bag: Path, tmp_path: Path, name: str
 ) -> None:
     read = read_bag(bag)
-    numbers = {each.name: number for number, each in enumerate(read.topics)}
+    numbers = {each.name: index for index, each in enumerate(read.topics)}
     attached = {key: ('', data) for key, data in read.attachments.items()}
     attached['scene.yaml'] = '', SCENES[name]
     writer = BagWriter(tmp_path / 'odd', read.topics, attached)
@@ -346,7 +346,7 @@ def test_what_is_in_a_bag_is_no_part_of_the_page_but_text(bag: Path, tmp_path: P
     attached['run.json'] = '', json.dumps(run).encode()
     odd = [replace(each, name=each.name.replace('withheld', name)) for each in read.topics]
     writer = BagWriter(tmp_path / 'odd', odd, attached)
-    numbers = {each.name: number for number, each in enumerate(read.topics)}
+    numbers = {each.name: index for index, each in enumerate(read.topics)}
     for message in read.messages():
         writer.write(numbers[message.topic], *message[1:])
     writer.close()

@@ -277,8 +277,8 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     channel = writer.register_channel('/t', 'cdr', schema)
 
     def chunk() -> None:
-        for number in range(MESSAGES):
-            writer.add_message(channel, 1, b'\0\1\0\0', 1, number)
+        for index in range(MESSAGES):
+            writer.add_message(channel, 1, b'\0\1\0\0', 1, index)
         writer.flush()
 
     chunk()

@@ -108,8 +108,8 @@ def test_ticks_are_those_of_the_pipeline_at_whole_nanoseconds(tmp_path):
     simulate_run(scene, tmp_path / 'bag', 7, lambda _: True)
     pipeline = Pipeline(scene)
     expected = []
-    for number in range(7):
-        now = BEGIN + round(number * 1e9 / 300.0)
+    for index in range(7):
+        now = BEGIN + round(index * 1e9 / 300.0)
         expected.append((now, pipeline.tick(now).message))
     found = [
         (log_time, data)

@@ -164,8 +164,8 @@ def test_a_stop_within_any_record_damages_no_bag(folder, command) -> None:
 @pytest.mark.parametrize('command', COMMANDS)
 def test_a_stop_at_any_time_damages_no_bag(folder, command) -> None:
     cases = [
-        (f'{SIGNALS[number % 3]}_{number}', SIGNALS[number % 3], 0, 0.05 + 0.15 * number)
-        for number in range(INSTANTS)
+        (f'{SIGNALS[index % 3]}_{index}', SIGNALS[index % 3], 0, 0.05 + 0.15 * index)
+        for index in range(INSTANTS)
     ]
     done = stopped(folder, command, 'long', cases)
     assert len(done) == len(cases)

@@ -91,12 +91,12 @@ def test_keyframes_of_an_svg_put_links_where_the_closure_has_them(tmp_path, name
     made = link_frames(motion.view.closure, motion.view.position)
     # Pixels per metre, from the farthest places of the first link that changes its place.
     scales = set()
-    for number, link in enumerate(motion.links):
-        keys = found[f'link{number}']
+    for index, link in enumerate(motion.links):
+        keys = found[f'link{index}']
         assert len(keys) == RATE + 1
         places = []
         for at, held in keys.items():
-            x, y, angle = motion.frames[round(at / 100.0 * len(motion.x)) % len(motion.x), number]
+            x, y, angle = motion.frames[round(at / 100.0 * len(motion.x)) % len(motion.x), index]
             px, py, turn = placed(held['transform'])
             # The SVG's y axis points down, so that its angles are clockwise.
             assert cos(-turn - (angle - made[link].angle)) == pytest.approx(1.0, abs=1e-6)

@@ -96,7 +96,7 @@ def drawn(design: Design, **more: Any) -> Sheet:
     """Draw a design, and keep the figure instead of storing it."""
     kept = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drawing, 'save', lambda figure, _file: kept.append(figure))
+        patch.setattr(drawing, 'save_picture', lambda figure, _file: kept.append(figure))
         draw_design(design, 'a design', Path('never.png'), **more)
     left, *others = kept[-1].axes
     panels = [axes for axes in others if not axes.get_xlabel()]

@@ -36,7 +36,7 @@ def drawn(name: str, inputs: tuple[float, ...] = ()) -> Any:
     closure = load(name)
     kept = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drawing, 'save', lambda figure, _file: kept.append(figure))
+        patch.setattr(drawing, 'save_picture', lambda figure, _file: kept.append(figure))
         shown = prepare_view(closure, inputs or usual_inputs(closure))
         paint_picture(shown, name, Path('never.png'), names=True)
     (figure,) = kept

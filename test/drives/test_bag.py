@@ -49,8 +49,8 @@ def write(folder, messages, types=None, run=None):
     topics = [Topic(name, (types or {}).get(name, TYPE), '', '') for name in names]
     attached = {} if run is None else {'run.json': ('application/json', run)}
     writer = BagWriter(folder, topics, attached)
-    for number, (name, data) in enumerate(messages):
-        log_time = RECORDED + number * MS
+    for index, (name, data) in enumerate(messages):
+        log_time = RECORDED + index * MS
         writer.write(list(names).index(name), log_time, log_time, data)
     writer.close()
     return str(folder)
@@ -168,7 +168,7 @@ times = st.lists(st.integers(0, 400), min_size=1, max_size=20).map(sorted)
 
 @given(times, times, st.booleans())
 def test_it_is_as_if_the_samples_came_by_topic(tmp_path_factory, taken, ticks, carry_forward):
-    values = [(0.1 * number, 3.0 - number) for number in range(len(taken))]
+    values = [(0.1 * index, 3.0 - index) for index in range(len(taken))]
     folder = tmp_path_factory.mktemp('bag') / 'bag'
     samples = [sample(t, *v) for t, v in zip(taken, values, strict=True)]
     drive = build(
@@ -252,8 +252,8 @@ def test_absent_rates_are_those_that_the_topic_would_have(
     parameters = BagParameters(file, pace=pace, carry_forward=carry_forward)
     drive = build(parameters, one_input(needs_rate=needs_rate))
     expected = [(0.6, 10.0), (0.65, 5.0)] if differenced else [(0.5, 0.0), (0.6, 0.0), (0.65, 0.0)]
-    for number, (angle, speed) in enumerate(expected):
-        state = drive.state(BEGIN + 10 * number * MS)
+    for index, (angle, speed) in enumerate(expected):
+        state = drive.state(BEGIN + 10 * index * MS)
         assert (*state.angles, *state.rates) == pytest.approx((angle, speed), rel=1e-9)
 
 

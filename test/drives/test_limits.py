@@ -101,8 +101,8 @@ def test_what_is_refused_when_the_scene_is_built(name):
     drive, limits, expected = DRIVES[name]
     if not expected:
         built = pipeline(drive, four_bar(limits))
-        for number in range(4000):
-            (look,) = built.tick(BEGIN + number * MS).full_states
+        for index in range(4000):
+            (look,) = built.tick(BEGIN + index * MS).full_states
             assert look.position.status is Status.CLOSED
         return
     with pytest.raises(FileError) as error:

@@ -383,6 +383,6 @@ def test_all_that_the_scene_publishes_is_a_state(interface):
 def test_the_greatest_jump_between_samples_is_kept(angles, jump):
     """A crank in degrees, when it is wrapped, jumps by 360 rad."""
     drive = TopicDrive(CARRIED, needs_rate=True)
-    for number, angle in enumerate(angles):
-        assert drive.offer(sample(1000 + number, angle), NOW) is GOOD
+    for index, angle in enumerate(angles):
+        assert drive.offer(sample(1000 + index, angle), NOW) is GOOD
     assert drive.jump == pytest.approx(jump)

@@ -80,13 +80,13 @@ def test_steps_without_trials_keep_the_momentum_and_the_play(force):
     mechanism = TwoMasses.from_motor(wheel, 0.1, 0.02, 0.7)
     motion = mechanism.state_at(0.0, 0.0)
     motion = motion._replace(motor=motion.motor._replace(rate=20.0))
-    for number in range(1, 300):
+    for index in range(1, 300):
         motion = mechanism.advance(motion._replace(trials=-100), 1e-3, force)
         momentum = 0.1 * motion.motor.rate + 0.23 * motion.crank.rate
-        assert momentum == pytest.approx(2.0 + force * 1e-3 * number, abs=1e-12)
+        assert momentum == pytest.approx(2.0 + force * 1e-3 * index, abs=1e-12)
         assert abs(motion.motor.value - motion.crank.value) <= 0.01 + 1e-12
         energy = 0.1 * motion.motor.rate**2 + 0.23 * motion.crank.rate**2
-        assert energy <= 0.1 * (20.0 + 10.0 * abs(force) * 1e-3 * number) ** 2 + 1e-9
+        assert energy <= 0.1 * (20.0 + 10.0 * abs(force) * 1e-3 * index) ** 2 + 1e-9
     assert motion.coarse > 0
 
 
@@ -129,7 +129,7 @@ def pushed(drive, every, until=1500):
             assert drive.offer(EffortCommand(0, 5.0), now) is None
         if not time % every:
             state = drive.state(now)
-    return state, drive.chattered
+    return state, drive.chatter_count
 
 
 def test_it_does_not_matter_when_it_is_looked_at():
@@ -149,8 +149,8 @@ def test_a_late_tick_integrates_little_while_it_chatters():
     # A tick comes each 100 ms, where 10 ms are wanted: 20 ms of these are integrated.
     drive = drive_of(f'{LIGHT}, on_chatter: close')
     lost = []
-    for number in range(40):
-        now = BEGIN + 100 * number * MS
+    for index in range(40):
+        now = BEGIN + 100 * index * MS
         assert drive.offer(EffortCommand(0, 5.0), now) is None
         drive.state(now)
         lost.append(drive.lost)
@@ -162,8 +162,8 @@ def test_a_late_tick_integrates_little_while_it_chatters():
 
 def test_bounces_that_end_are_no_chatter():
     drive = drive_of(f'{LIGHT}, on_chatter: end')
-    for number in range(100):
-        if not number % 10:
-            drive.offer(EffortCommand(0, 0.02 * (-1) ** (number // 10)), BEGIN + number * 10 * MS)
-        drive.state(BEGIN + number * 10 * MS)
+    for index in range(100):
+        if not index % 10:
+            drive.offer(EffortCommand(0, 0.02 * (-1) ** (index // 10)), BEGIN + index * 10 * MS)
+        drive.state(BEGIN + index * 10 * MS)
     assert drive.chatter_count == 0

@@ -114,7 +114,7 @@ SPEED = 40.0
 
 def turned(loaded, method, seconds, steps):
     """Return the states of a crank that turns freely, at the end of each step."""
-    crank = SingleDofMechanism(loaded.equation, STEP[method])
+    crank = SingleDofMechanism(loaded.motion_equation, STEP[method])
     motion = crank.state_at(BEGIN, SPEED)
     motions = [motion]
     for _ in range(steps):
@@ -126,7 +126,7 @@ def turned(loaded, method, seconds, steps):
 def time_to(loaded, end):
     """Return t = ∫ √(I/(2·(E − V))) dq up to an angle, by Gauss's rule on short pieces."""
     position = loaded.closure.position
-    whole = loaded.energy(position(BEGIN), SPEED)
+    whole = loaded.total_energy(position(BEGIN), SPEED)
     nodes, weights = np.polynomial.legendre.leggauss(20)
     edges = np.linspace(BEGIN, end, 60)
     seconds = 0.0
@@ -134,9 +134,9 @@ def time_to(loaded, end):
         half = 0.5 * (high - low)
         for node, share in zip(nodes, weights, strict=True):
             at = position(float(0.5 * (low + high) + half * node))
-            energy = whole - loaded.potential(at)
+            energy = whole - loaded.potential_energy(at)
             # At a rate of 1, twice the kinetic energy is the inertia.
-            inertia = 2.0 * (loaded.energy(at, 1.0) - loaded.potential(at))
+            inertia = 2.0 * (loaded.total_energy(at, 1.0) - loaded.potential_energy(at))
             seconds += half * share * sqrt(inertia / (2.0 * energy))
     return seconds
 
@@ -152,13 +152,16 @@ def time_to(loaded, end):
 def test_a_four_bar_errs_by_the_order(four_bar, method, steps):
     seconds = 0.4
     errors, drifts = [], []
-    energy = four_bar.energy(four_bar.closure.position(BEGIN), SPEED)
+    energy = four_bar.total_energy(four_bar.closure.position(BEGIN), SPEED)
     for n in steps:
         motions = turned(four_bar, method, seconds, n)
         errors.append(abs(time_to(four_bar, motions[-1].value) - seconds))
         drifts.append(
             max(
-                abs(four_bar.energy(four_bar.closure.position(m.value), m.rate) / energy - 1.0)
+                abs(
+                    four_bar.total_energy(four_bar.closure.position(m.value), m.rate) / energy
+                    - 1.0
+                )
                 for m in motions
             )
         )
@@ -171,9 +174,9 @@ def test_a_four_bar_errs_by_the_order(four_bar, method, steps):
 def test_the_best_keeps_the_energy_of_an_undamped_linkage(four_bar, steps):
     motions = turned(four_bar, 'gauss_legendre', steps * 5e-4, steps)
     position = four_bar.closure.position
-    whole = four_bar.energy(position(BEGIN), SPEED)
+    whole = four_bar.total_energy(position(BEGIN), SPEED)
     drift = max(
-        abs(four_bar.energy(position(m.value), m.rate) / whole - 1.0) for m in motions[::7]
+        abs(four_bar.total_energy(position(m.value), m.rate) / whole - 1.0) for m in motions[::7]
     )
     assert drift < 1e-9
     assert motions[-1].value > steps * 5e-4 * 20.0, 'it has gone round all the time'

@@ -141,7 +141,7 @@ def loaded(coulomb):
 
 def turned(mechanics, method, steps):
     """Return where a crank comes to in `SECONDS`, in a number of steps."""
-    crank = SingleDofMechanism(mechanics.equation, STEP[method])
+    crank = SingleDofMechanism(mechanics.motion_equation, STEP[method])
     motion = crank.state_at(BEGIN, SPEED)
     for _ in range(steps):
         motion = crank.advance(motion, SECONDS / steps, 0.0)
@@ -236,7 +236,7 @@ def test_without_coulomb_friction_no_slip_is_looked_at(method):
 
 
 def spun(mechanics, method, rate, seconds, steps):
-    crank = SingleDofMechanism(mechanics.equation, STEP[method])
+    crank = SingleDofMechanism(mechanics.motion_equation, STEP[method])
     motion = crank.state_at(0.1, rate)
     for _ in range(steps):
         motion = crank.advance(motion, seconds / steps, 0.0)

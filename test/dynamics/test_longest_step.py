@@ -102,8 +102,8 @@ effects: {velocity: {}}
 def test_a_rocker_leaves_its_stop_as_scipy_says(method, stiffness):
     scene = BLOW.replace('K}', f'{stiffness}}}').replace('METHOD', method)
     step = recommended(scene, STOPPED)
-    (line,) = pipeline_of(scene.replace('STEP', repr(step)), STOPPED).linkages
-    found = [line.drive.state(BEGIN + 1_000_000 * ms) for ms in range(26)][-1]
+    (linkage,) = pipeline_of(scene.replace('STEP', repr(step)), STOPPED).linkages
+    found = [linkage.drive.state(BEGIN + 1_000_000 * ms) for ms in range(26)][-1]
 
     closure = Closure(shipped('four_bar'))
     mechanics = Mechanics(closure, Loads((0.0, -9.81), drive_inertia=1e-3))
@@ -156,8 +156,8 @@ def rubbed_by_scipy(rate, count):
     closure = Closure(shipped('four_bar'))
     mechanics = Mechanics(closure, Loads((0.0, -9.81), drive_inertia=1e-3))
     state, sense = [1.0, 0.0], 0.0
-    for number in range(count):
-        t, end, push = 0.01 * number, 0.01 * (number + 1), pushed(number)
+    for index in range(count):
+        t, end, push = 0.01 * index, 0.01 * (index + 1), pushed(index)
         while t < end:
             if not sense:
                 left = push - mechanics.motion_terms(closure.position(state[0])).potential_slope
@@ -185,12 +185,12 @@ def rubbed_by_scipy(rate, count):
 def test_friction_that_falls_with_the_rate_is_followed_as_scipy_says(method, rate):
     scene = CURVED.replace('METHOD', method).replace('RATE', repr(rate))
     step = recommended(scene)
-    (line,) = pipeline_of(scene.replace('STEP', repr(step)), FOUR_BAR).linkages
-    line.drive.state(BEGIN)
-    for number in range(20):
-        now = BEGIN + 10_000_000 * number
-        assert line.drive.offer(EffortCommand(0, pushed(number)), now) is None
-    found = line.drive.state(BEGIN + 200_000_000).angles[0]
+    (linkage,) = pipeline_of(scene.replace('STEP', repr(step)), FOUR_BAR).linkages
+    linkage.drive.state(BEGIN)
+    for index in range(20):
+        now = BEGIN + 10_000_000 * index
+        assert linkage.drive.offer(EffortCommand(0, pushed(index)), now) is None
+    found = linkage.drive.state(BEGIN + 200_000_000).angles[0]
     expected = rubbed_by_scipy(rate, 20)
     assert abs(expected - 1.0) > 0.5, 'it moves'
     assert found == pytest.approx(expected, abs=0.1 * SHARES[method])
@@ -226,8 +226,8 @@ loads: {{LOADS}}
     into = pipeline_of(scene.replace('LOADS', stops), STOPPED)
     free = pipeline_of(scene.replace('LOADS', ''), FOUR_BAR)
     closure, touched = Closure(shipped('four_bar')), 0
-    for number in range(0, 1000, 20):
-        now = BEGIN + 1_000_000 * number
+    for index in range(0, 1000, 20):
+        now = BEGIN + 1_000_000 * index
         one, other = (pipeline.tick(now).full_states[0] for pipeline in (into, free))
         assert one.reading.joints == other.reading.joints
         assert one.reading.rates == other.reading.rates

@@ -53,11 +53,11 @@ def statics(angle, torque, force, at):
     rows, right = np.zeros((9, 9)), np.zeros(9)
     pins = (('O2', 0j, {'crank': 1}), ('A', a, {'coupler': 1, 'crank': -1}),
             ('B', b, {'rocker': 1, 'coupler': -1}), ('O4', D + 0j, {'rocker': 1}))  # fmt: skip
-    for number, (_, place, links) in enumerate(pins):
+    for index, (_, place, links) in enumerate(pins):
         for link, sign in links.items():
             row = 3 * ('crank', 'coupler', 'rocker').index(link)
-            rows[row, 2 * number] = rows[row + 1, 2 * number + 1] = sign
-            rows[row + 2, [2 * number, 2 * number + 1]] = -sign * place.imag, sign * place.real
+            rows[row, 2 * index] = rows[row + 1, 2 * index + 1] = sign
+            rows[row + 2, [2 * index, 2 * index + 1]] = -sign * place.imag, sign * place.real
     rows[2, 8] = 1.0
     right[3:6] = -force.real, -force.imag, -(at.real * force.imag - at.imag * force.real)
     right[8] = -torque
@@ -98,9 +98,9 @@ def test_the_drive_moves_its_own_inertia_and_nothing_else():
     effort = 0.3
     pipeline.tick(SECOND)
     assert pipeline.offer(joint_state(['crank_joint'], [], [], [effort]), SECOND) is None
-    for number in range(1, 50):
-        (look,) = pipeline.tick(SECOND + number * 10**6).full_states
-        seconds = number / 1000
+    for index in range(1, 50):
+        (look,) = pipeline.tick(SECOND + index * 10**6).full_states
+        seconds = index / 1000
         # The start, and half of effort over inertia times the time squared.
         assert look.crank.angles[0] == pytest.approx(0.5 + 0.5 * effort / 0.02 * seconds**2)
 

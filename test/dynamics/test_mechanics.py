@@ -136,11 +136,11 @@ def lagrange(mechanics, q, rates, pulls):
     units = np.eye(size)
 
     def potential(x):
-        return mechanics.potential(closure.position(*x))
+        return mechanics.potential_energy(closure.position(*x))
 
     def kinetic(x, v):
         position = closure.position(*x)
-        return mechanics.kinetic(position, closure.velocity(position, *v))
+        return mechanics.kinetic_energy(position, closure.velocity(position, *v))
 
     def matrix(x):
         found = np.diag([2.0 * kinetic(x, unit) for unit in units])

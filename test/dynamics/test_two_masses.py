@@ -43,7 +43,7 @@ def wheels(restitution=0.0, method='rk4', friction=0.0, slope=0.0):
 
 def run(mechanism, seconds, force, *, step=1e-3, rate=0.0, brake=0.0, motion=None):
     """Return the state after some seconds, and the states at each step before."""
-    motion = motion or mechanism.at(0.0, rate)
+    motion = motion or mechanism.state_at(0.0, rate)
     states = [motion]
     for _ in range(round(seconds / step)):
         states.append(mechanism.advance(states[-1], step, force, brake))
@@ -55,8 +55,8 @@ def test_the_motor_crosses_the_play_and_takes_the_crank_along(method):
     # The motor alone over half the play, p/2 = τ·t²/(2·J); then both as one.
     meets = sqrt(PLAY * MOTOR / TORQUE)
     rate = TORQUE / MOTOR * meets * MOTOR / (CRANK + MOTOR)
-    for number, state in enumerate(run(wheels(method=method), 0.2, TORQUE)):
-        t = 1e-3 * number
+    for index, state in enumerate(run(wheels(method=method), 0.2, TORQUE)):
+        t = 1e-3 * index
         if t < meets:
             assert state.crank.value == state.crank.rate == 0.0
             assert state.motor.value == pytest.approx(0.5 * TORQUE / MOTOR * t * t, abs=1e-15)
@@ -74,8 +74,8 @@ def test_they_bounce_as_a_ball_on_a_table(restitution):
     first = sqrt(PLAY * MOTOR / TORQUE)
     ends = first * (1.0 + 2.0 * restitution / (1.0 - restitution))
     states = run(wheels(restitution), 0.5, TORQUE)
-    for number, state in enumerate(states):
-        t = 1e-3 * number
+    for index, state in enumerate(states):
+        t = 1e-3 * index
         momentum = MOTOR * state.motor.rate + CRANK * state.crank.rate
         assert momentum == pytest.approx(TORQUE * t, abs=1e-12)
         assert abs(state.motor.value - state.crank.value) <= PLAY / 2.0 + 1e-12
@@ -109,8 +109,8 @@ def test_a_torque_that_turns_carries_the_motor_through_the_play_to_the_other_sid
     rate, value = driven.crank.rate, driven.crank.value
     crosses = sqrt(2.0 * PLAY * MOTOR / TORQUE)
     free = run(mechanism, 0.09, -TORQUE, motion=driven)
-    for number, state in enumerate(free[: int(1e3 * crosses)]):
-        t = 1e-3 * number
+    for index, state in enumerate(free[: int(1e3 * crosses)]):
+        t = 1e-3 * index
         assert state.crank.rate == rate
         expected = value + PLAY / 2.0 + rate * t - 0.5 * TORQUE / MOTOR * t * t
         assert state.motor.value == pytest.approx(expected, abs=1e-13)
@@ -124,8 +124,8 @@ def test_a_crank_that_is_drawn_away_leaves_a_braked_motor_and_hangs_at_the_other
     # A weight of 0.5 N·m draws it backward; the motor's brake holds 2 N·m.
     states = run(wheels(slope=0.5), 0.3, 0.0, brake=2.0)
     falls = sqrt(PLAY * CRANK / 0.5)
-    for number, state in enumerate(states):
-        t = 1e-3 * number
+    for index, state in enumerate(states):
+        t = 1e-3 * index
         if t < falls:
             assert state.crank.value == pytest.approx(-0.25 / CRANK * t * t, abs=1e-14)
             assert state.motor.value == state.motor.rate == 0.0
@@ -213,7 +213,7 @@ def test_a_motor_meets_a_crank_that_is_held_at_its_stop():
 
 
 def by_scipy(mechanics, restitution, times, force):
-    position, terms = mechanics.closure.position, mechanics.terms
+    position, terms = mechanics.closure.position, mechanics.motion_terms
 
     def alone(q, w):
         at = terms(position(q))
@@ -244,7 +244,7 @@ def by_scipy(mechanics, restitution, times, force):
             max_step=0.01, t_eval=[at for at in times if at > t],
         )  # fmt: skip
         found += [tuple(column) for column in done.y.T]
-        hit = [(when[0], number) for number, when in enumerate(done.t_events) if len(when)]
+        hit = [(when[0], index) for index, when in enumerate(done.t_events) if len(when)]
         if not hit:
             return found
         t, number = hit[0]
@@ -299,15 +299,17 @@ effects: {velocity: {}, effort: {}}
 
 def read(drive, commands=(), ticks=200, loads=''):
     """Return motor and crank, their values and rates, at each tick of a pendulum's scene."""
-    (line,) = pipeline_of(SCENE.replace('DRIVE', drive).replace('LOADS', loads), PENDULUM).linkages
+    (linkage,) = pipeline_of(
+        SCENE.replace('DRIVE', drive).replace('LOADS', loads), PENDULUM
+    ).linkages
     found = []
-    for number in range(ticks):
-        now = BEGIN + 2_000_000 * number
+    for index in range(ticks):
+        now = BEGIN + 2_000_000 * index
         for tick, effort in commands:
-            if tick == number:
-                assert line.drive.offer(EffortCommand(0, effort), now) is None
-        reading = line.compute_state(now).reading
-        found.append((*line.drive.motor[:2], reading.joints[0], reading.rates[0]))
+            if tick == index:
+                assert linkage.drive.offer(EffortCommand(0, effort), now) is None
+        reading = linkage.compute_state(now).reading
+        found.append((*linkage.drive.motor[:2], reading.joints[0], reading.rates[0]))
     return found
 
 
@@ -332,8 +334,8 @@ def test_a_motor_behind_play_runs_up_alone_and_slows_down_as_it_meets():
     motor = 'motor: {torque_constant: 0.1, resistance: 1, ratio: 2, command: voltage}'
     drive = f'{motor}, play: {{width: 10, inertia: 0.001}}, timeout: 10'
     found = read(drive, [(0, 6.0)], 60)
-    for number, (angle, rate, crank, _) in enumerate(found):
-        t = 0.002 * number
+    for index, (angle, rate, crank, _) in enumerate(found):
+        t = 0.002 * index
         assert crank == 0.0
         assert rate == pytest.approx(60.0 * (1.0 - exp(-t / 0.025)), abs=1e-6)
         assert angle == pytest.approx(60.0 * (t - 0.025 * (1.0 - exp(-t / 0.025))), abs=1e-6)
@@ -362,10 +364,10 @@ def test_the_motor_is_published_beside_the_load(counts):
     pipeline = pipeline_of(scene, PENDULUM)
     (extra,) = pipeline.extras
     assert (extra.topic, extra.message) == ('~/motor', 'sensor_msgs/msg/JointState')
-    for number in range(30):
-        (message,) = pipeline.tick(BEGIN + 2_000_000 * number).extras
+    for index in range(30):
+        (message,) = pipeline.tick(BEGIN + 2_000_000 * index).extras
         state = read_joint_state(message)
-        angle = 50.0 * 2.0 * 0.002 * number
+        angle = 50.0 * 2.0 * 0.002 * index
         assert list(state.name) == ['drive_joint_motor']
         if not counts:
             assert state.position[0] == pytest.approx(angle, abs=1e-9)
@@ -376,4 +378,4 @@ def test_the_motor_is_published_beside_the_load(counts):
         assert -1e-9 < angle - state.position[0] < tau / counts
         steps = state.velocity[0] * 0.002 * counts / tau
         assert steps == pytest.approx(round(steps), abs=1e-6)
-        assert abs(state.velocity[0] - 100.0) < tau / counts / 0.002 or number == 0
+        assert abs(state.velocity[0] - 100.0) < tau / counts / 0.002 or index == 0

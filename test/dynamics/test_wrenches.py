@@ -45,8 +45,8 @@ def crank_after(pipeline, messages, milliseconds):
     for tick in range(milliseconds + 1):
         while waiting and waiting[0][0] <= tick:
             time, wrench = waiting.pop(0)
-            assert topic.offer(wrench_stamped(*wrench), BEGIN + round(time * MS)) is None
-        crank = pipeline.tick(BEGIN + tick * MS).looks[0].crank
+            assert topic.offer_wrench(wrench_stamped(*wrench), BEGIN + round(time * MS)) is None
+        crank = pipeline.tick(BEGIN + tick * MS).full_states[0].crank
     return crank.angles[0], crank.rates[0]
 
 

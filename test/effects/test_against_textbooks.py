@@ -83,12 +83,12 @@ def test_rates_and_accelerations_are_derivatives_of_the_textbooks_pose(name):
     effects = 'effects: {velocity: {}, acceleration: {}}'
     built = pipeline(name, f'publish_input: false\n{DRIVE}{effects}')
     solved = TEXTBOOKS[name]
-    for number in range(0, 400, 9):
-        tick = built.tick(BEGIN + number * MS)
+    for index in range(0, 400, 9):
+        tick = built.tick(BEGIN + index * MS)
         state = read_joint_state(tick.message)
         (extra,) = tick.extras
         motion = STORE.deserialize_cdr(extra, 'trajectory_msgs/msg/JointTrajectory')
-        t = mpf(number) / 1000
+        t = mpf(index) / 1000
         n = len(state.position)
         places = doubles(solved(crank(t)))
         rates, pulls = (
@@ -113,10 +113,10 @@ def test_friction_of_a_piston_and_of_pins_takes_the_power_that_it_burns():
     efforts = []
     for effects in ('', f', friction: {{joints: {{{joints}}}}}'):
         built = pipeline('slider_crank', f'{DRIVE}effects: {{effort: {{}}{effects}}}')
-        ticks = [built.tick(BEGIN + number * 7 * MS) for number in range(40)]
+        ticks = [built.tick(BEGIN + index * 7 * MS) for index in range(40)]
         efforts.append([tick.full_states[0].reading.efforts[0] for tick in ticks])
-    for number, (bare, rubbed) in enumerate(zip(*efforts, strict=True)):
-        t = mpf(7 * number) / 1000
+    for index, (bare, rubbed) in enumerate(zip(*efforts, strict=True)):
+        t = mpf(7 * index) / 1000
         rate = mp.diff(crank, t)
         rod, slide = (mp.diff(lambda u, i=i: slider_crank(crank(u))[i], t) for i in range(2))
         slips = {'O2': rate, 'A': rod, 'cylinder': slide}

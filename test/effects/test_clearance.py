@@ -154,10 +154,10 @@ def test_it_is_added_to_what_the_links_yield_and_the_rest_is_passed_on():
     before = moved(within, MOTIONS[2], {'pin_forces': ()})
     stage = clearance.stage(ClearanceParameters({'A': 1e-5}), within)
     alone = stage(before)
-    assert alone == before._replace(shift=alone.deflection)
-    further = stage(before._replace(shift=(0.5, -0.25)))
+    assert alone == before._replace(deflection=alone.deflection)
+    further = stage(before._replace(deflection=(0.5, -0.25)))
     expected = (0.5 + alone.deflection[0], -0.25 + alone.deflection[1])
-    assert further == before._replace(shift=expected)
+    assert further == before._replace(deflection=expected)
 
 
 def test_of_a_pin_of_three_links_two_lean_against_the_third():

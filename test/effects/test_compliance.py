@@ -145,10 +145,10 @@ def test_it_is_added_to_a_shift_and_the_rest_is_passed_on():
     before = moved(within, MOTIONS[2], {'pin_forces': ()})
     stage = compliance.stage(ComplianceParameters({'coupler': 1e4}), within)
     alone = stage(before)
-    assert alone == before._replace(shift=alone.deflection)
-    further = stage(before._replace(shift=(0.5, -0.25)))
+    assert alone == before._replace(deflection=alone.deflection)
+    further = stage(before._replace(deflection=(0.5, -0.25)))
     expected = (0.5 + alone.deflection[0], -0.25 + alone.deflection[1])
-    assert further == before._replace(shift=expected)
+    assert further == before._replace(deflection=expected)
 
 
 @pytest.mark.parametrize(

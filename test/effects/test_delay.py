@@ -163,9 +163,9 @@ def test_behind_a_silent_sensor_each_reading_arrives_once_however_the_ticks_fall
     # A silence first, so that it is a line of messages from the beginning.
     sensor, now, sent, heard = delayed(ns * 1e-9, between=between), BEGIN, [], []
     assert sensor(now, None) is None
-    for number, gap in enumerate(gaps):
+    for index, gap in enumerate(gaps):
         now += gap
-        read = None if lost[number] else reading(now, float(number))
+        read = None if lost[index] else reading(now, float(index))
         sent += [] if read is None else [(now, read.joints)]
         found = sensor(now, read)
         if found is not None:
@@ -183,8 +183,8 @@ def test_while_time_stands_the_newest_reading_counts(between):
     sensor = delayed(0.001, between=between)
     times = [0, 0, 0, 1, 1, 2, 2]
     found = [
-        shown(sensor(BEGIN + ms * MS, reading(BEGIN + ms * MS, 1.0 * number)))
-        for number, ms in enumerate(times)
+        shown(sensor(BEGIN + ms * MS, reading(BEGIN + ms * MS, 1.0 * index)))
+        for index, ms in enumerate(times)
     ]
     assert found == [None, None, None, (2, 1), (2, 1), (4, 2), (4, 2)]
 
@@ -192,8 +192,8 @@ def test_while_time_stands_the_newest_reading_counts(between):
 @pytest.mark.parametrize('between', ['interpolated', 'sampled'])
 def test_no_more_is_kept_than_the_delay_takes(between):
     sensor = delayed(0.0205, between=between)
-    for number in range(20_000):
-        now = BEGIN + number * MS
+    for index in range(20_000):
+        now = BEGIN + index * MS
         sensor(now, reading(now, 0.0))
         assert len(sensor._history) <= 23
 
@@ -348,10 +348,10 @@ def test_what_came_after_a_time_is_known_with_its_own():
 @given(st.lists(st.integers(0, 20), min_size=1, max_size=50), st.integers(0, 40))
 def test_it_reaches_back_over_its_span_and_forgets_the_rest(gaps, span):
     history, all_of_them, now = History(span), {}, 0
-    for number, gap in enumerate(gaps):
+    for index, gap in enumerate(gaps):
         now += gap
-        history.add(now, reading(now, float(number)))
-        all_of_them[now] = reading(now, float(number))
+        history.add(now, reading(now, float(index)))
+        all_of_them[now] = reading(now, float(index))
         for time in range(now - span, now + 1):
             before = [known for known in all_of_them if known <= time]
             assert history.newest_reading(time, -1) == (
@@ -366,8 +366,8 @@ def test_it_reaches_back_over_its_span_and_forgets_the_rest(gaps, span):
 def test_while_time_stands_the_last_reading_counts_and_none_pile_up():
     history = History(10**9)
     history.add(BEGIN, reading(BEGIN, 0.0))
-    for number in range(1000):
-        history.add(BEGIN + MS, reading(BEGIN + MS, float(number)))
+    for index in range(1000):
+        history.add(BEGIN + MS, reading(BEGIN + MS, float(index)))
     assert len(history) == 2
     assert history.newest_reading(BEGIN + MS, -1).joints == (999.0,)
     assert history.interpolate(BEGIN + MS // 2).joints == (499.5,)

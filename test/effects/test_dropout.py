@@ -116,8 +116,8 @@ def test_a_lost_sample_is_missing_or_the_last_one_is_repeated():
     silent, _ = timeline(line(0.6, 3.0))
     repeated, found = timeline(line(0.6, 3.0, 'repeat'))
     last = 0
-    for number, (heard, held) in enumerate(zip(silent, repeated, strict=True)):
-        assert heard in {0, number + 1}
+    for index, (heard, held) in enumerate(zip(silent, repeated, strict=True)):
+        assert heard in {0, index + 1}
         last = heard or last
         assert held == last
     assert silent.count(0) > 80

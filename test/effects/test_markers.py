@@ -262,7 +262,7 @@ def ticked(effects, times, scene='rate: 1000'):
     steps=st.lists(st.integers(1, 40 * MS), min_size=2, max_size=60),
 )
 def test_the_first_tick_of_each_period_has_a_message(rate, steps):
-    times = [sum(steps[:number]) for number in range(len(steps))]
+    times = [sum(steps[:index]) for index in range(len(steps))]
     came = [time for time, _ in ticked(f'markers: {{rate: {rate}}}', times)]
     # Exact, as fractions: the double that stands for the rate is one.
     periods = [Fraction(BEGIN + time, SECOND) * Fraction(float(rate)) // 1 for time in times]
@@ -272,7 +272,7 @@ def test_the_first_tick_of_each_period_has_a_message(rate, steps):
 
 
 def test_what_does_not_move_comes_once_a_second():
-    came = ticked('markers: {rate: 10}', [100 * MS * number + MS for number in range(35)])
+    came = ticked('markers: {rate: 10}', [100 * MS * index + MS for index in range(35)])
     assert len(came) == 35
     whole = [time for time, message in came if named(message.markers, 'ground')]
     assert whole == [MS, SECOND + MS, 2 * SECOND + MS, 3 * SECOND + MS]
@@ -450,8 +450,8 @@ def test_an_arrow_shows_the_force_that_is_published(start, rate, scale):
     told = extra(pipeline, tick, '~/pin_forces')
     markers = extra(pipeline, tick).markers
     arrows = named(markers, 'forces')
-    (line,) = pipeline.linkages
-    points = line.closure.points(line.closure.position(start))
+    (linkage,) = pipeline.linkages
+    points = linkage.closure.points(linkage.closure.position(start))
     pins = {point: place for (_, point), place in points.items()}
     size = named(markers, 'pins')[0].scale.x / 1.1
     seen = 0
@@ -500,8 +500,8 @@ def test_the_effort_of_a_cylinder_is_straight():
     tick = pipeline.tick(BEGIN)
     effort = read_joint_state(tick.message).effort[0]
     begin, end = places(named(extra(pipeline, tick).markers, 'efforts')[0])[:2]
-    (line,) = pipeline.linkages
-    points = line.closure.points(line.closure.position(1.0))
+    (linkage,) = pipeline.linkages
+    points = linkage.closure.points(linkage.closure.position(1.0))
     rod, tube = points['cylinder_rod', 'C'], points['cylinder_tube', 'K']
     way = (rod - tube) / abs(rod - tube)
     assert abs(begin - rod) < 1e-12

@@ -64,7 +64,7 @@ def sensor(parameters, context):
 """
 DOUBLE = ADD.replace('joint + parameters.by', 'joint * 2.0')
 YIELD = """
-from linkage_ros.effects.stage import yielding
+from linkage_ros.effects.stage import with_deflection
 
 NEEDS = ('pin_forces',)
 AFTER = 'pin_forces'
@@ -73,7 +73,7 @@ AFTER = 'pin_forces'
 def stage(parameters, context):
     def mine(motion):
         force = motion.reactions[0].fx
-        return yielding(motion, (parameters.by * force,) * len(context.joints))
+        return with_deflection(motion, (parameters.by * force,) * len(context.joints))
 
     return mine
 """
@@ -208,8 +208,8 @@ def test_what_it_starts_from_is_computed_and_not_published(tmp_path, package):
     mine = package(soft=HEAD + YIELD)
     rigid = joints(scene_file(tmp_path, ['velocity: {}']))
     pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.soft: {{}}'])))
-    (line,) = pipeline.linkages
-    assert line.effect_names == ('velocity', 'acceleration', 'pin_forces', f'{mine}.soft')
+    (linkage,) = pipeline.linkages
+    assert linkage.effect_names == ('velocity', 'acceleration', 'pin_forces', f'{mine}.soft')
     (look,) = pipeline.tick(0).full_states
     assert look.reading.rates == ()
     assert pipeline.extras == []
@@ -351,9 +351,9 @@ def crank_bag(folder):
     topic = Topic('/crank_states', 'sensor_msgs/msg/JointState', '', '')
     bag = BagWriter(folder, [topic], {})
     write = JointStateWriter(['crank_joint']).write
-    for number in range(20):
-        stamp = SECOND + number * 1_000_000
-        bag.write(0, stamp, stamp, write(stamp, (0.1 * number,), (100.0,)))
+    for index in range(20):
+        stamp = SECOND + index * 1_000_000
+        bag.write(0, stamp, stamp, write(stamp, (0.1 * index,), (100.0,)))
     bag.close({})
 
 
@@ -392,7 +392,7 @@ def test_the_node_writes_it_into_its_bag(tmp_path, package):
     run_recording = pytest.importorskip('linkage_ros.node.run_recording', reason='needs rclpy')
     mine = package(add=HEAD + ADD)
     scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
-    files = run_recording._attachments(
+    files = run_recording._make_attachments(
         scene, [], 'with the run', Pipeline(scene).linkages, tmp_path
     )
     assert json.loads(files[RUN_FILE][1])['effects'] == user_effects_here(scene)

@@ -179,10 +179,10 @@ OWN = {
 def losses(sensor, n=N):
     """Return for coupler and rocker whether each sample is lost."""
     lost, held = [], (None, None)
-    for number in range(n):
-        now = BEGIN + number * MS
-        held = values(sensor(now, reading(now, number, number))) or held
-        lost.append(tuple(of != number for of in held))
+    for index in range(n):
+        now = BEGIN + index * MS
+        held = values(sensor(now, reading(now, index, index))) or held
+        lost.append(tuple(of != index for of in held))
     return list(zip(*lost, strict=True))
 
 

@@ -73,7 +73,7 @@ def test_where_the_balance_has_no_solution_there_are_none():
 
 def test_the_rest_of_the_motion_is_passed_on():
     within = context(FOUR_BAR)
-    before = moved(within, (1.0, 2.0, 3.0), {'effort': ()})._replace(shift=(0.5, 0.5))
+    before = moved(within, (1.0, 2.0, 3.0), {'effort': ()})._replace(deflection=(0.5, 0.5))
     found = pin_forces.stage(pin_forces.PARAMETERS(), within)(before)
     assert found == before._replace(reactions=found.reactions)
     assert isinstance(found, MechanismState)

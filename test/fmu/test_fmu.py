@@ -184,15 +184,15 @@ def test_every_output_has_the_bits_of_the_message(name, settings, bench):
     assert list(dict.fromkeys(name.split('.')[1] for name in names)) == driven
     newest: dict[str, float] = {}
     published = 0
-    for number in range(60):
+    for index in range(60):
         begin, now = (
-            SECOND + round(ticks * SECOND / scene.rate) for ticks in (max(number - 1, 0), number)
+            SECOND + round(ticks * SECOND / scene.rate) for ticks in (max(index - 1, 0), index)
         )
-        inputs = {name: _input(name, number) for name in names}
-        if number == 0:
+        inputs = {name: _input(name, index) for name in names}
+        if index == 0:
             outputs = instance.start(inputs)
         else:
-            outputs = instance.step((number - 1) / scene.rate, 1.0 / scene.rate, inputs)
+            outputs = instance.step((index - 1) / scene.rate, 1.0 / scene.rate, inputs)
         if inputs:
             assert pipeline.offer(_message(inputs, begin), begin) is None
         if pipeline.injection is not None:
@@ -317,8 +317,8 @@ def test_two_instances_know_nothing_of_each_other(bench):
     alone, one, other = (bench(load_scene('torque_crank')) for _ in range(3))
     for instance in (alone, one, other):
         instance.start({TORQUE: 0.0})
-    for number in range(20):
-        time = number / 1000
+    for index in range(20):
+        time = index / 1000
         expected = alone.step(time, 0.001, {TORQUE: 0.05})
         assert one.step(time, 0.001, {TORQUE: 0.05}) == expected
         assert other.step(time, 0.001, {TORQUE: -0.05}) != expected
@@ -348,8 +348,8 @@ def test_before_the_first_sample_there_is_no_crank(bench):
 def test_a_rejected_sample_is_counted_and_logged_once(bench):
     instance = bench(scene_of('drive: {topic: {carry_forward: false}}'))
     good = instance.start({CRANK: 1.0})
-    for number in range(3):
-        outputs = instance.step(number / 1000, 0.001, {CRANK: nan})
+    for index in range(3):
+        outputs = instance.step(index / 1000, 0.001, {CRANK: nan})
     assert outputs == {**good, 'rejected': 3}
     assert len(instance.logged) == 1
     assert 'rejected' in instance.logged[0][1]
@@ -360,8 +360,8 @@ def test_a_step_of_several_periods_does_as_many_ticks(bench):
     # Any start time: the scene's own clock begins there.
     one.start(at=3.0)
     other.start(at=3.0)
-    for number in range(6):
-        expected = one.step(3.0 + number / 1000, 0.001)
+    for index in range(6):
+        expected = one.step(3.0 + index / 1000, 0.001)
     other.step(3.0, 0.004)
     assert other.step(3.004, 0.002) == expected
 

@@ -79,18 +79,18 @@ def platform(rng: random.Random, *, turning: bool = True, lines: int = 0) -> Pla
     if not turning:
         x *= 0.1
     legs = []
-    for number in range(3):
+    for index in range(3):
         anchor, there = 2.0 * place(), p + place()
-        moved = place() if number == 0 else 0j
-        if not turning and number == 0:
+        moved = place() if index == 0 else 0j
+        if not turning and index == 0:
             moved /= abs(moved)
         point = (there - p) * rect(1.0, -angle)
         now = anchor + moved * (rect(1.0, x) if turning else x)
-        if number == 0 and lines == 3:
+        if index == 0 and lines == 3:
             # A slot of the crank, through its pivot.
             direction = (there - anchor) * rect(1.0, -x if turning else 0.0)
             legs.append(Leg(anchor, 0j, 0.0, direction / abs(direction), point))
-        elif number >= 3 - min(lines, 2):
+        elif index >= 3 - min(lines, 2):
             direction = there - anchor
             legs.append(Leg(anchor, 0j, 0.0, direction / abs(direction), point))
         else:
@@ -114,26 +114,26 @@ def linkage_of(made: Platform, rng: random.Random) -> Linkage:
 
     ground = {'O': made.legs[0].anchor}
     driver = {'O': 0j}
-    for number, leg in enumerate(made.legs):
-        name = f'P{number}'
-        if leg.length and number == 0:
+    for index, leg in enumerate(made.legs):
+        name = f'P{index}'
+        if leg.length and index == 0:
             driver['A0'] = leg.reach if made.turning else 0j
         elif leg.length:
-            ground[f'A{number}'] = leg.anchor
-        elif number:
-            ground[f'A{number}'] = leg.anchor
+            ground[f'A{index}'] = leg.anchor
+        elif index:
+            ground[f'A{index}'] = leg.anchor
             way = (leg.direction.real, leg.direction.imag)
-            sliders[f'line_{number}'] = Slider(name, 'ground', f'A{number}', way)
+            sliders[f'line_{index}'] = Slider(name, 'ground', f'A{index}', way)
         else:
             way = (leg.direction.real, leg.direction.imag)
             sliders['line_0'] = Slider(name, 'driver', 'O', way)
         if leg.length:
             end = leg.anchor
-            if number == 0:
+            if index == 0:
                 end += leg.reach * (rect(1.0, x) if made.turning else x)
             turn = rng.uniform(-3.0, 3.0)
-            links[f'arm_{number}'] = own(
-                {f'A{number}': end, name: spots[number]}, turn, spots[number] + 0.3
+            links[f'arm_{index}'] = own(
+                {f'A{index}': end, name: spots[index]}, turn, spots[index] + 0.3
             )
     joints = {name: RevoluteJoint('ground', name) for name in ('platform', *list(links)[3:])}
     links['ground'] = own(ground, 0.0, 0j)
@@ -146,7 +146,7 @@ def linkage_of(made: Platform, rng: random.Random) -> Linkage:
         sliders['drive'] = Slider('A0', 'ground', 'O', way, block='driver')
         given = Input('crank', slider='drive')
     links['platform'] = {
-        f'P{number}': (leg.point.real, leg.point.imag) for number, leg in enumerate(made.legs)
+        f'P{index}': (leg.point.real, leg.point.imag) for index, leg in enumerate(made.legs)
     }
     return Linkage(
         links=links,
@@ -154,9 +154,7 @@ def linkage_of(made: Platform, rng: random.Random) -> Linkage:
         assembly={},
         joints=joints,
         sliders=sliders,
-        pose=AssemblyPose(
-            (x,), {f'P{number}': (z.real, z.imag) for number, z in enumerate(spots)}
-        ),
+        pose=AssemblyPose((x,), {f'P{index}': (z.real, z.imag) for index, z in enumerate(spots)}),
     )
 
 

@@ -92,30 +92,30 @@ def test_the_walk_keeps_the_constraints(kind):
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_platform_stays_on_the_branch_of_its_pose(kind):
     wrong = {}
-    for number, (_, linkage, *both) in enumerate(family(kind)):
+    for index, (_, linkage, *both) in enumerate(family(kind)):
         closure = Closure(linkage)
         found = [text for walked in both for text in off_branch(closure, walked)]
         if found:
-            wrong[number] = found[:3]
+            wrong[index] = found[:3]
     assert not wrong
 
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_ranges_end_where_the_curve_turns_back(kind):
-    for number, (made, linkage, down, up) in enumerate(family(kind)):
+    for index, (made, linkage, down, up) in enumerate(family(kind)):
         closure = Closure(linkage)
         (interval,) = closure.input_ranges
         if interval.is_whole:
-            assert (down.end, up.end) == (None, None), number
+            assert (down.end, up.end) == (None, None), index
             continue
         x = made.pose[2]
         assert interval.lowest < x < interval.highest
         for end, walked, sign in ((interval.lowest, down, -1.0), (interval.highest, up, 1.0)):
             if walked.end is not None:
-                assert end == pytest.approx(walked.end, abs=1e-6), number
+                assert end == pytest.approx(walked.end, abs=1e-6), index
             else:
                 # The walk went so far and did not turn back.
-                assert sign * (end - walked.states[-1][3]) > 0.0, number
+                assert sign * (end - walked.states[-1][3]) > 0.0, index
             if any(interval.limited) and walked.end is not None:
                 # Range and solver are one: closed up to the end, at a toggle there, open behind.
                 assert closure.position(end).status is Status.TOGGLE

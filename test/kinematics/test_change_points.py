@@ -366,8 +366,8 @@ def drawn(kind: str, number: int) -> Flat:
 
 @pytest.mark.parametrize('kind', FLAT)
 def test_the_named_side_holds_on_one_side_of_the_line_on_which_it_folds(kind):
-    for number in range(COUNT):
-        flat = drawn(kind, number)
+    for index in range(COUNT):
+        flat = drawn(kind, index)
         closure = Closure(flat.linkage)
         (side,) = flat.linkage.assembly.values()
         named = 1.0 if side in ('left', 'ahead') else -1.0
@@ -378,13 +378,13 @@ def test_the_named_side_holds_on_one_side_of_the_line_on_which_it_folds(kind):
             if position.status is Status.OPEN:
                 continue
             met = flat.side(closure.points(position))
-            assert named * met > 0.0, (number, crank, flat)
+            assert named * met > 0.0, (index, crank, flat)
 
 
 @pytest.mark.parametrize('kind', FLAT)
 def test_the_linkage_goes_on_through_its_change_points_as_it_moves(kind):
-    for number in range(COUNT // 3):
-        flat = drawn(kind, number)
+    for index in range(COUNT // 3):
+        flat = drawn(kind, index)
         closure = Closure(flat.linkage)
         for at in flat.at:
             before, here, after = (
@@ -401,7 +401,7 @@ def test_the_linkage_goes_on_through_its_change_points_as_it_moves(kind):
                 if turning:
                     moved = [remainder(part, tau) for part in moved]
                 for part in moved:
-                    assert abs(part - flat.sign * _STEP * rates[j]) < 1e-3 * _STEP, (number, flat)
+                    assert abs(part - flat.sign * _STEP * rates[j]) < 1e-3 * _STEP, (index, flat)
 
 
 @pytest.mark.parametrize(

@@ -224,10 +224,10 @@ def test_a_step_alone_is_as_among_the_others(name):
     inputs = [[value + 0.02 * i for value in usual] for i in range(-150, 150)]
     closed = [one for one in inputs if closure.position(*one).status.has_pose]
     assert usual in map(tuple, closed)
-    for number in range(len(closure.steps)):
-        pose = pose_alone(closure, number, *closed[0])
+    for index in range(len(closure.steps)):
+        pose = pose_alone(closure, index, *closed[0])
         for one in closed:
-            assert repr(pose(*one)) == repr(closure.position(*one).poses[number])
+            assert repr(pose(*one)) == repr(closure.position(*one).poses[index])
 
 
 def side_by_side(count: int) -> Closure:

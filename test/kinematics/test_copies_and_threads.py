@@ -75,7 +75,7 @@ def use(closure):
     """Build all that is built at its first use."""
     closure.solve(*([x] * 3 for x in inputs_of(closure)), rates=[1.0] * len(closure.input_names))
     if closure.by_steps:
-        closure.compiled(2)
+        closure.compile_linkage(2)
     _ = closure.input_ranges, closure.singular_inputs, closure.link_frames
     motion(closure)
 

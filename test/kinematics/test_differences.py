@@ -37,7 +37,7 @@ def needles(count):
 @pytest.mark.parametrize(('diagonal', 'lengths', 'x'), needles(200))
 def test_no_difference_is_computed_from_one_that_cancels(diagonal, lengths, x):
     """In 60 digits; the bound is the rounding of the terms of the one that cancels least."""
-    found = diagonal.at(LinkState([0.0, x], []))
+    found = diagonal.diagonal_at(LinkState([0.0, x], []))
     with mp.workdps(60):
         a, b, c, d = map(mpf, lengths)
         near, far = (4 * a * d * f(mpf(x) / 2) ** 2 for f in (mp.sin, mp.cos))

@@ -121,8 +121,8 @@ def drawing(seed: int, dyads: int) -> Drawing:
     drafter.places['ground'] = pivots
     crank = pivots['O'] + 0.5 * exp(1j * drafter.rng.uniform(-pi, pi))
     drafter.link('crank', {'O': pivots['O'], 'A': crank})
-    for number in range(dyads):
-        drafter.dyad(number)
+    for index in range(dyads):
+        drafter.dyad(index)
     links = {
         link: {name: drafter.local(link, place) for name, place in points.items()}
         for link, points in drafter.places.items()

@@ -151,8 +151,8 @@ def test_a_dyad_behind_an_iterated_group_ends_the_range(reach):
     (alone,), ranges = Closure(platform).input_ranges, Closure(linkage).input_ranges
     closure, at_platform = Closure(linkage), Closure(platform)
     count = 0
-    for number in range(1, 200):
-        crank = alone.lowest + (alone.highest - alone.lowest) * number / 200
+    for index in range(1, 200):
+        crank = alone.lowest + (alone.highest - alone.lowest) * index / 200
         position = at_platform.position(crank)
         far = abs(position.points['P2'] - complex(1.6, 1.4))
         reached = reach - 0.3 <= far <= reach + 0.3

@@ -274,8 +274,8 @@ CAME_BACK_EARLY = (
 def test_gears_on_moving_links_over_whole_turns(ratio: float, case: int) -> None:
     """Teeth keep their mesh turn after turn, against a loop that is followed in small steps."""
     random = Random(case)
-    for number in range(200):
-        if not number and case < len(CAME_BACK_EARLY):
+    for index in range(200):
+        if not index and case < len(CAME_BACK_EARLY):
             lengths, theta, geared = CAME_BACK_EARLY[case]
         else:
             bars = (random.uniform(0.4, 1.5) for _ in range(3))

@@ -42,8 +42,8 @@ def agree(found: list[float], expected: list[float]) -> bool:
 
 @pytest.mark.parametrize('kind', FLAT)
 def test_change_points_and_pins_that_meet_are_listed(kind):
-    for number in range(COUNT):
-        flat = FLAT[kind](random.Random(f'singular/{kind}/{number}'))
+    for index in range(COUNT):
+        flat = FLAT[kind](random.Random(f'singular/{kind}/{index}'))
         closure = Closure(flat.linkage)
         assert agree(met(closure, Status.CHANGE_POINT), [flat.sign * at for at in flat.at]), flat
         assert agree(met(closure, Status.INDETERMINATE), list(flat.meets)), flat
@@ -51,8 +51,8 @@ def test_change_points_and_pins_that_meet_are_listed(kind):
 
 @pytest.mark.parametrize('kind', FLAT)
 def test_the_state_says_so_and_moves_on_as_before_and_behind(kind):
-    for number in range(COUNT):
-        flat = FLAT[kind](random.Random(f'singular/{kind}/{number}'))
+    for index in range(COUNT):
+        flat = FLAT[kind](random.Random(f'singular/{kind}/{index}'))
         closure = Closure(flat.linkage)
         for at in flat.at:
             value = flat.sign * remainder(at, tau)
@@ -73,8 +73,8 @@ def test_the_state_says_so_and_moves_on_as_before_and_behind(kind):
 
 @pytest.mark.parametrize('kind', FLAT)
 def test_arrays_have_the_same_statuses_rates_and_accelerations_there(kind):
-    for number in range(COUNT):
-        flat = FLAT[kind](random.Random(f'singular/{kind}/{number}'))
+    for index in range(COUNT):
+        flat = FLAT[kind](random.Random(f'singular/{kind}/{index}'))
         closure = Closure(flat.linkage)
         values = [flat.sign * remainder(at, tau) for at in flat.at]
         if not values:

@@ -342,7 +342,7 @@ def test_every_kind_of_step_is_tested():
     ]
     assert {type(step) for step in steps} == classes_with('close', step, newton_group, *kinds)
     parts = [getattr(step, name, None) for step in steps for name in ('diagonal', 'rail')]
-    wanted = classes_with('at', diagonals, diagonals, rail)
+    wanted = classes_with('diagonal_at', diagonals) | classes_with('pin_at', rail)
     assert {type(part) for part in parts if part is not None} == wanted
 
 

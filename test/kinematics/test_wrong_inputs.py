@@ -330,7 +330,10 @@ MALFORMED = {
         FOUR_BAR, put('traced', ('P',)), 'traced', 'name one of A, B'
     ),
     'a pose with a value too many': Fault(
-        FOUR_BAR, put('pose', AssemblyPose((1.0, 2.0), {})), 'pose.inputs', 'give one for each input'
+        FOUR_BAR,
+        put('pose', AssemblyPose((1.0, 2.0), {})),
+        'pose.inputs',
+        'give one for each input',
     ),
     'a class III group without a pose': Fault(CLASS_3, put('pose', None), 'pose', 'pose: {inputs'),
     'a pose that leaves a link out': Fault(

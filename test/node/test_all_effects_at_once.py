@@ -136,9 +136,9 @@ def samples(folder):
     """Record a crank, for the drive that takes it from a bag."""
     writer = BagWriter(folder, [Topic('/crank', 'sensor_msgs/msg/JointState', '', '')])
     write = JointStateWriter(['recorded_crank_joint']).write
-    for number in range(60):
-        stamp = BEGIN + number * 10 * MS
-        angle, rate = 1.0 + 0.5 * sin(0.2 * number), 10.0 * cos(0.2 * number)
+    for index in range(60):
+        stamp = BEGIN + index * 10 * MS
+        angle, rate = 1.0 + 0.5 * sin(0.2 * index), 10.0 * cos(0.2 * index)
         writer.write(0, stamp, stamp, write(stamp, [angle], [rate]))
     writer.close()
 
@@ -146,18 +146,18 @@ def samples(folder):
 def moments(joint):
     """Yield ticks and messages of a second and a half, as a real clock has them."""
     write = JointStateWriter([joint]).write
-    for number in range(TICKS):
-        now = BEGIN + number * MS + number * number % 137_000
+    for index in range(TICKS):
+        now = BEGIN + index * MS + index * index % 137_000
         messages = ()
-        if number % 3 == 0 and not 1000 < number < 1150:
-            angle, rate = 1.0 + sin(0.01 * number), 10.0 * cos(0.01 * number)
-            messages = (write(now, [angle], [rate], [0.03 * cos(0.05 * number)]),)
+        if index % 3 == 0 and not 1000 < index < 1150:
+            angle, rate = 1.0 + sin(0.01 * index), 10.0 * cos(0.01 * index)
+            messages = (write(now, [angle], [rate], [0.03 * cos(0.05 * index)]),)
         # Some expire, some are rejected, and they have no time in common with the samples.
         wrenches = []
-        if number % 7 == 0 and not 400 < number < 450:
-            wrenches.append((0, wrench_stamped(0.2, 0.1 * cos(0.03 * number), 0.001)))
-        if number % 250 < 2:
-            wrenches.append((1, wrench_stamped(0.1, inf if number % 2 else 0.05, -0.002)))
+        if index % 7 == 0 and not 400 < index < 450:
+            wrenches.append((0, wrench_stamped(0.2, 0.1 * cos(0.03 * index), 0.001)))
+        if index % 250 < 2:
+            wrenches.append((1, wrench_stamped(0.1, inf if index % 2 else 0.05, -0.002)))
         yield Moment(now, messages, wrenches=tuple(wrenches))
 
 
@@ -220,10 +220,10 @@ def test_they_replay_to_the_last_bit(recorded, name):
 PROGRAM = """
 import hashlib, sys
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay
+from linkage_ros.replay.replay import recorded_scene, replay_ticks
 bag = read_bag(sys.argv[1])
 digest = hashlib.sha256()
-for each in replay(bag, recorded_scene(bag)):
+for each in replay_ticks(bag, recorded_scene(bag)):
     for message in (each.tick.message, *each.tick.extras):
         digest.update(message)
 print(digest.hexdigest())

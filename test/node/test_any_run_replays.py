@@ -85,9 +85,9 @@ def samples(folder: Path) -> None:
     """Record the rocker alone, for the drive that takes it from a bag."""
     writer = BagWriter(folder, [Topic('/crank', 'sensor_msgs/msg/JointState', '', '')])
     write = JointStateWriter([ROCKER]).write
-    for number in range(TICKS):
-        stamp = BEGIN + number * MS + (50 * MS if number > 70 else 0)
-        writer.write(0, stamp, stamp, write(stamp, [angle(number)], [80.0 * 0.9]))
+    for index in range(TICKS):
+        stamp = BEGIN + index * MS + (50 * MS if index > 70 else 0)
+        writer.write(0, stamp, stamp, write(stamp, [angle(index)], [80.0 * 0.9]))
     writer.close()
 
 
@@ -105,13 +105,13 @@ def moments(plan: Plan) -> Iterator[Moment]:
     write = JointStateWriter([ROCKER]).write
     begin, end = plan.silence[0], sum(plan.silence)
     now = BEGIN
-    for number in range(TICKS):
-        now += MS + MS * plan.jumps.get(number, 0)
+    for index in range(TICKS):
+        now += MS + MS * plan.jumps.get(index, 0)
         messages: tuple[bytes, ...] = ()
-        if number % plan.every == 0 and not begin <= number < end:
-            messages = (write(now - MS // 7, [angle(number)], [72.0]),)
-        asked = (plan.asked[number],) if number in plan.asked else ()
-        yield Moment(now, messages, number in plan.resets, asked)
+        if index % plan.every == 0 and not begin <= index < end:
+            messages = (write(now - MS // 7, [angle(index)], [72.0]),)
+        asked = (plan.asked[index],) if index in plan.asked else ()
+        yield Moment(now, messages, index in plan.resets, asked)
 
 
 def scene(
@@ -232,7 +232,7 @@ def test_a_torque_that_is_made_up_for_while_a_link_is_broken(tmp_path):
         'effects: {velocity: {}}\nloads: {gravity: [0, -9.81]}\n'
         'faults: {broken: {broken_link: {link: coupler}, at: [0.2], seconds: 1.5}}\n'
     )
-    happens = [Moment(BEGIN + number * 10 * MS) for number in range(220)]
+    happens = [Moment(BEGIN + index * 10 * MS) for index in range(220)]
     bag, published, _, _ = run(tmp_path / 'bag', tmp_path / 'scene.yaml', happens)
     again = list(replay_all(bag, recorded_scene(bag), bag.messages()))
     assert [each.tick.message for each in again if each.recorded] == published

@@ -48,8 +48,8 @@ def test_a_parameter_of_no_known_type_does_not_end_the_node(graph, write_scene, 
 
 def test_what_huge_messages_are_for_is_not_remembered():
     routes = SampleRouter({'left': ['crank_joint'], 'right': ['other']})
-    for number in range(3):
-        names = ['crank_joint', f'of_message_{number}', *(f'joint_{n}' for n in range(20_000))]
+    for index in range(3):
+        names = ['crank_joint', f'of_message_{index}', *(f'joint_{n}' for n in range(20_000))]
         message = JointStateWriter(names).write(1, [0.0] * len(names), [])
         assert routes.find_receivers(message) == ('left',)
     assert routes._found == {}

@@ -30,7 +30,7 @@ faults: {cable: {silence: {}, at: %s, seconds: 0.2}}
 record: {directory: %s, name: bag, compression: zstd, flush_period: 0.1}
 """
 # However late the node is discovered, one falls within the time of 150 joint states.
-SILENCES = [0.5 * number for number in range(60)]
+SILENCES = [0.5 * index for index in range(60)]
 TOPICS = {'/joint_states', '/crank_states', '/diagnostics', '/linkage_node/motion'}
 
 

@@ -59,8 +59,8 @@ def test_silent_is_silent_beyond_and_within_the_same(effects):
     said = f'effects: {effects}\n'
     silent = Pipeline(scene(said + 'beyond_limits: silent'))
     free = Pipeline(scene(said))
-    for number, angle in enumerate((1.0, 1.4, 1.6, 2.0, 1.5, 1.2, 0.4)):
-        tick, other = at(silent, angle, number), at(free, angle, number)
+    for index, angle in enumerate((1.0, 1.4, 1.6, 2.0, 1.5, 1.2, 0.4)):
+        tick, other = at(silent, angle, index), at(free, angle, index)
         assert other.message
         if angle in (1.6, 2.0, 0.4):
             assert tick.message == b''
@@ -88,8 +88,8 @@ def test_a_published_angle_begins_within_its_limits(turns):
         'input: {limits: [0.5, 1.5]}', f'joints: {{rocker_joint: {{limits: [{low!r}, {high!r}]}}}}'
     )
     pipeline = Pipeline(scene('', linkage))
-    for number in range(100):
-        message = read(at(pipeline, 2.0 + 0.005 * number, number).message)
+    for index in range(100):
+        message = read(at(pipeline, 2.0 + 0.005 * index, index).message)
         values = dict(zip(message.name, message.position, strict=True))
         assert low <= values['rocker_joint'] <= high
         assert -pi < values['coupler_joint'] <= pi
@@ -119,9 +119,9 @@ def ran(said, angles, linkage=LIMITED):
         return (waiting.pop(0), {'source_timestamp': 0}) if waiting else None
 
     loop = TickLoop(lambda: Pipeline(made), take, published.append)
-    for number, message in enumerate(messages):
+    for index, message in enumerate(messages):
         waiting.append(message)
-        loop.tick_at(BEGIN + number * MS)
+        loop.tick_at(BEGIN + index * MS)
     return loop, published
 
 

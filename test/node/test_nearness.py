@@ -42,15 +42,17 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
             asked is position and SimpleNamespace(**dict(zip(LIMITS, nearness, strict=True)))
         ),
     )
-    member = SimpleNamespace(name='', linkage=SimpleNamespace(inputs=inputs, joints={}, limits={}))
-    lines = [SimpleNamespace(member=member, closure=closure, drive=None)]
-    counts.last_tick = SimpleNamespace(lines=lines, looks=(look,))
-    pipeline = SimpleNamespace(lines=lines, max_age=1, newest_stamp=0)
+    scene_linkage = SimpleNamespace(
+        name='', linkage=SimpleNamespace(inputs=inputs, joints={}, limits={})
+    )
+    linkages = [SimpleNamespace(scene_linkage=scene_linkage, closure=closure, drive=None)]
+    counts.last_tick = SimpleNamespace(linkages=linkages, full_states=(look,))
+    pipeline = SimpleNamespace(linkages=linkages, max_age=1, newest_stamp=0)
     loop = SimpleNamespace(
         counts=counts,
         pipeline=pipeline,
         newest_stamp=0,
-        missed=0,
+        missed_messages=0,
         recorder=None,
         injection=None,
     )

@@ -50,12 +50,12 @@ def joints_and_words(count):
 
 
 def _joints_and_words(count):
-    for number in range(count):
-        at = BEGIN + number * 10 * MS
-        message = crank(0.1 * number, 1.0, at)
+    for index in range(count):
+        at = BEGIN + index * 10 * MS
+        message = crank(0.1 * index, 1.0, at)
         yield 0, at, serialize_message(message)
-        if number % 10 == 0:
-            yield 1, at, serialize_message(String(data=f'say {number:03d}'))
+        if index % 10 == 0:
+            yield 1, at, serialize_message(String(data=f'say {index:03d}'))
 
 
 def write(folder, messages, topics=('/joints', '/words')):
@@ -150,8 +150,8 @@ def test_the_order_is_that_of_the_log_times(graph, tmp_path, play):
     bag = write(
         tmp_path / 'bag',
         [
-            (0, BEGIN + at * MS, serialize_message(crank(float(number))))
-            for number, at in enumerate(times)
+            (0, BEGIN + at * MS, serialize_message(crank(float(index))))
+            for index, at in enumerate(times)
         ],
         ['/joints'],
     )
@@ -192,7 +192,7 @@ def test_half_as_long_at_twice_the_rate(bag, play):
 def test_the_recorded_quality_of_service_is_offered(
     graph, tmp_path, play, qos, reliability, durability
 ):
-    messages = [(0, BEGIN + number * 100 * MS, b'\0\1\0\0') for number in range(300)]
+    messages = [(0, BEGIN + index * 100 * MS, b'\0\1\0\0') for index in range(300)]
     bag = write(tmp_path / 'bag', messages, [topic_of('/joints', **qos)])
     player = play(bag)
     (found,) = wait_for(lambda: graph.node.get_publishers_info_by_topic('/joints'), 'a publisher')
@@ -305,7 +305,7 @@ def test_the_clock_is_the_bags(graph, bag, play):
     time.sleep(0.2)
     times = [clock.clock.sec * NS + clock.clock.nanosec - BEGIN for clock in clocks]
     # A hundred a second, at half the pace: one each 5 ms of the bag; and one at its end.
-    expected = [number * 5 * MS for number in range(199)]
+    expected = [index * 5 * MS for index in range(199)]
     assert set(times) <= set(expected)
     assert times == sorted(times)
     assert times[-1] == 990 * MS
@@ -333,8 +333,8 @@ def test_a_node_on_simulated_time_repeats_what_was_recorded(
     publisher = graph.publisher(JointState, '/crank_states')
     heard = graph.listen(JointState, '/joint_states')
     wait_for(lambda: publisher.publish(crank(0.4, 1.0)) or heard, 'a joint state')
-    for number in range(300):
-        publisher.publish(crank(0.4 + 0.003 * number, 1.0))
+    for index in range(300):
+        publisher.publish(crank(0.4 + 0.003 * index, 1.0))
         time.sleep(0.003)
     assert recording.end() == 0, recording.log
     (bag,) = (tmp_path / 'runs').iterdir()
@@ -379,10 +379,10 @@ def foreign(file, channels):
     with file.open('wb') as stream:
         writer = Writer(stream)
         writer.start(profile='ros2', library='somebody else')
-        for number, (name, kind) in enumerate(channels):
+        for index, (name, kind) in enumerate(channels):
             schema = writer.register_schema(kind, 'ros2msg', b'') if kind else 0
             channel = writer.register_channel(name, 'cdr', schema)
-            writer.add_message(channel, BEGIN + number, b'\0\1\0\0\0\0\0\0', BEGIN + number)
+            writer.add_message(channel, BEGIN + index, b'\0\1\0\0\0\0\0\0', BEGIN + index)
         writer.finish()
     return file
 
@@ -407,8 +407,8 @@ LEFT_OUT = [
 
 def test_a_foreign_bag_plays_what_can_be_published(graph, tmp_path, play):
     strange = [
-        (f'{name}{number}' if name == '/x' else name, kind)
-        for number, (name, kind, _) in enumerate(LEFT_OUT)
+        (f'{name}{index}' if name == '/x' else name, kind)
+        for index, (name, kind, _) in enumerate(LEFT_OUT)
     ]
     file = foreign(tmp_path / 'foreign.mcap', [*strange, ('/joints', 'std_msgs/msg/Empty')])
     said, complaints = play(file).ended()
@@ -444,8 +444,8 @@ def test_a_killed_recording_is_played_as_far_as_it_goes(tmp_path, bag, play):
 
 def test_a_damaged_bag_is_played_up_to_the_damage(tmp_path, play):
     words = [
-        (0, BEGIN + number * MS, serialize_message(String(data=f'<{number}>' * 100)))
-        for number in range(500)
+        (0, BEGIN + index * MS, serialize_message(String(data=f'<{index}>' * 100)))
+        for index in range(500)
     ]
     bag = write(tmp_path / 'bag', words, ['/words'])
     (file,) = bag.glob('*.mcap')

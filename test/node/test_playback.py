@@ -89,7 +89,7 @@ def test_no_time_is_lost_on_the_way():
     times = []
     playback = Playback(FIRST, 3.0, {'a': lambda _: times.append(clock.time)}, clock)
     playback.send_messages(
-        QueuedMessage(0, FIRST + number * MS, 'a', b'') for number in range(1_000_000)
+        QueuedMessage(0, FIRST + index * MS, 'a', b'') for index in range(1_000_000)
     )
     assert all(abs(t - BEGUN - n * MS / 3) <= 0.5 + 1e-6 for n, t in enumerate(times))
 
@@ -243,7 +243,7 @@ def test_large_messages_are_read_ahead_by_their_size():
 
 def test_what_was_read_before_an_error_is_played_before_it():
     error = BagError('bag', 'is damaged', 'so it is')
-    order = Order([(number, 'a') for number in range(1000)], error)
+    order = Order([(index, 'a') for index in range(1000)], error)
     found = []
     with pytest.raises(BagError, match='is damaged'):
         found.extend(

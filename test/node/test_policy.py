@@ -104,8 +104,8 @@ WHOLE = (
 
 def test_the_policy_grants_nothing_that_no_node_has_and_no_topic_is_left_out(graph_of, tmp_path):
     has = {kind: set() for kind in KINDS}
-    for number, text in enumerate(WHOLE):
-        scene = tmp_path / f'whole_{number}.yaml'
+    for index, text in enumerate(WHOLE):
+        scene = tmp_path / f'whole_{index}.yaml'
         scene.write_text(f'linkage: {ROOT}/config/linkages/four_bar.yaml\n{text}')
         for kind, names in graph_of(scene).items():
             has[kind] |= {name for name in names if '/inject/' not in name}

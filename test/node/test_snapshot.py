@@ -387,7 +387,7 @@ def slow_disk(monkeypatch):
 
 
 def test_a_run_that_ends_waits_for_its_snapshot_and_answers(tmp_path, write_scene, slow_disk):
-    loop = SimpleNamespace(running=False, recorder=None, pipeline=SimpleNamespace(lines=()))
+    loop = SimpleNamespace(is_running=False, recorder=None, pipeline=SimpleNamespace(linkages=()))
     recording = RunRecording(SimpleNamespace(info=lambda _: None, error=lambda _: None))
     scene = load_scene(str(write_scene('ends', scene_text(tmp_path, 30))))
     states = bag_topic('/joint_states', JointState, QoSProfile(depth=10))

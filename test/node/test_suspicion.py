@@ -37,8 +37,8 @@ class Said(list):
 def test_a_crank_that_jumps_by_more_than_a_turn_is_told_once(linkage, angles, said):
     pipeline = Pipeline(load_scene(linkage, ['drive={topic: {}}']))
     (line,) = pipeline.linkages
-    for number, angle in enumerate(angles):
-        stamp = (1 + number) * SECOND // 100
+    for index, angle in enumerate(angles):
+        stamp = (1 + index) * SECOND // 100
         assert line.drive.offer(CrankSample(stamp, (angle,), (0.0,)), stamp) is None
     lines = Said()
     warnings = Warnings(lines)

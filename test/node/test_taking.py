@@ -74,8 +74,8 @@ class Rig:
 @pytest.mark.parametrize('rate', [50, 0])
 def test_a_sample_that_comes_while_others_are_taken_is_not_of_the_future(rate):
     rig = Rig(rate=rate)
-    for number in range(33):
-        rig.send(BEGIN + (number + 1) * MS)  # stamped at the instant at which it is taken
+    for index in range(33):
+        rig.send(BEGIN + (index + 1) * MS)  # stamped at the instant at which it is taken
     rig.tick(BEGIN, rig.clock)
     assert rig.loop.counts.rejected[Rejection.STAMP_FUTURE] == 0
     assert rig.counts() == ((33, 33, 0, 0, 0) if rate == 0 else (33, 1, 32, 0, 0))

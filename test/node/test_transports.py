@@ -52,7 +52,7 @@ node.trigger_configure()
 node.trigger_activate()
 while not stop.is_set():
     executor.spin_once(timeout_sec=0.1)
-node.end()
+node.end_run()
 """
 
 

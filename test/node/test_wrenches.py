@@ -44,13 +44,13 @@ SCENES = {
 def moments(resets, jumps):
     """Yield 300 ticks; wrenches come in bursts, and a crank for the drive that wants one."""
     write, now = JointStateWriter(['drive_joint']).write, BEGIN
-    for number in range(300):
-        now += MS + 137 * number + MS * jumps.get(number, 0)
+    for index in range(300):
+        now += MS + 137 * index + MS * jumps.get(index, 0)
         wrenches = ()
-        if number % 80 < 20 and number % 3:
-            wrenches = ((0, wrench_stamped(1.0, 0.02 * number, nan if number % 5 == 0 else 0.3)),)
-        sample = write(now - MS // 9, [0.01 * number], [10.0], [0.1])
-        yield Moment(now, (sample,), number in resets, wrenches=wrenches)
+        if index % 80 < 20 and index % 3:
+            wrenches = ((0, wrench_stamped(1.0, 0.02 * index, nan if index % 5 == 0 else 0.3)),)
+        sample = write(now - MS // 9, [0.01 * index], [10.0], [0.1])
+        yield Moment(now, (sample,), index in resets, wrenches=wrenches)
 
 
 @pytest.fixture
@@ -94,7 +94,7 @@ def test_a_bag_whose_account_names_more_wrenches_than_its_scene_can_be_read(reco
     scene = recorded_scene(done.bag)
     (member,) = scene.linkages
     loads = replace(member.loads, applied=type(member.loads.applied)())
-    bare = replace(scene, members=(replace(member, loads=loads),))
+    bare = replace(scene, linkages=(replace(member, loads=loads),))
     assert len(list(replay_ticks(done.bag, bare))) == len(done.published)
 
 

@@ -69,8 +69,8 @@ def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
         publish_change=lambda c: text_message(change_text(c, scene.faults[c.name].kind)),
         take_wrenches=[partial(_first, each) for each in pushing],
     )
-    others = [f'/extra_{number}' for number in range(len(pipeline.extras))]
-    loads = [f'/wrench_{number}' for number in range(len(pushing))]
+    others = [f'/extra_{index}' for index in range(len(pipeline.extras))]
+    loads = [f'/wrench_{index}' for index in range(len(pushing))]
     names = {
         'joint_states_topic': '/joint_states',
         'diagnostics_topic': '/diagnostics',

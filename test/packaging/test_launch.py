@@ -251,16 +251,16 @@ def test_two_streams_of_joint_states_meet_in_tf(start, root, name):
     )
     tf = RobotStatePublisher(frequency)
     gaps = []
-    for number in range(500):
-        stamp = 10**12 + number * 10_000_000
-        angle = 0.01 * number
+    for index in range(500):
+        stamp = 10**12 + index * 10_000_000
+        angle = 0.01 * index
         message = joint_state(['crank_joint'], [angle], [1.0], stamp=divmod(stamp, 10**9))
         assert pipeline.offer(message, stamp) is None
         if not publish_input:
             tf.take(['arm', 'crank_joint'], [0.0, angle], stamp)
         at = stamp if rate == 0 else stamp + 3_000_000
         # It starts a little after the broadcaster, so that each stream has a phase of its own.
-        if number >= 2:
+        if index >= 2:
             state = read_joint_state(pipeline.tick(at).message)
             tf.take(state.name, state.position, at)
             gaps.append(gap_of_pin(tf.angles))

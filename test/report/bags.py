@@ -89,7 +89,7 @@ def write(
             'wrench_topics': [*wrenches],
         }
         attachments[RUN_FILE] = ('application/json', json.dumps(said).encode())
-    numbers = {each: number for number, each in enumerate(types)}
+    numbers = {each: index for index, each in enumerate(types)}
     writer = BagWriter(folder, [topic(*each) for each in types.items()], attachments)
     for of, logged, published, data in messages:
         writer.write(numbers[of], logged, published, data)
@@ -363,7 +363,7 @@ def joint_states(bag: Path, of: str) -> list[tuple[int, int, int, list[str], Seq
     (file,) = bag.glob('*.mcap')
     with file.open('rb') as stream:
         messages = make_reader(stream).iter_messages(log_time_order=False)
-        for number, (_, channel, message) in enumerate(messages):
+        for index, (_, channel, message) in enumerate(messages):
             if channel.topic != of:
                 continue
             data = message.data
@@ -389,5 +389,5 @@ def joint_states(bag: Path, of: str) -> list[tuple[int, int, int, list[str], Seq
                 numbers += unpack_from(f'<{length}d', data, at)
                 at += 8 * length
             stamp = seconds * SECOND + nanoseconds
-            found.append((number, message.log_time, stamp, names, numbers))
+            found.append((index, message.log_time, stamp, names, numbers))
     return found

@@ -88,7 +88,7 @@ def recorded(
 
 def with_more(bag: Bag, folder: Path, more: Sequence[tuple[int, BagMessage]]) -> Bag:
     """Return a bag with more messages: each before the first that is recorded later."""
-    numbers = {each.name: number for number, each in enumerate(bag.topics)}
+    numbers = {each.name: index for index, each in enumerate(bag.topics)}
     attached = {name: ('', data) for name, data in bag.attachments.items()}
     writer = BagWriter(folder, bag.topics, attached)
     waiting = sorted(more, key=lambda each: each[0])
@@ -105,7 +105,7 @@ def with_more(bag: Bag, folder: Path, more: Sequence[tuple[int, BagMessage]]) ->
 
 def from_then_on(bag: Bag, folder: Path, begin: float) -> Bag:
     """Return a bag that says that it begins in mid-run, at a time of the whole one in [ms]."""
-    numbers = {each.name: number for number, each in enumerate(bag.topics)}
+    numbers = {each.name: index for index, each in enumerate(bag.topics)}
     attached = {name: ('', data) for name, data in bag.attachments.items()}
     attached['run.json'] = ('', attached['run.json'][1].replace(b'{', b'{"begun": "mid-run", ', 1))
     writer = BagWriter(folder, bag.topics, attached)

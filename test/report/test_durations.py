@@ -304,8 +304,8 @@ def test_no_event_is_lost_from_the_count_and_spans_are_apart(events):
 
 def test_a_million_events_are_a_bounded_number_of_spans():
     lane = EventTrack()
-    for number in range(1_000_000):
-        lane.add(number * 1000 + number * number % 997, number * 1000 + 997, f'kind {number % 3}')
+    for index in range(1_000_000):
+        lane.add(index * 1000 + index * index % 997, index * 1000 + 997, f'kind {index % 3}')
     assert lane.count == sum(span.count for span in lane.spans) == 1_000_000
     assert len(lane.spans) <= 1000
     assert (lane.spans[0].begin, lane.spans[-1].end) == (0, 999_999 * 1000 + 997)

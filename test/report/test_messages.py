@@ -295,7 +295,7 @@ def test_counts_are_those_of_info_for_a_harmed_bag_too(tmp_path, harm):
 
 
 def test_a_wish_to_stop_ends_the_reading_at_the_next_block():
-    messages = [BagMessage('/a', number, 0, b'') for number in range(100)]
+    messages = [BagMessage('/a', index, 0, b'') for index in range(100)]
     reader = Blocks(bag_of(messages), ['/a'], Progress(stopped=lambda: True))
     assert sum(len(block['/a']) for block in reader) == 8
     assert reader.count_contents().stopped

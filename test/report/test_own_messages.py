@@ -98,8 +98,8 @@ def test_numbers_that_no_joint_has_break_no_page(tmp_path, value):
     writer = JointStateWriter(['coupler_joint', 'rocker_joint'])
     messages = [
         m._replace(data=writer.write(BEGIN, [value, 1.0], [value, value]))
-        if m.topic == '/joint_states' and number % 3 else m
-        for number, m in enumerate(bag.messages())
+        if m.topic == '/joint_states' and index % 3 else m
+        for index, m in enumerate(bag.messages())
     ]  # fmt: skip
 
     class Changed(type(bag)):

@@ -141,9 +141,9 @@ def test_a_long_run_is_thinned_and_its_extremes_are_kept(long):
     place = [column.name for column in states.columns].index('rocker_joint')
     assert np.fmin(first, second)[:, place].min() == pytest.approx(values.min(), abs=1e-15)
     assert np.fmax(first, second)[:, place].max() == pytest.approx(values.max(), abs=1e-15)
-    for number, (begin, end) in enumerate(zip(begins // MS, ends // MS, strict=True)):
+    for index, (begin, end) in enumerate(zip(begins // MS, ends // MS, strict=True)):
         own = values[slice(begin, end + 1)]
-        told = sorted([first[number, place], second[number, place]])
+        told = sorted([first[index, place], second[index, place]])
         assert told == pytest.approx([own.min(), own.max()], abs=1e-15)
 
 
@@ -165,9 +165,9 @@ def filled(room, names, quantity='position'):
 
 def full_lane(**options):
     lane = EventTrack(**options)
-    for number in range(5000):
-        time = (number * number % 9973 + 10_000 * number) * 1_000_003 // 7
-        lane.add(time, time + 1, f'{number}{WORST[:200]}')
+    for index in range(5000):
+        time = (index * index % 9973 + 10_000 * index) * 1_000_003 // 7
+        lane.add(time, time + 1, f'{index}{WORST[:200]}')
     while len(lane.spans) < options.get('most', MOST_SPANS):
         time += 10**13
         lane.add(time, time + 1)
@@ -187,8 +187,8 @@ def _is_there(name):
 def worst_run():
     found = [closures()[n % len(closures())] for n in range(MOST_LINKAGES)]
     linkages, values = [], {}
-    for number, closure in enumerate(found):
-        prefix = f'l{number}_'
+    for index, closure in enumerate(found):
+        prefix = f'l{index}_'
         names = tuple(
             prefix + name
             for name in dict.fromkeys(
@@ -274,9 +274,9 @@ def test_a_bag_of_hundreds_of_topics_and_joints_with_endless_names(tmp_path):
     kind = 'sensor_msgs/msg/JointState'
     writer = BagWriter(tmp_path / 'bag', [Topic(name, kind, '', '') for name in names])
     write = JointStateWriter([f'{n}{"é" * 10_000}' for n in range(100)]).write
-    for number in range(300):
-        message = write(BEGIN, [float(number)] * 100, [1.0] * 100) if number < 6 else b''
-        writer.write(number, BEGIN + number * MS, 0, message)
+    for index in range(300):
+        message = write(BEGIN, [float(index)] * 100, [1.0] * 100) if index < 6 else b''
+        writer.write(index, BEGIN + index * MS, 0, message)
     writer.close()
     (file,) = writer.folder.glob('*.mcap')
     page = bag_page(file, Window(), Event())
@@ -339,9 +339,9 @@ def test_flipped_and_cut_bytes(bag, tmp_path, seed, monkeypatch):
     whole = bag.read_bytes()
     file = tmp_path / 'odd.mcap'
     lines = []
-    for number in range(PIECES // 3):
+    for index in range(PIECES // 3):
         content = bytearray(whole)
-        if number % 3 == 0:
+        if index % 3 == 0:
             content = content[: random.integers(len(content))]
         for at in random.integers(len(content) or 1, size=random.integers(1, 4)):
             if len(content):
@@ -360,14 +360,14 @@ def test_what_fits_its_checksums_may_still_be_anything(bag, tmp_path, seed, monk
     random = np.random.default_rng(seed)
     whole = read_bag(bag)
     messages = [*whole.messages()]
-    numbers = {each.name: number for number, each in enumerate(whole.topics)}
+    numbers = {each.name: index for index, each in enumerate(whole.topics)}
     lines = []
-    for number in range(PIECES // 12):
+    for index in range(PIECES // 12):
         attached = {name: ('', data) for name, data in whole.attachments.items()}
-        if number % 2:
+        if index % 2:
             name = str(random.choice([*attached]))
             attached[name] = '', changed(attached[name][1], random)
-        writer = BagWriter(tmp_path / f'{number}', whole.topics, attached)
+        writer = BagWriter(tmp_path / f'{index}', whole.topics, attached)
         odd = {*random.integers(len(messages), size=random.integers(1, 30)).tolist()}
         for place, (topic, logged, published, data) in enumerate(messages):
             time = TIMES[random.integers(len(TIMES))] if place in odd else 0

@@ -47,8 +47,8 @@ def published(closure, positions, inputs, prefix=''):
     """Return what messages say of joints, by name."""
     joints = np.array([position.joints for position in positions]).T
     values = dict(zip(closure.linkage.joints, joints, strict=True))
-    for number, given in enumerate(closure.linkage.inputs):
-        values[given.joint] = np.array([each[number] for each in inputs])
+    for index, given in enumerate(closure.linkage.inputs):
+        values[given.joint] = np.array([each[index] for each in inputs])
     return {prefix + name: value for name, value in values.items()}
 
 
@@ -144,8 +144,8 @@ def test_where_joints_do_not_tell_of_a_link_the_loops_are_closed_at_the_input():
     assert np.isnan(found.frames[1]).all()
     for i in (0, 2):
         frames = link_frames(whole, whole.position(*inputs[i]))
-        for number, link in enumerate(found.links):
-            x, y, angle = found.frames[i, number]
+        for index, link in enumerate(found.links):
+            x, y, angle = found.frames[i, index]
             assert abs(complex(x, y) - frames[link].place) < 1e-12
             assert abs(rect(1.0, angle) - rect(1.0, frames[link].angle)) < 1e-12
 
@@ -159,7 +159,7 @@ TICKS = 40
 def moments(scene):
     """Return ticks over the middle of the range, each with its sample of all inputs."""
     (line,) = Pipeline(scene).linkages
-    (member,) = scene.members
+    (member,) = scene.linkages
     usual = usual_inputs(line.closure)
     interval = InputSweep(line.closure, usual).range_about(usual[0])
     values = sample_inputs(interval, TICKS) if interval else [usual[0]] * TICKS
@@ -192,12 +192,12 @@ def test_links_are_drawn_where_the_loops_close_at_the_recorded_inputs(tmp_path, 
     closure = found.linkages[0].closure
     position = closure.position(*(each[0] for each in inputs))
     size = max(map(abs, closure.points(position).values()))
-    for number, given in enumerate(zip(*(each.tolist() for each in inputs), strict=True)):
+    for index, given in enumerate(zip(*(each.tolist() for each in inputs), strict=True)):
         points = closure.points(closure.position(*given))
         for (link, point), place in points.items():
             if link not in closure.linkage.links or link == 'ground':
                 continue
-            x, y, angle = frames[number, linkage['links'].index(link)].astype(float)
+            x, y, angle = frames[index, linkage['links'].index(link)].astype(float)
             at = complex(*closure.linkage.links[link][point])
             # Of single precision, as a picture has it.
             assert abs(complex(x, y) + at * rect(1.0, angle) - place) < 2e-6 * size

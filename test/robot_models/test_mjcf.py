@@ -132,10 +132,10 @@ def test_it_moves_as_the_closure_says(name):
     size, worst, first = size_of(closure), 0.0, state.ctrl.copy()
     sliding = [bool(each.slider) for each in closure.linkage.inputs]
     far = np.where(sliding, 0.05 * size, 0.3)
-    for number in range(800):
-        state.ctrl[:] = first + far * min(number / 600.0, 1.0)
+    for index in range(800):
+        state.ctrl[:] = first + far * min(index / 600.0, 1.0)
         mujoco.mj_step(model, state)
-        if number % 20 == 0:
+        if index % 20 == 0:
             mujoco.mj_forward(model, state)
             worst = max(worst, opened(model, state), off(model, state, closure))
     moved = state.qpos[[model.joint(e.joint).qposadr[0] for e in closure.linkage.inputs]]

@@ -135,8 +135,8 @@ def from_topic(text, angles):
 def swept(pipeline, name, values):
     """Yield what is said while an input goes through values."""
     writer = JointStateWriter([name])
-    for number, value in enumerate(values):
-        now = BEGIN + number * MS
+    for index, value in enumerate(values):
+        now = BEGIN + index * MS
         assert pipeline.offer(writer.write(now, [value], [0.0]), now) is None
         if message := pipeline.tick(now).message:
             yield heard(message)

@@ -51,8 +51,8 @@ class Walked:
 
 def said(pipeline, every=50 * MS, count=126):
     """Yield names and positions of the joint states that ticks come to."""
-    for number in range(count):
-        message = pipeline.tick(BEGIN + number * every).message
+    for index in range(count):
+        message = pipeline.tick(BEGIN + index * every).message
         if message:
             yield heard(message)
 
@@ -83,8 +83,8 @@ def several_inputs(text, names, values):
     """Yield what is said where several inputs come in messages."""
     pipeline = pipeline_of('rate: 0\npublish_input: true\n', text)
     writer = JointStateWriter(names)
-    for number, inputs in enumerate(values):
-        now = BEGIN + number * 50 * MS
+    for index, inputs in enumerate(values):
+        now = BEGIN + index * 50 * MS
         assert pipeline.offer(writer.write(now, inputs, [0.0] * len(names)), now) is None
         message = pipeline.tick(now).message
         if message:

@@ -72,7 +72,7 @@ def test_a_scene_that_says_nothing(build):
     scene, _ = build()
     assert scene.rate == 1000.0
     assert not scene.wrapped
-    (member,) = scene.members
+    (member,) = scene.linkages
     assert member.drive == (
         'topic',
         TopicParameters(carry_forward=True, max_age=0.2, max_lead=0.1),
@@ -96,7 +96,7 @@ record: {directory: bags, name: first, queue: 1000}
     )
     assert scene.rate == 0.0
     assert scene.wrapped
-    (member,) = scene.members
+    (member,) = scene.linkages
     assert member.drive == (
         'topic',
         TopicParameters(carry_forward=False, max_age=0.5, max_lead=0.0),
@@ -156,7 +156,7 @@ def test_what_yaml_1_1_would_change_is_a_name(build, name):
     linkage = linkage.replace('rocker:', f'{name}:')
     linkage = linkage.replace('{parent: ground, child: rocker}', joint)
     scene, _ = build(SCENE, linkage.encode())
-    assert name in scene.members[0].linkage.links
+    assert name in scene.linkages[0].linkage.links
 
 
 @pytest.mark.parametrize(
@@ -170,7 +170,7 @@ def test_what_yaml_1_1_would_change_is_a_name(build, name):
     ids=['byte order mark', 'CRLF', 'document marks', 'flow style'],
 )
 def test_the_same_file_written_otherwise(build, rewrite):
-    assert build(rewrite(SCENE), rewrite(FOUR_BAR))[0].members == build()[0].members
+    assert build(rewrite(SCENE), rewrite(FOUR_BAR))[0].linkages == build()[0].linkages
 
 
 FOUR_BAR_WRITTEN_OUT = b"""
@@ -223,28 +223,28 @@ def test_a_shorthand_stands_for_the_file_written_out(build, shorthand, written_o
         for angle in ANGLES:
             assert loop.position(angle) == full_loop.position(angle)
         if side == sides[0]:
-            assert default.members[0].linkage == short
+            assert default.linkages[0].linkage == short
 
 
 def linkage_of(built):
     scene, pipeline = built
-    return scene.members[0].linkage, pipeline.closures[0]
+    return scene.linkages[0].linkage, pipeline.closures[0]
 
 
 def test_joints_come_in_the_order_of_the_file(build):
     full = FOUR_BAR_WRITTEN_OUT % b'left'
     scene, pipeline = build(SCENE, full)
-    assert list(scene.members[0].linkage.joints) == ['coupler_joint', 'rocker_joint']
+    assert list(scene.linkages[0].linkage.joints) == ['coupler_joint', 'rocker_joint']
     lines = full.splitlines()
     swapped, other = build(SCENE, b'\n'.join([*lines[:-2], lines[-1], lines[-2]]))
-    assert list(swapped.members[0].linkage.joints) == ['rocker_joint', 'coupler_joint']
+    assert list(swapped.linkages[0].linkage.joints) == ['rocker_joint', 'coupler_joint']
     one, two = (each.closures[0].position(1.0).joints for each in (pipeline, other))
     assert one == two[::-1]
 
 
 def test_joints_turn_or_slide(build):
     scene, pipeline = build(SCENE, SLIDER_WRITTEN_OUT % b'ahead')
-    assert scene.members[0].linkage.joints == {
+    assert scene.linkages[0].linkage.joints == {
         'rod_joint': RevoluteJoint('crank', 'rod'),
         'rod_slide': SlideJoint('swivel'),
     }
@@ -290,8 +290,8 @@ def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(fil
     pipeline = Pipeline(scene)
     ends = LIMITED.get(file.stem)
     cranks = []
-    for number in range(5001):
-        now = BEGIN + number * MS
+    for index in range(5001):
+        now = BEGIN + index * MS
         if file.stem == 'five_bar':  # it has two inputs, which come from a topic
             inputs = JointStateWriter(scene.linkages[0].input_names)
             assert pipeline.offer(inputs.write(now, [SIXTY, SIXTY], [0.0, 0.0]), now) is None
@@ -351,8 +351,8 @@ def test_a_run_begins_where_the_pose_says(tmp_path, kind):
     file.write_text(f'{text}pose: {{inputs: [{start!r}]}}\n')
     pipeline = Pipeline(load_scene(file))
     values = []
-    for number in range(4001):
-        ((crank, position, _, _),) = pipeline.tick(BEGIN + number * MS).full_states
+    for index in range(4001):
+        ((crank, position, _, _),) = pipeline.tick(BEGIN + index * MS).full_states
         assert crank is not None
         assert position is not None
         assert position.status is Status.CLOSED
@@ -371,10 +371,10 @@ def test_a_start_at_a_toggle_is_where_the_swing_turns_back(tmp_path, end, beyond
     ((crank, _, _, _),) = pipeline.tick(BEGIN).full_states
     assert crank is not None
     assert crank.angles[0] == pytest.approx(end, abs=2e-12)
-    for number in range(1, 4000):
-        ((crank, position, _, _),) = pipeline.tick(BEGIN + number * MS).full_states
+    for index in range(1, 4000):
+        ((crank, position, _, _),) = pipeline.tick(BEGIN + index * MS).full_states
         assert position is not None
-        assert position.status is Status.CLOSED, number
+        assert position.status is Status.CLOSED, index
 
 
 @pytest.mark.parametrize(
@@ -428,8 +428,8 @@ def test_a_bag_holds_all_of_it(tmp_path):
     again = parse_scene(scene.name, 'a bag', scene.files)
     assert again == scene
     one, other = Pipeline(scene), Pipeline(again)
-    for number in range(100):
-        now = BEGIN + number * MS
+    for index in range(100):
+        now = BEGIN + index * MS
         assert one.tick(now).message == other.tick(now).message != b''
 
 

@@ -51,7 +51,7 @@ SET = {
 def test_keys_with_dots_are_reached(kind, scene):
     text, settings, expected = SET[kind]
     loaded = scene(text, *settings)
-    (member,) = loaded.members
+    (member,) = loaded.linkages
     forces = member.loads.applied.forces
     assert {name: force.constant for name, force in forces.items()} == expected
     # What a bag holds of the scene says the same by itself.

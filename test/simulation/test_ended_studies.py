@@ -117,7 +117,7 @@ def finished(monkeypatch):
         raise LinkageError('the table', 'is not written', 'try again')
 
     with monkeypatch.context() as patched:
-        patched.setattr('linkage_ros.cli.simulate._written', fail)
+        patched.setattr('linkage_ros.cli.simulate._write_results', fail)
         assert main([*options, '-o', 'x.csv']) == 2
     return Path('x.csv.part'), [*options, '-o', 'x.csv']
 
@@ -166,7 +166,7 @@ def test_a_run_that_raises_what_nobody_expected_is_a_line(monkeypatch, capsys):
     def fail(*_):
         raise ZeroDivisionError('\x1b[2J')
 
-    monkeypatch.setattr(study_module, '_reduced', fail)
+    monkeypatch.setattr(study_module, '_reduce_run', fail)
     assert main(command('x.csv', '--workers', '1')) == 1
     *named, count = capsys.readouterr().err.splitlines()
     assert count == 'linkage simulate: 24 of 24 runs failed'

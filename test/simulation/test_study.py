@@ -98,15 +98,15 @@ def test_a_run_is_reduced_to_what_its_messages_say(noisy):
     pipeline, reader = Pipeline(scene), JointStateReader(scene.joint_names)
     samples = [reader.read(pipeline.tick(BEGIN + n * 10_000_000).message) for n in range(101)]
     assert (outcome.failure, outcome.ticks, outcome.messages) == ('', 101, 101)
-    for number, joint in enumerate(scene.joint_names):
+    for index, joint in enumerate(scene.joint_names):
         for head, column in (
-            (joint, np.array([sample.angles[number] for sample in samples])),
-            (f'{joint} rate', np.array([sample.rates[number] for sample in samples])),
+            (joint, np.array([sample.angles[index] for sample in samples])),
+            (f'{joint} rate', np.array([sample.rates[index] for sample in samples])),
         ):
             expected = column.min(), column.max(), column.mean(), np.sqrt(np.mean(column**2))
             assert outcome.statistics[head] == pytest.approx(expected, rel=1e-12)
-        at = [samples[10 * n].angles[number] for n in range(11)]
-        assert list(outcome.positions[number]) == at
+        at = [samples[10 * n].angles[index] for n in range(11)]
+        assert list(outcome.positions[index]) == at
 
 
 def test_the_spread_over_seeds_is_that_of_the_noise(noisy):

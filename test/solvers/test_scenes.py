@@ -79,8 +79,8 @@ def test_a_scene_runs_with_it(name):
     pipeline = Pipeline(scene_of(effects + SOLVERS[name][0]))
     closure = plain.linkages[0].closure
     of_position, of_rate, of_acceleration = error_bounds(pipeline.linkages[0].closure)
-    for number in range(3000):
-        now = BEGIN + number * 1_000_000
+    for index in range(3000):
+        now = BEGIN + index * 1_000_000
         tick = pipeline.tick(now)
         (look,), (expected,) = tick.full_states, plain.tick(now).full_states
         assert tick.message
@@ -98,22 +98,22 @@ def test_ticks_that_are_not_in_the_bag_change_nothing(name):
     scene = scene_of(f'{SOLVERS[name][0]}\neffects: {{velocity: {{}}}}\nangles: wrapped')
     crank = JointStateWriter(['crank_joint']).write
     whole, part = Pipeline(scene), Pipeline(scene)
-    for number in range(500):
-        now = BEGIN + number * 1_000_000
+    for index in range(500):
+        now = BEGIN + index * 1_000_000
         for pipeline in (whole, part):
-            pipeline.offer(crank(now, (0.004 * number,), (4.0,), ()), now)
+            pipeline.offer(crank(now, (0.004 * index,), (4.0,), ()), now)
         message = whole.tick(now).message
-        if number % 3 == 0:
+        if index % 3 == 0:
             assert part.tick(now).message == message
 
 
 @pytest.mark.parametrize('name', SOLVERS)
 def test_a_bag_replays_to_the_same_bytes(tmp_path, name):
     run = Run(tmp_path / 'bag', f'{SOLVERS[name][0]}\neffects: {{velocity: {{}}}}')
-    for number in range(400):
-        now = BEGIN + number * 1_000_000
-        if number % 2 == 0:
-            run.offer(now, sample(now, 0.007 * number, 3.5))
+    for index in range(400):
+        now = BEGIN + index * 1_000_000
+        if index % 2 == 0:
+            run.offer(now, sample(now, 0.007 * index, 3.5))
         run.tick(now, now)
     run.recorder.stop()
     ticks = list(replay_ticks(read_bag(tmp_path / 'bag'), run.scene))
@@ -154,7 +154,7 @@ def test_a_replay_does_not_choose_again(monkeypatch):
     def never(*_):
         raise AssertionError
 
-    monkeypatch.setattr(choosing, 'choose', never)
+    monkeypatch.setattr(choosing, 'choose_solver', never)
     files = {
         'scene.yaml': b'linkage: l.yaml\naccuracy: 1.0e-6\n',
         'linkage.yaml': FOUR_BAR,
@@ -249,7 +249,7 @@ def timed(monkeypatch, **times: float) -> list[set[str]]:
         asked.append(set(able))
         return {name: times[name] for name in able}
 
-    monkeypatch.setattr(choosing, '_times', stand_in)
+    monkeypatch.setattr(choosing, '_median_times', stand_in)
     return asked
 
 

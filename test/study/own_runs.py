@@ -30,8 +30,8 @@ def run_scene(scene, ticks, messages=()):
     pipeline = Pipeline(scene)
     reader = MessageValues(JOINT_STATE, scene.dependent_joints)
     waiting = list(messages)
-    for number in range(ticks):
-        now = round(number * 1e9 / scene.rate)
+    for index in range(ticks):
+        now = round(index * 1e9 / scene.rate)
         while waiting and waiting[0][0] <= now:
             time, message = waiting.pop(0)
             pipeline.offer(message, BEGIN + time)
@@ -103,11 +103,11 @@ class FourBar:
         directions = (theta, coupler, four_bar(theta)[1])
         pin_rate = 1j * rect(A, theta)
         total = self.drive_inertia
-        for number, (mass, center, inertia) in enumerate(_MASSES):
-            speed = 1j * ratios[number] * center * rect(1.0, directions[number])
-            if number == 1:
+        for index, (mass, center, inertia) in enumerate(_MASSES):
+            speed = 1j * ratios[index] * center * rect(1.0, directions[index])
+            if index == 1:
                 speed += pin_rate
-            total += mass * abs(speed) ** 2 + inertia * ratios[number] ** 2
+            total += mass * abs(speed) ** 2 + inertia * ratios[index] ** 2
         return total
 
     def potential(self, theta):

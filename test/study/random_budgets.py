@@ -40,7 +40,7 @@ def random_budgets(count: int = COUNT) -> Iterator[Budget]:
 def _budget(random: Random) -> Budget:
     rate = random.choice([50.0, 1000.0, 20_000.0])
     knobs = []
-    for number in range(random.randint(1, 5)):
+    for index in range(random.randint(1, 5)):
         chosen = _setting(random, rate)._replace(changes=(), advice='')
         others = [
             _setting(random, rate * random.choice([0.5, 1.0, 2.0]))
@@ -49,7 +49,7 @@ def _budget(random: Random) -> Budget:
         place = random.randint(0, len(others))
         knobs.append(
             Knob(
-                f'source {number}',
+                f'source {index}',
                 [*others[:place], chosen, *others[place:]],
                 place,
                 random.choice([None, 10.0]),

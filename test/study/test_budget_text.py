@@ -107,10 +107,13 @@ def test_a_price_within_its_spread_is_no_number(
     assert (NOISE in change_text(BUDGET, STEP, Setting('x', error(1.0), price))) == is_noise
 
 
+CHEAPEST = STEP.settings[2].instruction
+
+
 def test_the_first_lines_answer() -> None:
     assert lead_lines(BUDGET) == [
         'hil: 0.023 rad off at worst after 10 s, mostly by the step of the drive',
-        f'less than a fifth of it: {STEP.settings[2].instruction} (+6.1 µs a tick, 0.6 % of a core)',
+        f'less than a fifth of it: {CHEAPEST} (+6.1 µs a tick, 0.6 % of a core)',
         'on purpose: encoder 1.8e-3 rad',
     ]
 

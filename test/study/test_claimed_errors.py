@@ -139,9 +139,9 @@ def compared(scene, motion, horizon, name, truth):
     """Return the worst and the rms error of an own run, and what is claimed of it."""
     claimed = measure_drive_step(motion, scene.rate, horizon, quick=True, seconds=0.0)[0]
     ticks = round(horizon * scene.rate) + 1
-    joint = motion.member.linkage.inputs[0].joint
+    joint = motion.scene_linkage.linkage.inputs[0].joint
     runs = [*run_scene(scene, ticks, command_messages(motion.commands, joint))]
-    exact = truth([number / scene.rate for number in range(1, ticks)])
+    exact = truth([index / scene.rate for index in range(1, ticks)])
     apart = []
     for (_, joints, _), theta in zip(runs[1:], exact, strict=True):
         expected = joints_of(name, theta)
@@ -181,8 +181,8 @@ def samples_of(motion, joint, rate, phase, horizon):
     """Return exact samples, the first a phase after the first tick."""
     write = JointStateWriter([joint]).write
     found = []
-    for number in range(round(horizon * rate)):
-        time = round((number + phase) * 1e9 / rate)
+    for index in range(round(horizon * rate)):
+        time = round((index + phase) * 1e9 / rate)
         values, rates = motion.path(time)
         found.append((time, write(BEGIN + time, values, rates, (0.0,))))
     return found

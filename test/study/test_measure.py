@@ -153,8 +153,8 @@ def bag_of(folder, delay, count=400, rate=200.0):
     write = JointStateWriter(['drive_joint']).write
     topics = [Topic('/crank_states', JOINT_STATE, '', '')]
     writer = BagWriter(folder, topics, {})
-    for number in range(count):
-        time = number / rate
+    for index in range(count):
+        time = index / rate
         stamp = 10**18 + round(time * 1e9)
         data = write(stamp, (1.5 * sin(3.0 * time),), (4.5 * cos(3.0 * time),), (0.0,))
         writer.write(0, stamp + round(delay * 1e9), stamp + round(delay * 1e9), data)

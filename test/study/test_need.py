@@ -31,19 +31,19 @@ def price(micros, rate=RATE):
 def random_budget(rng):
     """Return a budget of up to four knobs, whose better settings are mostly dearer."""
     knobs = []
-    for number in range(rng.randint(1, 4)):
+    for index in range(rng.randint(1, 4)):
         settings = []
         for k in range(rng.randint(1, 6)):
             error = 10.0 ** rng.uniform(-9.0, -1.0)
             adds = rng.choice([None, price(rng.uniform(-5.0, 20.0))])
             settings.append(
                 Setting(
-                    f'setting {k}', JointError(0.5 * error, error), adds, [(f'key.{number}', k)]
+                    f'setting {k}', JointError(0.5 * error, error), adds, [(f'key.{index}', k)]
                 )
             )
         settings[0] = settings[0]._replace(changes=())
         settings.append(Setting('comparison', JointError(0.0, 0.0), price(-9.0), None))
-        knobs.append(Knob(f'knob {number}', settings, 0))
+        knobs.append(Knob(f'knob {index}', settings, 0))
     knobs.append(
         Knob('noise', [Setting('', JointError(1.0, 1.0), price(3.0))], 0, is_deliberate=True)
     )
@@ -129,7 +129,7 @@ def errors_of(scene):
 def price_of(scene, setting):
     changes = dict(setting.changes or ())
     step = changes.get('drive.torque.step')
-    dearer = 0.0 if step is None else 10.0 * (scene.members[0].drive[1].step / step - 1.0)
+    dearer = 0.0 if step is None else 10.0 * (scene.linkages[0].drive[1].step / step - 1.0)
     return price(dearer, changes.get('rate', scene.rate))
 
 

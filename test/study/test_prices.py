@@ -125,8 +125,8 @@ def test_every_round_begins_where_the_scene_does() -> None:
     begun: list[int] = []
 
     def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
-        for number, (now, message) in enumerate(turn_crank(scene, pipeline)):
-            if not number:
+        for index, (now, message) in enumerate(turn_crank(scene, pipeline)):
+            if not index:
                 begun.append(now)
             yield now, message
 

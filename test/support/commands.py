@@ -146,8 +146,8 @@ def _serve(control: socket.socket) -> None:
             continue
         control.close()
         *streams, asked = files
-        for number, file in enumerate(streams):
-            os.dup2(file, number)
+        for index, file in enumerate(streams):
+            os.dup2(file, index)
             os.close(file)
         with os.fdopen(asked) as stream:
             request = json.load(stream)

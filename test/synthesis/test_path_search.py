@@ -61,7 +61,7 @@ def drawn(aim: Aim, closed: bool) -> tuple[Any, np.ndarray[Any, Any], np.ndarray
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
 def test_a_start_is_what_its_score_says_and_closes(aim, closed):
     problem, candidates, scores = drawn(aim, closed)
-    starts = problem.starts(candidates)
+    starts = problem.place_candidates(candidates)
     assert are_allowed(starts, aim).all()
     for row, angles, side, score in zip(*starts, scores, strict=True):
         a, b, c, d = (float(value) for value in np.exp(row[3:7]))
@@ -79,7 +79,7 @@ def test_a_start_is_what_its_score_says_and_closes(aim, closed):
 def test_it_is_laid_on_as_well_as_can_be(aim, closed):
     """Neither pivot, ground direction, size nor traced point can be better, one at a time."""
     problem, candidates, scores = drawn(aim, closed)
-    starts = problem.starts(candidates)
+    starts = problem.place_candidates(candidates)
     frames = np.exp(1j * starts.rows[:, 2])
     cranks = np.exp(1j * starts.angles) * (np.exp(starts.rows[:, 3]) * frames)[:, None]
     free = aim.timing is None or aim.zero_free
@@ -127,7 +127,7 @@ def test_a_problem_goes_to_another_process_and_scores_the_same(aim, closed):
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
 def test_steps_keep_what_was_asked_for(aim, closed, guard):
     problem, candidates, scores = drawn(aim, closed)
-    fitted, squares = improve(problem.starts(candidates), aim, 20, guard)
+    fitted, squares = improve(problem.place_candidates(candidates), aim, 20, guard)
     assert are_allowed(fitted, aim).all()
     assert np.exp(fitted.rows[:, 3:7]).min() > aim.shortest * (1.0 - 1e-9)
     assert np.exp(fitted.rows[:, 3:7]).max() < aim.longest * (1.0 + 1e-9)

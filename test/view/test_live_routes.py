@@ -66,8 +66,8 @@ def live(script: Script) -> Callable[[Any], None]:
 
 def test_a_page_gets_the_newest_of_each_kind_model_first() -> None:
     script = Script()
-    for number in range(50):
-        script.say('state', number)
+    for index in range(50):
+        script.say('state', index)
     script.say('node', 'well')
     script.say('model', 'four_bar')
 
@@ -121,16 +121,16 @@ def test_a_page_that_never_reads_is_sent_no_more_than_fits_and_holds_nobody_up()
 
     async def reading(address: str) -> None:
         async with opened(address, 'live') as page:
-            for number in range(60):
-                script.say('state', [number, LARGE])
-                assert (await page.get())['state'][0] == number
+            for index in range(60):
+                script.say('state', [index, LARGE])
+                assert (await page.get())['state'][0] == index
 
     with served([live(script)]) as server:
         deaf = _upgraded(server.address, server.server)
         asyncio.run(reading(server.address))
         before = script.taken
-        for number in range(60):
-            script.say('state', [number, LARGE])
+        for index in range(60):
+            script.say('state', [index, LARGE])
             asyncio.run(asyncio.sleep(0.01))
         # The page that reads has gone; the other one is stuck within its buffers.
         assert script.taken - before <= 3

@@ -232,7 +232,7 @@ def test_a_defect_is_one_line_on_the_page_and_one_in_the_report(
     def fails(*_: Any, **__: Any) -> None:
         raise ZeroDivisionError('float\ndivision')
 
-    monkeypatch.setattr(requests, 'model', fails)
+    monkeypatch.setattr(requests, 'build_model', fails)
     reported: list[str] = []
     answers = RequestHandler('mine', None, reported.append)
     request = read_request(json.dumps({'id': 7, 'do': 'model', 'text': FOUR_BAR}))

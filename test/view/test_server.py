@@ -245,8 +245,8 @@ def bad_messages(count: int) -> Iterator[str | bytes]:
     rng = random.Random(22)
     good = {'id': 1, 'do': 'model', 'text': FOUR_BAR, 'whole': False}
     written = json.dumps(good)
-    for number in range(count):
-        match number % 10:
+    for index in range(count):
+        match index % 10:
             case 0:
                 yield rng.randbytes(rng.randrange(200))
             case 1:

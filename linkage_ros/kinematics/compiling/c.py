@@ -82,9 +82,9 @@ class C(Language):
 
     def return_solution(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
         lines = [
-            f'{array}[{number}] = {text};'
+            f'{array}[{index}] = {text};'
             for array, group in zip(RETURNED, groups, strict=False)
-            for number, text in enumerate(group)
+            for index, text in enumerate(group)
         ]
         return [*lines, f'return {status};']
 

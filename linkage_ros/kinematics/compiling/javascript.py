@@ -96,7 +96,7 @@ class JavaScript(Language):
         given = GIVEN[: 1 + subject.derivatives]
         empty = ', '.join(f'{name}: []' for name in self._returned_values(subject))
         comment = (f' * {line}'.rstrip() for line in (*head, *_NOTES))
-        statuses = (f'    {status}: {number},' for number, status in enumerate(STATUSES))
+        statuses = (f'    {status}: {index},' for index, status in enumerate(STATUSES))
         name = self.function_name(subject.derivatives)
         lines = [
             '/*', *comment, ' */', '',

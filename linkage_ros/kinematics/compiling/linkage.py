@@ -126,7 +126,7 @@ class Compiled:
 
         Parameters
         ----------
-        leave
+        bail_out
             The statement that leaves the lines if the path is not valid.
 
         """

@@ -64,7 +64,7 @@ def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]
 
 
 def python_body(path: Path, bail_out: str) -> PythonBody:
-    """Return a path as lines of Python; ``leave`` is the statement if it is not valid."""
+    """Return a path as lines of Python; ``bail_out`` is the statement if it is not valid."""
     constants: dict[str, Any] = {}
     conditions = [decision.condition for decision in path.decisions]
     outputs = [number for group in path.outputs for number in group]

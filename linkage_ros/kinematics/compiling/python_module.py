@@ -102,7 +102,7 @@ class PythonModule(Language):
         name = self.function_name(subject.derivatives)
         lines = [
             _CODING, *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', _IMPORTS, '',
-            *(f'{status} = {number}' for number, status in enumerate(STATUSES)), '', '',
+            *(f'{status} = {index}' for index, status in enumerate(STATUSES)), '', '',
             f'def {name}({", ".join(GIVEN[: self._groups])}):', *body,
         ]  # fmt: skip
         return '\n'.join([*lines, ''])

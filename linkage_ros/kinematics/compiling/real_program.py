@@ -71,7 +71,7 @@ def lower_path(
     ----------
     path
         The path.
-    fates
+    fallback_statuses
         The status of the linkage where each decision differs.
     by_squares
         Whether lengths and quotients are computed by squares, which is fastest for arrays: the

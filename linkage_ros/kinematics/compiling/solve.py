@@ -189,7 +189,7 @@ class SolverOutline:
         for k in left.tolist():
             block.solve_state(k, self._driven, one)
         if self._limited and (bounds := self._closure.bounds):
-            beyond = bounds.beyond(block.given, block.values[0])
+            beyond = bounds.are_beyond(block.given, block.values[0])
             block.status[beyond & (block.status < _LIMITED)] = _LIMITED
         block.clear_invalid()
 

@@ -312,8 +312,8 @@ class _SourceBody:
         *groups, bounded = leaf.outputs
         bounds = self._subject.closure.bounds
         beyond = [self._write_beyond(bound, f'q{bound.number}') for bound in bounds.inputs]
-        for number, (bound, value) in enumerate(zip(bounds.joints, bounded, strict=True)):
-            name = f'limited{number}'
+        for index, (bound, value) in enumerate(zip(bounds.joints, bounded, strict=True)):
+            name = f'limited{index}'
             writer.lines.append(language.assign(name, writer.write(value)))
             if isinstance(value, Operation):
                 writer.name_operation(value, name)
@@ -328,7 +328,7 @@ class _SourceBody:
         writer.lines += language.return_solution(status, texts)
 
     def _write_beyond(self, bound: Bound, name: str) -> str:
-        """Write that a value is beyond its limits, as `Bound.beyond` does."""
+        """Write that a value is beyond its limits, as `Bound.is_beyond` does."""
         language = self._language
 
         def compared(value: str) -> str:
@@ -399,20 +399,20 @@ def _head_lines(subject: Subject, function: str) -> Iterator[str]:
     yield f'from {comment_text(subject.file)}. Change that file, and compile it again.'
     yield ''
     yield f'The function {function} takes:'
-    for number, given in enumerate(linkage.inputs):
+    for index, given in enumerate(linkage.inputs):
         unit = given.unit
-        yield f'  {GIVEN[0]}[{number}]  {comment_text(given.joint)} [{unit}]'
+        yield f'  {GIVEN[0]}[{index}]  {comment_text(given.joint)} [{unit}]'
     yield from _derived_names(subject, GIVEN)
     yield 'and gives:'
-    for number, name in enumerate(subject.joints):
+    for index, name in enumerate(subject.joints):
         unit = 'rad' if isinstance(linkage.joints[name], RevoluteJoint) else 'm'
-        yield f'  {RETURNED[0]}[{number}]  {comment_text(name)} [{unit}]'
+        yield f'  {RETURNED[0]}[{index}]  {comment_text(name)} [{unit}]'
     yield from _derived_names(subject, RETURNED)
     yield ''
     yield 'Angles are not wrapped to one turn. The function returns a status:'
-    for number, (name, text) in enumerate(STATUSES.items()):
+    for index, (name, text) in enumerate(STATUSES.items()):
         yield from textwrap.wrap(
-            text, WIDTH - 4, initial_indent=f'  {number} {name}: ', subsequent_indent='      '
+            text, WIDTH - 4, initial_indent=f'  {index} {name}: ', subsequent_indent='      '
         )
     yield ''
     if closure.bounds:

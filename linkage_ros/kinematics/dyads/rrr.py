@@ -177,7 +177,7 @@ def square_sums(b: float, c: float, least: Fraction) -> tuple[float, float]:
 
 
 def close_triangle(diagonal: Diagonal, more: float, less: float, sign: float) -> RRRPose:
-    """Return the pose over a diagonal; more and less are the two `sums`."""
+    """Return the pose over a diagonal; more and less are the two `square_sums`."""
     status = diagonal.status
     if not status.has_pose:
         return RRRPose(status, diagonal.gap, 0.0, 0.0, 0.0, diagonal, 0.0, 0.0)
@@ -264,7 +264,7 @@ class FoldingRRRDyad(RRRDyad):
     Parameters
     ----------
     diagonal
-        From A to D; one that `fits`.
+        From A to D; one that `passes_fold`.
     b, c, sign
         As in `RRRDyad`.
 
@@ -378,7 +378,7 @@ class DyadSide:
     ----------
     start, end
         The points, each in the frame of its own link.
-    carries
+    transforms
         The transformations from the link of the end to the link of the start, in this order.
 
     """

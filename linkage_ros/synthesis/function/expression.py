@@ -194,8 +194,8 @@ def _as_python(text: str) -> str:
     opened: list[_Token] = []
     depths = [1]  # of each open parenthesis: how many signs and powers the next value is within
     has_value = False
-    for number, token in enumerate(tokens):
-        before = tokens[number - 1]
+    for index, token in enumerate(tokens):
+        before = tokens[index - 1]
         if has_value:
             if token.text == ')':
                 if not opened:
@@ -220,7 +220,7 @@ def _as_python(text: str) -> str:
         elif token.text in ('+', '-'):
             depths[-1] += 1
         else:
-            after = tokens[number + 1] if number + 1 < len(tokens) else None
+            after = tokens[index + 1] if index + 1 < len(tokens) else None
             has_value = _is_value(text, token, after)
     if not has_value:
         raise _token_error(text, tokens[-1], 'has nothing after it', 'write what it applies to')

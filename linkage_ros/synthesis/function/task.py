@@ -355,7 +355,7 @@ def generate_function(
     crank_range, rocker_range
         Angles of crank and rocker there, in [rad].
     points
-        Number of precision points, spaced by `chebyshev`.
+        Number of precision points, spaced by `chebyshev_points`.
     ground
         Length of the ground, in [m].
 

@@ -29,10 +29,10 @@ of angles that are sums of two or four doubles, and are computed so. Determinant
 coupler are computed in sums of two doubles too, so that they lose no more than rounding the angles
 loses: at a change point, in a parallelogram or with a short coupler, terms cancel whatever the
 angles are. So the error of the lengths is that of the angles: each length is within 4·2⁻⁵³ of its
-sensitivity κ, the sum of its relative changes with each angle (`gradient`); if κ is too large for
-any digit, no digit is trusted. More pairs are met by least squares. The coupler is real whenever
-the angles are: b² is the mean, over the pairs, of the squared distance of crank pin and rocker
-pin.
+sensitivity κ, the sum of its relative changes with each angle (`length_gradient`); if κ is too
+large for any digit, no digit is trusted. More pairs are met by least squares. The coupler is real
+whenever the angles are: b² is the mean, over the pairs, of the squared distance of crank pin and
+rocker pin.
 """
 
 from __future__ import annotations
@@ -282,7 +282,8 @@ def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) 
         if theta < _SAME:
             raise SynthesisError(
                 f'pairs {i} and {j}',
-                f'want the rocker at {_degrees_text(one[1])} and at {_degrees_text(other[1])} for the same '
+                f'want the rocker at {_degrees_text(one[1])} and at {_degrees_text(other[1])} '
+                'for the same '
                 f'crank angle, {_degrees_text(one[0])}, which needs both assemblies',
                 'change one of the crank angles',
             )
@@ -313,7 +314,8 @@ def dependence_error(crank: Sequence[float], rocker: Sequence[float]) -> Synthes
         if all(abs(remainder(u + v, tau)) < _SAME for u, v in zip(one, other, strict=True)):
             return SynthesisError(
                 f'pairs {i} and {j}',
-                f'{_pair_text(one)} and {_pair_text(other)} are mirror images in the ground line: a '
+                f'{_pair_text(one)} and {_pair_text(other)} are mirror images in the ground '
+                'line: a '
                 'four-bar that has one has the other',
                 'give another pair in place of one of them',
             )
@@ -364,7 +366,7 @@ class FreudensteinLinks(NamedTuple):
 class ThreePairs(NamedTuple):
     """The solution of three pairs, and its accuracy; any number of them at once."""
 
-    # As in `Links`.
+    # As in `FreudensteinLinks`.
     k: Array
     lengths: Array
     # Condition number of the matrix of rows (cos φ, cos θ, 1), by the 2-norm; (…).
@@ -418,7 +420,7 @@ def solve_links(crank: ArrayLike, rocker: ArrayLike) -> FreudensteinLinks:
 
 
 def three_pairs(crank: ArrayLike, rocker: ArrayLike) -> ThreePairs:
-    """Solve as `links`, with the accuracy of the result."""
+    """Solve as `solve_links`, with the accuracy of the result."""
     theta, phi = _angle_columns(crank), _angle_columns(rocker)
     count = theta.shape[1]
     k, lengths, kappa = np.empty((3, 3, count))

@@ -337,7 +337,7 @@ def theta_at(way: Array, wanted: Array) -> Array:
     """
     Return the places at relative distances along curves, as a fraction of their steps.
 
-    The ways are from `along`, (n, M), the distances from 0 to 1, (N,) or (n, N).
+    The ways are from `curve_distances`, (n, M), the distances from 0 to 1, (N,) or (n, N).
     """
     before, part = _find_segment(way, wanted)
     part += before

@@ -115,11 +115,11 @@ def run(folder: Path, text: str, linkage: str = 'four_bar') -> Path:
     )
 
     def pace(loop, stopping):
-        for number, (now, message) in enumerate(islice(turn_crank(scene, pipeline), TICKS)):
+        for index, (now, message) in enumerate(islice(turn_crank(scene, pipeline), TICKS)):
             if message:
                 samples.append((message, {'source_timestamp': now - 137_000}))
-            if number % 50 == 25:
-                loop.recorder.offer(loop.topics.diagnostics, now, now, health(number))
+            if index % 50 == 25:
+                loop.recorder.offer(loop.topics.diagnostics, now, now, health(index))
             loop.tick_at(now)
 
     recording = RunRecording(_Log())
@@ -221,17 +221,17 @@ def anything(kind: str, random: Random) -> Any:
 def test_messages_of_all_types_with_anything_in_them(tmp_path):
     random = Random(7)
     topics = [
-        bag_topic(f'/topic_{number}', message_type(kind, 'test'), QoSProfile(depth=number + 1))
-        for number, kind in enumerate(KINDS)
+        bag_topic(f'/topic_{index}', message_type(kind, 'test'), QoSProfile(depth=index + 1))
+        for index, kind in enumerate(KINDS)
     ]
     writer = BagWriter(tmp_path / 'bag', topics, {'ä b.bin': ('', bytes(range(256)))})
-    for number in range(1200):
+    for index in range(1200):
         topic = random.randrange(len(KINDS))
         # Not by rclpy, which leaves bytes behind the end of some messages.
         message = anything(KINDS[topic].replace('/msg/', '/'), random)
         data = bytes(STORE.serialize_cdr(message, KINDS[topic]))
         # The greatest times that rosbag2 has, and none, are among them.
-        time = random.choice((0, 1, START + number, 2**63 - 1))
+        time = random.choice((0, 1, START + index, 2**63 - 1))
         assert writer.write(topic, time, random.choice((0, time, 2**63 - 1)), data)
     writer.close({'note': 'ü: [1, 2]\n~'})
     bag = assert_agreement(tmp_path / 'bag')
@@ -251,9 +251,9 @@ def test_a_killed_bag_before_and_after_its_recovery(
     messages = messages[:4000]
     storage = Storage(split_bytes=100_000, compression=compression)
     writer = BagWriter(tmp_path / 'run', topics, {'a.txt': ('text/plain', b'a')}, storage)
-    for number, message in enumerate(messages):
+    for index, message in enumerate(messages):
         writer.write(*message)
-        if number == len(messages) - 500:
+        if index == len(messages) - 500:
             writer.flush()
     # What a kill leaves is what the system has been given by then.
     shutil.copytree(tmp_path / 'run', tmp_path / 'killed')

@@ -76,10 +76,10 @@ def states(closure: Closure, count: int, seed: str, start: State = ()) -> list[S
         ranges = [(each.lowest, each.highest) for each in closure.closing_ranges]
         spans += ranges * 3
     found = []
-    for number in range(count):
-        if near and number % 3 == 0:
+    for index in range(count):
+        if near and index % 3 == 0:
             at = [value + rng.gauss(0.0, 0.2) * (rng.random() < 0.9) for value in near]
-        elif special and number % 16 == 1:
+        elif special and index % 16 == 1:
             value = rng.choice(special)
             at = [value + rng.randrange(-20, 21) * (nextafter(value, inf) - value)]
         elif len(closure.linkage.inputs) == 1:
@@ -87,7 +87,7 @@ def states(closure: Closure, count: int, seed: str, start: State = ()) -> list[S
         else:
             at = [rng.uniform(*span) for span in spans]
         rates = [rng.uniform(-3.0, 3.0) for _ in range(2 * len(at))]
-        if number % 8 == 5:
+        if index % 8 == 5:
             # At rest and in steady motion the sign of a zero shows.
             rates = [rng.choice((0.0, -0.0, 1.0)) for _ in rates]
         found.append((*at, *rates))

@@ -139,8 +139,8 @@ def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name):
 @pytest.mark.parametrize('family', FAMILIES)
 def test_random_linkages_of_every_topology_have_them(family):
     seen = set()
-    for number in range(3):
-        rng = random.Random(f'{family}/{number}')
+    for index in range(3):
+        rng = random.Random(f'{family}/{index}')
         topology = FAMILIES[family].make(rng)
         try:
             closure = Closure(topology.linkage)
