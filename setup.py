@@ -143,10 +143,10 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
         NAME: ['py.typed', '*.pyi'],
-        f'{NAME}.pages': ['*.css', '*.js'],
-        f'{NAME}.report': ['*.css', '*.js'],
-        f'{NAME}.study': ['*.css', '*.js'],
-        f'{NAME}.view': ['*.css', '*.js'],
+        f'{NAME}.tools.study': ['*.css', '*.js'],
+        f'{NAME}.tools.view': ['*.css', '*.js'],
+        f'{NAME}.tools.view.pages': ['*.css', '*.js'],
+        f'{NAME}.tools.view.report': ['*.css', '*.js'],
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),

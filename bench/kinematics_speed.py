@@ -24,7 +24,7 @@ from math import atan2, cos, sin, sqrt, tau
 
 from bench import ROOT
 from bench.report import compare, in_turn, say, Table
-from linkage_ros.files.linkage_file import load
+from linkage_ros.description.linkage_file import load
 from linkage_ros.kinematics.batch import Batch
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled

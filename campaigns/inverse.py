@@ -26,8 +26,8 @@ from typing import Any
 from bench import ROOT
 from bench.report import Table
 from campaigns.campaign import exit_code, machine_of, Page, parser_of, progress_lines, publish
+from linkage_ros.description.linkage_file import load
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.crank_branches import CrankBranch
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint

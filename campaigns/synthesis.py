@@ -43,7 +43,7 @@ from campaigns.campaign import (
     tallies_of,
 )
 from flint import arb, ctx
-from linkage_ros.synthesis.pairs.freudenstein import solve_links, three_pairs, TRUSTED
+from linkage_ros.tools.design.pairs.freudenstein import solve_links, three_pairs, TRUSTED
 import numpy as np
 from numpy.typing import NDArray
 

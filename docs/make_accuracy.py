@@ -21,15 +21,13 @@ from pathlib import Path
 import sys
 from typing import NamedTuple
 
-from linkage_ros.effects.stage import NEEDS, PUBLISHED_WITH
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.scene_file import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
 from linkage_ros.errors import list_names
-from linkage_ros.measuring import describe_machine, Progress
-from linkage_ros.pages.markdown import fill_marks, table_lines
 from linkage_ros.resources import shipped_path
-from linkage_ros.scene.load import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
-from linkage_ros.scene.scene import Scene
-from linkage_ros.study.budget import Budget
-from linkage_ros.study.budget_text import (
+from linkage_ros.stages.effects.stage import NEEDS, PUBLISHED_WITH
+from linkage_ros.tools.study.budget import Budget
+from linkage_ros.tools.study.budget_text import (
     closing_lines,
     error_text,
     heads_of,
@@ -37,11 +35,13 @@ from linkage_ros.study.budget_text import (
     price_text,
     rows_of,
 )
-from linkage_ros.study.deliberate import compare_runs, leave_out
-from linkage_ros.study.measure import measure_budget, PARTS
-from linkage_ros.study.picture import budget_svg
-from linkage_ros.study.prices import price_scenes, tick_price, turn_crank
-from linkage_ros.study.solving import compare_hard_cases, DISTANCES, HardCase
+from linkage_ros.tools.study.deliberate import compare_runs, leave_out
+from linkage_ros.tools.study.measure import measure_budget, PARTS
+from linkage_ros.tools.study.measuring import describe_machine, Progress
+from linkage_ros.tools.study.picture import budget_svg
+from linkage_ros.tools.study.prices import price_scenes, tick_price, turn_crank
+from linkage_ros.tools.study.solving import compare_hard_cases, DISTANCES, HardCase
+from linkage_ros.tools.view.pages.markdown import fill_marks, table_lines
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'

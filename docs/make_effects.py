@@ -24,13 +24,13 @@ import sys
 from typing import NamedTuple
 
 from linkage_ros.cli.scene import parameters_of, REGISTRIES, table_of
+from linkage_ros.description.parameters import first_docstring_line, parameter_rows
+from linkage_ros.description.scene_file import parse_scene
 from linkage_ros.dynamics.loads import AppliedLoads
-from linkage_ros.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
 from linkage_ros.errors import FileError
-from linkage_ros.files.parameters import first_docstring_line, parameter_rows
-from linkage_ros.pages import markdown
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
+from linkage_ros.stages.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tools.view.pages import markdown
 import yaml
 
 DOCS = Path(__file__).resolve().parent

@@ -25,10 +25,7 @@ import sys
 
 from linkage_ros.cli.arguments import angle_text, fixed_text
 from linkage_ros.cli.check import describe_group
-from linkage_ros.drawing.animation import animate, range_motion
-from linkage_ros.drawing.figure import paint_background, paint_picture
-from linkage_ros.drawing.painting import paint_shapes, picture_settings, save_picture, set_plane
-from linkage_ros.files.linkage_file import load
+from linkage_ros.description.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.pose_view import all_places, LinkageView, prepare_view, symbol_size
 from linkage_ros.kinematics.shapes import bounding_corners, draw_shapes, shape_outline
@@ -40,6 +37,14 @@ from linkage_ros.kinematics.sweep_analysis import (
     usual_inputs,
 )
 from linkage_ros.kinematics.topology import Driven, links_of
+from linkage_ros.tools.drawing.animation import animate, range_motion
+from linkage_ros.tools.drawing.figure import paint_background, paint_picture
+from linkage_ros.tools.drawing.painting import (
+    paint_shapes,
+    picture_settings,
+    save_picture,
+    set_plane,
+)
 from matplotlib.figure import Figure
 from PIL import Image
 

@@ -15,7 +15,7 @@
 # What `linkage_ros` exports, for type checkers: at run time a name is imported when it is used.
 
 from linkage_ros.bag.reader import Bag as Bag, BagMessage as BagMessage, read_bag as read_bag
-from linkage_ros.drawing.svg import svg as svg
+from linkage_ros.tools.drawing.svg_picture import svg as svg
 from linkage_ros.errors import (
     BagError as BagError,
     DefinitionError as DefinitionError,
@@ -47,22 +47,22 @@ from linkage_ros.kinematics.linkage import (
 )
 from linkage_ros.kinematics.results import InputRange as InputRange
 from linkage_ros.kinematics.status import Status as Status
-from linkage_ros.pipeline.pipeline import Pipeline as Pipeline, Tick as Tick
+from linkage_ros.tick.pipeline import Pipeline as Pipeline, Tick as Tick
 from linkage_ros.replay.replay import recorded_scene as recorded_scene
-from linkage_ros.files.linkage_file import load as load
-from linkage_ros.scene.load import load_scene as load_scene
-from linkage_ros.scene.scene import Scene as Scene
+from linkage_ros.description.linkage_file import load as load
+from linkage_ros.description.scene_file import load_scene as load_scene
+from linkage_ros.description.scene import Scene as Scene
 from linkage_ros.resources import linkage_names as linkage_names, scene_names as scene_names
-from linkage_ros.synthesis.defects import assess as assess, Assessment as Assessment
-from linkage_ros.synthesis.design import Design as Design
-from linkage_ros.synthesis.function.task import generate_function as generate_function
-from linkage_ros.synthesis.motion import (
+from linkage_ros.tools.design.defects import assess as assess, Assessment as Assessment
+from linkage_ros.tools.design.design import Design as Design
+from linkage_ros.tools.design.function.task import generate_function as generate_function
+from linkage_ros.tools.design.motion import (
     from_fixed_pivots as from_fixed_pivots,
     from_moving_pivots as from_moving_pivots,
     Pose as Pose,
 )
-from linkage_ros.synthesis.path.curves import PathTask as PathTask
-from linkage_ros.synthesis.path.generate import generate_path as generate_path
-from linkage_ros.view.linkage_page import LinkagePage as LinkagePage
+from linkage_ros.tools.design.path.curves import PathTask as PathTask
+from linkage_ros.tools.design.path.generate import generate_path as generate_path
+from linkage_ros.tools.view.linkage_page import LinkagePage as LinkagePage
 
 __version__: str

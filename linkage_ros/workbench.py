@@ -21,22 +21,22 @@ from linkage_ros.errors import LinkageError
 
 TOOLS = {
     # Commands; those of the other half are in linkage_ros.cli, each by its own name.
-    'accuracy': 'linkage_ros.cli.accuracy',
-    'view': 'linkage_ros.cli.view',
-    'report': 'linkage_ros.cli.report',
-    'compare': 'linkage_ros.cli.compare',
-    'plot': 'linkage_ros.cli.plot',
-    'draw': 'linkage_ros.cli.draw',
-    'animate': 'linkage_ros.cli.animate',
-    'synthesize': 'linkage_ros.cli.synthesize',
-    'compile': 'linkage_ros.cli.compile',
-    'fmu': 'linkage_ros.cli.fmu',
-    'urdf': 'linkage_ros.cli.robot_model',
-    'mjcf': 'linkage_ros.cli.robot_model',
-    'import': 'linkage_ros.cli.import_urdf',
+    'accuracy': 'linkage_ros.tools.study.accuracy_command',
+    'view': 'linkage_ros.tools.view.view_command',
+    'report': 'linkage_ros.tools.view.report_command',
+    'compare': 'linkage_ros.tools.view.compare_command',
+    'plot': 'linkage_ros.tools.drawing.plot_command',
+    'draw': 'linkage_ros.tools.drawing.draw_command',
+    'animate': 'linkage_ros.tools.view.animate_command',
+    'synthesize': 'linkage_ros.tools.design.synthesize_command',
+    'compile': 'linkage_ros.tools.models.compile_command',
+    'fmu': 'linkage_ros.tools.models.fmu_command',
+    'urdf': 'linkage_ros.tools.models.robot_model_command',
+    'mjcf': 'linkage_ros.tools.models.robot_model_command',
+    'import': 'linkage_ros.tools.models.import_command',
     # What commands and scenes ask for.
-    'robot_description': 'linkage_ros.scene.robot_model',
-    'spread': 'linkage_ros.simulation.spread',
+    'robot_description': 'linkage_ros.tools.models.scene_model',
+    'spread': 'linkage_ros.tools.drawing.spread',
 }
 """The module of each tool, by its name."""
 

@@ -15,25 +15,25 @@ A row is what stands behind the name in a scene file; in a message, … stands f
 from importlib import import_module
 import re
 
-from linkage_ros.drives.drive import DRIVES
+from linkage_ros.description.parameters import declared_fields
 from linkage_ros.dynamics.loads import JointFriction
-from linkage_ros.effects.backlash import BacklashParameters
-from linkage_ros.effects.bias import BiasParameters
-from linkage_ros.effects.clearance import ClearanceParameters
-from linkage_ros.effects.compliance import ComplianceParameters
-from linkage_ros.effects.delay import DelayParameters, JointDelay
-from linkage_ros.effects.dropout import DropoutParameters, JointDropout
-from linkage_ros.effects.encoder import EncoderParameters, JointEncoder
-from linkage_ros.effects.friction import FrictionParameters
-from linkage_ros.effects.jitter import JitterParameters
-from linkage_ros.effects.measuring_range import JointRange, MeasuringRangeParameters
-from linkage_ros.effects.noise import JointNoise, NoiseParameters
-from linkage_ros.effects.rate_limit import JointRateLimit, RateLimitParameters
-from linkage_ros.effects.stage import EFFECTS, NEEDS
-from linkage_ros.effects.tolerance import ToleranceParameters
 from linkage_ros.errors import FileError
-from linkage_ros.faults import FAULTS
-from linkage_ros.files.parameters import declared_fields
+from linkage_ros.stages.drives.drive import DRIVES
+from linkage_ros.stages.effects.backlash import BacklashParameters
+from linkage_ros.stages.effects.bias import BiasParameters
+from linkage_ros.stages.effects.clearance import ClearanceParameters
+from linkage_ros.stages.effects.compliance import ComplianceParameters
+from linkage_ros.stages.effects.delay import DelayParameters, JointDelay
+from linkage_ros.stages.effects.dropout import DropoutParameters, JointDropout
+from linkage_ros.stages.effects.encoder import EncoderParameters, JointEncoder
+from linkage_ros.stages.effects.friction import FrictionParameters
+from linkage_ros.stages.effects.jitter import JitterParameters
+from linkage_ros.stages.effects.measuring_range import JointRange, MeasuringRangeParameters
+from linkage_ros.stages.effects.noise import JointNoise, NoiseParameters
+from linkage_ros.stages.effects.rate_limit import JointRateLimit, RateLimitParameters
+from linkage_ros.stages.effects.stage import EFFECTS, NEEDS
+from linkage_ros.stages.effects.tolerance import ToleranceParameters
+from linkage_ros.stages.faults import FAULTS
 import pytest
 
 from .support.scenes import LINKAGES, pipeline_of, scene_of

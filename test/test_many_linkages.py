@@ -8,10 +8,10 @@
 
 """A scene of several linkages: each as it would be alone, and one joint state for all."""
 
+from linkage_ros.description.scene_file import load_scene, parse_scene
 from linkage_ros.errors import FileError
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 
 from .support.messages import read_joint_state as read
@@ -79,7 +79,7 @@ linkages:
   - {{name: right, linkage: half_open.yaml, {turning}, effects: {{velocity: {{}}}}}}
 """)
     whole = Pipeline(scene)
-    monkeypatch.setattr('linkage_ros.pipeline.pipeline.LinkagePipeline.whole_tick', None)
+    monkeypatch.setattr('linkage_ros.tick.pipeline.LinkagePipeline.whole_tick', None)
     apart = Pipeline(scene)
     usual = 0
     for index in range(400):

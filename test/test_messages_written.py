@@ -25,7 +25,7 @@ from linkage_ros.messages.joint_values import (
 )
 from linkage_ros.messages.layout import MalformedError, pack_message, parse_message
 from linkage_ros.messages.marker_array import ADD, DELETE, Marker, MARKER_ARRAY, MarkerArrayWriter
-from linkage_ros.report.diagnostics_summary import DIAGNOSTIC_ARRAY
+from linkage_ros.tools.view.report.diagnostics_summary import DIAGNOSTIC_ARRAY
 import numpy as np
 import pytest
 from rosbags.interfaces import Nodetype

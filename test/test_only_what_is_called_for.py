@@ -19,10 +19,10 @@ import subprocess
 import sys
 from typing import NamedTuple
 
-from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.faults import FAULTS
 from linkage_ros.solvers.registry import SOLVERS
+from linkage_ros.stages.drives.drive import DRIVES
+from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.stages.faults import FAULTS
 import pytest
 
 from .support.messages import read_joint_state
@@ -98,8 +98,8 @@ SOLVER_SCENES = {
 # tick then published, and the files it passed through.
 PROGRAM = """
 import json, sys
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.description.scene_file import load_scene
 pipeline = Pipeline(load_scene(sys.argv[1]))
 modules = sorted(sys.modules)
 seen = set()
@@ -158,9 +158,9 @@ class Look:
 
 # The closed form is in every scene; it is named in the registry itself.
 OTHER_SOLVERS = {name: module for name, module in SOLVERS.items() if name != 'closed_form'}
-COMMON = {'files', 'kinematics', 'messages'}
-FAULTS_MODULE = 'linkage_ros.faults'
-OPTIONAL = {'drawing', 'dynamics', 'robot_models', 'solvers', 'synthesis'}
+COMMON = {'description', 'kinematics', 'messages'}
+FAULTS_MODULE = 'linkage_ros.stages.faults'
+OPTIONAL = {'dynamics', 'solvers', 'tools'}
 """Packages of which nothing is in a tick, unless the scene asks for it."""
 
 
@@ -171,8 +171,11 @@ def of_registry(names, modules):
 
 def packages(modules):
     """Return which packages of ours modules lie in; messages are there for their topics."""
-    parts = (module.split('.') for module in modules)
-    return {part[1] for part in parts if part[0] == 'linkage_ros' and len(part) > 2} - COMMON
+    parts = (module.split('.') for module in modules if module.startswith('linkage_ros.'))
+    # The folders of the stages are told apart; the workbench is one.
+    return {
+        '.'.join(part[1:3]) if part[1] == 'stages' else part[1] for part in parts if len(part) > 2
+    } - COMMON
 
 
 @pytest.fixture(scope='module')
@@ -210,7 +213,7 @@ def test_a_scene_with_one_effect_has_no_other(tmp_path, bare, effect):
     assert effect in of_registry(EFFECTS, look.passed) or effect in ALTERING
     assert look.arrays == set(expected.arrays)
     assert look.topics == list(expected.topics)
-    assert packages(look.modules - bare.modules) == {'effects', *expected.packages}
+    assert packages(look.modules - bare.modules) == {'stages.effects', *expected.packages}
     assert packages(look.passed) & OPTIONAL <= set(expected.packages)
     assert of_registry(DRIVES, look.modules) == {'constant_rate'}
     assert FAULTS_MODULE not in look.modules
@@ -250,7 +253,7 @@ def test_a_motor_is_made_where_it_is_asked_for_alone(tmp_path):
 
 
 def test_wrenches_are_made_where_they_are_asked_for_alone(tmp_path):
-    theirs = {f'linkage_ros.{name}' for name in ('dynamics.wrenches', 'pipeline.wrench_topics')}
+    theirs = {f'linkage_ros.{name}' for name in ('dynamics.wrenches', 'tick.wrench_topics')}
     theirs.add('linkage_ros.messages.wrench')
     other = 'efforts: {rocker_joint: {constant: 1}}'
     for loads, there in ((other, set()), (f'{other}, wrenches: {{coupler: {{}}}}', theirs)):
@@ -269,8 +272,8 @@ def test_a_robot_model_is_made_where_it_is_asked_for_alone(tmp_path):
     """Neither building a scene nor the node's own modules bring it: configuring the node does."""
     for scene in ('', 'robot_description: true\n'):
         look = Look(tmp_path, BARE + scene)
-        assert 'robot_models' not in packages(look.modules | look.passed)
+        assert 'tools' not in packages(look.modules | look.passed)
     pytest.importorskip('rclpy')
     loaded = run_python('import sys, linkage_ros.node.node; print(*sys.modules)').split()
     assert 'linkage_ros.node.node' in loaded
-    assert 'robot_models' not in packages(loaded)
+    assert 'tools' not in packages(loaded)

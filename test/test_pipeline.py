@@ -18,7 +18,7 @@ import sys
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.pipeline.pipeline import LinkageState
+from linkage_ros.tick.pipeline import LinkageState
 import pytest
 
 from .support.messages import read_joint_state as read
@@ -116,8 +116,8 @@ def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
     (tmp_path / 'linkage.yaml').write_bytes(FOUR_BAR)
     (tmp_path / 'scene.yaml').write_text(f'linkage: linkage.yaml\neffects: {effects}')
     program = (
-        'import sys; from linkage_ros.pipeline.pipeline import Pipeline; '
-        'from linkage_ros.scene.load import load_scene; '
+        'import sys; from linkage_ros.tick.pipeline import Pipeline; '
+        'from linkage_ros.description.scene_file import load_scene; '
         f'Pipeline(load_scene({str(tmp_path / "scene.yaml")!r})); '
         'print(*sys.modules)'
     )

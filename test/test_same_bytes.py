@@ -23,8 +23,8 @@ PROGRAM = """
 import hashlib, sys
 from math import cos, sin
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.description.scene_file import load_scene
 scene = load_scene(sys.argv[1])
 pipeline = Pipeline(scene)
 names = [name for linkage in scene.linkages for name in linkage.input_names]

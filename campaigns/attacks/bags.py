@@ -32,8 +32,8 @@ from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
+from linkage_ros.description.scene_file import LINKAGE_FILE, parse_scene, SCENE_FILE
+from linkage_ros.tick.pipeline import Pipeline
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 

@@ -31,8 +31,8 @@ from campaigns.campaign import attack_in_parts
 from campaigns.in_process import confined, in_process
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.resources import shipped_path
 

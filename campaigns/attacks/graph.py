@@ -32,7 +32,7 @@ from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from linkage_ros.files.linkage_file import load
+from linkage_ros.description.linkage_file import load
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter
 from linkage_ros.processes import Graph, MeasurementError, private_domain
 from linkage_ros.resources import shipped_path

@@ -33,12 +33,12 @@ from linkage_ros.bag.recorder import Recorder, RecordingSummary
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.pipeline.tick_loop import TickLoop
-from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.scene import Scene
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick.tick_loop import TickLoop
 from rosbags.typesys import get_typestore, Stores
 
 SCENES = Path(__file__).parents[2] / 'config' / 'scenes'

@@ -33,7 +33,7 @@ from campaigns.topologies.families import FAMILIES
 from campaigns.topologies.judge import closure_of, Findings, judge_states
 from campaigns.topologies.judge_ranges import judge_ranges
 from campaigns.topologies.topology import both_ways, Topology
-from linkage_ros.files.linkage_text import linkage_text
+from linkage_ros.description.linkage_writer import linkage_text
 from linkage_ros.kinematics.linkage import Linkage
 
 FILES = ('draw', 'urdf', 'mjcf')

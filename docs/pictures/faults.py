@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
-from linkage_ros.faults import FAULTS
+from linkage_ros.stages.faults import FAULTS
 from matplotlib.figure import Figure
 import numpy as np
 

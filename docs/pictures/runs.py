@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.effects.stage import SensorReading
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import LinkageState, Pipeline
-from linkage_ros.scene.load import load_scene
+from linkage_ros.stages.effects.stage import SensorReading
+from linkage_ros.tick.pipeline import LinkageState, Pipeline
 import numpy as np
 from numpy.typing import NDArray
 

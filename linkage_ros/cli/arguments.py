@@ -17,8 +17,8 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
+from linkage_ros.description.file_access import check_new, check_output_name
 from linkage_ros.errors import decimal_comma, LinkageError, list_names
-from linkage_ros.files.file_access import check_new, check_output_name
 from linkage_ros.kinematics.linkage import Linkage
 
 PICTURES = ('.png', '.svg', '.pdf')

@@ -39,11 +39,11 @@ from linkage_ros.bag.run_events import (
 )
 from linkage_ros.cli.arguments import finite_or_none
 from linkage_ros.cli.terminal import show_progress
+from linkage_ros.description.scene import Scene, SceneLinkage
 from linkage_ros.errors import BagError, escape_unprintable, list_names
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.replay.replay import recorded_scene
 from linkage_ros.replay.verify import ExaminedRun, WorstResiduals
-from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heed_signals, StoppedError
 
 _MIB = 2**20
@@ -95,7 +95,7 @@ def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> 
     scene = recorded_scene(bag, settings=settings)
     if not trust_effects or not scene.not_imported:
         return scene
-    from linkage_ros.effects.user_effects import found_in
+    from linkage_ros.stages.effects.user_effects import found_in
 
     for name in scene.not_imported:
         where = found_in(name)

@@ -21,8 +21,9 @@ from typing import Any
 
 from linkage_ros.cli.arguments import add_file, add_radians, AngleUnit, finite_or_none
 from linkage_ros.cli.terminal import print_tables, ProgressCallback, show_progress, TerminalTable
+from linkage_ros.description.linkage_file import linkage_content, read_closure
+from linkage_ros.description.notes import linkage_notes
 from linkage_ros.errors import DefinitionError, LinkageError
-from linkage_ros.files.linkage_file import linkage_content, read_closure
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.kinematics.ranges import is_iterated
@@ -39,7 +40,6 @@ from linkage_ros.kinematics.sweep_analysis import (
 )
 from linkage_ros.kinematics.topology import Driven, Dyad, Group, Iterated, links_of
 from linkage_ros.resources import named_file
-from linkage_ros.scene.notes import linkage_notes
 
 _SINGULAR = {
     Status.TOGGLE: 'toggles',

@@ -29,17 +29,17 @@ from typing import TYPE_CHECKING
 from linkage_ros.cli.gallery import first_sentence
 from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.terminal import print_tables, TerminalTable
+from linkage_ros.description.scene import Scene, SceneLinkage
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import did_you_mean, LinkageError, list_names
 from linkage_ros.node.real_time import stay_on_this_machine
 from linkage_ros.processes import private_domain
 from linkage_ros.resources import scene_names, shipped_path
-from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heed_signals
 from linkage_ros.workbench import find_tool
 
 if TYPE_CHECKING:
-    from linkage_ros.faults import Fault
+    from linkage_ros.stages.faults import Fault
 
 _BESIDE = {
     'topic': ('linkage_ros.node.crank_source',),

@@ -31,8 +31,9 @@ from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.arguments import add_bag, add_output
 from linkage_ros.cli.bag_reading import open_bag, run_or_blank, unfinished_text
 from linkage_ros.cli.terminal import show_progress
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.tables import block_rows, check_kind, KINDS, table_file
 from linkage_ros.errors import BagError, did_you_mean, escape_unprintable, LinkageError, list_names
-from linkage_ros.files.tables import block_rows, check_kind, KINDS, table_file
 from linkage_ros.messages.joint_values import (
     FORCE_X,
     JOINT_STATE,
@@ -46,7 +47,6 @@ from linkage_ros.messages.joint_values import (
 )
 from linkage_ros.replay.replay import own_joint_states, recorded_scene
 from linkage_ros.replay.verify import turning_joints
-from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
 
 # Each tick, or each message of one topic, becomes a row.

@@ -30,13 +30,13 @@ from linkage_ros.bag.run_events import (
 )
 from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.description.scene import Scene
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.counterfactual import Counterfactual, ReplayEvent
 from linkage_ros.replay.replay import user_effects_here, versions_here
 from linkage_ros.replay.topic_description import describe_topic, message_type
-from linkage_ros.scene.scene import Scene
+from linkage_ros.tick.pipeline import Pipeline
 
 _FLUSHED_EVERY = 50_000
 _TIME = 'builtin_interfaces/msg/Time'

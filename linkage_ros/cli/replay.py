@@ -44,8 +44,10 @@ from linkage_ros.cli.bag_reading import (
 )
 from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource, TopicNames
 from linkage_ros.cli.terminal import print_tables, TerminalTable
+from linkage_ros.description.file_access import remove_bag
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
-from linkage_ros.files.file_access import remove_bag
 from linkage_ros.messages.joint_values import JOINT_STATE, Key, UNITS
 from linkage_ros.replay.compare import (
     Comparison,
@@ -76,8 +78,6 @@ from linkage_ros.replay.verify import (
     turning_joints,
     verify_replay,
 )
-from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import heed_signals
 
 

@@ -29,17 +29,16 @@ from threading import Event
 from linkage_ros.cli.arguments import add_force, add_set, bounded_number, PICTURES, SCENE_HELP
 from linkage_ros.cli.export import export_bag
 from linkage_ros.cli.terminal import show_progress
+from linkage_ros.description.file_access import check_output_name, remove_bag
+from linkage_ros.description.notes import scene_notes
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description.tables import check_kind, KINDS, table_file
 from linkage_ros.errors import escape_unprintable, LinkageError
-from linkage_ros.files.file_access import check_output_name, remove_bag
-from linkage_ros.files.tables import check_kind, KINDS, table_file
 from linkage_ros.messages.joint_values import EFFORT, POSITION, RATE, UNITS
-from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.notes import scene_notes
-from linkage_ros.scene.scene import Scene
-from linkage_ros.signals import StoppedError
-from linkage_ros.simulation.finished_runs import FinishedRuns
-from linkage_ros.simulation.run import check_simulated, simulate_run
-from linkage_ros.simulation.study import (
+from linkage_ros.replay.finished_runs import FinishedRuns
+from linkage_ros.replay.simulate import check_simulated, simulate_run
+from linkage_ros.replay.study import (
     instants_of,
     Outcome,
     ParameterSweep,
@@ -50,6 +49,7 @@ from linkage_ros.simulation.study import (
     Study,
     sweep_of,
 )
+from linkage_ros.signals import StoppedError
 from linkage_ros.workbench import find_tool
 
 EXAMPLE = 'linkage simulate torque_crank --seconds 1 -o my_run.csv'

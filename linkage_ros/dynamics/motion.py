@@ -29,9 +29,9 @@ A law of an applied force (`linkage_ros.dynamics.laws`) is smooth in segments. W
 law stays in the segment of the step's start; if a segment has been left at the end, the
 integrator finds the instant and cuts the step there, too. Without laws no instant is searched for.
 
-Friction by the forces in the joints (`linkage_ros.dynamics.pressed_joints`) depends on q̈, and is
-found with it. Where the linkage jams, it is held as by a stop. A step across a kink of this
-friction is of order 2.
+Friction by the forces in the joints (`linkage_ros.dynamics.load_dependent_friction`) depends on
+q̈, and is found with it. Where the linkage jams, it is held as by a stop. A step across a kink of
+this friction is of order 2.
 
 A stop is hard: the integrator finds the instant of the impact, the rate becomes −e·q̇, and the
 rest of the step continues from there. A mechanism that is pushed against a stop rests at it.

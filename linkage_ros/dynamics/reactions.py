@@ -19,7 +19,7 @@ linear system A·f = b (R. L. Norton, Design of Machinery, ch. 11; E. J. Haug, C
 Kinematics and Dynamics of Mechanical Systems, 1989, ch. 6).
 
 Friction that grows with the force in its joint changes the forces: see
-`linkage_ros.dynamics.pressed_joints`.
+`linkage_ros.dynamics.load_dependent_friction`.
 
 A column of A is the effect of one unknown on each link (`JointMatrix`). By virtual work, a row of
 Aᵀ gives the displacement δ in a joint that small displacements Δ of the links cause: Aᵀ·Δ = δ.
@@ -325,8 +325,8 @@ class Reactions:
         self._solve_system: Callable[..., list[float] | None] = _solve_linear
         if self._load_dependent:
             from linkage_ros.dynamics import (
-                pressed_joints,
-            )  # local import: only with it
+                load_dependent_friction as pressed_joints,  # local import: only with it
+            )
 
             unknowns = [self._friction_unknown(rubbing) for rubbing in self._load_dependent]
             self._solve_system = partial(pressed_joints.solve_pressed, unknowns)
@@ -417,7 +417,7 @@ class Reactions:
         seconds
             Time since the first tick.
         pull, mobility
-            As of `linkage_ros.dynamics.pressed_joints.solve_frictions`.
+            As of `linkage_ros.dynamics.load_dependent_friction.solve_frictions`.
 
         Returns
         -------

@@ -11,7 +11,7 @@ Wrenches that messages give: a force and a torque on a link, held until they exp
 
 A wrench counts from the time at which it is taken, constant until the next one or until it is too
 old; then it is 0. So its laws have one segment, and no integrator cuts a step for them: the torque
-drive divides its steps where a wrench changes (`linkage_ros.drives.torque`).
+drive divides its steps where a wrench changes (`linkage_ros.stages.drives.torque`).
 """
 
 from __future__ import annotations

@@ -31,8 +31,8 @@ from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.topology import Dyad, Iterated, links_of
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.known_links import SolvedLinks
     from linkage_ros.kinematics.results import LoopClosure, Position
+    from linkage_ros.kinematics.solved_links import SolvedLinks
 
 _SAME = 1e-9
 """Places nearer to each other than this, in lengths, count as one."""

@@ -22,15 +22,15 @@ from math import hypot, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import make_vector, remainder, unit_vector
-from linkage_ros.kinematics.known_links import count_turns
 from linkage_ros.kinematics.linkage import Linkage, Ratio, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.solved_links import count_turns
 from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.topology import Joint
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.known_links import SolvedLinks
+    from linkage_ros.kinematics.solved_links import SolvedLinks
 
 Array = NDArray[np.floating[Any]]
 

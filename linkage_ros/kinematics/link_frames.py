@@ -16,8 +16,8 @@ from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.kinematics.point_tracker import PointTracker
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.known_links import SolvedLinks
     from linkage_ros.kinematics.results import Position, Velocity
+    from linkage_ros.kinematics.solved_links import SolvedLinks
     from linkage_ros.kinematics.topology import Structure
 
 

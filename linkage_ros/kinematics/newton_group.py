@@ -51,7 +51,7 @@ from linkage_ros.kinematics.step import LinkState, Step
 import numpy as np
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.known_links import SolvedLinks
+    from linkage_ros.kinematics.solved_links import SolvedLinks
 
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 """Largest residual of a constraint at a solution, relative to the size of the coordinates."""

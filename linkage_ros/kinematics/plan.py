@@ -33,7 +33,6 @@ from linkage_ros.kinematics.dyads.rrr import (
 )
 from linkage_ros.kinematics.dyads.two_sided import TwoSided
 from linkage_ros.kinematics.grashof import nearly_paired
-from linkage_ros.kinematics.known_links import Angle, Attachment, Slide, SlideLine, SolvedLinks
 from linkage_ros.kinematics.linkage import Input, Linkage
 from linkage_ros.kinematics.rail import (
     CrankRail,
@@ -43,6 +42,7 @@ from linkage_ros.kinematics.rail import (
     UnsignedRail,
 )
 from linkage_ros.kinematics.sides import closing_name, SIDES, telling_part, TwoWays
+from linkage_ros.kinematics.solved_links import Angle, Attachment, Slide, SlideLine, SolvedLinks
 from linkage_ros.kinematics.step import RelativeAngle
 from linkage_ros.kinematics.topology import (
     assur_groups,

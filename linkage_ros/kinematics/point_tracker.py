@@ -23,8 +23,8 @@ from collections.abc import Sequence
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import make_vector, unit_vector
-from linkage_ros.kinematics.known_links import SolvedLinks
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.solved_links import SolvedLinks
 from linkage_ros.kinematics.step import LinkState
 
 if TYPE_CHECKING:

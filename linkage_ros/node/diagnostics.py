@@ -23,7 +23,6 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from linkage_ros.drives.drive import describe_chatter
 from linkage_ros.errors import list_names
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe_ranges
@@ -32,12 +31,13 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import head_of, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.run_recording import RunSnapshots
-from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageState
-from linkage_ros.pipeline.tick_loop import Counts, TickLoop, WrenchCounts
+from linkage_ros.stages.drives.drive import describe_chatter
+from linkage_ros.tick.pipeline import LinkagePipeline, LinkageState
+from linkage_ros.tick.tick_loop import Counts, TickLoop, WrenchCounts
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 if TYPE_CHECKING:
-    from linkage_ros.faults import Injection
+    from linkage_ros.stages.faults import Injection
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,

@@ -25,6 +25,9 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.bag.topic import Topic
+from linkage_ros.description.notes import scene_notes
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.layout import NANOSECONDS
@@ -44,12 +47,9 @@ from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE, nearne
 from linkage_ros.node.real_time import RealTime, STANDSTILL, standstill_reason
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.pipeline.tick_loop import Pace, TickLoop
 from linkage_ros.replay.replay import own_joint_states
-from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.notes import scene_notes
-from linkage_ros.scene.scene import Scene
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick.tick_loop import Pace, TickLoop
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
 from rclpy.clock import Clock, ClockType

@@ -25,11 +25,11 @@ from linkage_ros.bag.snapshot import KeptCounts, SnapshotMemory, SnapshotWriting
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.description.scene import RecordParameters, Scene
 from linkage_ros.errors import RecordingError
-from linkage_ros.pipeline.pipeline import LinkagePipeline
-from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.run_files import EXTRA, scene_files, to_attachments
-from linkage_ros.scene.scene import RecordParameters, Scene
+from linkage_ros.tick.pipeline import LinkagePipeline
+from linkage_ros.tick.tick_loop import TickLoop
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)

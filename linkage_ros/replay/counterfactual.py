@@ -35,6 +35,7 @@ from linkage_ros.bag.run_events import (
     TickEvent,
     WrenchEvent,
 )
+from linkage_ros.description.scene import Scene, SceneLinkage
 from linkage_ros.errors import BagError, did_you_mean, LinkageError, list_names
 from linkage_ros.messages.joint_state import (
     head_of,
@@ -44,12 +45,11 @@ from linkage_ros.messages.joint_state import (
 )
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.single_values import text_message, TIME_END
-from linkage_ros.pipeline.pipeline import Pipeline, Tick
 from linkage_ros.replay.replay import change_text, read_change
-from linkage_ros.scene.scene import Scene, SceneLinkage
+from linkage_ros.tick.pipeline import Pipeline, Tick
 
 if TYPE_CHECKING:
-    from linkage_ros.faults import Injection
+    from linkage_ros.stages.faults import Injection
 
 
 _TOPICS = {'topic': '/crank_states', 'torque': '/crank_commands'}
@@ -139,7 +139,7 @@ class Counterfactual:
     def _make_injection(self) -> Injection | None:
         if not self._scene.faults:
             return None
-        from linkage_ros.faults import (
+        from linkage_ros.stages.faults import (
             Injection,  # local import: only where a scene has faults
         )
 

@@ -36,15 +36,15 @@ from linkage_ros.bag.run_events import (
     VERSIONS,
     WrenchEvent,
 )
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.scene_file import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.errors import BagError, list_names
 from linkage_ros.messages.joint_state import OwnJointStates
 from linkage_ros.messages.single_values import text_of, TIME_END
-from linkage_ros.pipeline.pipeline import Pipeline, Tick
-from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
-from linkage_ros.scene.scene import Scene
+from linkage_ros.tick.pipeline import Pipeline, Tick
 
 if TYPE_CHECKING:
-    from linkage_ros.faults import FaultChange, Injection
+    from linkage_ros.stages.faults import FaultChange, Injection
 
 
 _LONGEST_ANNOUNCED = 16 * 2**20
@@ -266,7 +266,7 @@ def user_effects_here(scene: Scene) -> dict[str, str]:
     }
     if not names:
         return {}
-    from linkage_ros.effects.user_effects import (
+    from linkage_ros.stages.effects.user_effects import (
         effect_version,  # local import: only where a scene names one
     )
 

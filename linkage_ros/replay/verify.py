@@ -23,16 +23,16 @@ from typing import NamedTuple
 
 from linkage_ros.bag.reader import Bag, BagMessage
 from linkage_ros.bag.run_events import missing_start_reason, read_run_metadata
+from linkage_ros.description.scene import Scene, SceneLinkage
 from linkage_ros.errors import BagError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import RevoluteJoint
 from linkage_ros.kinematics.results import Position, SingularityMargin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.compare import Comparison, FirstDifference, TickPlace
 from linkage_ros.replay.replay import replay_all, replay_ticks, ReplayedTick
-from linkage_ros.scene.scene import Scene, SceneLinkage
+from linkage_ros.tick.pipeline import Pipeline
 
 IDENTICAL, DIFFERENT, UNDECIDED = 'identical', 'different', 'cannot be told'
 

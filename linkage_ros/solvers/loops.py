@@ -22,8 +22,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.kinematics.known_links import Angle, SolvedLinks
 from linkage_ros.kinematics.linkage import GROUND, Linkage
+from linkage_ros.kinematics.solved_links import Angle, SolvedLinks
 from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Joint, Structure
 
 Turns = tuple[tuple[int, float], ...]

@@ -37,7 +37,7 @@ from dataclasses import dataclass, replace
 from math import copysign, inf, tau
 from typing import Any, NamedTuple
 
-from linkage_ros.files.parameters import number
+from linkage_ros.description.parameters import number
 from linkage_ros.kinematics.arithmetic import cross_product, UNIT_ROUNDOFF
 from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.closure import Closure

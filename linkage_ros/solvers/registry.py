@@ -9,8 +9,8 @@
 """
 The solvers that a scene can name; each is imported only if a scene names it.
 
-A module has ``PARAMETERS``, the type of its parameters (see `linkage_ros.files.parameters`), and
-``build(parameters, linkage) -> Closure``.
+A module has ``PARAMETERS``, the type of its parameters (see `linkage_ros.description.parameters`),
+and ``build(parameters, linkage) -> Closure``.
 """
 
 from __future__ import annotations

@@ -33,8 +33,8 @@ from struct import Struct
 from time import perf_counter
 from typing import Any, cast, Literal, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.description.parameters import number, point
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.parameters import number, point
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.doubles import to_double
 from linkage_ros.kinematics.linkage import Linkage

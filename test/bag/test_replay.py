@@ -21,8 +21,8 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import recorded_scene, replay_ticks
+from linkage_ros.tick.pipeline import Pipeline
 import numpy as np
 import pytest
 

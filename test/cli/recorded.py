@@ -21,10 +21,10 @@ from typing import Any
 from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene
+from linkage_ros.tick.pipeline import Pipeline
 from rosbags.highlevel import AnyReader
 
 from ..support.messages import joint_state, STORE

@@ -13,8 +13,8 @@ from math import pi, sin
 
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli import compare
 from linkage_ros.errors import LinkageError
+from linkage_ros.tools.view import compare_command as compare
 import pytest
 
 from .recorded import answer, JOINT_STATE

@@ -28,8 +28,8 @@ from hypothesis import strategies as st
 from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import export
+from linkage_ros.description import tables
 from linkage_ros.errors import LinkageError
-from linkage_ros.files import tables
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.joint_values import (
     JOINT_STATE,

@@ -23,9 +23,9 @@ import sys
 
 from linkage_ros.cli.completion import SHELLS
 from linkage_ros.cli.main import COMMANDS, EXIT_CODES, module_of, Parser, parser_of
+from linkage_ros.description.scene_file import load_scene, SCENE_FILE
 from linkage_ros.errors import LinkageError
 from linkage_ros.resources import linkage_names, named_file, scene_names
-from linkage_ros.scene.load import load_scene, SCENE_FILE
 import pytest
 
 from .recorded import Recorded, scene_file

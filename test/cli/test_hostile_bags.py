@@ -22,16 +22,18 @@ from typing import Any
 from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli import export, info, plot, replay, report
+from linkage_ros.cli import export, info, replay
 from linkage_ros.cli.main import COMMANDS as ALL_COMMANDS
 from linkage_ros.cli.main import module_of, parser_of
 from linkage_ros.cli.terminal import PrintableStream
+from linkage_ros.description.scene_file import SCENE_FILE
 from linkage_ros.errors import BagError, escape_unprintable, FileError, LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import text_message
-from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import read_change, recorded_scene
-from linkage_ros.scene.load import SCENE_FILE
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tools.drawing import plot_command as plot
+from linkage_ros.tools.view import report_command as report
 import pytest
 
 from .recorded import answer, BEGIN, FOUR_BAR, JOINT_STATE, MS, scene_file
@@ -447,5 +449,5 @@ def test_the_scene_of_a_bag_is_not_trusted_where_nobody_says_so(folder: Path) ->
     'name', ['__main__.effect', 'no_such_package.effect', '.effect', 'a b.effect', 'os.path', '..']
 )
 def test_any_name_is_told_in_a_line(name: str) -> None:
-    own = import_module('linkage_ros.effects.user_effects')
+    own = import_module('linkage_ros.stages.effects.user_effects')
     assert own.found_in(name).isprintable()

@@ -27,6 +27,7 @@ from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import replay
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.node.run_recording import RunRecording
@@ -34,7 +35,6 @@ from linkage_ros.replay.compare import Comparison, TickPlace, ulp_distance
 from linkage_ros.replay.replay import recorded_scene, versions_here
 from linkage_ros.replay.replay import replay_ticks as replayed
 from linkage_ros.resources import shipped_path
-from linkage_ros.scene.load import load_scene
 import pytest
 
 from .conftest import json_keys, json_keys_of, Run

@@ -20,11 +20,11 @@ from typing import Any
 from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import replay
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene
 from linkage_ros.signals import StoppedError
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 from rosbags.highlevel import AnyReader
 

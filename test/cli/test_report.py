@@ -20,9 +20,9 @@ from typing import Any
 
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli import report as command
 from linkage_ros.errors import LinkageError
 from linkage_ros.signals import StoppedError
+from linkage_ros.tools.view import report_command as command
 import pytest
 
 from .conftest import Run

@@ -22,9 +22,9 @@ from threading import Event
 from linkage_ros.cli import scene as command
 from linkage_ros.cli.scene import REGISTRIES, table_of
 from linkage_ros.cli.terminal import table_text
+from linkage_ros.description.schema import as_text
 from linkage_ros.errors import FileError, LinkageError
 from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.scene.schema import as_text
 import pytest
 
 from .conftest import json_keys, Run

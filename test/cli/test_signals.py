@@ -29,7 +29,7 @@ from ..support.commands import environment
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 # Arguments and input of each command. Where a command computes, it closes loops.
-PARSE = 'linkage_ros.files.yaml_file:parse_yaml'
+PARSE = 'linkage_ros.description.yaml_file:parse_yaml'
 
 READS = {
     'check': (['four.yaml'], PARSE),
@@ -45,7 +45,10 @@ READS = {
     'simulate': (['four.yaml', '-o', 'x.csv'], PARSE),
     'accuracy': (['four.yaml', '--page', 'page.html'], PARSE),
     'demo': ([], PARSE),
-    'import': (['robot.urdf', '-o', 'x.yaml'], 'linkage_ros.cli.import_urdf:read_urdf'),
+    'import': (
+        ['robot.urdf', '-o', 'x.yaml'],
+        'linkage_ros.tools.models.import_command:read_urdf',
+    ),
     'synthesize': (['--pairs', 'pairs.csv'], 'csv:reader'),
 }
 
@@ -84,7 +87,7 @@ sys.exit(main())
 FINALIZER = """
 import os, sys, time
 from linkage_ros.cli.main import main
-from linkage_ros.files import yaml_file
+from linkage_ros.description import yaml_file
 class Lost:
     def __del__(self):
         os.write(1, b'stuck')

@@ -15,7 +15,7 @@ import re
 from docs.make_reference import MADE, made_pages
 from linkage_ros.cli.main import COMMANDS
 from linkage_ros.cli.scene import REGISTRIES
-from linkage_ros.scene.schema import linkage_schema, scene_schema
+from linkage_ros.description.schema import linkage_schema, scene_schema
 import pytest
 
 from .blocks import ROOT

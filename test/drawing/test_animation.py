@@ -15,14 +15,14 @@ import re
 from xml.etree import ElementTree as ET
 
 from linkage_ros.cli.main import main
-from linkage_ros.drawing.animation import animate, check_kind, range_motion, RATE
+from linkage_ros.description.linkage_file import load
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.shapes import link_frames
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.report.run import Window
-from linkage_ros.report.run_motion import run_motion
+from linkage_ros.tools.drawing.animation import animate, check_kind, range_motion, RATE
+from linkage_ros.tools.view.report.run import Window
+from linkage_ros.tools.view.report.run_motion import run_motion
 import numpy as np
 import pytest
 

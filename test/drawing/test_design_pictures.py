@@ -15,12 +15,12 @@ from math import acos, cos, degrees, pi, radians, remainder, sin, tau
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing import design as drawing
-from linkage_ros.drawing.design import draw_design
-from linkage_ros.drawing.painting import OTHER, WANTED
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.shapes import INK
-from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
+from linkage_ros.tools.design import picture as drawing
+from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
+from linkage_ros.tools.design.picture import draw_design
+from linkage_ros.tools.drawing.painting import OTHER, WANTED
 import numpy as np
 import pytest
 

@@ -15,9 +15,8 @@ import random
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drawing.painting import Label, place_labels
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import parse_yaml, read_yaml
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.curves import drawn_once, sweep_range, unwrap_angles
 from linkage_ros.kinematics.linkage import GROUND
@@ -31,6 +30,7 @@ from linkage_ros.kinematics.shapes import (
     Segment,
 )
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
+from linkage_ros.tools.drawing.painting import Label, place_labels
 import pytest
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'

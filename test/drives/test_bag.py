@@ -16,13 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.drives.bag import BagParameters, build
-from linkage_ros.drives.drive import CrankState
-from linkage_ros.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import BagError, DefinitionError
 from linkage_ros.messages.joint_state import CrankSample, JointStateWriter, Rejection
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene
+from linkage_ros.stages.drives.bag import BagParameters, build
+from linkage_ros.stages.drives.drive import CrankState
+from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.tick.pipeline import Pipeline
 from mcap.writer import IndexType, Writer
 import pytest
 

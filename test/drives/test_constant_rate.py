@@ -12,14 +12,14 @@ from math import ulp
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.constant_rate import (
+from linkage_ros.errors import DefinitionError
+from linkage_ros.stages.drives.constant_rate import (
     build,
     ConstantRate,
     ConstantRateParameters,
     motion_curve,
 )
-from linkage_ros.drives.drive import CrankState
-from linkage_ros.errors import DefinitionError
+from linkage_ros.stages.drives.drive import CrankState
 from mpmath import mp
 import pytest
 

@@ -12,9 +12,9 @@ from math import cos, exp, pi, sin
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import FileError
 from linkage_ros.messages.joint_state import CrankSample, Rejection
+from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
 import pytest
 
 from ..support.messages import joint_state as serialized

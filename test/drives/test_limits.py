@@ -10,10 +10,10 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.drives.profile import motion_curve, ProfileParameters, value_range
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import EffortCommand
+from linkage_ros.stages.drives.profile import motion_curve, ProfileParameters, value_range
 import pytest
 
 from ..support.scenes import four_bar_text, pipeline_of, symmetric_five_bar

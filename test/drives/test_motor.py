@@ -18,13 +18,13 @@ from math import copysign, exp, log
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import Context
-from linkage_ros.drives.torque import build, MotorParameters, TorqueParameters
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, Loads
 from linkage_ros.dynamics.motor import Motor
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import EffortCommand
+from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives.torque import build, MotorParameters, TorqueParameters
 import pytest
 from scipy.integrate import solve_ivp
 

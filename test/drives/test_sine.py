@@ -12,8 +12,8 @@ from math import pi
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import CrankState
-from linkage_ros.drives.sine import build, motion_curve, Sine, SineParameters
+from linkage_ros.stages.drives.drive import CrankState
+from linkage_ros.stages.drives.sine import build, motion_curve, Sine, SineParameters
 from mpmath import mp
 import pytest
 

@@ -15,12 +15,12 @@ from xml.etree import ElementTree as ET
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import CrankState
-from linkage_ros.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.description.scene_file import parse_scene
 from linkage_ros.kinematics.linkage import Input
 from linkage_ros.messages.joint_state import CrankSample, Rejection
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
+from linkage_ros.stages.drives.drive import CrankState
+from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 
 from ..support.messages import joint_state as serialized

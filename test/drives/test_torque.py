@@ -19,14 +19,14 @@ import random
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import Context
-from linkage_ros.drives.torque import build, reader, TOPIC, TorqueParameters
 from linkage_ros.dynamics.loads import Friction, JointFriction, Loads
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Mass
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import EffortCommand, Rejection
+from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives.torque import build, reader, TOPIC, TorqueParameters
 import pytest
 
 from .contexts import two_inputs

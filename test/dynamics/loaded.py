@@ -13,8 +13,8 @@ from itertools import pairwise
 from pathlib import Path
 import random
 
-from linkage_ros.drives.drive import Context
-from linkage_ros.drives.torque import build, TorqueParameters
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.yaml_file import parse_yaml, read_yaml
 from linkage_ros.dynamics.loads import (
     AppliedLoads,
     JointLoad,
@@ -23,8 +23,6 @@ from linkage_ros.dynamics.loads import (
     PointLoad,
     Spring,
 )
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     GROUND,
@@ -34,6 +32,8 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
+from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives.torque import build, TorqueParameters
 
 from ..support.scenes import closure_of, PENDULUM
 

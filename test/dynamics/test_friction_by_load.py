@@ -14,8 +14,6 @@ from math import copysign, cos, hypot, pi, sin, sqrt
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import Context
-from linkage_ros.drives.torque import build, TorqueParameters
 from linkage_ros.dynamics.integrators import METHODS
 from linkage_ros.dynamics.loads import (
     AppliedLoads,
@@ -35,6 +33,8 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Mass
 from linkage_ros.messages.joint_state import EffortCommand
 from linkage_ros.messages.wrench import PlanarWrench
+from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives.torque import build, TorqueParameters
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq

@@ -13,10 +13,10 @@ from math import inf, isfinite, nan
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import Context, CrankState
-from linkage_ros.effects import acceleration, velocity
-from linkage_ros.effects.stage import MechanismState, SensorReading
 from linkage_ros.kinematics.status import Status
+from linkage_ros.stages.drives.drive import Context, CrankState
+from linkage_ros.stages.effects import acceleration, velocity
+from linkage_ros.stages.effects.stage import MechanismState, SensorReading
 import pytest
 
 from .sensors import ANGLES, SLIDE

@@ -12,10 +12,10 @@ from math import pi, remainder, sin, tau
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import Context, CrankState
-from linkage_ros.effects import backlash
-from linkage_ros.effects.backlash import BacklashParameters
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.stages.drives.drive import Context, CrankState
+from linkage_ros.stages.effects import backlash
+from linkage_ros.stages.effects.backlash import BacklashParameters
 import pytest
 
 from ..support.messages import read_joint_state

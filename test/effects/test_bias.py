@@ -10,9 +10,9 @@
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.effects import bias
-from linkage_ros.effects.bias import BiasParameters, EccentricDisc
 from linkage_ros.errors import DefinitionError
+from linkage_ros.stages.effects import bias
+from linkage_ros.stages.effects.bias import BiasParameters, EccentricDisc
 from mpmath import mp
 import pytest
 

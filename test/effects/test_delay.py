@@ -15,10 +15,10 @@ from random import Random
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from linkage_ros.effects import delay
-from linkage_ros.effects.delay import DelayParameters
-from linkage_ros.effects.history import History
 from linkage_ros.errors import DefinitionError
+from linkage_ros.stages.effects import delay
+from linkage_ros.stages.effects.delay import DelayParameters
+from linkage_ros.stages.effects.history import History
 import pytest
 from scipy.stats import expon, kstest, uniform
 

@@ -12,12 +12,12 @@ from math import cos, sin
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import CrankState
 from linkage_ros.dynamics.loads import Friction, JointFriction
-from linkage_ros.effects import effort
-from linkage_ros.effects.stage import MechanismState
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
+from linkage_ros.stages.drives.drive import CrankState
+from linkage_ros.stages.effects import effort
+from linkage_ros.stages.effects.stage import MechanismState
 import numpy as np
 import pytest
 

@@ -16,8 +16,8 @@ J. Craig, Introduction to Robotics, 3rd ed., 2005, 6.7).
 
 from math import cos, sin, tau
 
+from linkage_ros.description.scene_file import parse_scene
 from linkage_ros.errors import FileError
-from linkage_ros.scene.load import parse_scene
 import pytest
 
 from ..support.messages import read_joint_state

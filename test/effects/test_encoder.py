@@ -14,9 +14,9 @@ from math import exp, floor, isclose, pi, tau, ulp
 
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from linkage_ros.effects import encoder
-from linkage_ros.effects.encoder import EncoderParameters, JointEncoder
 from linkage_ros.errors import DefinitionError
+from linkage_ros.stages.effects import encoder
+from linkage_ros.stages.effects.encoder import EncoderParameters, JointEncoder
 import pytest
 
 from .sensors import ANGLES, BEGIN, context, MS, published, reading, SLIDE

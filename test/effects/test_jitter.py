@@ -11,8 +11,8 @@
 from itertools import pairwise
 from math import erf, sqrt
 
-from linkage_ros.effects import jitter
-from linkage_ros.effects.jitter import JitterParameters
+from linkage_ros.stages.effects import jitter
+from linkage_ros.stages.effects.jitter import JitterParameters
 import pytest
 
 from .sensors import BEGIN, chi_square, context, MS, published, reading, UNLIKELY

@@ -15,12 +15,12 @@ from math import acos, cos, hypot, log, pi, radians, remainder, tau
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from linkage_ros.description.scene_file import parse_scene
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.shapes import carried_shapes, Polygon, shape_outline
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 
 from ..support.messages import read_joint_state, STORE

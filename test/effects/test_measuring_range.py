@@ -10,9 +10,9 @@
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.effects import measuring_range
-from linkage_ros.effects.measuring_range import JointRange, MeasuringRangeParameters
 from linkage_ros.errors import DefinitionError
+from linkage_ros.stages.effects import measuring_range
+from linkage_ros.stages.effects.measuring_range import JointRange, MeasuringRangeParameters
 import pytest
 
 from .sensors import BEGIN, context, published, reading

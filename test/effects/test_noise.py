@@ -11,9 +11,9 @@
 from itertools import accumulate, cycle, islice, pairwise
 from math import exp, sqrt
 
-from linkage_ros.effects import noise
-from linkage_ros.effects.noise import JointNoise, NoiseParameters
 from linkage_ros.errors import DefinitionError
+from linkage_ros.stages.effects import noise
+from linkage_ros.stages.effects.noise import JointNoise, NoiseParameters
 import pytest
 
 from .sensors import BEGIN, context, likely, MS, published, reading, SLIDE

@@ -18,17 +18,17 @@ import sys
 from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.effects.user_effects import FUNCTIONS
+from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description.schema import scene_schema
+from linkage_ros.description.violations import find_violations
+from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import FileError
-from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import user_effects_here
-from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.schema import scene_schema
-from linkage_ros.scene.violations import find_violations
+from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.stages.effects.user_effects import FUNCTIONS
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 
 from ..support.commands import linkage
@@ -40,7 +40,7 @@ RATE = 3.0
 HEAD = """
 from dataclasses import dataclass
 
-from linkage_ros.files.parameters import number
+from linkage_ros.description.parameters import number
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ def sensor(parameters, context):
 """
 DOUBLE = ADD.replace('joint + parameters.by', 'joint * 2.0')
 YIELD = """
-from linkage_ros.effects.stage import with_deflection
+from linkage_ros.stages.effects.stage import with_deflection
 
 NEEDS = ('pin_forces',)
 AFTER = 'pin_forces'
@@ -321,10 +321,10 @@ def test_the_schema_takes_it_and_still_refuses_what_is_misspelt(tmp_path, packag
 
 def test_a_scene_without_one_does_not_import_what_looks_for_them():
     code = (
-        'import sys\nfrom linkage_ros.pipeline.pipeline import Pipeline\n'
-        'from linkage_ros.scene.load import load_scene\n'
+        'import sys\nfrom linkage_ros.tick.pipeline import Pipeline\n'
+        'from linkage_ros.description.scene_file import load_scene\n'
         "Pipeline(load_scene('config/scenes/worn_press.yaml'))\n"
-        "assert 'linkage_ros.effects.user_effects' not in sys.modules\n"
+        "assert 'linkage_ros.stages.effects.user_effects' not in sys.modules\n"
     )
     subprocess.run([sys.executable, '-c', code], cwd=ROOT, check=True)
 

@@ -13,10 +13,10 @@ from math import floor, tau
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.effects import delay, dropout, rate_limit
-from linkage_ros.effects.delay import DelayParameters, JointDelay
-from linkage_ros.effects.dropout import DropoutParameters, JointDropout
-from linkage_ros.effects.rate_limit import JointRateLimit, RateLimitParameters
+from linkage_ros.stages.effects import delay, dropout, rate_limit
+from linkage_ros.stages.effects.delay import DelayParameters, JointDelay
+from linkage_ros.stages.effects.dropout import DropoutParameters, JointDropout
+from linkage_ros.stages.effects.rate_limit import JointRateLimit, RateLimitParameters
 import pytest
 
 from .sensors import BEGIN, context, likely, MS, published, reading

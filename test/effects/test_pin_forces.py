@@ -12,11 +12,11 @@ from cmath import rect
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.effects import pin_forces
-from linkage_ros.effects.stage import MechanismState, SensorReading
+from linkage_ros.description.scene_file import parse_scene
 from linkage_ros.kinematics.status import Status
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
+from linkage_ros.stages.effects import pin_forces
+from linkage_ros.stages.effects.stage import MechanismState, SensorReading
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 
 from .four_bar_by_hand import FourBar

@@ -13,8 +13,8 @@ from math import floor
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.effects import rate_limit
-from linkage_ros.effects.rate_limit import RateLimitParameters
+from linkage_ros.stages.effects import rate_limit
+from linkage_ros.stages.effects.rate_limit import RateLimitParameters
 import pytest
 
 from .sensors import BEGIN, context, MS, published, reading

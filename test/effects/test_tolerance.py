@@ -14,10 +14,10 @@ from math import erf, hypot, sqrt
 from pathlib import Path
 from random import Random
 
-from linkage_ros.effects import tolerance
-from linkage_ros.effects.tolerance import alter, ToleranceParameters
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.stages.effects import tolerance
+from linkage_ros.stages.effects.tolerance import alter, ToleranceParameters
 import mpmath
 import pytest
 

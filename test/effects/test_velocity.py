@@ -12,10 +12,10 @@ from math import isfinite, remainder, tau
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import Context, CrankState
-from linkage_ros.effects import velocity
-from linkage_ros.effects.stage import MechanismState
 from linkage_ros.kinematics.status import Status
+from linkage_ros.stages.drives.drive import Context, CrankState
+from linkage_ros.stages.effects import velocity
+from linkage_ros.stages.effects.stage import MechanismState
 import pytest
 
 from .sensors import ANGLES, SLIDE

@@ -10,11 +10,11 @@
 
 from math import isnan
 
-from linkage_ros.faults import Fault, FaultChange, Freeze, Injection
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.pipeline.tick_loop import TickLoop
+from linkage_ros.stages.faults import Fault, FaultChange, Freeze, Injection
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick.tick_loop import TickLoop
 import pytest
 
 from ..support.scenes import scene_of

@@ -25,14 +25,14 @@ from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from linkage_ros import __version__
-from linkage_ros.drives.drive import CrankState
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.fmu import stepped_scene
-from linkage_ros.fmu.build import scene_fmu
-from linkage_ros.fmu.stepped_scene import LinkageOutputs
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.scene import Scene
+from linkage_ros.stages.drives.drive import CrankState
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tools.models.fmu import stepped_scene
+from linkage_ros.tools.models.fmu.build import scene_fmu
+from linkage_ros.tools.models.fmu.stepped_scene import LinkageOutputs
 from mpmath import mp, mpf
 import pytest
 
@@ -466,7 +466,7 @@ def test_a_seed_out_of_bounds_fails_every_step(seed, bench):
 
 def test_without_this_package_the_fmu_says_what_it_needs(tmp_path, monkeypatch):
     file = _opened('bare', tmp_path)
-    monkeypatch.setitem(sys.modules, 'linkage_ros.fmu.slave', None)
+    monkeypatch.setitem(sys.modules, 'linkage_ros.tools.models.fmu.slave', None)
     logged: list[tuple[int, str]] = []
     with pytest.raises(Exception, match='instantiate'):
         Bench(file, tmp_path / 'extracted', logged)

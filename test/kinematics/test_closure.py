@@ -12,8 +12,8 @@ from cmath import rect
 from math import cos, pi, remainder, sin
 import random
 
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status

@@ -19,8 +19,8 @@ import sys
 from threading import Barrier, Thread
 
 import linkage_ros as lr
-from linkage_ros.files.linkage_file import read_closure
-from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.description.linkage_file import read_closure
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.solvers.newton import NewtonClosure

@@ -21,9 +21,8 @@ from math import cos, pi, radians, remainder, sin, sqrt, tau
 import random
 from typing import NamedTuple
 
-from linkage_ros.effects.tolerance import alter, ToleranceParameters
+from linkage_ros.description.linkage_file import load
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.drawn_pose import drawn_pose
 from linkage_ros.kinematics.linkage import (
@@ -35,6 +34,7 @@ from linkage_ros.kinematics.linkage import (
     Slider,
 )
 from linkage_ros.kinematics.sides import sides_at
+from linkage_ros.stages.effects.tolerance import alter, ToleranceParameters
 import pytest
 
 from .linkages import four_bar_linkage

@@ -13,10 +13,10 @@ from math import cos, hypot, ldexp, pi, remainder, sin, tau
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.linkage_writer import scene_text_for
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import FileError
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.linkage_text import scene_text_for
-from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep

@@ -18,8 +18,8 @@ import json
 from math import radians, remainder, sqrt, tau
 from pathlib import Path
 
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.topology import Dyad, Iterated

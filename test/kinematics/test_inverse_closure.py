@@ -25,7 +25,7 @@ from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.crank_branches import _monotonic_pieces, CrankBranch
 from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.status import Status
-from linkage_ros.study.enclosure import prove, SingularError
+from linkage_ros.tools.study.enclosure import prove, SingularError
 import numpy as np
 import pytest
 

@@ -21,8 +21,8 @@ from math import copysign, inf, isfinite, nan
 import warnings
 
 import linkage_ros as lr
-from linkage_ros.files.linkage_file import read_closure
-from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.description.linkage_file import read_closure
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.status import Status
 from linkage_ros.solvers.newton import NewtonClosure

@@ -29,12 +29,12 @@ import sys
 
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.faults import FAULTS
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.replay.replay import recorded_scene, replay_ticks
-from linkage_ros.scene.load import load_scene
+from linkage_ros.stages.drives.drive import DRIVES
+from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.stages.faults import FAULTS
 import pytest
 
 from .conftest import LINKAGES

@@ -10,7 +10,7 @@
 
 from campaigns.attacks.graph import attack
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.sample_router import SampleRouter
+from linkage_ros.tick.sample_router import SampleRouter
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from sensor_msgs.msg import JointState

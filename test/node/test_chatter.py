@@ -15,7 +15,7 @@ from linkage_ros.node.diagnostics import (
     DiagnosticsSummary,
     Warnings,
 )
-from linkage_ros.pipeline.tick_loop import TickLoop
+from linkage_ros.tick.tick_loop import TickLoop
 from sensor_msgs.msg import JointState
 
 from .graph import NS, stamp_of, wait_for

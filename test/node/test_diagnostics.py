@@ -8,11 +8,11 @@
 
 """What diagnostics say of a run, by a clock that a test sets, and without a graph."""
 
+from linkage_ros.description.scene_file import parse_scene
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.node.diagnostics import CountsSnapshot, DiagnosticsSummary
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.pipeline.tick_loop import TickLoop
-from linkage_ros.scene.load import parse_scene
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick.tick_loop import TickLoop
 import pytest
 
 from ..support.scenes import FOUR_BAR

@@ -28,8 +28,8 @@ from linkage_ros import load
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.shapes import link_frames
-from linkage_ros.node.live_bridge import LiveBridge
-from linkage_ros.view.live import add_live, live_page
+from linkage_ros.tools.view.live import add_live, live_page
+from linkage_ros.tools.view.live_bridge import LiveBridge
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState

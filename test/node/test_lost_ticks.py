@@ -14,7 +14,7 @@ from types import SimpleNamespace
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node import diagnostics, pacing
 from linkage_ros.node.diagnostics import Warnings
-from linkage_ros.pipeline.tick_loop import Counts, Stall
+from linkage_ros.tick.tick_loop import Counts, Stall
 import pytest
 
 MS = 10**6

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 from linkage_ros.kinematics.linkage import Input
 from linkage_ros.node.diagnostics import CountsSnapshot, DiagnosticsSummary
-from linkage_ros.pipeline.tick_loop import Counts
+from linkage_ros.tick.tick_loop import Counts
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters

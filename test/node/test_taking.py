@@ -16,12 +16,12 @@ from functools import partial
 from itertools import count
 from time import time_ns
 
+from linkage_ros.description.scene_file import parse_scene
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.replay import own_joint_states
-from linkage_ros.scene.load import parse_scene
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick.tick_loop import TickLoop
 import pytest
 
 MS = 1_000_000

@@ -18,11 +18,11 @@ from linkage_ros.bag.reader import Bag, read_bag
 from linkage_ros.bag.recorder import Recorder
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.messages.single_values import text_message
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.pipeline.tick_loop import TickLoop
 from linkage_ros.replay.replay import change_text
-from linkage_ros.scene.load import load_scene
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick.tick_loop import TickLoop
 
 
 class Moment(NamedTuple):

@@ -110,14 +110,18 @@ class Refuse(importlib.abc.MetaPathFinder):
 sys.meta_path.insert(0, Refuse())
 import linkage_ros
 
-names = ['linkage_ros']
-for package in list(pkgutil.iter_modules(linkage_ros.__path__, 'linkage_ros.')):
-    if package.name.split('.')[1] in skipped:
-        continue
-    names.append(package.name)
-    if package.ispkg:
-        path = importlib.import_module(package.name).__path__
-        names += [module.name for module in pkgutil.walk_packages(path, package.name + '.')]
+
+
+def walk(path, prefix):
+    for module in pkgutil.iter_modules(path, prefix):
+        if module.name.removeprefix('linkage_ros.') in skipped:
+            continue
+        yield module.name
+        if module.ispkg:
+            yield from walk(importlib.import_module(module.name).__path__, module.name + '.')
+
+
+names = ['linkage_ros', *walk(linkage_ros.__path__, 'linkage_ros.')]
 for name in names:
     importlib.import_module(name)
 print(linkage_ros.__file__, len(names))

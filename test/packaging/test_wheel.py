@@ -44,8 +44,8 @@ def prefix(tmp_path_factory, copy_checkout, run):
 def test_core_imports_without_extras(prefix, import_core):
     file, _ = import_core(
         prefix / 'bin' / 'python',
-        # The study may need its extra.
-        skip=('node', 'cli', 'study'),
+        # The study may need its extra; the others have it only where a picture is drawn.
+        skip=('node', 'cli', 'tools.study', 'tools.view.live_bridge', 'tools.view.followed_run'),
         refuse=ROS + REPORT,
         cwd=prefix,
     )
@@ -70,12 +70,14 @@ def test_share_is_what_the_checkout_has(prefix, root):
     assert index.is_file()
 
 
-@pytest.mark.parametrize('room', ['pages', 'study', 'report'])
+@pytest.mark.parametrize('room', ['study', 'view', 'view/pages', 'view/report'])
 def test_what_pages_are_made_with_is_there(prefix, root, room):
-    packages = [folder for folder in prefix.rglob(f'linkage_ros/{room}') if folder.is_dir()]
+    packages = [folder for folder in prefix.rglob(f'linkage_ros/tools/{room}') if folder.is_dir()]
     assert len(packages) == 1
     files = [
-        file for file in (root / 'linkage_ros' / room).iterdir() if file.suffix in ('.css', '.js')
+        file
+        for file in (root / 'linkage_ros/tools' / room).iterdir()
+        if file.suffix in ('.css', '.js')
     ]
     assert files
     for file in files:

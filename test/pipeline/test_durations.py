@@ -10,7 +10,7 @@
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.pipeline.tick_loop import DurationHistogram
+from linkage_ros.tick.tick_loop import DurationHistogram
 import numpy as np
 import pytest
 

@@ -17,10 +17,10 @@ from struct import unpack_from
 
 from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
 from linkage_ros.resources import shipped_path
-from linkage_ros.scene.load import load_scene
 from mcap.reader import make_reader
 import numpy as np
 

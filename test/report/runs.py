@@ -15,10 +15,10 @@ from typing import NamedTuple
 from linkage_ros.bag.reader import Bag, BagMessage, read_bag
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.report.blocks import Progress
-from linkage_ros.report.data import event_tracks
-from linkage_ros.report.reading import read_run
-from linkage_ros.report.run import ReportedRun, Window
+from linkage_ros.tools.view.report.blocks import Progress
+from linkage_ros.tools.view.report.data import event_tracks
+from linkage_ros.tools.view.report.reading import read_run
+from linkage_ros.tools.view.report.run import ReportedRun, Window
 import numpy as np
 
 from ..node.ticked import Moment, run

@@ -14,17 +14,17 @@ import json
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.report.blocks import RunClock, times_of
-from linkage_ros.report.curves import Lateness
-from linkage_ros.report.decimation import (
+from linkage_ros.tools.view.report.blocks import RunClock, times_of
+from linkage_ros.tools.view.report.curves import Lateness
+from linkage_ros.tools.view.report.decimation import (
     DecimatedCurves,
     Decimation,
     Histogram,
     interval_capacity,
     most_columns,
 )
-from linkage_ros.report.labels import size_in_json
-from linkage_ros.report.run import EventTrack, Silences
+from linkage_ros.tools.view.report.labels import size_in_json
+from linkage_ros.tools.view.report.run import EventTrack, Silences
 import numpy as np
 import pytest
 

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from linkage_ros.bag.contents import contents_of
 from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.bag.topic import Topic
-from linkage_ros.report import blocks as blocks_module
-from linkage_ros.report.blocks import Blocks, Progress
-from linkage_ros.report.diagnostics_summary import read_statuses
-from linkage_ros.report.joint_states import JointStates, MOST_JOINTS
+from linkage_ros.tools.view.report import blocks as blocks_module
+from linkage_ros.tools.view.report.blocks import Blocks, Progress
+from linkage_ros.tools.view.report.diagnostics_summary import read_statuses
+from linkage_ros.tools.view.report.joint_states import JointStates, MOST_JOINTS
 import numpy as np
 import pytest
 

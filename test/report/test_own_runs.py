@@ -14,10 +14,10 @@ from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.report.blocks import Progress
-from linkage_ros.report.html import ReportHeader, run_html
-from linkage_ros.report.reading import read_run
-from linkage_ros.report.run import Window
+from linkage_ros.tools.view.report.blocks import Progress
+from linkage_ros.tools.view.report.html import ReportHeader, run_html
+from linkage_ros.tools.view.report.reading import read_run
+from linkage_ros.tools.view.report.run import Window
 import numpy as np
 import pytest
 
@@ -155,7 +155,7 @@ HAPPENS = {
 def test_what_happens_is_on_its_lane_at_its_time_and_nothing_on_the_others(
     tmp_path, monkeypatch, name, block
 ):
-    monkeypatch.setattr('linkage_ros.report.blocks._MOST_MESSAGES', block)
+    monkeypatch.setattr('linkage_ros.tools.view.report.blocks._MOST_MESSAGES', block)
     scene, changed, linkage, expected = HAPPENS[name]
     ticks = 16 if linkage == FLAT else 1000
     moments = but(ticks, changed or (lambda _tick, moment: moment))
@@ -189,7 +189,7 @@ def test_blocks_make_no_difference(tmp_path, monkeypatch):
     *whole, arrays = all_of()
     assert {'fault', 'stale', 'silent', 'reset', 'lost', 'health', 'withheld'} == {*whole[0]}
     for size in (1, 50, 333):
-        monkeypatch.setattr('linkage_ros.report.blocks._MOST_MESSAGES', size)
+        monkeypatch.setattr('linkage_ros.tools.view.report.blocks._MOST_MESSAGES', size)
         *other, pieces = all_of()
         assert other == whole
         for one, two in zip(arrays, pieces, strict=True):
@@ -253,7 +253,7 @@ BEGUN_LATER = {
 def test_a_fault_that_was_on_before_the_bag_is_on_from_its_begin(
     tmp_path, monkeypatch, name, block
 ):
-    monkeypatch.setattr('linkage_ros.report.blocks._MOST_MESSAGES', block)
+    monkeypatch.setattr('linkage_ros.tools.view.report.blocks._MOST_MESSAGES', block)
     changed, said, expected = BEGUN_LATER[name]
     bag = recorded(tmp_path, QUIET, but(1000, changed), said=said)
     found = on_lanes(read(from_then_on(bag, tmp_path / 'later', 300.0)))

@@ -20,18 +20,18 @@ from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.bag.run_events import read_run_metadata
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli.report import bag_page
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pages.document import plotting_library
 from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.report.blocks import Blocks, Progress
-from linkage_ros.report.curves import BoundedCurves, MOST_LINKAGES
-from linkage_ros.report.data import page_data
-from linkage_ros.report.decimation import (  # fmt: skip
+from linkage_ros.resources import shipped_path
+from linkage_ros.tools.view.pages.document import plotting_library
+from linkage_ros.tools.view.report.blocks import Blocks, Progress
+from linkage_ros.tools.view.report.curves import BoundedCurves, MOST_LINKAGES
+from linkage_ros.tools.view.report.data import page_data
+from linkage_ros.tools.view.report.decimation import (  # fmt: skip
     DURATION_BYTES,
     FORCE_BYTES,
     FRAME_BYTES,
@@ -43,12 +43,12 @@ from linkage_ros.report.decimation import (  # fmt: skip
     STATE_BYTES,
     TABLE_BYTES,
 )
-from linkage_ros.report.diagnostics_summary import read_statuses
-from linkage_ros.report.html import ReportHeader, run_html, TableOf
-from linkage_ros.report.joint_states import JointStates
-from linkage_ros.report.labels import EVENT_TRACKS
-from linkage_ros.report.reading import SceneRun
-from linkage_ros.report.run import (
+from linkage_ros.tools.view.report.diagnostics_summary import read_statuses
+from linkage_ros.tools.view.report.html import ReportHeader, run_html, TableOf
+from linkage_ros.tools.view.report.joint_states import JointStates
+from linkage_ros.tools.view.report.labels import EVENT_TRACKS
+from linkage_ros.tools.view.report.reading import SceneRun
+from linkage_ros.tools.view.report.run import (
     CurveColumn,
     EventTrack,
     Frames,
@@ -58,7 +58,7 @@ from linkage_ros.report.run import (
     ReportedRun,
     Window,
 )
-from linkage_ros.resources import shipped_path
+from linkage_ros.tools.view.report_command import bag_page
 import numpy as np
 import pytest
 
@@ -105,7 +105,7 @@ def held(thing, seen):
         return sum(held(each, seen) for each in thing.values())
     if isinstance(thing, (list, tuple)):
         return sum(held(each, seen) for each in thing)
-    if type(thing).__module__.startswith('linkage_ros.report'):
+    if type(thing).__module__.startswith('linkage_ros.tools.view.report'):
         return held(getattr(thing, '__dict__', {}), seen)
     return 0
 
@@ -334,7 +334,7 @@ def told(file: Path) -> str:
 @pytest.mark.parametrize('seed', range(3))
 def test_flipped_and_cut_bytes(bag, tmp_path, seed, monkeypatch):
     # The library makes pages long, and nothing else.
-    monkeypatch.setattr('linkage_ros.pages.document.plotting_library', lambda: '')
+    monkeypatch.setattr('linkage_ros.tools.view.pages.document.plotting_library', lambda: '')
     random = np.random.default_rng(seed)
     whole = bag.read_bytes()
     file = tmp_path / 'odd.mcap'
@@ -356,7 +356,7 @@ def test_flipped_and_cut_bytes(bag, tmp_path, seed, monkeypatch):
 
 @pytest.mark.parametrize('seed', range(2))
 def test_what_fits_its_checksums_may_still_be_anything(bag, tmp_path, seed, monkeypatch):
-    monkeypatch.setattr('linkage_ros.pages.document.plotting_library', lambda: '')
+    monkeypatch.setattr('linkage_ros.tools.view.pages.document.plotting_library', lambda: '')
     random = np.random.default_rng(seed)
     whole = read_bag(bag)
     messages = [*whole.messages()]

@@ -10,11 +10,11 @@
 
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.messages.joint_values import MessageValues, PlanarWrenchWriter, WRENCHES
-from linkage_ros.report.curves import LATER_PINS, PinForces
-from linkage_ros.report.data import time_plots, zero_plots
-from linkage_ros.report.html import ReportHeader, run_html
-from linkage_ros.report.run import Window
 from linkage_ros.resources import shipped_path
+from linkage_ros.tools.view.report.curves import LATER_PINS, PinForces
+from linkage_ros.tools.view.report.data import time_plots, zero_plots
+from linkage_ros.tools.view.report.html import ReportHeader, run_html
+from linkage_ros.tools.view.report.run import Window
 import numpy as np
 import pytest
 

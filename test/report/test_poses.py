@@ -14,18 +14,18 @@ from dataclasses import replace
 import json
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.drawing.drawing_data import drawn_in_frames
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.shapes import carried_shapes, Circle, draw_shapes, link_frames
 from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.report.data import link_poses, page_data
 from linkage_ros.resources import shipped_path
-from linkage_ros.scene.load import load_scene
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tools.drawing.drawing_data import drawn_in_frames
+from linkage_ros.tools.view.report.data import link_poses, page_data
 import numpy as np
 import pytest
 

@@ -18,11 +18,11 @@ from xml.etree import ElementTree as ET
 
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
-from linkage_ros.cli.robot_model import model_of
 from linkage_ros.errors import FileError
-from linkage_ros.robot_models.mjcf import mujoco_model
-from linkage_ros.robot_models.part import ModelPart, PartError
-from linkage_ros.robot_models.urdf import urdf_model
+from linkage_ros.tools.models.mjcf import mujoco_model
+from linkage_ros.tools.models.part import ModelPart, PartError
+from linkage_ros.tools.models.robot_model_command import model_of
+from linkage_ros.tools.models.urdf import urdf_model
 import pytest
 import yaml
 

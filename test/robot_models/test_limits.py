@@ -13,15 +13,15 @@ from xml.etree import ElementTree as ET
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from linkage_ros.description.linkage_file import load
 from linkage_ros.errors import FileError
-from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits
-from linkage_ros.robot_models.from_urdf import from_urdf
-from linkage_ros.robot_models.mjcf import mujoco_model
-from linkage_ros.robot_models.part import ModelPart
-from linkage_ros.robot_models.urdf import urdf_model
-from linkage_ros.robot_models.urdf_file import read_urdf
+from linkage_ros.tools.models.from_urdf import from_urdf
+from linkage_ros.tools.models.mjcf import mujoco_model
+from linkage_ros.tools.models.part import ModelPart
+from linkage_ros.tools.models.urdf import urdf_model
+from linkage_ros.tools.models.urdf_file import read_urdf
 import mujoco
 import pytest
 

@@ -15,10 +15,10 @@ from linkage_ros.cli.main import main
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import RevoluteJoint
-from linkage_ros.robot_models.from_urdf import from_urdf
-from linkage_ros.robot_models.onto import urdf_onto
-from linkage_ros.robot_models.part import ModelPart
-from linkage_ros.robot_models.urdf_file import read_urdf
+from linkage_ros.tools.models.from_urdf import from_urdf
+from linkage_ros.tools.models.onto import urdf_onto
+from linkage_ros.tools.models.part import ModelPart
+from linkage_ros.tools.models.urdf_file import read_urdf
 import numpy as np
 import pytest
 import yourdfpy

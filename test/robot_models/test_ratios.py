@@ -15,11 +15,11 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Ratio
 from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs
-from linkage_ros.robot_models.from_urdf import from_urdf, ImportedLinkage
-from linkage_ros.robot_models.mjcf import mujoco_model
-from linkage_ros.robot_models.part import ModelPart
-from linkage_ros.robot_models.urdf import urdf_model
-from linkage_ros.robot_models.urdf_file import read_urdf
+from linkage_ros.tools.models.from_urdf import from_urdf, ImportedLinkage
+from linkage_ros.tools.models.mjcf import mujoco_model
+from linkage_ros.tools.models.part import ModelPart
+from linkage_ros.tools.models.urdf import urdf_model
+from linkage_ros.tools.models.urdf_file import read_urdf
 import numpy as np
 import pytest
 

@@ -10,8 +10,8 @@
 
 import re
 
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import FileError
-from linkage_ros.scene.load import load_scene
 import pytest
 
 from .conftest import CONFIG, FOUR_BAR, is_one_line, SCENE

@@ -15,14 +15,14 @@ from typing import Any
 
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.scene_file import load_scene, parse_scene
+from linkage_ros.description.section import Section
+from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import FileError
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.section import Section
-from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 import yaml
 

@@ -15,10 +15,10 @@ import resource
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.linkage_writer import linkage_text, number_text, write_linkage
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.linkage_text import linkage_text, number_text, write_linkage
-from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.linkage import (
     AssemblyPose,
     Limits,

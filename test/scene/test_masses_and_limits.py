@@ -10,10 +10,10 @@
 
 from math import inf
 
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.linkage_writer import linkage_text
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import FileError
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.linkage_text import linkage_text
-from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.linkage import Limits, Mass
 import pytest
 

@@ -8,13 +8,13 @@
 
 """Errors that a newcomer meets: the whole line, with what to write instead."""
 
+from linkage_ros.description.linkage_file import load
+from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description.schema import scene_schema
+from linkage_ros.description.violations import find_violations
+from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import FileError
-from linkage_ros.files.linkage_file import load
-from linkage_ros.files.yaml_file import read_yaml
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.schema import scene_schema
-from linkage_ros.scene.violations import find_violations
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 
 LINKAGE = """

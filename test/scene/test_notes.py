@@ -9,8 +9,8 @@
 """Values that look like those of another unit get a note, and nothing is refused."""
 
 from linkage_ros.cli.main import main
-from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.notes import scene_notes
+from linkage_ros.description.notes import scene_notes
+from linkage_ros.description.scene_file import load_scene
 import pytest
 
 from .conftest import CONFIG

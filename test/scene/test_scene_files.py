@@ -10,16 +10,16 @@
 
 from math import acos, hypot, pi, tau
 
-from linkage_ros.drives.constant_rate import ConstantRateParameters
-from linkage_ros.drives.topic import TopicParameters
-from linkage_ros.effects.velocity import VelocityParameters
+from linkage_ros.description.scene import RecordParameters, StorageParameters
+from linkage_ros.description.scene_file import load_scene, parse_scene
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene, parse_scene
-from linkage_ros.scene.scene import RecordParameters, StorageParameters
+from linkage_ros.stages.drives.constant_rate import ConstantRateParameters
+from linkage_ros.stages.drives.topic import TopicParameters
+from linkage_ros.stages.effects.velocity import VelocityParameters
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 
 from .conftest import CONFIG, FOUR_BAR, is_one_line, SCENE

@@ -20,12 +20,8 @@ from typing import Any
 
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
-from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import FileError
-from linkage_ros.faults import FAULTS
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.parameters import (
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.parameters import (
     choice,
     ChoiceOf,
     declared_fields,
@@ -56,12 +52,16 @@ from linkage_ros.files.parameters import (
     TextOf,
     whole_number,
 )
-from linkage_ros.files.section import Section
-from linkage_ros.files.units import Units
-from linkage_ros.files.yaml_file import parse_yaml
-from linkage_ros.scene.load import load_scene, parse_scene
-from linkage_ros.scene.schema import as_text, linkage_schema, parameter_types, scene_schema
-from linkage_ros.scene.violations import import_jsonschema
+from linkage_ros.description.scene_file import load_scene, parse_scene
+from linkage_ros.description.schema import as_text, linkage_schema, parameter_types, scene_schema
+from linkage_ros.description.section import Section
+from linkage_ros.description.units import Units
+from linkage_ros.description.violations import import_jsonschema
+from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.errors import FileError
+from linkage_ros.stages.drives.drive import DRIVES
+from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.stages.faults import FAULTS
 import pytest
 import yaml
 

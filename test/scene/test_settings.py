@@ -8,8 +8,8 @@
 
 """Keys with dots in their names, as those of points, set beside a scene's file."""
 
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import FileError
-from linkage_ros.scene.load import load_scene
 import pytest
 
 from ..support.scenes import four_bar_text

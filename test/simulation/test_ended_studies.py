@@ -20,7 +20,7 @@ import time
 
 from linkage_ros.cli.main import main
 from linkage_ros.errors import LinkageError
-from linkage_ros.simulation import study as study_module
+from linkage_ros.replay import study as study_module
 import pytest
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'

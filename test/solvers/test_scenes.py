@@ -13,20 +13,20 @@ from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.run_events import CHOSEN, read_run_metadata
+from linkage_ros.description.scene_file import load_scene, parse_scene
+from linkage_ros.description.schema import scene_schema
+from linkage_ros.description.violations import find_violations
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import FileError
-from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import replay_ticks
-from linkage_ros.scene.load import load_scene, parse_scene
-from linkage_ros.scene.schema import scene_schema
-from linkage_ros.scene.violations import find_violations
 from linkage_ros.solvers import choose as choosing
 from linkage_ros.solvers.choose import choose_solver, only_closed_form
 from linkage_ros.solvers.newton import NewtonClosure
 from linkage_ros.solvers.solver import Solver
 from linkage_ros.solvers.table import TableClosure
+from linkage_ros.tick.pipeline import Pipeline
 import pytest
 
 from .linkages import apart, CRANK_ROCKER, crank_rocker, worst_error

@@ -19,7 +19,7 @@ from math import acos, copysign, inf, sin, sqrt
 
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues, POSITION, RATE
-from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.tick.pipeline import Pipeline
 from scipy.integrate import solve_ivp
 
 BEGIN = 10**9

@@ -15,9 +15,8 @@ from math import inf, isclose
 from random import Random
 import re
 
-from linkage_ros.measuring import Spread
-from linkage_ros.study.budget import Budget, JointError, Price, Setting
-from linkage_ros.study.budget_text import (
+from linkage_ros.tools.study.budget import Budget, JointError, Price, Setting
+from linkage_ros.tools.study.budget_text import (
     budget_json,
     change_text,
     closing_lines,
@@ -34,6 +33,7 @@ from linkage_ros.study.budget_text import (
     time_text,
     total_error,
 )
+from linkage_ros.tools.study.measuring import Spread
 import pytest
 
 from .random_budgets import random_budgets

@@ -13,11 +13,11 @@ from math import remainder, tau
 import os
 import random
 
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.scene.load import load_scene
-from linkage_ros.study.age import errors_in_use, measure_age_of_command
-from linkage_ros.study.drive_step import measure_drive_step
-from linkage_ros.study.scene_motion import motions_of
+from linkage_ros.tools.study.age import errors_in_use, measure_age_of_command
+from linkage_ros.tools.study.drive_step import measure_drive_step
+from linkage_ros.tools.study.scene_motion import motions_of
 import numpy as np
 import pytest
 

@@ -12,22 +12,22 @@ from math import cos, inf, sin
 
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.scene.load import load_scene
-from linkage_ros.study.age import (
+from linkage_ros.tools.study.age import (
     errors_in_use,
     IN_USE,
     measure_age_in_use,
     measure_age_of_command,
     OF_COMMAND,
 )
-from linkage_ros.study.drive_step import measure_drive_step
-from linkage_ros.study.drive_step import NAME as STEP
-from linkage_ros.study.measure import ERRORS, measure_budget
-from linkage_ros.study.scene_motion import motions_of
-from linkage_ros.study.solving import compare_hard_cases, measure_solving
+from linkage_ros.tools.study.drive_step import measure_drive_step
+from linkage_ros.tools.study.drive_step import NAME as STEP
+from linkage_ros.tools.study.measure import ERRORS, measure_budget
+from linkage_ros.tools.study.scene_motion import motions_of
+from linkage_ros.tools.study.solving import compare_hard_cases, measure_solving
 import pytest
 
 from ..support.scenes import PENDULUM

@@ -11,14 +11,14 @@
 from itertools import pairwise, product
 import random
 
-from linkage_ros.measuring import Spread
-from linkage_ros.scene.load import load_scene
-from linkage_ros.study.age import CARRY, IN_USE, measure_age_in_use
-from linkage_ros.study.budget import Budget, JointError, Knob, Price, Setting
-from linkage_ros.study.drive_step import measure_drive_step
-from linkage_ros.study.need import answer_need, answers_of
-from linkage_ros.study.prices import change_scene
-from linkage_ros.study.scene_motion import motions_of
+from linkage_ros.description.scene_file import load_scene
+from linkage_ros.tools.study.age import CARRY, IN_USE, measure_age_in_use
+from linkage_ros.tools.study.budget import Budget, JointError, Knob, Price, Setting
+from linkage_ros.tools.study.drive_step import measure_drive_step
+from linkage_ros.tools.study.measuring import Spread
+from linkage_ros.tools.study.need import answer_need, answers_of
+from linkage_ros.tools.study.prices import change_scene
+from linkage_ros.tools.study.scene_motion import motions_of
 import pytest
 
 RATE, HORIZON = 1000.0, 1.0

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.description.scene_file import load_scene
 from linkage_ros.errors import RecordingError
-from linkage_ros.scene.load import load_scene
-from linkage_ros.study.recording import measure_recording
+from linkage_ros.tools.study.recording import measure_recording
 import pytest
 
 SCENE = load_scene('demo', ['record={directory: runs, flush_period: 0.1}'])
@@ -32,7 +32,7 @@ def test_a_crash_loses_about_the_flush_period(tmp_path: Path) -> None:
 
 
 def test_other_flush_periods_stand_beside_it(tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr('linkage_ros.study.recording._ROUNDS', 1)
+    monkeypatch.setattr('linkage_ros.tools.study.recording._ROUNDS', 1)
     shares: list[float] = []
     own, *others = measure_recording(SCENE, tmp_path, progress=shares.append)
     # A fifth of it would be less than a scene may ask for.

@@ -35,8 +35,8 @@ import time
 
 import linkage_ros
 from linkage_ros.cli.main import main
+from linkage_ros.description.violations import import_jsonschema
 from linkage_ros.processes import private_domain
-from linkage_ros.scene.violations import import_jsonschema
 
 # What commands import only where they need it.
 LIBRARIES = (

@@ -10,13 +10,13 @@
 
 from pathlib import Path
 
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.scene_file import parse_scene
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.scene import Scene
+from linkage_ros.tick.pipeline import Pipeline
 
 ROOT = Path(__file__).parents[2]
 LINKAGES = ROOT / 'config' / 'linkages'

@@ -19,8 +19,8 @@ from math import acos, asin, cos, degrees, pi, radians, sin, tau
 import random
 from typing import NamedTuple
 
-from linkage_ros.synthesis.defects import assess
-from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
+from linkage_ros.tools.design.defects import assess
+from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
 import numpy as np
 import pytest
 

@@ -20,8 +20,8 @@ from flint import arb, arb_mat, ctx
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.pairs.free_zeros import five_pairs, four_pairs, FreeZeros
-from linkage_ros.synthesis.proof import prove
+from linkage_ros.tools.design.pairs.free_zeros import five_pairs, four_pairs, FreeZeros
+from linkage_ros.tools.design.proof import prove
 from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest

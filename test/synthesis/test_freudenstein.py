@@ -20,15 +20,15 @@ from campaigns.synthesis import FAMILIES, parts, run
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.double_double import sine_cosine
-from linkage_ros.synthesis.pairs.freudenstein import (
+from linkage_ros.tools.design.double_double import sine_cosine
+from linkage_ros.tools.design.pairs.freudenstein import (
     exact_four_bar,
     fit_equation,
     solve_links,
     three_pairs,
     TRUSTED,
 )
-from linkage_ros.synthesis.proof import prove
+from linkage_ros.tools.design.proof import prove
 from mpmath import cos, lu_solve, matrix, mp, mpf, sin, sqrt
 import numpy as np
 import pytest

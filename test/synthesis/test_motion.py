@@ -13,7 +13,7 @@ from math import inf, nan, pi, radians, tau
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
-from linkage_ros.synthesis.motion import (
+from linkage_ros.tools.design.motion import (
     fixed_pivots,
     from_fixed_pivots,
     from_moving_pivots,
@@ -21,7 +21,7 @@ from linkage_ros.synthesis.motion import (
     Pose,
     TRUSTED,
 )
-from linkage_ros.synthesis.proof import prove
+from linkage_ros.tools.design.proof import prove
 from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.design import Design
-from linkage_ros.synthesis.path.curves import PathTask
-from linkage_ros.synthesis.path.generate import generate_path, PathResult
+from linkage_ros.tools.design.design import Design
+from linkage_ros.tools.design.path.curves import PathTask
+from linkage_ros.tools.design.path.generate import generate_path, PathResult
 import numpy as np
 import pytest
 from scipy.optimize import least_squares

@@ -15,7 +15,7 @@ from typing import Any
 
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from linkage_ros.synthesis.path.curves import (
+from linkage_ros.tools.design.path.curves import (
     Aim,
     COLUMNS,
     curve_distances,
@@ -25,8 +25,8 @@ from linkage_ros.synthesis.path.curves import (
     theta_at,
     transmission_cotangents,
 )
-from linkage_ros.synthesis.path.generate import are_allowed, improve
-from linkage_ros.synthesis.path.search import problem_of
+from linkage_ros.tools.design.path.generate import are_allowed, improve
+from linkage_ros.tools.design.path.search import problem_of
 import numpy as np
 import pytest
 

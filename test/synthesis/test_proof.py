@@ -15,15 +15,15 @@ import random
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.status import Status
-from linkage_ros.synthesis.defects import (
+from linkage_ros.tools.design.defects import (
     assess,
     Needs,
     needs_penalties,
     needs_penalty,
     unmet_needs,
 )
-from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
-from linkage_ros.synthesis.proof import assemble, prove, prove_both_sides
+from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
+from linkage_ros.tools.design.proof import assemble, prove, prove_both_sides
 from mpmath import mp, mpf
 import numpy as np
 import pytest

@@ -16,22 +16,22 @@ from math import acos, isnan, pi, radians, remainder, sqrt, tau
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.design import Assembly, Design, DesignRequest, FourBar
-from linkage_ros.synthesis.function.task import (
+from linkage_ros.tools.design.design import Assembly, Design, DesignRequest, FourBar
+from linkage_ros.tools.design.function.task import (
     angle_pairs,
     chebyshev_points,
     FunctionTask,
     structural_error,
     wanted_rocker,
 )
-from linkage_ros.synthesis.pairs.angle_fit import (
+from linkage_ros.tools.design.pairs.angle_fit import (
     fit_angles,
     nearest_four_bar,
     rocker_errors,
     root_mean_square,
 )
-from linkage_ros.synthesis.pairs.freudenstein import exact_four_bar, fit_equation
-from linkage_ros.synthesis.proof import closure_of
+from linkage_ros.tools.design.pairs.freudenstein import exact_four_bar, fit_equation
+from linkage_ros.tools.design.proof import closure_of
 from mpmath import mp
 import numpy as np
 import pytest

@@ -13,11 +13,11 @@ from math import degrees, hypot, inf, isfinite, pi, radians, remainder
 import pickle
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.defects import assess, Assessment, Needs, needs_penalty, unmet_needs
-from linkage_ros.synthesis.design import Design, DesignRequest, FourBar
-from linkage_ros.synthesis.pairs.freudenstein import exact_four_bar
-from linkage_ros.synthesis.pairs.zero_search import search_zeros, ZeroProblem
-from linkage_ros.synthesis.proof import assemble
+from linkage_ros.tools.design.defects import assess, Assessment, Needs, needs_penalty, unmet_needs
+from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
+from linkage_ros.tools.design.pairs.freudenstein import exact_four_bar
+from linkage_ros.tools.design.pairs.zero_search import search_zeros, ZeroProblem
+from linkage_ros.tools.design.proof import assemble
 import numpy as np
 import pytest
 

@@ -23,9 +23,9 @@ import linkage_ros as lr
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.resources import shipped_path
-from linkage_ros.view import exports
-from linkage_ros.view.exports import export_linkage, KINDS
-from linkage_ros.view.requests import read_request, RequestHandler
+from linkage_ros.tools.view import exports
+from linkage_ros.tools.view.exports import export_linkage, KINDS
+from linkage_ros.tools.view.requests import read_request, RequestHandler
 from PIL import Image
 import pytest
 

@@ -18,8 +18,8 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.shapes import link_frames
 from linkage_ros.resources import shipped_path
-from linkage_ros.view import requests
-from linkage_ros.view.requests import LARGEST, read_request, RequestError, RequestHandler
+from linkage_ros.tools.view import requests
+from linkage_ros.tools.view.requests import LARGEST, read_request, RequestError, RequestHandler
 import pytest
 
 from .test_server import FOUR_BAR, LONGER

@@ -31,13 +31,13 @@ from urllib.parse import urlsplit
 from urllib.request import urlopen
 
 import aiohttp
-from linkage_ros.cli.report import bag_page
 from linkage_ros.errors import LinkageError
-from linkage_ros.report.run import Window
-from linkage_ros.view.conversation import Conversation, UserFile
-from linkage_ros.view.requests import LARGEST
-from linkage_ros.view.server import MOST_PAGES
-from linkage_ros.view.worker import Worker
+from linkage_ros.tools.view.conversation import Conversation, UserFile
+from linkage_ros.tools.view.report.run import Window
+from linkage_ros.tools.view.report_command import bag_page
+from linkage_ros.tools.view.requests import LARGEST
+from linkage_ros.tools.view.server import MOST_PAGES
+from linkage_ros.tools.view.worker import Worker
 import pytest
 
 from .served import asked, opened, Page, Served, served

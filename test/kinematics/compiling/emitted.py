@@ -21,9 +21,9 @@ from tempfile import mkdtemp
 from typing import NamedTuple
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.c import C
-from linkage_ros.kinematics.compiling.source import FUNCTIONS, STATUSES, Subject, write_source
 from linkage_ros.kinematics.compiling.trace import motion_at
+from linkage_ros.tools.models.source_code.c import C
+from linkage_ros.tools.models.source_code.source import FUNCTIONS, STATUSES, Subject, write_source
 import pytest
 
 COMPILERS = {'C99': ('cc', '-x', 'c', '-std=c99'), 'C++': ('c++', '-x', 'c++', '-std=c++11')}

@@ -17,11 +17,11 @@ import re
 from typing import Any
 
 from campaigns.topologies.families import FAMILIES
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.arithmetic import sin, sqrt
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled

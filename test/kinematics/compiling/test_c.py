@@ -16,9 +16,9 @@ import random
 from campaigns.topologies.families import FAMILIES
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.c import C
-from linkage_ros.kinematics.compiling.source import write_source
 from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
+from linkage_ros.tools.models.source_code.c import C
+from linkage_ros.tools.models.source_code.source import write_source
 import pytest
 
 from .emitted import (

@@ -10,8 +10,8 @@
 
 from pathlib import Path
 
-from linkage_ros.files.linkage_file import read_linkage
-from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 
 FOLDER = Path(__file__).parent

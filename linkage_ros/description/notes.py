@@ -1,0 +1,111 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Notes on a scene: values that are allowed, but look like those of another unit.
+
+A note has the form of an error; whoever reads the scene shows it and goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from math import dist, hypot, isfinite, tau
+from typing import TYPE_CHECKING
+
+from linkage_ros.description.units import Units
+from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.kinematics.linkage import Linkage, links_by_point, RevoluteJoint
+
+if TYPE_CHECKING:
+    from linkage_ros.description.scene import Scene, SceneLinkage
+
+_OTHER_UNIT = 300.0
+"""Ratio of two links above which a unit was probably mistaken; mm for m make it 1000."""
+
+_LONG = 3.0
+"""Length above which metres were probably mistaken for millimetres, in [m]."""
+
+_WEAK = 0.1
+"""Gravity below which its unit was probably mistaken, in [m/s²]; 9.81 mm/s² is 0.01."""
+
+
+def scene_notes(scene: Scene) -> Iterator[FileError]:
+    """Yield the notes on a scene and its linkages."""
+    for scene_linkage in scene.linkages:
+        content = scene_linkage.linkage_content
+        notes = linkage_notes(scene_linkage.linkage, content.units, scene.rate)
+        yield from map(content.locate_error, notes)
+        yield from map(scene_linkage.content.locate_error, _linkage_notes(scene_linkage))
+
+
+def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator[DefinitionError]:
+    """Yield the notes on a linkage of a file in some units, which ticks at a rate in [Hz]."""
+    turning = {given.joint: not given.slider for given in linkage.inputs} | {
+        name: isinstance(joint, RevoluteJoint) for name, joint in linkage.joints.items()
+    }
+    for name, limits in linkage.limits.items():
+        ends = [abs(end) for end in (limits.low, limits.high) if isfinite(end)]
+        if units.angle == 'radians' and turning[name] and max(ends, default=0.0) > tau:
+            driven = name in (given.joint for given in linkage.inputs)
+            yield DefinitionError(
+                'input.limits' if driven else f'joints.{name}.limits',
+                f'{max(ends):g} rad is more than a turn',
+                'if it is in degrees, write angles: degrees',
+            )
+    lengths = _link_lengths(linkage)
+    if not lengths:
+        return
+    shortest, longest = (of(lengths, key=lengths.__getitem__) for of in (min, max))
+    if lengths[longest] > _OTHER_UNIT * lengths[shortest]:
+        ratio = float(f'{min(lengths[longest] / lengths[shortest], 1e300):.3g}')
+        yield DefinitionError(
+            f'links.{longest}',
+            f'is {ratio:g} times as long as {shortest!r}',
+            'write all lengths in metres, or all in millimetres with units: mm',
+        )
+    elif rate and units.length == 'm' and lengths[longest] > _LONG:
+        yield DefinitionError(
+            f'links.{longest}',
+            f'is {lengths[longest]:g} m long',
+            'if it is in millimetres, write units: mm',
+        )
+
+
+def _link_lengths(linkage: Linkage) -> dict[str, float]:
+    """Return for each link the greatest distance between its pins, in [m]."""
+    pins = {name for name, links in links_by_point(linkage.links).items() if len(links) > 1}
+    lengths = {}
+    for link, points in linkage.links.items():
+        joined = [place for name, place in points.items() if name in pins]
+        if len(joined) > 1:
+            lengths[link] = max(dist(one, other) for one, other in combinations(joined, 2))
+    return lengths
+
+
+def _linkage_notes(scene_linkage: SceneLinkage) -> Iterator[DefinitionError]:
+    drive, parameters = scene_linkage.drive
+    if scene_linkage.content.units.angle == 'radians' and hasattr(parameters, 'amplitude'):
+        for given in scene_linkage.linkage.inputs:
+            own = given.joint in parameters.inputs
+            amplitude = (parameters.inputs[given.joint] if own else parameters).amplitude
+            if not given.slider and amplitude > tau:
+                key = f'drive.{drive}{f".inputs.{given.joint}" if own else ""}.amplitude'
+                yield DefinitionError(
+                    key,
+                    f'{amplitude:g} rad is more than a turn',
+                    'if it is in degrees, write angles: degrees',
+                )
+    if scene_linkage.loads is not None and 0.0 < hypot(*scene_linkage.loads.gravity) < _WEAK:
+        x, y = scene_linkage.loads.gravity
+        yield DefinitionError(
+            'loads.gravity',
+            f'[{x:g}, {y:g}] m/s² is hardly any',
+            'write it in the unit of the file: 9.81 [m/s²] is 9810 [mm/s²]',
+        )

@@ -1,0 +1,584 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Declare the parameters of drives, effects and faults once, for reader, table and schema.
+
+Parameters are a frozen dataclass whose fields are made by the functions below. Each field has a
+kind, which reads the value from a section of a file, describes it in tables, and gives its JSON
+Schema.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, Field, field, fields, is_dataclass, MISSING, replace
+from math import inf
+from os.path import join
+from typing import Any, ClassVar
+
+from linkage_ros.description.section import Section
+from linkage_ros.description.units import most_in_one, unit_of
+from linkage_ros.errors import did_you_mean, list_names, quote
+
+_KEY = 'parameter'
+
+Schema = dict[str, Any]
+
+Parts = Mapping[str, Sequence[str]]
+"""The existing names for each kind of part; of joints and pins, 'slide' and 'slider' slide."""
+
+KINDS = {
+    'joint': 'published joint',
+    'input': 'driven joint',
+    'any_joint': 'driven or published joint',
+    'pin': 'pin or slider',
+    'link': 'moving link',
+    'body': 'link or the ground',
+    'point': 'point: LINK.POINT',
+}
+"""Kinds of parts that a parameter can name, and their terms in messages."""
+
+_SLIDING = {'joint': 'slide', 'input': 'slide', 'any_joint': 'slide', 'pin': 'slider'}
+"""Kinds whose parts turn or slide, and the names of those that slide."""
+
+CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
+"""Pattern of a printable character."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind(ABC):
+    """Kind of a parameter, with its meaning as text."""
+
+    meaning: str
+    unit: ClassVar[str] = ''
+
+    @abstractmethod
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
+        """Read the value of a key; arguments and errors as in `read_parameters`."""
+
+    @abstractmethod
+    def json_schema(self) -> Schema:
+        """Return the JSON Schema of the value."""
+
+    @abstractmethod
+    def values_text(self) -> str:
+        """Return the allowed values, for a table."""
+
+    def default_text(self, default: Any) -> str:
+        """Return a default, for a table."""
+        return str(default) or "''"
+
+    def table_rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
+        """Yield rows of a table: key, unit, default, values, meaning."""
+        yield key, self.unit, default, self.values_text(), self.meaning
+
+    def _described_schema(self, **schema: Any) -> Schema:
+        return {'description': self.meaning + (f' [{self.unit}]' if self.unit else ''), **schema}
+
+
+@dataclass(frozen=True, slots=True)
+class Number(Kind):
+    """A finite number: least ≤ value ≤ most, and value > above; with ``whole`` an integer."""
+
+    unit: str = ''  # type: ignore[misc]  # a constant without a unit
+    least: float = -inf
+    most: float = inf
+    above: float = -inf
+    whole: bool = False
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> float | int:
+        if self.whole:
+            return content.whole_number(key, least=self.least, most=self.most, unit=self.unit)
+        bounds = {'least': self.least, 'most': self.most, 'above': self.above}
+        return content.number(key, **bounds, unit=self.unit)
+
+    def json_schema(self) -> Schema:
+        kind = 'integer' if self.whole else 'number'
+        return self._described_schema(
+            type=kind, **_bounds_schema(self.least, self.most, self.above, self.unit)
+        )
+
+    def values_text(self) -> str:
+        least, most, above = map(number_text, (self.least, self.most, self.above))
+        if self.above > -inf:
+            bounds = f'more than {above}' + (f', to {most}' if self.most < inf else '')
+        elif self.least > -inf:
+            bounds = f'{least} to {most}' if self.most < inf else f'{least} or more'
+        else:
+            bounds = f'at most {most}' if self.most < inf else 'any number'
+        return f'whole: {bounds}' if self.whole else bounds
+
+    def default_text(self, default: Any) -> str:
+        return number_text(default)
+
+
+@dataclass(frozen=True, slots=True)
+class NumberList(Kind):
+    """A list of finite numbers, each within ±most."""
+
+    unit: str = ''  # type: ignore[misc]
+    most: float = inf
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, ...]:
+        return tuple(content.numbers(key, most=self.most, unit=self.unit))
+
+    def json_schema(self) -> Schema:
+        items = {'type': 'number', **_bounds_schema(-self.most, self.most, unit=self.unit)}
+        return self._described_schema(type='array', items=items)
+
+    def values_text(self) -> str:
+        return f'a list of numbers{_each_at_most(self.most)}'
+
+
+@dataclass(frozen=True, slots=True)
+class Point(NumberList):
+    """Two finite numbers [x, y], each within ±most."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, float]:
+        return content.point(key, most=self.most, unit=self.unit)
+
+    def json_schema(self) -> Schema:
+        return {**NumberList.json_schema(self), 'minItems': 2, 'maxItems': 2}
+
+    def values_text(self) -> str:
+        return f'[x, y]{_each_at_most(self.most)}'
+
+
+@dataclass(frozen=True, slots=True)
+class RowsOf(Kind):
+    """A list of rows of finite numbers, one per column, each within ±most."""
+
+    columns: tuple[str, ...]  # The meaning of each column, with its unit
+    most: float = inf
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
+        return content.rows(key, self.columns, most=self.most)
+
+    def json_schema(self) -> Schema:
+        row, count = f'[{", ".join(self.columns)}]', len(self.columns)
+        bounds = _bounds_schema(
+            -self.most, self.most, unit=' or '.join(map(unit_of, self.columns))
+        )
+        items = {
+            **NumberList(row).json_schema(),
+            'items': {'type': 'number', **bounds},
+            'minItems': count,
+            'maxItems': count,
+        }
+        description = f'{self.meaning}: rows of {row}'
+        return {'description': description, 'type': 'array', 'minItems': 1, 'items': items}
+
+    def values_text(self) -> str:
+        return f'rows of [{", ".join(self.columns)}]{_each_at_most(self.most)}'
+
+
+@dataclass(frozen=True, slots=True)
+class Flag(Kind):
+    """True or false."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> bool:
+        return content.flag(key)
+
+    def json_schema(self) -> Schema:
+        return self._described_schema(type='boolean')
+
+    def values_text(self) -> str:
+        return 'true or false'
+
+    def default_text(self, default: Any) -> str:
+        return 'true' if default else 'false'
+
+
+@dataclass(frozen=True, slots=True)
+class ChoiceOf(Kind):
+    """One of a set of words."""
+
+    words: tuple[str, ...]
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
+        return content.choice(key, self.words)
+
+    def json_schema(self) -> Schema:
+        return self._described_schema(enum=list(self.words))
+
+    def values_text(self) -> str:
+        return ' or '.join(self.words)
+
+
+@dataclass(frozen=True, slots=True)
+class TextOf(Kind):
+    """A string; without a pattern, a printable one that is not empty."""
+
+    pattern: str = f'^{CHARACTER}+$'
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
+        return content.text(key)
+
+    def json_schema(self) -> Schema:
+        return self._described_schema(type='string', pattern=self.pattern)
+
+    def values_text(self) -> str:
+        return 'a text'
+
+
+@dataclass(frozen=True, slots=True)
+class File(TextOf):
+    """A path, relative to the folder of the scene file."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
+        return join(folder, content.text(key))  # noqa: PTH118 (Path's raises on a NUL)
+
+    def values_text(self) -> str:
+        return 'a file'
+
+
+@dataclass(frozen=True, slots=True)
+class Name(Kind):
+    """The name of a part of the linkage: one of ``kind``, a key of `KINDS`."""
+
+    kind: str
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
+        return self._known_name(content, key, content.text(key), parts)
+
+    def json_schema(self) -> Schema:
+        # It cannot know the existing names.
+        return TextOf(f'{self.meaning} (name of a {KINDS[self.kind]})').json_schema()
+
+    def values_text(self) -> str:
+        return f'a {KINDS[self.kind]}'
+
+    def _known_name(self, content: Section, key: str, name: str, parts: Parts) -> str:
+        """Return the name if such a part exists."""
+        names = parts[self.kind]
+        if name in names:
+            return name
+        raise content.error(
+            key,
+            f'there is no {self.kind.removeprefix("any_")} {quote(name)}',
+            did_you_mean(name, names, f'there are: {list_names(names) or "none"}'),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class NamesOf(Name):
+    """A list of names of parts of the linkage."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
+        return tuple(self._known_name(content, key, name, parts) for name in content.texts(key))
+
+    def json_schema(self) -> Schema:
+        description = f'{self.meaning} (names, each of a {KINDS[self.kind]})'
+        return {
+            'description': description,
+            'type': 'array',
+            'items': TextOf('a name').json_schema(),
+        }
+
+    def values_text(self) -> str:
+        return f'names, each of a {KINDS[self.kind]}'
+
+    def default_text(self, default: Any) -> str:
+        return ', '.join(default) or 'all'
+
+
+@dataclass(frozen=True, slots=True)
+class Each(Name):
+    """A value of a `Kind`, or a section of parameters, for each named part of the linkage."""
+
+    of: Any
+
+    @property
+    def _value_kind(self) -> Kind:
+        return ParameterGroup('', self.of) if isinstance(self.of, type) else self.of
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
+        inner, values = content.section(key), {}
+        for name in inner:
+            part = self._known_name(inner, name, name, parts)
+            if sliding := _SLIDING.get(self.kind):
+                inner.units = replace(inner.units, slides=name in parts.get(sliding, ()))
+            values[part] = self._value_kind.read(inner, name, parts, folder)
+        return values
+
+    def json_schema(self) -> Schema:
+        of = parameters_schema(self.of) if isinstance(self.of, type) else self.of.json_schema()
+        return named_mapping(f'{self.meaning} (by the name of a {KINDS[self.kind]})', of)
+
+    @property
+    def part_keys(self) -> tuple[str, ...]:
+        """Return the keys of each part; none if it has a single value."""
+        return tuple(e.name for e in fields(self.of)) if isinstance(self.of, type) else ()
+
+    def values_text(self) -> str:
+        return f'for each {KINDS[self.kind]}'
+
+    def default_text(self, default: Any) -> str:
+        return ''  # its own rows have the defaults
+
+    def table_rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
+        """Yield one row, and the rows of the values."""
+        yield from Kind.table_rows(self, key, default)
+        one = 'LINK.POINT' if self.kind == 'point' else self.kind.removeprefix('any_').upper()
+        part = f'{key}.{one}'
+        rows = self._value_kind.table_rows(part, '')
+        if isinstance(self.of, type):
+            next(rows)
+        yield from rows
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterGroup(Kind):
+    """A section of parameters within a section."""
+
+    of: Any
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
+        return read_parameters(content.section(key), self.of, parts, folder)
+
+    def json_schema(self) -> Schema:
+        return {**parameters_schema(self.of), 'description': self.meaning}
+
+    def values_text(self) -> str:
+        return 'a mapping'
+
+    def default_text(self, default: Any) -> str:
+        return ''  # its own rows have the defaults
+
+    def table_rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
+        """Yield one row, and the rows of the parameters."""
+        yield from Kind.table_rows(self, key, default)
+        yield from parameter_rows(self.of, f'{key}.')
+
+
+def number(
+    meaning: str,
+    default: Any = MISSING,
+    *,
+    unit: str = '',
+    least: float = -inf,
+    most: float = inf,
+    above: float = -inf,
+) -> Any:
+    """Declare a number; it is required if it has no default."""
+    return _declare(Number(meaning, unit, least, most, above), default)
+
+
+def whole_number(
+    meaning: str, default: Any = MISSING, *, unit: str = '', least: float, most: float
+) -> Any:
+    """Declare a whole number."""
+    return _declare(Number(meaning, unit, least, most, whole=True), default)
+
+
+def number_list(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
+    """Declare a list of numbers, read as a tuple."""
+    return _declare(NumberList(meaning, unit, most), default)
+
+
+def number_rows(
+    meaning: str, columns: Sequence[str], *, default: Any = MISSING, most: float = inf
+) -> Any:
+    """Declare a list of rows of numbers, read as a tuple of tuples."""
+    return _declare(RowsOf(meaning, tuple(columns), most), default)
+
+
+def flag(meaning: str, default: Any = MISSING) -> Any:
+    """Declare a boolean."""
+    return _declare(Flag(meaning), default)
+
+
+def choice(meaning: str, words: Sequence[str], default: Any = MISSING) -> Any:
+    """Declare one of a set of words."""
+    return _declare(ChoiceOf(meaning, tuple(words)), default)
+
+
+def text(meaning: str, default: Any = MISSING) -> Any:
+    """Declare a string."""
+    return _declare(TextOf(meaning), default)
+
+
+def file(meaning: str) -> Any:
+    """Declare the path of a file, read as a string with the scene's folder prepended."""
+    return _declare(File(meaning), MISSING)
+
+
+def point(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
+    """Declare a point or a vector, read as a tuple of two."""
+    return _declare(Point(meaning, unit, most), default)
+
+
+def part_name(meaning: str, kind: str, default: Any = MISSING) -> Any:
+    """Declare the name of a part of the linkage."""
+    return _declare(Name(meaning, kind), default)
+
+
+def part_names(meaning: str, kind: str, default: Any = ()) -> Any:
+    """Declare names of parts, read as a tuple; the default () stands for all parts."""
+    return _declare(NamesOf(meaning, kind), default)
+
+
+def each_part(meaning: str, kind: str, of: Any, *, required: bool = False) -> Any:
+    """Declare values for parts by name, read as a mapping; empty if not required."""
+    declared = Each(meaning, kind, of)
+    if required:
+        return _declare(declared, MISSING)
+    return field(default_factory=dict, metadata={_KEY: declared})
+
+
+def own_parameters(meaning: str, of: Any) -> Any:
+    """Declare parameters that joints have of their own, read as a mapping; if absent, None."""
+    return _declare(Each(meaning, 'joint', of), None)
+
+
+def parameter_section(meaning: str, of: Any) -> Any:
+    """Declare a section of parameters; if absent, all have their defaults."""
+    return field(default_factory=of, metadata={_KEY: ParameterGroup(meaning, of)})
+
+
+def optional_section(meaning: str, of: Any) -> Any:
+    """Declare a section of parameters; if absent, None."""
+    return _declare(ParameterGroup(meaning, of), None)
+
+
+def _declare(kind: Kind, default: Any) -> Any:
+    return field(default=default, metadata={_KEY: kind})
+
+
+def declared_fields(parameters: Any) -> list[tuple[Field[Any], Kind]]:
+    """Return the fields of a parameter type, each with its kind."""
+    return [(entry, entry.metadata[_KEY]) for entry in fields(parameters)]
+
+
+def is_required(entry: Field[Any]) -> bool:
+    """Return whether a parameter has no default."""
+    return entry.default is MISSING and entry.default_factory is MISSING
+
+
+def default_of(entry: Field[Any]) -> Any:
+    """Return the default of an optional parameter, in the form of JSON."""
+    value = entry.default
+    if entry.default_factory is not MISSING:
+        value = entry.default_factory()
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    return list(value) if isinstance(value, tuple) else value
+
+
+def first_docstring_line(parameters: Any) -> str:
+    """Return the first line of the docstring of a parameter type."""
+    return str(parameters.__doc__).strip().splitlines()[0]
+
+
+def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -> Any:
+    """
+    Read a section of parameters, which may name parts of the linkage and files in a folder.
+
+    A FileError has line and key of a wrong value, the expected values, and the nearest name.
+    """
+    entries = declared_fields(of)
+    _refuse_misplaced(content, entries, parts)
+    values = {
+        entry.name: kind.read(content, entry.name, parts, folder)
+        for entry, kind in entries
+        if entry.name in content or is_required(entry)
+    }
+    content.finish([entry.name for entry, _ in entries])
+    return of(**values)
+
+
+def _refuse_misplaced(
+    content: Section, entries: Sequence[tuple[Field[Any], Kind]], parts: Parts
+) -> None:
+    """Refuse a key that belongs under the name of a part, and say where to write it."""
+    known = [entry.name for entry, _ in entries]
+    for key in content:
+        for entry, kind in entries:
+            if key in known or not isinstance(kind, Each):
+                continue
+            if remedy := under_part(key, entry.name, kind.part_keys, parts.get(kind.kind, ())):
+                raise content.error(key, f'is for each {KINDS[kind.kind]}', remedy)
+
+
+def under_part(key: str, section: str, keys: Sequence[str], names: Sequence[str]) -> str:
+    """
+    Return the remedy for a key that belongs into a section of named parts; '' for another key.
+
+    The keys are those of each of its parts: none if a part has a single value.
+    """
+    if key in keys:
+        name = names[0] if names else 'NAME'
+        return f'write it under {section}, as {section}: {{{name}: {{{key}: …}}}}'
+    return f'write it under {section}, as {section}: {{{key}: …}}' if key in names else ''
+
+
+def parameters_schema(of: Any) -> Schema:
+    """Return the JSON Schema of the section of a parameter type."""
+    entries = declared_fields(of)
+    return mapping_schema(
+        first_docstring_line(of),
+        {
+            entry.name: kind.json_schema()
+            | (
+                {}
+                if is_required(entry) or entry.default is None
+                else {'default': default_of(entry)}
+            )
+            for entry, kind in entries
+        },
+        required=tuple(entry.name for entry, _ in entries if is_required(entry)),
+    )
+
+
+def parameter_rows(of: Any, prefix: str = '') -> Iterator[tuple[str, ...]]:
+    """Yield rows of a table of parameters: key, unit, default, values, meaning."""
+    for entry, kind in declared_fields(of):
+        default = 'required' if is_required(entry) else kind.default_text(default_of(entry))
+        yield from kind.table_rows(prefix + entry.name, default)
+
+
+def mapping_schema(
+    description: str, properties: Mapping[str, Schema], *, required: tuple[str, ...] = ()
+) -> Schema:
+    """Return the JSON Schema of a mapping with these keys only."""
+    schema: Schema = {'description': description, 'type': 'object'}
+    if required:
+        schema['required'] = list(required)
+    return {**schema, 'properties': dict(properties), 'additionalProperties': False}
+
+
+def named_mapping(description: str, of: Schema) -> Schema:
+    """Return the JSON Schema of a mapping whose keys are names."""
+    return {'description': description, 'type': 'object', 'additionalProperties': of}
+
+
+def number_text(value: Any) -> str:
+    """Return a number in its usual notation: 1e9, but 4096; a list unchanged."""
+    if not isinstance(value, int | float):
+        return str(value)
+    short = f'{value:g}'.replace('e+0', 'e').replace('e-0', 'e-').replace('e+', 'e')
+    return short if float(short) == value else f'{value:.15g}'
+
+
+def _each_at_most(most: float) -> str:
+    return f', each of at most {number_text(most)}' if most < inf else ''
+
+
+def _bounds_schema(least: float, most: float, above: float = -inf, unit: str = '') -> Schema:
+    # A schema does not know the file's units: the reader alone has the exact bounds.
+    scale = most_in_one(unit)
+    least, most, above = least * scale, most * scale, above * scale
+    bounds = (('minimum', least), ('maximum', most), ('exclusiveMinimum', above))
+    return {word: _without_decimals(bound) for word, bound in bounds if abs(bound) < inf}
+
+
+def _without_decimals(bound: float) -> float:
+    """Return a whole number without decimals: users see 1, not 1.0."""
+    return int(bound) if float(bound).is_integer() and abs(bound) < 1e15 else bound

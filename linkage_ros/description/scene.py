@@ -1,0 +1,253 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Content of a scene, as frozen types."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, TYPE_CHECKING
+
+from linkage_ros.bag.storage import COMPRESSIONS, Storage
+from linkage_ros.description.parameters import choice, number, Parts, whole_number
+from linkage_ros.description.section import Section
+from linkage_ros.dynamics.loads import Loads
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND, Linkage, SlideJoint
+
+if TYPE_CHECKING:
+    from linkage_ros.stages.faults import Fault
+
+SPLITS = {'split_bytes': 1_000_000, 'split_seconds': 1.0}
+"""
+What makes files of a bag, and the least that it may be where it is not 0.
+
+Each file begins with the scene, the linkages and the types, and costs the disk some ten waits.
+"""
+
+LEAST_FLUSH_PERIOD = 0.05
+"""Least flush period, in [s]."""
+
+LEASTS: Mapping[str, float] = {**SPLITS, 'snapshot_seconds': 0.1}
+"""Least value of a setting that may also be 0, for never."""
+
+AS_THE_RUN_GOES = ('queue', 'flush_period', *SPLITS, 'keep_files')
+"""Settings without effect if the run is kept in memory and written at once."""
+
+_DEFAULT = Storage()
+
+
+@dataclass(frozen=True, slots=True)
+class StorageParameters(Storage):
+    """How the bag is stored."""
+
+    flush_period: float = number(
+        'what a power cut may cost: the disk is waited for a little more often',
+        _DEFAULT.flush_period,
+        unit='s',
+        least=LEAST_FLUSH_PERIOD,
+        most=60.0,
+    )
+    split_bytes: int = whole_number(
+        'size at which the next file begins; 0: never',
+        _DEFAULT.split_bytes,
+        unit='bytes',
+        least=0,
+        most=10**15,
+    )
+    split_seconds: float = number(
+        'time after which the next file begins; 0: never',
+        _DEFAULT.split_seconds,
+        unit='s',
+        least=0.0,
+        most=1e9,
+    )
+    keep_files: int = whole_number(
+        'how many files are kept: the oldest goes when one more begins; 0: all',
+        _DEFAULT.keep_files,
+        least=0,
+        most=1_000_000,
+    )
+    min_free_bytes: int = whole_number(
+        'what stays free on the disk: where less is, the recording ends; 0: no matter',
+        _DEFAULT.min_free_bytes,
+        unit='bytes',
+        least=0,
+        most=10**15,
+    )
+    compression: str = choice('how messages are packed', COMPRESSIONS, _DEFAULT.compression)
+    snapshot_seconds: float = number(
+        'no bag as the run goes: the last so many seconds are kept in memory, and written when '
+        '~/snapshot asks for them; 0: off',
+        _DEFAULT.snapshot_seconds,
+        unit='s',
+        least=0.0,
+        most=86_400.0,
+    )
+    snapshot_bytes: int = whole_number(
+        'how much memory that may take: where it is too little, less than snapshot_seconds is '
+        'kept; twice as much while a snapshot is written',
+        _DEFAULT.snapshot_bytes,
+        unit='bytes',
+        least=1_000_000,
+        most=10**12,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class RecordParameters:
+    """How a run is recorded."""
+
+    directory: str  # Parent folder of the bags, relative to the working directory of the node
+    # Name of the bag's folder; '' for the scene's name and the time. If it exists, a number is
+    # added: NAME_2.
+    name: str
+    # Messages of up to 16 KiB that may wait for the disk before more are dropped; a larger message
+    # counts as several.
+    queue: int
+    # Files of the bag: size, compression, flush period.
+    storage: Storage = field(default_factory=StorageParameters)
+
+
+@dataclass(frozen=True, slots=True)
+class SceneLinkage:
+    """A linkage of a scene, with its drive and its effects."""
+
+    name: str  # Name of the linkage; '' if it is the only one of the scene
+    # The linkage, and its closure. Published input joints come first among its joints.
+    linkage: Linkage
+    closure: Closure = field(compare=False, repr=False)
+    drive: tuple[str, Any]  # Name and parameters of the drive
+    # Parameters of each effect in the scene, by name, in physical order.
+    effects: Mapping[str, Any]
+    loads: Loads | None  # Loads on it; None if the scene has none
+    prefix: str  # Before the names of its joints and links, as messages have them
+    # Sections for error messages: in the scene, and in the linkage file.
+    content: Section = field(compare=False, repr=False)
+    linkage_content: Section = field(compare=False, repr=False)
+    # Name and parameters of the solver; None for the closed form.
+    solver: tuple[str, Any] | None = None
+    # Required accuracy of positions, in [rad] or [m], for the cheapest solver; None without one.
+    accuracy: float | None = None
+    # Whether nothing is published while a joint is beyond its limits.
+    silent_beyond_limits: bool = False
+    # User-defined effects that the scene names but that were not imported, so that the linkage
+    # cannot run.
+    not_imported: tuple[str, ...] = ()
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Return the published names of its joints."""
+        return tuple(self.prefix + joint for joint in self.linkage.joints)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Return the names of its driven joints, as in messages."""
+        return tuple(self.prefix + given.joint for given in self.linkage.inputs)
+
+    @property
+    def sampled_joints(self) -> tuple[str, ...]:
+        """Return the joints that samples for its drive name: the driven ones, or a dependent."""
+        return (self.prefix + self.dependent_joint,) if self.dependent_joint else self.input_names
+
+    @property
+    def dependent_joint(self) -> str:
+        """Return the dependent joint that samples name instead of the input; '' for none."""
+        name, parameters = self.drive
+        return parameters.joint if name == 'topic' else ''
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """
+    Linkages with their drives and effects, faults, and recording.
+
+    Attributes
+    ----------
+    name
+        Name of the scene file without its suffix.
+    linkages
+        The linkages; most scenes have one.
+    rate
+        Tick rate, in [Hz]; 0 for one tick per crank sample.
+    wrapped
+        Whether published angles are wrapped to (−π, π]; else they continue beyond a turn.
+    seed
+        Seed of all random numbers.
+    faults
+        Faults that can be injected, by name.
+    record
+        Settings of the recording; None for no bag.
+    files
+        Content of the scene and linkage files, by name.
+    folder
+        Folder for the relative paths in the scene.
+    robot_description
+        Whether the node publishes the linkages as URDF.
+
+    """
+
+    name: str
+    linkages: tuple[SceneLinkage, ...]
+    rate: float
+    wrapped: bool
+    seed: int
+    faults: Mapping[str, Fault]
+    record: RecordParameters | None
+    files: Mapping[str, bytes]
+    folder: str = field(compare=False)
+    robot_description: bool = False
+
+    def __repr__(self) -> str:
+        linkages = 'linkage' if len(self.linkages) == 1 else 'linkages'
+        return f'<Scene {self.name}: {len(self.linkages)} {linkages}, {self.rate:g} Hz>'
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Return the names of all published joints, in order."""
+        return tuple(
+            joint for scene_linkage in self.linkages for joint in scene_linkage.joint_names
+        )
+
+    @property
+    def dependent_joints(self) -> frozenset[str]:
+        """Return the names of the published joints that depend on others."""
+        return frozenset(self.joint_names).difference(
+            *(scene_linkage.input_names for scene_linkage in self.linkages)
+        )
+
+    @property
+    def not_imported(self) -> tuple[str, ...]:
+        """Return the names of the user-defined effects that were not imported."""
+        named = (
+            effect for scene_linkage in self.linkages for effect in scene_linkage.not_imported
+        )
+        return tuple(dict.fromkeys(named))
+
+
+def parts_of(linkage: Linkage) -> Parts:
+    """Return the parts of a linkage that parameters can name, by kind."""
+    points = [point for carried in linkage.links.values() for point in carried]
+    # A point in a slot is a pin between its link and the block of the slot.
+    points += [slider.point for slider in linkage.sliders.values() if not slider.block]
+    pins = {point: None for point in points if points.count(point) > 1}
+    return {
+        'joint': tuple(linkage.joints),
+        'input': tuple(given.joint for given in linkage.inputs),
+        'any_joint': tuple(dict.fromkeys([*(i.joint for i in linkage.inputs), *linkage.joints])),
+        'pin': (*pins, *linkage.sliders),
+        'link': tuple(link for link in linkage.links if link != GROUND),
+        'body': tuple(linkage.links),
+        'slide': (
+            *(given.joint for given in linkage.inputs if given.slider),
+            *(name for name, joint in linkage.joints.items() if isinstance(joint, SlideJoint)),
+        ),
+        'slider': tuple(linkage.sliders),
+        'point': tuple(f'{link}.{p}' for link, carried in linkage.links.items() for p in carried),
+    }

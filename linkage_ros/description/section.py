@@ -1,0 +1,368 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Section of a YAML file: a mapping whose keys are taken one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import repeat
+from math import inf, isfinite, isnan
+from re import fullmatch
+from typing import Any, cast
+
+from linkage_ros.description.units import unit_of, Units
+from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
+
+
+class LinedDict(dict[str, Any]):
+    """A mapping with the line of each of its keys."""
+
+    __slots__ = ('lines',)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: dict[str, int] = {}
+
+
+SI = Units()
+
+
+class Section:
+    """
+    A mapping of a YAML file, whose keys are taken one by one; the getters return SI.
+
+    Every getter removes its key from the section; `finish` refuses the remaining keys. The path is
+    the dotted key of the mapping, the line its line, for error messages.
+    """
+
+    def __init__(
+        self,
+        file: str,
+        path: str,
+        content: Mapping[str, Any],
+        line: int = 0,
+        units: Units = SI,
+    ) -> None:
+        self.file = file
+        self._path = path
+        self._content = content
+        self._line = line
+        self.units = units
+        self._taken: set[str] = set()
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._content
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._content)
+
+    @property
+    def mapping(self) -> Mapping[str, Any]:
+        """Return the whole mapping, as it was read."""
+        return self._content
+
+    def error(self, key: str, reason: str, remedy: str) -> FileError:
+        """Return the error for a key of this section ('' for the section itself)."""
+        path = '.'.join(filter(None, (self._path, key)))
+        return FileError(self.file, path, reason, remedy, self._line_of(key))
+
+    def locate_error(self, error: DefinitionError) -> FileError:
+        """Return an error of this content as one of its file, in the file's units."""
+        told = self.units.convert_quantities
+        return self.error(error.where, told(error.reason), told(error.remedy))
+
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        *,
+        least: float = -inf,
+        most: float = inf,
+        above: float = -inf,
+        unit: str = '',
+    ) -> float:
+        """Return a finite number within bounds: least ≤ value ≤ most, and value > above."""
+        name = self.units.file_unit(unit)
+        value = self._take_value(key, default, f'a number{_unit_text(name)}')
+        if not _is_number(value):
+            raise self.error(
+                key, f'{quote(value)} is not a number', f'write a number{_unit_text(name)}'
+            )
+        found = self._to_si(key, value, unit)
+        if not isfinite(found) or not least <= found <= most or found <= above:
+            bounds = ' and '.join(
+                f'{word} {self.units.to_file_unit(bound, unit):g}'
+                for word, bound in (('more than', above), ('at least', least), ('at most', most))
+                if isfinite(bound)
+            )
+            raise self.error(
+                key,
+                f'{quote(value)} is out of bounds',
+                f'write a finite number{bounds and f", {bounds}"}{name and f" [{name}]"}',
+            )
+        return found
+
+    def whole_number(
+        self,
+        key: str,
+        default: int | None = None,
+        *,
+        least: float,
+        most: float,
+        unit: str = '',
+    ) -> int:
+        """Return a whole number within bounds."""
+        value = self.number(key, default, least=least, most=most, unit=unit)
+        if not value.is_integer():
+            raise self.error(key, f'{value:g} is not whole', 'write a whole number')
+        return int(value)
+
+    def flag(self, key: str, default: bool | None = None) -> bool:
+        """Return a boolean."""
+        value = self._take_value(key, default, 'true or false')
+        if not isinstance(value, bool):
+            raise self.error(key, f'{quote(value)} is not a flag', 'write true or false')
+        return value
+
+    def text(self, key: str, default: str | None = None, *, expected: str = 'a text') -> str:
+        """Return a string that is not empty, or the default; ``expected`` tells its meaning."""
+        value = self._take_value(key, default, expected)
+        if value == default and default is not None:
+            return default
+        if not isinstance(value, str) or not value.isprintable() or not value:
+            raise self.error(key, f'{quote(value)} is not a text', 'write a name; quote numbers')
+        return value
+
+    def ros_name(self, name: str) -> str:
+        """Return a key of this section, or a value in it, that will be part of a topic name."""
+        if not fullmatch('[A-Za-z][A-Za-z0-9_]*', name):
+            raise self.error(
+                name if name in self._content else '',
+                f'{quote(name)} is no ROS name',
+                'use letters, digits and _, a letter first',
+            )
+        return name
+
+    def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
+        """Return one of a set of words."""
+        value = self._take_value(key, default, list_names(choices, ' or '))
+        if value not in choices:
+            raise self.error(
+                key, f'{quote(value)} is not a choice', f'write {list_names(choices, " or ")}'
+            )
+        return cast(str, value)
+
+    def choose_words(self, key: str, groups: Sequence[Sequence[str]]) -> list[str]:
+        """
+        Return a word of each group: of those that the file names, else the group's first.
+
+        The file names one word, or a list of words of different groups.
+        """
+        value = self._take_value(key, [], 'a word')
+        named = value if isinstance(value, list) else [value]
+        found = [[word for word in named if word in group] for group in groups]
+        if sum(map(len, found)) != len(named) or any(len(words) > 1 for words in found):
+            choices = ', '.join(' or '.join(group) for group in groups)
+            both = ', '.join(group[-1] for group in groups)
+            raise self.error(
+                key,
+                f'{quote(value)} is not a choice',
+                f'write {choices}, or one of each: [{both}]',
+            )
+        return [
+            words[0] if words else group[0] for words, group in zip(found, groups, strict=True)
+        ]
+
+    def point(self, key: str, *, most: float = inf, unit: str = '') -> tuple[float, float]:
+        """Return two finite numbers, each within ±most."""
+        name = self.units.file_unit(unit)
+        value = self._take_value(key, None, f'two numbers [x, y]{_unit_text(name)}')
+        if not _is_pair(value) or not all(map(isfinite, value)):
+            remedy = 'write two finite numbers: [x, y]'
+            if isinstance(value, list) and len(value) > 2 and all(map(_is_number, value)):
+                whole = all(float(part).is_integer() for part in value)
+                comma = '; a decimal has a point, not a comma: [0.040, 0]'
+                remedy += comma if whole else '; a planar linkage has no z'
+            raise self.error(key, f'{quote(value)} is not a point', remedy)
+        x, y = (self._to_si(key, part, unit) for part in value)
+        self._check_most(key, value, (x, y), most, unit)
+        return x, y
+
+    def interval(self, key: str, *, most: float = inf, unit: str = '') -> tuple[float, float]:
+        """
+        Return two numbers [low, high]; infinite for no limit, and if the key is absent.
+
+        The caller checks their order.
+        """
+        value = self._take_value(key, [-inf, inf], 'two numbers [low, high]')
+        if not _is_pair(value) or any(map(isnan, value)):
+            raise self.error(
+                key,
+                f'{quote(value)} is not two numbers',
+                'write [low, high]; -.inf or .inf for none on a side',
+            )
+        low, high = (self._to_si(key, end, unit) for end in value)
+        self._check_most(key, value, filter(isfinite, (low, high)), most, unit)
+        return low, high
+
+    def section(self, key: str, *, required: bool = True) -> Section:
+        """Return a nested mapping; an empty one if it is absent and not required."""
+        value = self._take_value(key, None if required else {}, 'a mapping')
+        line = self._line_of(key)
+        if not isinstance(value, dict):
+            remedy = f'write {key}: {_as_mapping(value)}'
+            reason = 'is empty' if value is None else f'{quote(value)} is not a mapping'
+            raise self.error(key, reason, remedy)
+        path = '.'.join(filter(None, (self._path, key)))
+        return Section(self.file, path, value, line, self.units)
+
+    def sections(self, key: str) -> list[Section]:
+        """Return one mapping, or a list of them."""
+        value = self._take_value(key, None, 'a mapping')
+        if not isinstance(value, list):
+            return [self.section(key)]
+        found = []
+        for i, item in enumerate(value, 1):
+            path = '.'.join(filter(None, (self._path, f'{key}[{i}]')))
+            if not isinstance(item, dict):
+                raise self.error(key, f'{quote(item)} is not a mapping', 'write {…}')
+            found.append(Section(self.file, path, item, self._line_of(key), self.units))
+        if not found:
+            raise self.error(key, 'the list is empty', 'name one at least')
+        return found
+
+    def numbers(self, key: str, *, most: float = inf, unit: str = '') -> list[float]:
+        """Return a list of finite numbers, each within ±most."""
+        value = self._take_value(key, None, 'a list of numbers')
+        if not _is_list_of_finite(value):
+            raise self.error(
+                key, f'{quote(value)} is no list of finite numbers', 'write [0.1, 0.2]'
+            )
+        found = [self._to_si(key, v, unit) for v in value]
+        self._check_most(key, value, found, most, unit)
+        return found
+
+    def rows(
+        self, key: str, columns: Sequence[str], *, most: float = inf
+    ) -> tuple[tuple[float, ...], ...]:
+        """Return a list of rows of finite numbers, each within ±most."""
+        value = self._take_value(key, None, 'a list of rows of numbers')
+        units = list(map(unit_of, columns))
+        names = [
+            column.replace(f'[{unit}]', f'[{self.units.file_unit(unit)}]')
+            for column, unit in zip(columns, units, strict=True)
+        ]
+        row = f'[{", ".join(names)}]'
+        table: list[tuple[float, ...]] = []
+        if not isinstance(value, list) or not value:
+            raise self.error(key, f'{quote(value)} is no list of rows', f'write [{row}, …]')
+        for number, found in enumerate(value, 1):
+            if not _is_list_of_finite(found) or len(found) != len(units):
+                raise self.error(
+                    key, f'row {number}, {quote(found)}, is not {row}', 'write finite numbers'
+                )
+            table.append(tuple(map(self._to_si, repeat(key), found, units)))
+            for value, unit in zip(table[-1], units, strict=True):
+                self._check_most(key, found, (value,), most, unit)
+        return tuple(table)
+
+    def texts(self, key: str) -> list[str]:
+        """Return a list of names; empty if the key is absent."""
+        value = self._take_value(key, [], 'a list of names')
+        if not isinstance(value, list) or any(not isinstance(v, str) or not v for v in value):
+            raise self.error(key, f'{quote(value)} is no list of names', 'write [one, other]')
+        return list(value)
+
+    def remove_key(self, key: str) -> None:
+        """Remove a key that another section uses."""
+        self._taken.add(key)
+
+    def finish(self, known: Sequence[str] = ()) -> None:
+        """
+        Refuse the remaining keys.
+
+        Parameters
+        ----------
+        known
+            Further keys that could have been here, for the suggestion.
+
+        """
+        for key in self._content:
+            if key not in self._taken:
+                names = sorted(self._taken | set(known))
+                known_names = f'known: {list_names(names)}' if names else 'leave it out'
+                remedy = did_you_mean(key, names, known_names)
+                raise self.error(key, 'unknown key', remedy)
+
+    def _line_of(self, key: str) -> int:
+        """Return the line of a key, or of the longest existing part of a dotted key."""
+        line, content = self._line, self._content
+        while isinstance(content, LinedDict):
+            # The name of a user-defined effect contains dots.
+            part = key if key in content else key.partition('.')[0]
+            if part not in content:
+                break
+            line, content = content.lines[part], content[part]
+            key = key.removeprefix(part).removeprefix('.')
+        return line
+
+    def _to_si(self, key: str, value: float, unit: str) -> float:
+        """Return a number of the file in SI."""
+        if value and self.units.is_ambiguous(unit):
+            raise self.error(
+                key,
+                f'{quote(value)} is for joints that turn and joints that slide, '
+                f'in {self.units.file_unit(unit)}',
+                'leave units and angles out of this file',
+            )
+        return float(self.units.to_si(value, unit))
+
+    def _check_most(
+        self, key: str, value: Any, found: Iterable[float], most: float, unit: str
+    ) -> None:
+        if any(abs(one) > most for one in found):
+            name = self.units.file_unit(unit)
+            raise self.error(
+                key,
+                f'{quote(value)} is out of bounds',
+                f'write numbers of at most {self.units.to_file_unit(most, unit):g}'
+                f'{name and f" [{name}]"}',
+            )
+
+    def _take_value(self, key: str, default: Any, expected: str) -> Any:
+        self._taken.add(key)
+        if key not in self._content:
+            if default is None:
+                raise self.error('', f'the key {key!r} is missing', f'add {key}: {expected}')
+            return default
+        return self._content[key]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_list_of_finite(value: Any) -> bool:
+    return isinstance(value, list) and all(_is_number(v) and isfinite(v) for v in value)
+
+
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+
+
+def _as_mapping(value: Any) -> str:
+    """Return how a mapping of names is written, for names that stand there without one."""
+    names = value if isinstance(value, list) else [value]
+    if not names or not all(isinstance(name, str) and fullmatch(r'\w+', name) for name in names):
+        return '{…}'
+    return f'{{{list_names(f"{name}: {{}}" for name in names)}}}'
+
+
+def _unit_text(unit: str) -> str:
+    return unit and f' in [{unit}]'

@@ -1,0 +1,220 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+A run without a ROS graph: the node's tick loop, as fast as it goes, on a time of its own.
+
+Tick k is at `BEGIN` plus k periods, to the whole nanosecond. The bag is the one that a node of
+this scene would record, so that a replay of it gives the same bytes. Nothing of rclpy is imported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+import json
+from math import floor
+from pathlib import Path
+from typing import Any, cast, TYPE_CHECKING
+
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.run_events import WITH_THE_RUN
+from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.description.scene import Scene
+from linkage_ros.errors import LinkageError
+from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.messages.single_values import text_message
+from linkage_ros.replay.replay import change_text
+from linkage_ros.replay.run_files import EXTRA, scene_files, to_attachments
+from linkage_ros.replay.topic_description import describe_topic, message_type
+from linkage_ros.signals import heed_signals
+from linkage_ros.stages.drives.drive import describe_chatter
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick.tick_loop import TickLoop
+
+if TYPE_CHECKING:
+    from linkage_ros.stages.faults import FaultChange
+
+BEGIN = 1_000_000_000
+"""Time of the first tick, in [ns]: a stamp of 0 means none in ROS."""
+
+MOST_TICKS = 100_000_000
+
+_NODE = '/linkage_node'
+_LATCHED = QosProfile(depth=100, durability='transient_local')
+_TIME = 'builtin_interfaces/msg/Time'
+_ASKED_EVERY = 50
+_FLUSHED_EVERY = 50_000
+
+
+def check_simulated(scene: Scene, seconds: float) -> int:
+    """
+    Return the number of ticks of a simulation, the last at its end.
+
+    Raises
+    ------
+    FileError
+        A drive waits for samples, or a load for messages.
+    LinkageError
+        There would be too many ticks.
+
+    """
+    for scene_linkage in scene.linkages:
+        if scene_linkage.drive[0] == 'topic':
+            raise scene_linkage.content.error(
+                'drive',
+                'topic waits for samples, and there are none',
+                'write another drive, such as constant_rate; bag takes the samples of a run',
+            )
+        if scene_linkage.loads is not None and scene_linkage.loads.applied.wrenches:
+            raise scene_linkage.content.error(
+                'loads.wrenches',
+                'wait for messages, and there are none',
+                'leave them out, or write forces and efforts over_time instead',
+            )
+    ticks = floor(seconds * scene.rate * (1.0 + 1e-12)) + 1
+    if ticks > MOST_TICKS:
+        raise LinkageError(
+            '--seconds', f'{seconds:g} are {ticks:,} ticks, more than {MOST_TICKS:,}', 'take fewer'
+        )
+    return ticks
+
+
+def tick_times(scene: Scene, ticks: int) -> Sequence[int]:
+    """Return the times of ticks, in [ns]."""
+    return [BEGIN + round(index * 1e9 / scene.rate) for index in range(ticks)]
+
+
+def simulate_run(
+    scene: Scene,
+    folder: Path,
+    ticks: int,
+    keep_going: Callable[[int], bool],
+    warn: Callable[[str], None] = lambda _: None,
+) -> dict[str, int]:
+    """
+    Run a scene, and write what its node would record.
+
+    Parameters
+    ----------
+    scene
+        The scene; see `check_simulated`.
+    folder
+        Folder of the bag, which does not exist yet.
+    ticks
+        Number of ticks.
+    keep_going
+        Called now and then with the number of ticks so far; if it returns False, the run ends and
+        the bag is complete up to there. Signals only set the stop event: it has to look at that.
+    warn
+        Called at the end with a line on what a node would have warned of.
+
+    Returns
+    -------
+    counts
+        Number of messages by topic.
+
+    Raises
+    ------
+    LinkageError
+        Parts of the scene do not fit together, or the bag cannot be written.
+
+    """
+    first = Pipeline(scene)
+    kinds = {name: fault.kind for name, fault in scene.faults.items()}
+
+    def change_message(change: FaultChange) -> bytes:
+        return text_message(change_text(change, kinds[change.name]))
+
+    def ignore_message(_message: bytes) -> None:
+        """Take a message that nobody receives."""
+
+    loop = TickLoop(
+        partial(Pipeline, scene, first.closures, first.injection),
+        None,
+        ignore_message,
+        None,
+        [ignore_message] * len(first.extras),
+        change_message,
+    )
+    topics = _bag_topics(loop, first)
+    named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
+    named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
+    files = scene_files(scene, named, WITH_THE_RUN, first.linkages, folder)
+    # A signal ends the run between two ticks: raised here, it would cut a record of the bag.
+    with heed_signals():
+        writer = BagWriter(folder, [topic for _, topic in topics], to_attachments(files))
+        recording = _Recording(writer, len(topics))
+        loop.recorder = cast('Recorder', recording)
+        try:
+            for index, now in enumerate(tick_times(scene, ticks)):
+                if not index % _ASKED_EVERY and not keep_going(index):
+                    break
+                loop.tick_at(now)
+        finally:
+            counts = dict(zip((topic.name for _, topic in topics), recording.written, strict=True))
+            writer.close({'linkage_ros.dropped': json.dumps(dict.fromkeys(counts, 0))})
+    for linkage in loop.pipeline.linkages:
+        if linkage.drive.chatter_count:
+            warn(describe_chatter(linkage.drive.chatter_count))
+    return counts
+
+
+class _Recording:
+    """
+    Writes each message at once; a tick sees a recorder.
+
+    Parameters
+    ----------
+    writer
+        The bag.
+    topics
+        Number of topics.
+
+    """
+
+    def __init__(self, writer: BagWriter, topics: int) -> None:
+        self._writer = writer
+        self._unflushed = 0
+        self.written = [0] * topics
+
+    def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
+        """Write a message; raise RecordingError if that fails."""
+        self.written[topic] += self._writer.write(topic, log_time, publish_time, data)
+        self._unflushed += 1
+        if self._unflushed == _FLUSHED_EVERY:
+            self._writer.flush()
+            self._unflushed = 0
+
+
+def _bag_topics(loop: TickLoop, pipeline: Pipeline) -> list[tuple[str, Topic]]:
+    """Return the topics of the bag, in the order of their handles, each with its key."""
+    handles = loop.topics
+    found = {
+        handles.joint_states: ('joint_states_topic', '/joint_states', JOINT_STATE, QosProfile()),
+        handles.diagnostics: (
+            'diagnostics_topic',
+            '/diagnostics',
+            'diagnostic_msgs/msg/DiagnosticArray',
+            QosProfile(),
+        ),
+        handles.resets: ('resets_topic', f'{_NODE}/resets', _TIME, QosProfile()),
+    }
+    if handles.crank is not None:
+        found[handles.crank] = 'crank_topic', f'/{pipeline.topic}', JOINT_STATE, QosProfile()
+    if handles.faults is not None:
+        found[handles.faults] = 'faults_topic', f'{_NODE}/faults', 'std_msgs/msg/String', _LATCHED
+    if handles.suppressed is not None:
+        found[handles.suppressed] = 'withheld_topic', f'{_NODE}/withheld', _TIME, QosProfile()
+    for handle, extra in zip(handles.extras, pipeline.extras, strict=True):
+        found[handle] = EXTRA, extra.topic.replace('~', _NODE, 1), extra.message, QosProfile()
+    return [
+        (key, describe_topic(name, message_type(kind, 'scene'), qos))
+        for _, (key, name, kind, qos) in sorted(found.items())
+    ]

@@ -1,0 +1,208 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Drives that generate the crank by themselves: a curve for each input, on one clock.
+
+Time is the integer number of nanoseconds since the first tick. A curve takes that integer, so that
+no digit is lost before the multiplication by a rate or a frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from linkage_ros.errors import DefinitionError, list_names, quote
+from linkage_ros.generated_code import Lines
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.stages.drives.drive import Context, CrankState, Drive
+
+
+def refuse_beyond(
+    closure: Closure, number: int, where: str, start: float, extent: tuple[float, float]
+) -> None:
+    """
+    Refuse a motion of an input that leaves the limits of a joint, where that can be known.
+
+    It can be known for the limits of the input itself and, with a single input, for those of
+    published joints. A motion that leaves the range through a toggle is not refused: there the
+    loop is open.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    number
+        Index of the input.
+    where
+        Key of the motion, for error messages.
+    start
+        Its first value, in [rad] or [m].
+    extent
+        Least and greatest value; infinite for a motion without bound.
+
+    Raises
+    ------
+    DefinitionError
+        A joint leaves its limits; the error names it.
+
+    """
+    given = closure.linkage.inputs[number]
+    low, high = extent
+    unit = given.unit
+    goes = f'takes {quote(given.joint)} from {low:.6g} {unit} to {high:.6g} {unit}'
+    for bound in closure.bounds.inputs:
+        if bound.number == number and (bound.is_beyond(low) or bound.is_beyond(high)):
+            raise DefinitionError(
+                where,
+                f'{goes}, beyond its limits {given.limits} {unit}',
+                'stay within them, or widen them in the linkage file',
+            )
+    if not closure.bounds.joints or len(closure.linkage.inputs) > 1:
+        return
+    way = InputSweep(closure)
+    interval = way.range_about(start)
+    if interval is None:
+        if beyond := closure.limit_exceeded(way.position_at(start)):
+            raise DefinitionError(
+                where,
+                f'starts at {start:.6g} {unit}, beyond limits: {beyond}',
+                'start within them',
+            )
+        return
+    for value, end, outward, by in zip(
+        extent, interval[:2], (-1.0, 1.0), interval.by, strict=True
+    ):
+        if by and outward * (value - end) > 1e-12 * (abs(end) + 1.0):
+            raise DefinitionError(
+                where,
+                f'{goes}, beyond {end:.6g} {unit}, where {quote(by)} is at its limit',
+                'stay within it, or widen it in the linkage file',
+            )
+
+
+LARGEST = 1e10
+"""Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
+
+Curve = Callable[[int], tuple[float, float, float]]
+"""
+Value, rate and acceleration of an input at a time since the first tick, in [ns].
+
+In [rad], [rad/s] and [rad/s²]; of an input that slides in [m], [m/s] and [m/s²]. Each is the
+derivative by time of the one before it.
+"""
+
+
+class ClockedDrive(Drive):
+    """
+    Inputs that follow curves from the first tick on.
+
+    Parameters
+    ----------
+    curves
+        One curve for each input, in the order of the linkage.
+
+    """
+
+    __slots__ = ('_curve', '_curves', 'start')
+
+    stamp = 0
+    max_age = 0
+    start: int | None
+    """Time of the first tick, in [ns]; None before it."""
+
+    def __init__(self, curves: tuple[Curve, ...]) -> None:
+        self._curves = curves
+        self._curve = curves[0] if len(curves) == 1 else None
+        self.start = None
+
+    def state(self, now: int) -> CrankState:
+        """Return the crank state at a time, in [ns]; the first call sets the time 0."""
+        if self.start is None:
+            self.start = now
+        if self._curve is not None:  # zip over one curve would double the time
+            value, rate, acceleration = self._curve(now - self.start)
+            return CrankState((value,), (rate,), (acceleration,), 0)
+        elapsed = now - self.start
+        values, rates, accelerations = zip(*[c(elapsed) for c in self._curves], strict=True)
+        return CrankState(values, rates, accelerations, 0)
+
+    def compile_state(self, inputs: int, bail_out: str) -> Lines:
+        """Return `state` as generated lines; a single input needs no function call."""
+        if self._curve is None:
+            return super().compile_state(inputs, bail_out)
+        lines = [
+            'if drive.start is None:',
+            '    drive.start = now',
+            'value, rate, acceleration = curve(now - drive.start)',
+            'angles, rates, accelerations, age = (value,), (rate,), (acceleration,), 0',
+        ]
+        return Lines(lines, {'drive': self, 'curve': self._curve})
+
+
+def build_clocked(
+    where: str,
+    curve: Callable[[Any, str], Curve],
+    extent: Callable[[Any], tuple[float, float]],
+    use: Any,
+    context: Context,
+) -> ClockedDrive:
+    """
+    Build a drive from curves.
+
+    Parameters
+    ----------
+    where
+        Key of the drive, for error messages.
+    curve
+        Makes a curve from parameters and their key for error messages.
+    extent
+        Returns the least and the greatest value of a curve, in [rad] or [m]; infinite for a motion
+        without bound.
+    use
+        Parameters of an input, and of those that differ by name in its ``inputs``.
+    context
+        Context of the drive.
+
+    Raises
+    ------
+    DefinitionError
+        Every input has its own parameters, so that the common ones have no effect; or an input
+        leaves the limits of a joint.
+
+    """
+    names = [given.joint for given in context.closure.linkage.inputs]
+    inputs = use.inputs
+    if inputs and len(inputs) == len(names):
+        raise DefinitionError(
+            f'{where}.inputs',
+            f'names every input ({list_names(names)}), so the values beside it are unused',
+            f'leave one of them out: it then takes the values beside {where}.inputs',
+        )
+    curves = []
+    for index, name in enumerate(names):
+        of, key = (inputs[name], f'{where}.inputs.{name}') if name in inputs else (use, where)
+        curves.append(curve(of, key))
+        if context.hard_limited.bounds:
+            refuse_beyond(context.hard_limited, index, key, curves[-1](0)[0], extent(of))
+    return ClockedDrive(tuple(curves))
+
+
+def as_integers(*numbers: float) -> tuple[list[int], int]:
+    """
+    Return doubles as integers over one denominator.
+
+    This is exact, since each double is an integer over a power of 2. Python divides integers of
+    any length to the nearest double. So a formula of products and sums of such integers, with the
+    time as another integer, is rounded only once.
+    """
+    ratios = [number.as_integer_ratio() for number in numbers]
+    denominator = max(below for _, below in ratios)
+    return [above * (denominator // below) for above, below in ratios], denominator

@@ -1,0 +1,233 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Interface of the drives, which determine the crank state.
+
+Each drive is a module, imported only if a scene names the drive, with
+
+``PARAMETERS``
+    The type of its parameters (see `linkage_ros.description.parameters`).
+``build(parameters, context: Context) -> Drive``
+    Build it.
+
+A drive that listens to a topic also has
+
+``TOPIC``
+    The topic; its messages are ``sensor_msgs/msg/JointState``.
+``reader(parameters, context) -> Callable[[bytes], sample | Rejection]``
+    Build a function that reads a sample from a message; the drive then has ``offer(sample, now)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from random import Random
+from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
+
+from linkage_ros.generated_code import Lines
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import without_limits
+
+if TYPE_CHECKING:
+    from linkage_ros.dynamics.loads import Friction, Loads
+    from linkage_ros.dynamics.mechanics import Mechanics
+    from linkage_ros.dynamics.reactions import Reactions
+
+DRIVES = {
+    'topic': 'linkage_ros.stages.drives.topic',
+    'constant_rate': 'linkage_ros.stages.drives.constant_rate',
+    'profile': 'linkage_ros.stages.drives.profile',
+    'sine': 'linkage_ros.stages.drives.sine',
+    'chirp': 'linkage_ros.stages.drives.chirp',
+    'bag': 'linkage_ros.stages.drives.bag',
+    'torque': 'linkage_ros.stages.drives.torque',
+}
+"""Module of each drive, by name of the drive."""
+
+LARGEST = 1e10
+"""Larger angles, in [rad], are 2e-6 rad apart as doubles: no machine has them. Likewise rates."""
+
+
+class CrankState(NamedTuple):
+    """
+    State of the inputs at a tick.
+
+    Attributes
+    ----------
+    angles
+        Value of each input, in the order of the linkage, in [rad]; of a sliding input in [m].
+    rates
+        Rates in [rad/s] or [m/s].
+    accelerations
+        Accelerations in [rad/s²] or [m/s²]; 0 where unknown.
+    age
+        Time of the tick minus that of the sample, in [ns].
+
+    """
+
+    angles: tuple[float, ...]
+    rates: tuple[float, ...]
+    accelerations: tuple[float, ...]
+    age: int
+
+
+_CRANK = ', '.join(CrankState._fields)
+
+
+class CrankBehindPlay(CrankState):
+    """State of the inputs at a tick, after the play between them and their motors."""
+
+    # For each input the acceleration of its motor, in [rad/s²] or [m/s²], while the motor moves
+    # within the play and transmits no force; None while it drives the input.
+    free_motors: tuple[float | None, ...] = ()
+
+
+class CrankAtRest(CrankState):
+    """State of an input that stands, with the efforts that its drive may exert on it."""
+
+    # The least and the greatest, in [N·m] or [N]: they differ where a brake or a gear holds.
+    bearing: tuple[float, ...] = ()
+
+
+class Drive(Protocol):
+    """Drive with its state; a reset builds a new one."""
+
+    @property
+    def stamp(self) -> int:
+        """Stamp of the newest good sample, in [ns]; 0 without one."""
+
+    @property
+    def max_age(self) -> int:
+        """Age of the newest sample above which a warning is due, in [ns]; 0 for never."""
+
+    def state(self, now: int, /) -> CrankState | None:
+        """Return the crank state at a time, in [ns]; None if there is none."""
+
+    @property
+    def chatter_count(self) -> int:
+        """Return the number of steps in which motor and crank met and parted too often."""
+        return 0
+
+    def compile_state(self, _inputs: int, bail_out: str) -> Lines:
+        """
+        Return `state` as generated lines that compute the fields of `CrankState` from ``now``.
+
+        Parameters
+        ----------
+        inputs
+            Number of inputs of the linkage.
+        bail_out
+            Statement that leaves the lines where there is no crank state.
+
+        """
+        lines = ['crank = state(now)', 'if crank is None:', f'    {bail_out}', f'{_CRANK} = crank']
+        return Lines(lines, {'state': self.state})
+
+
+def describe_chatter(steps: int) -> str:
+    """Return a line on the steps that `Drive.chatter_count` counts."""
+    return (
+        f'drive.torque.play: motor and crank met and parted too often in {steps} steps, at whose '
+        'ends the play was closed; shorten the step, or look at the controller'
+    )
+
+
+@dataclass(frozen=True)
+class Context:
+    """
+    Context from which drives and effects are built.
+
+    Attributes
+    ----------
+    closure
+        Closure of the linkage.
+    rate
+        Tick rate, in [Hz]; 0 for one tick per crank sample.
+    needs_rate
+        Whether something uses the rate of the crank.
+    seed
+        Seed of every random generator of this linkage.
+    loads
+        Forces on the linkage.
+    friction
+        Friction in its joints; None if the scene has none.
+    prefix
+        Prefix of the joint names in messages; '' for none.
+    dependent
+        Names, as in messages, of the dependent joints of all linkages.
+    effects
+        Names of the effects in the scene.
+    moves_by_rates
+        Whether the crank moves at its rates; an input that is held between samples stands still,
+        whatever its rate.
+
+    """
+
+    closure: Closure
+    rate: float
+    needs_rate: bool
+    seed: str
+    loads: Loads | None
+    friction: Friction | None
+    prefix: str = ''
+    dependent: frozenset[str] = frozenset()
+    effects: frozenset[str] = frozenset()
+    moves_by_rates: bool = True
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the published joints, without prefix."""
+        return tuple(self.closure.linkage.joints)
+
+    @property
+    def joints_in_messages(self) -> tuple[str, ...]:
+        """Names of the published joints, as messages have them."""
+        return tuple(self.prefix + joint for joint in self.closure.linkage.joints)
+
+    @property
+    def inputs_in_messages(self) -> tuple[str, ...]:
+        """Names of the driven joints, as messages have them."""
+        return tuple(self.prefix + given.joint for given in self.closure.linkage.inputs)
+
+    def random(self, effect: str) -> Random:
+        """Return the random generator of an effect, independent of those of other effects."""
+        return self.generator(self.seed, effect)
+
+    @staticmethod
+    def generator(seed: str, effect: str) -> Random:
+        """Return the random generator of an effect before its context exists."""
+        return Random(f'{seed}/{effect}')
+
+    @cached_property
+    def hard_limited(self) -> Closure:
+        """Return the closure without the limits at which a stop yields."""
+        yielding = self.loads.applied.stops if self.loads else ()
+        if not yielding:
+            return self.closure
+        return Closure(without_limits(self.closure.linkage, yielding))
+
+    @cached_property
+    def mechanics(self) -> Mechanics:
+        """Return the force model of the linkage; all users share it."""
+        from linkage_ros.dynamics.mechanics import Mechanics  # local import: only with forces
+
+        return Mechanics(self.closure, self.loads, self.friction)
+
+    @cached_property
+    def reactions(self) -> Reactions:
+        """Return the forces in pins and sliders; all users share them."""
+        from linkage_ros.dynamics.reactions import Reactions  # local import: only with forces
+
+        return Reactions(self.mechanics)
+
+
+Reader = Callable[[bytes], Any]
+"""Reads a sample, or a Rejection, from a message."""

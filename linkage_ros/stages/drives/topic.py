@@ -1,0 +1,339 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Drive from a topic: the newest measured sample, extrapolated by its rate.
+
+A rate that is absent, or NaN as joint_state_broadcaster fills it in for an interface that is not
+there, is the backward difference of the angles, where one is needed: ω = (q − q₋₁)/Δt, for a
+revolute input by the shorter way around. Before a second sample there is none, and no crank state.
+
+A JointState has no accelerations. With ``acceleration: differenced`` they come from the rates of
+the samples: their backward difference d = (ω − ω₋₁)/Δt, and behind it a low-pass of order one,
+
+    α ← α + (1 − e^(−2π·cutoff·Δt))·(d − α)
+
+which is exact for a d that is held over the time Δt between both stamps. The difference lags by
+half an interval, the low-pass by 1/(2π·cutoff) (A. V. Oppenheim, R. W. Schafer, Discrete-Time
+Signal Processing, 3rd ed., 2010, ch. 7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import expm1, isfinite, isnan, nan, remainder, tau
+
+from linkage_ros.description.parameters import choice, flag, number, part_name, whole_number
+from linkage_ros.errors import DefinitionError
+from linkage_ros.generated_code import Lines
+from linkage_ros.kinematics.linkage import Input
+from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.stages.drives.drive import Context, CrankState, Drive, LARGEST, Reader
+
+TOPIC = 'crank_states'
+
+
+@dataclass(frozen=True, slots=True)
+class TopicParameters:
+    """A measured crank: the newest sample of crank_states, a sensor_msgs/JointState."""
+
+    carry_forward: bool = flag(
+        "carry the crank to the tick's time by its rate; else it is held as measured", True
+    )
+    max_age: float = number(
+        'age of the newest sample beyond which there is no crank',
+        0.2,
+        unit='s',
+        least=1e-6,
+        most=3600.0,
+    )
+    max_lead: float = number(
+        'longest time by which a stamp may be ahead of the clock',
+        0.1,
+        unit='s',
+        least=0.0,
+        most=3600.0,
+    )
+    stamp: str = choice(
+        'time of a sample: its stamp, or its arrival whatever the stamp',
+        ('measured', 'arrival'),
+        'measured',
+    )
+    acceleration: str = choice(
+        "the crank's acceleration: zero, or the differences of the samples' rates",
+        ('zero', 'differenced'),
+        'zero',
+    )
+    cutoff: float = number(
+        'of the low-pass behind the differences; 0: none', 0.0, unit='Hz', least=0.0, most=1e6
+    )
+    joint: str = part_name(
+        'dependent joint that the samples name instead of the input, whose crank is computed; '
+        'absent, they name the input',
+        'joint',
+        '',
+    )
+    branch: int = whole_number(
+        'branch of that joint on which the crank is, as linkage check --branches lists them; 0: '
+        'the only one',
+        0,
+        least=0,
+        most=10_000,
+    )
+
+
+PARAMETERS = TopicParameters
+
+
+def reader(parameters: TopicParameters, context: Context) -> Reader:
+    """
+    Build the reader of the messages.
+
+    Raises
+    ------
+    DefinitionError
+        The joint does not tell the crank.
+
+    """
+    if parameters.joint:
+        from linkage_ros.stages.drives.dependent_samples import (  # local import: seldom named
+            DependentSampleReader,
+            sampled_inverse,
+        )
+
+        inverse = sampled_inverse(context.closure, parameters.joint, parameters.branch)
+        return DependentSampleReader(inverse.branch, context.prefix + parameters.joint).read
+    return JointStateReader(context.inputs_in_messages).read
+
+
+def build(parameters: TopicParameters, context: Context) -> TopicDrive:
+    """
+    Build the drive.
+
+    Raises
+    ------
+    DefinitionError
+        A low-pass has nothing to filter, or a branch has no joint.
+
+    """
+    if parameters.cutoff and parameters.acceleration == 'zero':
+        raise DefinitionError(
+            'drive.topic.cutoff', 'filters nothing', 'add acceleration: differenced'
+        )
+    if parameters.branch and not parameters.joint:
+        raise DefinitionError('drive.topic.branch', 'is of no joint', 'name it: joint: NAME')
+    return TopicDrive(parameters, context.needs_rate, context.closure.linkage.inputs)
+
+
+_Values = tuple[float, ...]
+
+
+class TopicDrive(Drive):
+    """
+    Drive that keeps the newest good sample only.
+
+    The crank's acceleration is 0, as the extrapolation at constant rate implies. If it is
+    estimated, the crank is carried forward with it, rates included.
+
+    Parameters
+    ----------
+    use
+        How samples are used.
+    needs_rate
+        Whether anything besides the extrapolation needs the crank's rate. If nothing does,
+        a rate that is absent counts as 0.
+    inputs
+        Inputs of the linkage; () for inputs that are all revolute.
+
+    """
+
+    __slots__ = (
+        '_at_arrival',
+        '_bend',
+        '_carry_forward',
+        '_estimate',
+        '_last',
+        '_max_lead',
+        '_needs_rate',
+        '_sliding',
+        'jump',
+        'max_age',
+        'sample',
+    )
+
+    max_age: int
+    """Age of the newest sample above which there is no crank state, in [ns]."""
+    sample: tuple[int, _Values, _Values, _Values] | None
+    """The newest good sample with rates: its stamp, in [ns], angles, rates, accelerations."""
+    jump: float
+    """Greatest change of the first input from one sample to the next, in [rad] or [m]."""
+
+    def __init__(
+        self, use: TopicParameters, needs_rate: bool, inputs: Sequence[Input] = ()
+    ) -> None:
+        self._carry_forward = use.carry_forward
+        self.max_age = round(use.max_age * NANOSECONDS)
+        self._max_lead = round(use.max_lead * NANOSECONDS)
+        self._at_arrival = use.stamp == 'arrival'
+        self._estimate = use.acceleration == 'differenced'
+        self._bend = -tau * use.cutoff
+        self._needs_rate = needs_rate or use.carry_forward or self._estimate
+        self._sliding = {index for index, given in enumerate(inputs) if given.slider}
+        self._last: tuple[int, _Values] | None = None
+        """Stamp and angles of the newest good sample."""
+        self.sample = None
+        self.jump = 0.0
+
+    @property
+    def stamp(self) -> int:
+        """Stamp of the newest good sample, in [ns]; 0 before the first."""
+        return self._last[0] if self._last else 0
+
+    def offer(self, sample: CrankSample, now: int) -> Rejection | None:
+        """
+        Take a sample, or return why it is rejected; a rejected sample changes nothing.
+
+        Parameters
+        ----------
+        sample
+            The sample.
+        now
+            The time, in [ns].
+
+        """
+        stamp, angles, rates = sample
+        zeros = (0.0,) * len(angles)
+        if rates is None:
+            rates = (nan,) * len(angles)
+        complete = True
+        for value in angles + rates:
+            if not -LARGEST <= value <= LARGEST:
+                complete = False
+        if not complete and (why := _find_rejection(angles, rates)) is not None:
+            return why
+        if self._at_arrival:
+            stamp = now
+        if stamp == 0:
+            return Rejection.STAMP_ZERO
+        if stamp > now + self._max_lead:
+            return Rejection.STAMP_FUTURE
+        if self._last is not None:
+            before, last = self._last
+            if stamp < before:
+                return Rejection.STAMP_OLD
+            jump = abs(angles[0] - last[0])
+            if jump > self.jump:
+                self.jump = jump
+        if not complete:
+            known = self._mean_rates(stamp, angles) if self._needs_rate else zeros
+            if known is None:
+                self._last = stamp, angles
+                return None
+            rates = tuple(
+                [old if isnan(rate) else rate for rate, old in zip(rates, known, strict=True)]
+            )
+        self.sample = (
+            stamp,
+            angles,
+            rates,
+            self._estimate_accelerations(stamp, rates) if self._estimate else zeros,
+        )
+        self._last = stamp, angles
+        return None
+
+    def _mean_rates(self, stamp: int, angles: _Values) -> _Values | None:
+        """Return the mean rates since the last sample; None without one of another stamp."""
+        if self._last is None or stamp == self._last[0]:
+            return self.sample and self.sample[2]
+        before, earlier = self._last
+        ways = [q - old for q, old in zip(angles, earlier, strict=True)]
+        seconds = (stamp - before) * 1e-9
+        return tuple(
+            [
+                (way if index in self._sliding else remainder(way, tau)) / seconds
+                for index, way in enumerate(ways)
+            ]
+        )
+
+    def _estimate_accelerations(self, stamp: int, rates: _Values) -> _Values:
+        """Return the accelerations at a new sample; 0 at the first one, and after a gap."""
+        if self.sample is None or stamp - self.sample[0] > self.max_age:
+            return (0.0,) * len(rates)
+        before, _, earlier, bent = self.sample
+        if stamp == before:
+            return bent
+        seconds = (stamp - before) * 1e-9
+        share = -expm1(self._bend * seconds) if self._bend else 1.0
+        found = tuple(
+            [
+                a + share * ((rate - old) / seconds - a)
+                for rate, old, a in zip(rates, earlier, bent, strict=True)
+            ]
+        )
+        return found if all(-LARGEST <= a <= LARGEST for a in found) else (0.0,) * len(rates)
+
+    def state(self, now: int) -> CrankState | None:
+        """Return the crank state at a time, in [ns]; None if the newest sample is too old."""
+        if self.sample is None:
+            return None
+        stamp, angles, rates, accelerations = self.sample
+        age = now - stamp
+        if age > self.max_age:
+            return None
+        if self._carry_forward and self._estimate:
+            seconds = age * 1e-9
+            half = 0.5 * seconds
+            three = [*zip(angles, rates, accelerations, strict=True)]
+            angles = tuple([q + (w + a * half) * seconds for q, w, a in three])
+            rates = tuple([w + a * seconds for _, w, a in three])
+        elif self._carry_forward:
+            seconds = age * 1e-9
+            if len(angles) == 1:  # a loop over one takes five times as long
+                angles = (angles[0] + rates[0] * seconds,)
+            else:
+                pairs = zip(angles, rates, strict=True)
+                angles = tuple([angle + rate * seconds for angle, rate in pairs])
+        return CrankState(angles, rates, accelerations, age)
+
+    def compile_state(self, inputs: int, bail_out: str) -> Lines:
+        """Return `state` as generated lines, without a function call."""
+        lines = [
+            'if drive.sample is None:',
+            f'    {bail_out}',
+            'stamp, angles, rates, accelerations = drive.sample',
+            'age = now - stamp',
+            f'if age > {self.max_age}:',
+            f'    {bail_out}',
+        ]
+        if self._carry_forward and self._estimate:
+            carried = [
+                f'angles[{i}] + (rates[{i}] + accelerations[{i}] * half) * seconds,'
+                for i in range(inputs)
+            ]
+            faster = [f'rates[{i}] + accelerations[{i}] * seconds,' for i in range(inputs)]
+            lines += [
+                'seconds = age * 1e-9',
+                'half = 0.5 * seconds',
+                f'angles = ({" ".join(carried)})',
+                f'rates = ({" ".join(faster)})',
+            ]
+        elif self._carry_forward:
+            carried = [f'angles[{i}] + rates[{i}] * seconds,' for i in range(inputs)]
+            lines += ['seconds = age * 1e-9', f'angles = ({" ".join(carried)})']
+        return Lines(lines, {'drive': self})
+
+
+def _find_rejection(angles: _Values, rates: _Values) -> Rejection | None:
+    """Return why a sample is rejected for its numbers; a rate that is NaN is absent."""
+    bad = [value for value in angles if not -LARGEST <= value <= LARGEST]
+    bad += [rate for rate in rates if abs(rate) > LARGEST]
+    if not bad:
+        return None
+    return Rejection.TOO_LARGE if all(map(isfinite, bad)) else Rejection.NOT_FINITE

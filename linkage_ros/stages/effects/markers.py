@@ -1,0 +1,235 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Markers: the linkage for RViz and Foxglove, on a separate topic, at its own rate.
+
+They show the solved mechanism, without the effects of sensors. With the time t of the tick and the
+rate f of the markers, a message is published at the first tick at which::
+
+    ⌊t·f⌋ ≠ ⌊t′·f⌋
+
+t′ is the time of the last message. Only the times of the ticks decide, so that a replay gives the
+same messages. Still markers come with the first message of each second. A marker disappears after
+its lifetime, so that a silent linkage does not look like one that stands still.
+
+Forces are arrows; see `linkage_ros.stages.effects.marker_shapes`.
+
+Links are red while the conditioning of their group (see
+`linkage_ros.kinematics.singularity_margin`) is below √2·sin(μ/2), with the threshold μ: for a
+dyad, while its transmission angle is smaller than μ. Where a loop does not close there is no pose:
+moving markers are deleted, and a text shows the closure error.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from math import pi, radians, sin, sqrt
+
+from linkage_ros.description.parameters import number, text
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.results import Position
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.kinematics.topology import links_of
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages.marker_array import DELETE, MarkerArrayWriter
+from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.effects.marker_shapes import ALARM, Arrows, Key, marker_shapes
+from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Writer
+
+TOPIC = '~/markers'
+MESSAGE = 'visualization_msgs/msg/MarkerArray'
+
+_LONGEST_TRAIL = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class MarkersParameters:
+    """The linkage drawn for RViz and Foxglove, on ~/markers."""
+
+    rate: float = number('messages a second, at most', 30.0, unit='Hz', least=0.01, most=1000.0)
+    frame: str = text("frame of the markers, instead of the ground's", '')
+    thickness: float = number(
+        'width of a bar, as a fraction of the workspace; 0: a suitable one',
+        0.0,
+        least=0.0,
+        most=0.5,
+    )
+    trace: float = number(
+        'duration of the trail of a traced point; 0: its whole curve, with one input',
+        0.0,
+        unit='s',
+        least=0.0,
+        most=60.0,
+    )
+    force_scale: float = number(
+        'length of an arrow for a force; 0: by its logarithm', 0.0, unit='m/N', least=0.0, most=1e6
+    )
+    near_toggle: float = number(
+        'transmission angle below which links are red',
+        radians(10.0),
+        unit='rad',
+        least=0.0,
+        most=0.5 * pi,
+    )
+
+
+PARAMETERS = MarkersParameters
+
+
+def writer(parameters: MarkersParameters, context: Context) -> Writer:
+    """Build the writer of the message."""
+    return Markers(parameters, context)
+
+
+class Markers:
+    """
+    The markers of a linkage, at their own rate.
+
+    Parameters
+    ----------
+    use
+        Parameters of the effect.
+    context
+        Context with the linkage to show.
+
+    """
+
+    __slots__ = (
+        '_arrows', '_closure', '_frame', '_full', '_groups', '_inputs', '_moving', '_near', '_per',
+        '_second', '_shapes', '_slot', '_trails', '_unit',
+    )  # fmt: skip
+
+    def __init__(self, use: MarkersParameters, context: Context) -> None:
+        self._closure = closure = context.closure
+        self._unit, denominator = use.rate.as_integer_ratio()
+        self._per = NANOSECONDS * denominator
+        self._slot = self._second = -1
+        self._frame = use.frame or context.prefix + GROUND
+        named = context.effects
+        self._inputs = closure.linkage.inputs if 'effort' in named else ()
+        reactions = context.reactions.joints if 'pin_forces' in named else ()
+        joints = [
+            Key(joint.link, closure.linkage.sliders[joint.name].point)
+            if joint.kind == 'P'
+            else Key(joint.link, joint.name)
+            for joint in reactions
+        ]
+        trail = min(round(use.trace * use.rate) + 1, _LONGEST_TRAIL) if use.trace else 0
+        self._shapes = shapes = marker_shapes(
+            closure,
+            use.thickness,
+            trail,
+            len(joints),
+            len(self._inputs),
+            _marker_lifetimes(use, context),
+        )
+        self._arrows = Arrows(use.force_scale, closure, shapes, joints)
+        self._moving = MarkerArrayWriter(self._frame, shapes.moving)
+        self._full = MarkerArrayWriter(self._frame, (*shapes.moving, *shapes.still))
+        self._trails: list[deque[complex]] = [deque(maxlen=trail) for _ in shapes.trails]
+        self._near = sqrt(2.0) * sin(0.5 * use.near_toggle)
+        self._groups = tuple(frozenset(links_of(group)) for group in closure.structure.groups)
+        # Search once here, not in a tick.
+        closure.singularity_margin(closure.position(*usual_inputs(closure)))
+
+    def __call__(self, now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
+        """Return a message; b'' between two messages."""
+        if not self.due(now):
+            return b''
+        self._slot = now * self._unit // self._per
+        position = motion.position
+        full = self._still_due(now)
+        write, shapes = self._full if full else self._moving, self._shapes
+        closure = self._closure
+        points, angles = closure.points(position), closure.link_angles(position)
+        red = self._links_near_toggle(position)
+        for marker, at, colour, filled in shapes.bodies:
+            write.place_marker(marker, points[at], angles[at.link])
+            write.colour_marker(marker, ALARM if filled and at.link in red else colour)
+        pins = [points[at] for at in shapes.pin_places]
+        for marker in shapes.pins:
+            write.move_points(marker, pins)
+        for marker, at, trail in zip(
+            shapes.trails, shapes.trail_places, self._trails, strict=True
+        ):
+            place = points[at]
+            trail.append(place)
+            # A line has its full number of points from the start.
+            write.move_points(marker, [*trail, *(place,) * (trail.maxlen or 0)][: trail.maxlen])
+        for marker, drawn in zip(
+            shapes.forces, self._arrows.force_arrows(points, motion.reactions), strict=True
+        ):
+            _show_arrow(write, marker, drawn)
+        for marker, drawn in zip(
+            shapes.efforts,
+            self._arrows.effort_arrows(self._inputs, points, angles, motion.efforts),
+            strict=True,
+        ):
+            _show_arrow(write, marker, drawn)
+        write.show_marker(shapes.status, False)
+        return write.message_at(now)
+
+    def due(self, now: int) -> bool:
+        """Return whether a message is due at a time, in [ns]."""
+        return now * self._unit // self._per != self._slot
+
+    def no_pose(self, now: int, position: Position) -> bytes:
+        """Return a message without a pose; b'' between two messages."""
+        if not self.due(now):
+            return b''
+        self._slot = now * self._unit // self._per
+        for trail in self._trails:
+            trail.clear()
+        said = f'{position.status.value}: no pose'
+        if position.status is Status.OPEN:
+            said = f'open: the links miss each other by {position.gap:.3g} m'
+        elif position.status is Status.LIMITED:
+            said = 'limited: a joint is beyond its limits'
+        shapes = self._shapes
+        markers = [
+            marker._replace(text=said)
+            if index == shapes.status
+            else marker._replace(points=(), action=DELETE)
+            for index, marker in enumerate(shapes.moving)
+        ]
+        if self._still_due(now):
+            markers += shapes.still
+        return MarkerArrayWriter(self._frame, markers).message_at(now)
+
+    def _still_due(self, now: int) -> bool:
+        """Return whether the still markers are due."""
+        before, self._second = self._second, now // NANOSECONDS
+        return before != self._second
+
+    def _links_near_toggle(self, position: Position) -> frozenset[str]:
+        """Return the links near a toggle."""
+        nearness = self._closure.singularity_margin(position)
+        near = nearness.conditioning < self._near and nearness.group >= 0
+        return self._groups[nearness.group] if near else frozenset()
+
+
+def _show_arrow(write: MarkerArrayWriter, marker: int, drawn: list[complex]) -> None:
+    write.show_marker(marker, bool(drawn))
+    write.move_points(marker, drawn)
+
+
+def _marker_lifetimes(use: MarkersParameters, context: Context) -> tuple[int, int]:
+    """
+    Return the lifetimes of moving and of still markers, in [ns].
+
+    Three periods of the message, but at least a second; without limit if ticks come with samples
+    only, since their period is unknown.
+    """
+    if not context.rate:
+        return 0, 0
+    period = 1.0 / min(use.rate, context.rate)
+    moves = max(1.0, 3.0 * period)
+    return round(moves * NANOSECONDS), round(max(3.0, moves) * NANOSECONDS)

@@ -1,0 +1,415 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Design a four-bar: from pairs of angles, a function, a traced curve, poses or dead centres.
+
+Angles are typed and shown in degrees, or in radians with --radians; lengths in metres.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from math import inf
+from pathlib import Path
+from shlex import quote
+import sys
+from threading import Event
+
+from linkage_ros.cli.arguments import (
+    add_output,
+    add_radians,
+    AngleUnit,
+    bounded_number,
+    LINKAGES,
+    output_path,
+    PICTURES,
+)
+from linkage_ros.cli.terminal import print_tables, ProgressCallback, show_progress, TerminalTable
+from linkage_ros.description.file_access import check_new
+from linkage_ros.description.linkage_writer import write_linkage
+from linkage_ros.errors import LinkageError
+from linkage_ros.tools.design.defects import Assessment, Needs, needs_penalty, unmet_needs
+from linkage_ros.tools.design.design import FourBar
+from linkage_ros.tools.design.synthesis_tasks import (
+    CANDIDATES,
+    DesignAnswer,
+    DesignSearch,
+    find_answers,
+)
+
+# Tables of a designed four-bar: its links, its proof, its quality.
+
+
+def solution_tables(
+    answer: DesignAnswer, title: str, needs: Needs, angles: AngleUnit
+) -> Iterator[TerminalTable]:
+    """Yield the tables of a solution."""
+    four_bar = answer.design.four_bar
+    yield TerminalTable(
+        angles.convert_text(title), ('link', '>length [m]', ''), list(_link_rows(four_bar))
+    )
+    if answer.facts:
+        yield TerminalTable(
+            '', ('', ''), [tuple(map(angles.convert_text, fact)) for fact in answer.facts]
+        )
+    yield _positions_table(answer, angles)
+    yield TerminalTable('', ('', ''), list(_assessment_facts(answer.assessment, needs, angles)))
+
+
+def _link_rows(four_bar: FourBar) -> Iterator[tuple[str, str, str]]:
+    names = ('crank', 'coupler', 'rocker', 'ground')
+    pins = (four_bar.crank, None, four_bar.rocker, None)
+    for name, length, pin in zip(names, four_bar.lengths, pins, strict=True):
+        note = ''
+        if pin is not None and pin.imag == 0.0 and pin.real < 0.0:
+            note = f'{pin.real:.10g}, reversed: it points away from its angle'
+        yield name, f'{length:.10g}', note
+
+
+def _positions_table(answer: DesignAnswer, angles: AngleUnit) -> TerminalTable:
+    """Return how each position is met; optional columns appear only if they were asked for."""
+    wanted = answer.design.wanted
+    columns = ['>', '>crank']
+    rocker, coupler, place = (
+        any(getattr(one, what) is not None for one in wanted)
+        for what in ('rocker', 'coupler', 'place')
+    )
+    columns += ['>x [m]', '>y [m]'] if place else []
+    columns += ['>rocker'] if rocker else []
+    columns += ['>coupler'] if coupler else []
+    columns += ['assembly']
+    columns += ['>off [m]'] if place else []
+    columns += [f'>off [{angles.name}]'] if rocker or coupler else []
+    rows = []
+    for number, (one, met) in enumerate(zip(wanted, answer.assessment.met, strict=True), 1):
+        row = [str(number), angles.format_angle(one.crank)]
+        if place:
+            at = one.place
+            row += ['', ''] if at is None else [f'{at.real:.6g}', f'{at.imag:.6g}']
+        for asked, angle in ((rocker, one.rocker), (coupler, one.coupler)):
+            if asked:
+                row.append('' if angle is None else angles.format_angle(angle))
+        row.append(met.side if met.is_closed else f'open by {met.gap:.3g} m')
+        if place:
+            row.append(f'{met.distance:.2e}' if met.is_closed else '')
+        if rocker or coupler:
+            row.append(f'{angles.convert(met.angle):+.2e}' if met.is_closed else '')
+        rows.append(row)
+    return TerminalTable('Proof: each position, analysed again', columns, rows)
+
+
+def _assessment_facts(
+    assessment: Assessment, needs: Needs, angles: AngleUnit
+) -> Iterator[tuple[str, str]]:
+    kind = assessment.kind
+    turns = 'the crank turns fully' if assessment.turns else 'the crank does not turn fully'
+    yield 'kind', f'{kind.name} ({kind.code}), {turns}'
+    if assessment.travel is not None:
+        start, end = map(angles.format_angle, assessment.travel)
+        yield 'crank goes', f'{start} to {end}, through all positions'
+    where = 'on the way' if assessment.travel is not None else 'of the positions'
+    least = angles.format_angle(assessment.transmission, 2)
+    yield (
+        'transmission',
+        f'{least} at least {where}, with the crank at {angles.format_angle(assessment.at)}',
+    )
+    if assessment.full_transmission is not None:
+        yield '', f'{angles.format_angle(assessment.full_transmission, 2)} over the full turn'
+    yield 'link ratio', f'{assessment.link_ratio:.4g}, longest to shortest'
+    for defect in assessment.defects:
+        yield f'{defect.name} defect', angles.convert_text(defect.text)
+    if not assessment.defects:
+        yield 'defects', 'none: order, branch and circuit are right'
+    for missed in unmet_needs(assessment, needs):
+        yield 'lacks what is needed', angles.convert_text(missed)
+
+
+_NOT_MET = 1
+"""Exit code if there are solutions, but none meets the requirements."""
+
+
+_LISTED = 3
+"""Default number of solutions that a search lists."""
+
+
+EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.yaml'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_radians(parser, 'type angles, also in CSV files, and show them')
+    _add_tasks(parser)
+    _add_freedoms(parser)
+    needs = parser.add_argument_group('what a solution needs')
+    needs.add_argument(
+        '--need', default='', metavar='KIND', help='crank-rocker, double-crank, grashof, …'
+    )
+    needs.add_argument(
+        '--min-transmission',
+        type=float,
+        default=0.0,
+        metavar='ANGLE',
+        help='least transmission angle from the first to the last position',
+    )
+    needs.add_argument(
+        '--max-link-ratio',
+        type=float,
+        default=inf,
+        metavar='RATIO',
+        help='longest link to shortest',
+    )
+    needs.add_argument('--usable', action='store_true', help='no order, branch or circuit defect')
+    written = parser.add_argument_group('what is written')
+    add_output(written, LINKAGES, 'no linkage file is written')
+    written.add_argument(
+        '--pick', type=int, default=1, metavar='N', help='the solution to write (default: 1)'
+    )
+    written.add_argument(
+        '--draw',
+        type=output_path(PICTURES),
+        metavar='OUTPUT',
+        help='picture of the solution at its positions, OUTPUT.png, .svg or .pdf; of several '
+        'OUTPUT-1, OUTPUT-2, …',
+    )
+
+
+def _add_tasks(parser: argparse.ArgumentParser) -> None:
+    _add_pairs(parser)
+    _add_function(parser)
+    _add_curve(parser)
+    _add_dead_centres(parser)
+    _add_poses(parser)
+
+
+def _add_pairs(parser: argparse.ArgumentParser) -> None:
+    pairs = parser.add_argument_group('pairs of crank and rocker angles')
+    pairs.add_argument(
+        '--pair',
+        nargs=2,
+        type=float,
+        action='append',
+        metavar=('CRANK', 'ROCKER'),
+        help='angles of crank and rocker in one position; three or more times',
+    )
+    pairs.add_argument(
+        '--pairs', type=Path, metavar='CSV', help='the same as a CSV of two columns'
+    )
+    pairs.add_argument(
+        '--ground', type=float, default=1.0, metavar='M', help='length of the ground (default: 1)'
+    )
+
+
+def _add_function(parser: argparse.ArgumentParser) -> None:
+    function = parser.add_argument_group('a function')
+    function.add_argument('--function', metavar='FORMULA', help='of x, such as "log10(x)"')
+    function.add_argument('--range', nargs=2, type=float, metavar=('X0', 'X1'), help='of x')
+    for link in ('crank', 'rocker'):
+        function.add_argument(
+            f'--{link}-range',
+            nargs=2,
+            type=float,
+            metavar=('FROM', 'TO'),
+            help=f"the {link}'s angles over the range",
+        )
+    function.add_argument(
+        '--points',
+        type=bounded_number(0, 2**53 - 1, int),
+        default=3,
+        metavar='N',
+        help='points, by Chebyshev (default: 3)',
+    )
+    function.add_argument(
+        '--at', nargs='+', type=float, metavar='X', help='points of your own, instead'
+    )
+
+
+def _add_curve(parser: argparse.ArgumentParser) -> None:
+    path = parser.add_argument_group('a traced curve')
+    path.add_argument(
+        '--point', nargs=2, type=float, action='append', metavar=('X', 'Y'), help='in metres'
+    )
+    path.add_argument(
+        '--path',
+        type=Path,
+        metavar='CSV',
+        help='columns x, y in metres, and the crank angle where that is wanted too',
+    )
+    path.add_argument('--closed', action='store_true', help='the last point leads to the first')
+    path.add_argument(
+        '--timing',
+        nargs='+',
+        type=float,
+        metavar='CRANK',
+        help="the crank's angle at each point",
+    )
+
+
+def _add_dead_centres(parser: argparse.ArgumentParser) -> None:
+    rocker = parser.add_argument_group('the dead centres of a crank-rocker')
+    rocker.add_argument('--swing', type=float, metavar='ANGLE', help='of the rocker')
+    rocker.add_argument(
+        '--time-ratio',
+        type=_read_ratio,
+        metavar='RATIO',
+        help='longer stroke to shorter one, as 10/9 or 1.2',
+    )
+
+
+def _add_poses(parser: argparse.ArgumentParser) -> None:
+    motion = parser.add_argument_group('poses of the coupler')
+    motion.add_argument(
+        '--pose',
+        nargs=3,
+        type=float,
+        action='append',
+        metavar=('X', 'Y', 'ANGLE'),
+        help='place in metres, and angle; three times',
+    )
+    for kind, frame in (('fixed', 'ground'), ('moving', 'coupler')):
+        motion.add_argument(
+            f'--{kind}-pivot',
+            nargs=2,
+            type=float,
+            action='append',
+            metavar=('X', 'Y'),
+            help=f"in the {frame}'s frame; twice: crank's and rocker's",
+        )
+
+
+def _read_ratio(text: str) -> float:
+    """Read a number, or a fraction such as 10/9."""
+    try:
+        return float(Fraction(text))
+    except (ValueError, ZeroDivisionError, OverflowError):
+        raise argparse.ArgumentTypeError(f'{text!r} is no ratio; write 10/9 or 1.2') from None
+
+
+def _add_freedoms(parser: argparse.ArgumentParser) -> None:
+    freedoms = parser.add_argument_group('what is free, and the search')
+    freedoms.add_argument(
+        '--free-zeros',
+        action='store_true',
+        help='only how far crank and rocker turn matters, not from where: with three pairs the '
+        'best are searched for, with four and five all are listed, with more they are fitted',
+    )
+    freedoms.add_argument(
+        '--seed',
+        type=bounded_number(0, 2**53 - 1, int),
+        default=0,
+        metavar='N',
+        help='of the search (default: 0)',
+    )
+    freedoms.add_argument(
+        '--candidates',
+        type=bounded_number(1, 2**53 - 1, int),
+        default=CANDIDATES,
+        metavar='N',
+        help=f'how many are tried in a search (default: {CANDIDATES})',
+    )
+    freedoms.add_argument(
+        '--best',
+        type=bounded_number(1, 2**53 - 1, int),
+        metavar='N',
+        help=f'how many are listed (of a search {_LISTED}, else all)',
+    )
+    freedoms.add_argument(
+        '--dask',
+        default='',
+        metavar='ADDRESS',
+        help='scheduler of a Dask cluster that shares the search, as tcp://host:8786',
+    )
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """Design; return 1 if no solution meets the requirements."""
+    try:
+        return _run_design(arguments)
+    except LinkageError as error:
+        if arguments.angles.in_degrees:
+            raise
+        told = arguments.angles.told
+        raise LinkageError(told(error.where), told(error.reason), told(error.remedy)) from None
+
+
+def _run_design(arguments: argparse.Namespace) -> int:
+    with show_progress('candidates') as advance:
+        found, meeting = find_solutions(arguments, advance)
+    if not meeting:
+        print(f'None of {len(found)} solution(s) has what is needed. Nearest to it:\n')
+    needs = needs_of(arguments)
+    shown = found[: arguments.best]
+    _print_solutions(shown, needs, arguments.angles)
+    _draw_solutions(arguments.draw, shown, force=arguments.force)
+    if not meeting:
+        return _NOT_MET
+    if arguments.output is not None:
+        _write_solution(arguments, shown)
+    return 0
+
+
+def find_solutions(
+    typed: argparse.Namespace, advance: ProgressCallback
+) -> tuple[list[DesignAnswer], bool]:
+    """Return the solutions that meet the requirements and True; or the nearest ones and False."""
+    needs = needs_of(typed)
+    keep = typed.best or _LISTED
+    found = find_answers(
+        typed, DesignSearch(needs, typed.seed, typed.candidates, keep, typed.dask, advance)
+    )
+    meeting = [one for one in found if not unmet_needs(one.assessment, needs)]
+    if meeting:
+        return meeting, True
+    return sorted(found, key=lambda one: needs_penalty(one.assessment, needs)), False
+
+
+def needs_of(typed: argparse.Namespace) -> Needs:
+    """Return the requirements; if there are any, a solution must also be free of defects."""
+    needs = Needs(typed.need, typed.angles.read(typed.min_transmission), typed.max_link_ratio)
+    needs.check()
+    return needs._replace(usable=typed.usable or needs != Needs())
+
+
+def _print_solutions(shown: Sequence[DesignAnswer], needs: Needs, angles: AngleUnit) -> None:
+    for number, answer in enumerate(shown, 1):
+        title = answer.title if len(shown) == 1 else f'{number}: {answer.title}'
+        for table in solution_tables(answer, title, needs, angles):
+            print_tables(table)
+            print()
+
+
+def _draw_solutions(file: Path | None, shown: Sequence[DesignAnswer], *, force: bool) -> None:
+    if file is None:
+        return
+    from linkage_ros.tools.design.picture import draw_design
+
+    for number, answer in enumerate(shown, 1):
+        own = file if len(shown) == 1 else file.with_stem(f'{file.stem}-{number}')
+        check_new(own, force=force)
+        draw_design(answer.design, answer.title, own, error=answer.curve)
+        print(own)
+
+
+def _write_solution(arguments: argparse.Namespace, shown: Sequence[DesignAnswer]) -> None:
+    if not 1 <= arguments.pick <= len(shown):
+        raise LinkageError(
+            f'--pick {arguments.pick}',
+            f'there are {len(shown)} solution(s)',
+            f'name one of 1 to {len(shown)}',
+        )
+    answer = shown[arguments.pick - 1]
+    first = answer.design.wanted[0].crank
+    command = ' '.join(['linkage synthesize', *map(quote, sys.argv[2:])])
+    defects = [f'{one.name} defect: {one.text}' for one in answer.assessment.defects]
+    told = arguments.angles.told
+    lines = [told(f'Designed: {answer.title}'), command, *map(told, defects)]
+    write_linkage(answer.design.four_bar.linkage(first), arguments.output, lines)
+    names = ' and '.join(one.name for one in answer.assessment.defects)
+    print(f'{arguments.output}  ({names} defect: see above)' if names else arguments.output)

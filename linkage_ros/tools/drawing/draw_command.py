@@ -1,0 +1,125 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Draw a linkage in a pose, its range behind it, and beside it its joints over the input.
+
+A DXF holds the links as flat parts with holes instead, in millimetres, to be cut.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from threading import Event
+
+from linkage_ros.cli.arguments import (
+    add_at,
+    add_file,
+    add_output,
+    bounded_number,
+    output_or,
+    PICTURES,
+    read_inputs,
+)
+from linkage_ros.description.file_access import atomic_write
+from linkage_ros.description.linkage_file import find_assemblies, load, written_linkage
+from linkage_ros.description.linkage_writer import pose_text
+from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.drawn_pose import drawn_pose
+from linkage_ros.kinematics.pose_view import prepare_view
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.resources import named_file
+from linkage_ros.tools.drawing.dxf import links_dxf
+from linkage_ros.tools.drawing.figure import assemblies_picture, paint_picture
+
+EXAMPLE = 'linkage draw jansen_leg -o jansen_leg.svg --names'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_file(parser)
+    add_output(parser, (*PICTURES, '.dxf'), 'FILE.png in this folder')
+    add_at(
+        parser,
+        'pose to draw, in degrees, or metres for a slide; further ones are drawn in light grey',
+    )
+    parser.add_argument('--names', action='store_true', help='write the names of pins and links')
+    parser.add_argument(
+        '--assemblies',
+        action='store_true',
+        help='draw each assembly that closes, with the pose for the file, which is printed too',
+    )
+
+    parts = parser.add_argument_group('parts, in a DXF')
+    parts.add_argument(
+        '--width', type=bounded_number(1e-6, 1e6), metavar='MM', help='width of a bar, in mm'
+    )
+    parts.add_argument(
+        '--hole', type=bounded_number(1e-6, 1e6), metavar='MM', help='diameter of a hole, in mm'
+    )
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """Draw the linkage."""
+    if arguments.assemblies:
+        return _draw_assemblies(arguments)
+    closure = load(arguments.file)
+    if arguments.output and arguments.output.suffix.lower() == '.dxf':
+        return _write_parts(closure, arguments)
+    for option in ('width', 'hole'):
+        if getattr(arguments, option) is not None:
+            raise LinkageError(f'--{option}', 'is of the parts in a DXF', 'add -o FILE.dxf')
+    typed = [read_inputs(closure.linkage, at, '--at') for at in arguments.at]
+    pose, *ghosts = typed or [usual_inputs(closure)]
+    name = Path(arguments.file).stem
+    file = output_or(arguments, Path(f'{name}.png'))
+    paint_picture(prepare_view(closure, pose, ghosts), name, file, names=arguments.names)
+    print(file)
+    return 0
+
+
+def _write_parts(closure: Closure, arguments: argparse.Namespace) -> int:
+    """Write the links as parts."""
+    width, hole = (
+        None if typed is None else typed / 1e3 for typed in (arguments.width, arguments.hole)
+    )
+    atomic_write(arguments.output, links_dxf(closure, width=width, hole=hole))
+    print(arguments.output)
+    return 0
+
+
+def _draw_assemblies(arguments: argparse.Namespace) -> int:
+    """Draw all assemblies at the same inputs; one that is open there, at inputs of its own."""
+    found = list(find_assemblies(arguments.file).values())
+    first = found[0]
+    if arguments.at:
+        pose = read_inputs(first.linkage, arguments.at[0], '--at')
+        closed = [each for each in found if each.position(*pose).joints]
+        # If it closes in no assembly there, `prepare_view` says so.
+        views = [prepare_view(each, pose) for each in closed or [first]]
+    else:
+        pose = usual_inputs(first)
+        views = [
+            prepare_view(each, pose if each.position(*pose).joints else usual_inputs(each))
+            for each in found
+        ]
+    file = output_or(arguments, Path(f'{Path(arguments.file).stem}.png'))
+    content, _ = read_yaml(named_file(arguments.file, 'linkages'))
+    written_linkage(content)  # it sets the units
+    texts = [
+        pose_text(one.closure.linkage, drawn_pose(one.closure, one.position), content.units)
+        for one in views
+    ]
+    assemblies_picture(dict(zip(texts, views, strict=True)), file)
+    for text in texts:
+        print(text)
+    print(file)
+    return 0

@@ -1,0 +1,271 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A picture of a linkage by matplotlib: a pose, and beside it its joints over the input."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil, degrees, sqrt
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+from linkage_ros.kinematics.curves import Curve
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.pose_view import (
+    all_places,
+    LinkageView,
+    pose_text,
+    SAME_ANGLE,
+    symbol_size,
+)
+from linkage_ros.kinematics.shapes import (
+    bounding_corners,
+    Circle,
+    COLOURS,
+    draw_shapes,
+    draw_skeleton,
+    INK,
+    Polygon,
+    Shape,
+    shape_outline,
+)
+from linkage_ros.names import picture_text
+from linkage_ros.tools.drawing.painting import (
+    degree_step,
+    GHOST,
+    label_ends,
+    LAYERS,
+    NAME_INK,
+    NameLabels,
+    paint_shapes,
+    picture_settings,
+    plot_places,
+    save_picture,
+    set_plane,
+    show_lengths,
+)
+
+
+def _turns_text(shown: LinkageView) -> str:
+    """Return where the mark is, if that is not the angle that was named."""
+    if abs(shown.mark - shown.inputs[0]) < SAME_ANGLE:
+        return ''
+    return f' ({degrees(shown.mark):.4g}° on the axis)'
+
+
+def _beyond_text(shown: LinkageView) -> str:
+    beyond = shown.closure.limit_exceeded(shown.position)
+    return f' (limited: {beyond})' if beyond else ''
+
+
+def paint_picture(shown: LinkageView, title: str, file: Path, *, names: bool = False) -> None:
+    """
+    Paint a picture to a file.
+
+    A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
+    """
+    context = picture_settings()
+    from matplotlib.figure import Figure  # local import: an extra, and slow to load
+
+    size = symbol_size(shown)
+    drawn = draw_shapes(shown.closure, shown.position, size, shown.sweep.travels)
+    low, high = bounding_corners(
+        [*all_places(shown), *(p for shape in drawn for p in shape_outline(shape))]
+    )
+    margin = complex(3.0, 3.0) * size
+    width, height = (high - low + 2.0 * margin).real, (high - low + 2.0 * margin).imag
+    wide = min(max(4.9 * width / height, 3.0), 6.4)
+    tall = min(max(wide * height / width, 3.2), 4.9)
+    with context:
+        figure = Figure(figsize=(wide + 5.4, tall + 0.5), dpi=110, layout='constrained')
+        grid = figure.add_gridspec(1, 2, width_ratios=(wide, 4.7))
+        left, joints = figure.add_subplot(grid[0]), shown.sweep.joints
+        panels = joint_axes(grid[1], joints)
+        heading = (
+            f'{title}, {pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}'
+            f'{_beyond_text(shown)}'
+        )
+        left.set_title(picture_text(heading, 120), loc='left', fontsize=9)
+        set_plane(left, low - margin, high + margin)
+        paint_background(left, shown)
+        paint_shapes(left, drawn)
+        turning_input = not shown.closure.linkage.inputs[0].slider
+        lines = plot_joints(panels, joints, degrees_x=turning_input)
+        # A pose beyond the limits has no place on the axis.
+        if shown.interval.lowest <= shown.mark <= shown.interval.highest:
+            now = degrees(shown.mark) if turning_input else shown.mark
+            for axes in panels.values():
+                axes.axvline(now, color='0.55', linewidth=0.8, linestyle=':')
+        label_across(list(panels.values())[-1], *moved_input(shown))
+        figure.draw_without_rendering()  # only now axes and texts have a size
+        label_joints(panels, joints, lines)
+        if names:
+            figure.draw_without_rendering()
+            _write_names(left, shown, drawn, size)
+        save_picture(figure, file)
+
+
+def assemblies_picture(views: Mapping[str, LinkageView], file: Path) -> None:
+    """
+    Paint the same linkage in several assemblies, each under the text that a file needs for it.
+
+    A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
+    """
+    context = picture_settings()
+    from matplotlib.figure import Figure  # local import: an extra, and slow to load
+
+    size = min(map(symbol_size, views.values()))
+    low, high = bounding_corners(place for shown in views.values() for place in all_places(shown))
+    margin = complex(4.0, 4.0) * size
+    ratio = (high - low + 2.0 * margin).imag / (high - low + 2.0 * margin).real
+    rows = ceil(len(views) / ceil(sqrt(len(views) * ratio)))
+    columns = ceil(len(views) / rows)
+    wide = min(max(9.0 / columns, 2.6), 4.6)
+    with context:
+        figure = Figure(
+            figsize=(columns * wide, rows * (wide * ratio + 0.45)), dpi=110, layout='constrained'
+        )
+        first = next(iter(views.values()))
+        for number, (text, shown) in enumerate(views.items(), 1):
+            axes = figure.add_subplot(rows, columns, number)
+            title = fill(picture_text(text, 200), round(15.0 * wide), subsequent_indent='  ')
+            if shown.inputs != first.inputs:
+                title += f'\nat {picture_text(pose_text(shown.closure, shown.inputs))}'
+            axes.set_title(title, loc='left', fontsize=7.5, family='monospace')
+            set_plane(axes, low - margin, high + margin)
+            axes.set_axis_off()
+            paint_background(axes, shown)
+            paint_shapes(
+                axes, draw_shapes(shown.closure, shown.position, size, shown.sweep.travels)
+            )
+        save_picture(figure, file)
+
+
+def paint_background(axes: Any, shown: LinkageView) -> None:
+    """Paint poses in light grey, and the paths of the traced points dashed."""
+    for index, position in enumerate(shown.ghosts):
+        for line in draw_skeleton(shown.closure, position):
+            plot_places(
+                axes,
+                (line.start, line.end),
+                color=GHOST,
+                alpha=1.0 - 0.75 * index / len(shown.ghosts),  # the later, the paler
+                linewidth=1.0,
+                marker='o',
+                markersize=2.0,
+                zorder=LAYERS['ghost'],
+            )
+    points = shown.closure.points(shown.position)
+    for index, (name, path) in enumerate(shown.sweep.paths.items()):
+        colour = COLOURS[index % len(COLOURS)]
+        plot_places(
+            axes,
+            path,
+            color=colour,
+            linewidth=1.1,
+            linestyle=(0, (5, 2)),
+            zorder=LAYERS['path'],
+        )
+        place = next(place for (_, point), place in points.items() if point == name)
+        plot_places(axes, [place], 'o', color=colour, markersize=3.5, zorder=LAYERS['label'])
+
+
+def joint_axes(place: Any, joints: Sequence[Curve]) -> dict[bool, Any]:
+    """Return the axes for angles (key True) and for slides (False), above each other."""
+    kinds = sorted({joint.turning for joint in joints}, reverse=True)
+    panels = place.subgridspec(len(kinds), 1).subplots(sharex=True, squeeze=False)[:, 0]
+    return dict(zip(kinds, panels, strict=True))
+
+
+def plot_joints(
+    panels: Mapping[bool, Any], joints: Sequence[Curve], *, degrees_x: bool, steps: int = 8
+) -> dict[str, Any]:
+    """Plot joints; return their lines by name. `label_joints` labels their ends."""
+    from matplotlib.ticker import MultipleLocator  # local import: an extra, and slow to load
+
+    lines = {}
+    for index, joint in enumerate(joints):
+        (lines[joint.name],) = panels[joint.turning].plot(
+            [degrees(x) for x in joint.x] if degrees_x else joint.x,
+            [degrees(y) for y in joint.y] if joint.turning else joint.y,
+            color=COLOURS[index % len(COLOURS)],
+            linewidth=1.3,
+            label=picture_text(joint.name, 40),
+        )
+    for turning, axes in panels.items():
+        if turning:
+            axes.set_ylabel('joint angle [°]')
+            axes.yaxis.set_major_locator(
+                MultipleLocator(degree_step(axes.get_ylim(), steps // len(panels)))
+            )
+        else:
+            show_lengths(axes.yaxis, 'slide', max(map(abs, axes.get_ylim())))
+        axes.tick_params(labelsize=7, width=0.5)
+        axes.margins(x=0.0)
+        axes.grid(alpha=0.25, linewidth=0.5)
+        for side in ('top', 'right'):
+            axes.spines[side].set_visible(False)
+    if degrees_x:
+        axes = next(iter(panels.values()))
+        axes.xaxis.set_major_locator(MultipleLocator(degree_step(axes.get_xlim(), steps)))
+    return lines
+
+
+def label_joints(panels: Mapping[bool, Any], joints: Sequence[Curve], lines: Any) -> None:
+    """Write the names of joints at the ends of their lines; the figure has been drawn once."""
+    for turning, axes in panels.items():
+        label_ends(axes, [lines[joint.name] for joint in joints if joint.turning == turning])
+
+
+def moved_input(shown: LinkageView) -> tuple[str, str]:
+    """Return the name and the unit of the input that moves."""
+    given = shown.closure.linkage.inputs[0]
+    held = ', the others held' if len(shown.inputs) > 1 else ''
+    return f'{picture_text(given.joint)}{held}', 'm' if given.slider else '°'
+
+
+def label_across(axes: Any, name: str, unit: str) -> None:
+    """Label the axis of the abscissa; of a length, in the unit for its size."""
+    if unit == 'm':
+        show_lengths(axes.xaxis, name, max(map(abs, axes.get_xlim())))
+    else:
+        axes.set_xlabel(f'{name} [{unit}]')
+
+
+def _write_names(axes: Any, shown: LinkageView, drawn: Sequence[Shape], size: float) -> None:
+    """Write the names of pins and links where they hide little."""
+    names = NameLabels(axes)
+    radius = abs(names.to_pixel(complex(size, 0.0)) - names.to_pixel(0j))
+    pins = {shape.name: shape.centre for shape in drawn if isinstance(shape, Circle)}
+    points = shown.closure.points(shown.position)
+    for (link, name), place in points.items():
+        if link in shown.closure.linkage.links and link != GROUND:
+            pins.setdefault(name, place)
+    for name, place in pins.items():
+        names.add_name(name, (place,), 1.2 * radius, fontsize=7.5, fontweight='bold', color=INK)
+    for link, named in shown.closure.linkage.links.items():
+        if link == GROUND:
+            continue
+        places = [points[link, point] for point in named]
+        bodies = [shape for shape in drawn if isinstance(shape, Polygon) and shape.name == link]
+        middle = sum(places) / len(places)
+        if bodies:
+            edge = bodies[-1].corners
+            middle = sum(edge) / len(edge)
+        anchors = [middle]
+        if len(places) > 1:
+            one, other = places[0], places[-1]
+            anchors += [one + (other - one) * part for part in (0.35, 0.65, 0.25, 0.75)]
+        names.add_name(
+            link, anchors, 1.1 * radius, fontsize=6.5, fontstyle='italic', color=NAME_INK
+        )
+    lines = [shape_outline(shape) for shape in drawn]
+    lines += [(line.start, line.end) for line in draw_skeleton(shown.closure, shown.position)]
+    names.place_names(lines)

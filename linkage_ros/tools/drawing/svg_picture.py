@@ -1,0 +1,112 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A linkage as SVG text, for notebooks and scripts; it needs no matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from xml.sax.saxutils import escape
+
+from linkage_ros.errors import quote
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.pose_view import all_places, prepare_view, symbol_size
+from linkage_ros.kinematics.results import Position
+from linkage_ros.kinematics.shapes import (
+    bounding_corners,
+    Circle,
+    COLOURS,
+    draw_shapes,
+    draw_skeleton,
+    FACES,
+    INK,
+    Polygon,
+    shape_outline,
+)
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.tools.drawing.painting import GHOST, STROKES
+
+_LONGER_SIDE = 420.0
+"""Longer side of a picture, in pixels."""
+
+
+def svg(shown: Closure | Position) -> str:
+    """
+    Draw a linkage as SVG.
+
+    Other poses of its range are grey, and the paths of its traced points are dashed.
+
+    Parameters
+    ----------
+    shown
+        A position; or a closure, which is drawn at its start.
+
+    Returns
+    -------
+    text : str
+        The SVG document.
+
+    Raises
+    ------
+    LinkageError
+        If the position does not close.
+    TypeError
+        If it is neither.
+
+    """
+    position = shown.position(*usual_inputs(shown)) if isinstance(shown, Closure) else shown
+    if not isinstance(position, Position):
+        raise TypeError(f'svg: {quote(shown)} is not drawn; give a Closure or a Position')
+    closure = position.closure
+    assert isinstance(closure, Closure)
+    seen = prepare_view(closure, position.inputs)
+    size = symbol_size(seen)
+    drawn = draw_shapes(closure, position, size, seen.sweep.travels)
+    low, high = bounding_corners(
+        [*all_places(seen), *(p for shape in drawn for p in shape_outline(shape))]
+    )
+    margin = complex(2.0, 2.0) * size
+    low, high = low - margin, high + margin
+    scale = _LONGER_SIDE / max((high - low).real, (high - low).imag)
+    width, height = scale * (high - low).real, scale * (high - low).imag
+
+    def polyline_svg(places: Iterable[complex], style: str) -> str:
+        pixels = (((p - low).real * scale, (high - p).imag * scale) for p in places)
+        points = ' '.join(f'{x:.1f},{y:.1f}' for x, y in pixels)
+        return f'<polyline points="{points}" {style}/>'
+
+    lines = [
+        polyline_svg(shape_outline(bar), f'stroke="{GHOST}"')
+        for ghost in seen.ghosts
+        for bar in draw_skeleton(closure, ghost)
+    ]
+    for index, path in enumerate(seen.sweep.paths.values()):
+        colour = COLOURS[index % len(COLOURS)]
+        lines.append(polyline_svg(path, f'stroke="{colour}" stroke-dasharray="5 2"'))
+    for shape in drawn:
+        if isinstance(shape, Polygon):
+            colour, opacity = FACES[shape.role][:7], int(FACES[shape.role][7:] or 'ff', 16) / 255
+            style = f'fill="{colour}" fill-opacity="{opacity:.2f}" stroke="{INK}"'
+            lines.append(polyline_svg(shape_outline(shape), style))
+        elif isinstance(shape, Circle):
+            centre, radius = shape.centre - low, shape.radius * scale
+            lines.append(
+                f'<circle cx="{centre.real * scale:.1f}" cy="{height - centre.imag * scale:.1f}" '
+                f'r="{radius:.1f}" fill="#ffffff" stroke="{INK}"/>'
+            )
+        else:
+            colour, weight = STROKES[shape.role]
+            lines.append(
+                polyline_svg(shape_outline(shape), f'stroke="{colour}" stroke-width="{weight}"')
+            )
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
+        f'viewBox="0 0 {width:.1f} {height:.1f}" fill="none" stroke-linejoin="round">'
+    )
+    title = f'<title>{escape(repr(shown))}</title>'
+    return '\n'.join((head, title, *lines, '</svg>\n'))

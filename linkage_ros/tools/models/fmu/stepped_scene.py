@@ -1,0 +1,391 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+A scene that another program steps: inputs in, so many ticks, outputs.
+
+The clock is that of the other program, counted in ticks: tick n is at n/rate seconds after the
+first. No other clock is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib import import_module
+from itertools import islice
+from math import isfinite
+from typing import NamedTuple
+
+from linkage_ros.description.scene import Scene, SceneLinkage
+from linkage_ros.errors import LinkageError, list_names
+from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import JointStateWriter, Rejection
+from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.stages.drives.drive import DRIVES
+from linkage_ros.stages.effects.stage import PUBLISHED_WITH
+from linkage_ros.tick.pipeline import LinkagePipeline, LinkageState, Pipeline
+
+FIRST_TICK = NANOSECONDS
+"""Time of the first tick, in [ns]; not 0, since a sample stamped 0 is rejected as unstamped."""
+
+NO_CRANK = 0
+"""Status where no state of the crank is known; those of `Status` count from 1, in their order."""
+
+STATUS_NUMBERS: Mapping[Status, int] = {status: n for n, status in enumerate(Status, 1)}
+
+LARGEST_SEED = 2**53
+"""As for the key ``seed`` of a scene."""
+
+_INPUT_FIELDS = {'topic': ('position', 'velocity'), 'torque': ('effort',)}
+"""Fields of the messages that a drive reads, by name of the drive."""
+
+_UNITS = {
+    'position': ('rad', 'm'),
+    'velocity': ('rad/s', 'm/s'),
+    'acceleration': ('rad/s2', 'm/s2'),
+    'effort': ('N.m', 'N'),
+    'current': ('A', 'A'),
+    'voltage': ('V', 'V'),
+}
+"""Units of each quantity, of a joint that turns and of one that slides."""
+
+_MOST_TICKS = 10_000_000
+"""Most ticks of one step: hours of computing."""
+
+_OF_A_TICK = 1e-3
+"""How far a step may be from whole ticks, in ticks: what rounding of sums of steps takes."""
+
+
+class Variable(NamedTuple):
+    """A number that goes in or comes out, named as ``joint_states.rocker_joint.position``."""
+
+    name: str
+    unit: str
+    description: str
+
+
+class _Sender:
+    """
+    Sends the input values of a linkage as the message that its drive reads.
+
+    Parameters
+    ----------
+    line
+        The pipeline of the linkage, whose drive listens to a topic.
+
+    """
+
+    def __init__(self, line: LinkagePipeline) -> None:
+        scene_linkage = line.scene_linkage
+        drive, parameters = scene_linkage.drive
+        self._fields = _INPUT_FIELDS[drive]
+        # A motor may be commanded by another quantity, which the message calls an effort too.
+        command = getattr(getattr(parameters, 'motor', None), 'command', 'effort')
+        quantities = {field: command if field == 'effort' else field for field in self._fields}
+        self._count = len(scene_linkage.sampled_joints)
+        self._write = JointStateWriter(scene_linkage.sampled_joints).write
+        parts = (
+            [scene_linkage.linkage.joints[scene_linkage.dependent_joint]]
+            if scene_linkage.dependent_joint
+            else (scene_linkage.linkage.inputs)
+        )
+        self.variables = [
+            Variable(
+                f'{line.topic}.{joint}.{quantity}',
+                _UNITS[quantity][given.unit == 'm'],
+                f'{quantity} of the input {joint}'
+                if quantity == field
+                else f'{quantity} that is commanded to the motor of {joint}',
+            )
+            for field, quantity in quantities.items()
+            for joint, given in zip(scene_linkage.sampled_joints, parts, strict=True)
+        ]
+
+    def write_message(self, stamp: int, values: Sequence[float]) -> bytes:
+        """Return the message of a time, in [ns], with values in the order of the variables."""
+        given = iter(values)
+        of = {field: tuple(islice(given, self._count)) for field in self._fields}
+        # A reader of efforts ignores the positions, which every message has.
+        return self._write(
+            stamp,
+            of.get('position', (0.0,) * self._count),
+            of.get('velocity', ()),
+            of.get('effort', ()),
+        )
+
+
+class LinkageOutputs:
+    """The newest reading of a linkage, and whether it is of the last tick."""
+
+    def __init__(self, line: LinkagePipeline) -> None:
+        scene_linkage = line.scene_linkage
+        self.prefix = f'{scene_linkage.name}.' if scene_linkage.name else ''
+        """What its variables that belong to no joint begin with."""
+        turning = line.closure.turning
+        self.variables = {
+            field: [
+                Variable(
+                    f'joint_states.{joint}.{field}',
+                    _UNITS[field][not turns],
+                    f'{field} of {joint}, as its sensor reads it',
+                )
+                for joint, turns in zip(scene_linkage.joint_names, turning, strict=True)
+            ]
+            for field in _published_fields(scene_linkage)
+        }
+        """The variables of each field."""
+        self.values = {field: [0.0] * len(of) for field, of in self.variables.items()}
+        """The newest values of each field, in the order of the variables; 0 before the first."""
+        self.valid = dict.fromkeys(self.variables, False)
+        """Whether the last tick had values of each field."""
+        self.status = NO_CRANK
+        """Status of the linkage at the last tick, as a number."""
+
+    def set_state(self, full_state: LinkageState) -> None:
+        """Take the state of the linkage at a tick."""
+        position, reading = full_state.position, full_state.reading
+        self.status = NO_CRANK if position is None else STATUS_NUMBERS[position.status]
+        for field, values in self.values.items():
+            newest: tuple[float, ...] = ()
+            if reading is not None:
+                newest = getattr(reading, _READ_AS[field])
+            self.valid[field] = bool(newest) and all(map(isfinite, newest))
+            if self.valid[field]:
+                values[:] = newest
+
+
+_READ_AS = {
+    'position': 'joints',
+    'velocity': 'rates',
+    'acceleration': 'accelerations',
+    'effort': 'efforts',
+}
+"""Name of each field in a `SensorReading`."""
+
+
+def _published_fields(scene_linkage: SceneLinkage) -> list[str]:
+    """Return the fields that a linkage publishes."""
+    named = {also for effect in scene_linkage.effects for also in PUBLISHED_WITH.get(effect, ())}
+    named |= {'position', *scene_linkage.effects}
+    return [field for field in _READ_AS if field in named]
+
+
+class MotorOutputs:
+    """
+    What the encoder of a motor reads: the newest message on ``~/motor``.
+
+    Parameters
+    ----------
+    line
+        The pipeline of its linkage.
+    writer
+        Number of its topic among the auxiliary topics.
+
+    """
+
+    def __init__(self, line: LinkagePipeline, writer: int) -> None:
+        scene_linkage = line.scene_linkage
+        (joint,), (given,) = scene_linkage.input_names, scene_linkage.linkage.inputs
+        _, parameters = scene_linkage.drive
+        # Without a motor at the input, the reading is of what is commanded: the input itself.
+        slides = bool(given.slider) and parameters.motor is None
+        fields = ('position', 'velocity', 'effort')[: 2 if parameters.motor is None else 3]
+        self.variables = [
+            Variable(
+                f'motor.{joint}_motor.{field}',
+                _UNITS[field][slides],
+                f'{field} of the motor of {joint}, as its encoder reads it',
+            )
+            for field in fields
+        ]
+        self.values = [0.0] * len(fields)
+        """The newest values, in the order of the variables; 0 before the first."""
+        self._writer, self._read = writer, MessageValues(JOINT_STATE).read
+
+    def set_messages(self, messages: Sequence[bytes]) -> None:
+        """Take the auxiliary messages of a tick."""
+        values = self._read(messages[self._writer]) if messages else ''
+        if not isinstance(values, str):
+            self.values[:] = values.numbers
+
+
+class SteppedScene:
+    """
+    A scene that is stepped from outside. To reset it, build it again.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Raises
+    ------
+    FileError
+        The scene cannot be stepped: it has no tick rate, needs further files or modules, or sets
+        its own clock.
+
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        _refuse_scene(scene)
+        self._scene = scene
+        self._pipeline = Pipeline(scene)
+        self._ticks = 0
+        self._senders = [_Sender(linkage) for linkage in self._pipeline.linkages if linkage.topic]
+        self.inputs = [variable for sender in self._senders for variable in sender.variables]
+        """What goes in, in order."""
+        self.outputs = [LinkageOutputs(linkage) for linkage in self._pipeline.linkages]
+        """What comes out of each linkage."""
+        extras = [
+            (linkage, extra) for linkage in self._pipeline.linkages for extra in linkage.extras
+        ]
+        self.motors = [
+            MotorOutputs(line, index)
+            for index, (line, extra) in enumerate(extras)
+            if extra.effect in DRIVES
+        ]
+        """What comes out of each motor that has an encoder."""
+        self.rejections: dict[Rejection, int] = {}
+        """How many samples were rejected, by reason."""
+
+    @property
+    def period(self) -> float:
+        """Time between two ticks, in [s]."""
+        return 1.0 / self._scene.rate
+
+    def start(self, seed: int, inputs: Sequence[float]) -> None:
+        """
+        Do the first tick, with a seed of all random numbers, and the inputs at that time.
+
+        A LinkageError says that the seed is out of bounds, or that no linkage can be made of it.
+        """
+        if not 0 <= seed <= LARGEST_SEED:
+            raise LinkageError('seed', f'{seed} is out of bounds', f'write 0 to {LARGEST_SEED}')
+        if seed != self._scene.seed:
+            self._pipeline = Pipeline(replace(self._scene, seed=seed))
+        self._offer_inputs(inputs)
+        self._run_tick()
+
+    def whole_ticks(self, begin: float, seconds: float) -> int:
+        """
+        Return how many ticks a step takes.
+
+        Parameters
+        ----------
+        begin
+            Begin of the step, in [s] since the first tick.
+        seconds
+            Its length, in [s].
+
+        Raises
+        ------
+        LinkageError
+            The step does not begin where the last one ended, or is no whole number of ticks.
+
+        """
+        rate = self._scene.rate
+        # Written so that NaN is refused too.
+        if not abs(begin * rate - self._ticks) <= _OF_A_TICK:
+            raise LinkageError(
+                f'a step from {begin:.9g} s',
+                f'the last one ended at {self._ticks / rate:.9g} s',
+                'go on from there, or reset',
+            )
+        ticks = seconds * rate
+        if not 0.5 < ticks <= _MOST_TICKS or abs(ticks - round(ticks)) > _OF_A_TICK:
+            raise LinkageError(
+                f'a step of {seconds:.9g} s',
+                f'is not 1 to {_MOST_TICKS} ticks at {rate:g} Hz',
+                f'step by a whole multiple of {self.period:.9g} s',
+            )
+        return round(ticks)
+
+    def step(self, ticks: int, inputs: Sequence[float]) -> None:
+        """
+        Take the values of the inputs at the end of the last step, then do so many ticks.
+
+        A drive takes them once, as one message.
+        """
+        self._offer_inputs(inputs)
+        for _ in range(ticks):
+            self._ticks += 1
+            self._run_tick()
+
+    def _tick_time(self) -> int:
+        """Return the time of the last tick, in [ns]; lets faults begin and end."""
+        now = FIRST_TICK + round(self._ticks * NANOSECONDS / self._scene.rate)
+        if self._pipeline.injection is not None:
+            self._pipeline.injection.advance(now)
+        return now
+
+    def _offer_inputs(self, inputs: Sequence[float]) -> None:
+        now = self._tick_time()
+        first = 0
+        for sender in self._senders:
+            end = first + len(sender.variables)
+            rejection = self._pipeline.offer(sender.write_message(now, inputs[first:end]), now)
+            first = end
+            if rejection is not None:
+                self.rejections[rejection] = self.rejections.get(rejection, 0) + 1
+
+    def _run_tick(self) -> None:
+        tick = self._pipeline.tick(self._tick_time())
+        for outputs, look in zip(self.outputs, tick.full_states, strict=True):
+            outputs.set_state(look)
+        for motor in self.motors:
+            motor.set_messages(tick.extras)
+
+
+def _refuse_scene(scene: Scene) -> None:
+    """Refuse a scene that needs more than its files and a clock from outside."""
+    content = scene.linkages[0].content
+    if scene.rate == 0.0:
+        raise content.error(
+            'rate', '0 is one tick for every message, and there are none', 'name a rate'
+        )
+    for name, fault in scene.faults.items():
+        if fault.kind == 'time_jump':
+            raise content.error(
+                f'faults.{name}', 'sets the clock, which is that of the importer', 'leave it out'
+            )
+    for scene_linkage in scene.linkages:
+        drive, _ = scene_linkage.drive
+        if drive == 'bag':
+            raise scene_linkage.content.error(
+                'drive.bag',
+                'the bag does not travel with the scene',
+                'name another drive; topic takes the crank as an input',
+            )
+        topic = getattr(import_module(DRIVES[drive]), 'TOPIC', '')
+        if topic and drive not in _INPUT_FIELDS:
+            raise scene_linkage.content.error(
+                f'drive.{drive}',
+                f'listens to {topic}, for which an FMU has no inputs',
+                f'name one of {list_names(_INPUT_FIELDS)}, or a drive that moves by itself',
+            )
+        if scene_linkage.loads is not None and scene_linkage.loads.applied.wrenches:
+            raise scene_linkage.content.error(
+                'loads.wrenches',
+                'come on topics, for which an FMU has no inputs',
+                'leave them out',
+            )
+        if scene_linkage.accuracy is not None:
+            raise scene_linkage.content.error(
+                'accuracy',
+                'lets every machine choose its own solver',
+                'name a solver instead',
+            )
+        for effect in scene_linkage.effects:
+            if '.' in effect:
+                raise scene_linkage.content.error(
+                    f'effects.{effect}',
+                    'is a module of your own, which does not travel with the scene',
+                    'leave it out',
+                )

@@ -1,0 +1,110 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Write a linkage or a scene as a robot model.
+
+URDF is a tree of the published joints, with frames where loops are cut. MJCF, MuJoCo's format, has
+bodies, masses, springs and the closed loops.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+import sys
+from threading import Event
+
+from linkage_ros.cli.arguments import add_output, SCENE_HELP
+from linkage_ros.description.file_access import atomic_write
+from linkage_ros.description.linkage_file import read_closure
+from linkage_ros.description.scene_file import kind_of
+from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.resources import named_file
+from linkage_ros.tools.models.mjcf import mujoco_model
+from linkage_ros.tools.models.onto import urdf_onto
+from linkage_ros.tools.models.part import ModelPart, PartError
+from linkage_ros.tools.models.scene_model import scene_model, Write
+from linkage_ros.tools.models.urdf import urdf_model
+from linkage_ros.tools.models.urdf_file import read_urdf, read_urdf_file
+
+WRITERS: dict[str, Write] = {'urdf': urdf_model, 'mjcf': mujoco_model}
+"""Writers of models, by the command's name."""
+
+SUFFIXES = {'urdf': ('.urdf', '.xml'), 'mjcf': ('.xml', '.mjcf')}
+"""Suffixes of the models, by the command's name."""
+
+EXAMPLE = {
+    'urdf': 'linkage urdf jansen_leg -o jansen_leg.urdf',
+    'mjcf': 'linkage mjcf worn_press -o worn_press.xml',
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('file', metavar='SCENE', help=SCENE_HELP)
+    command = parser.get_default('command')
+    add_output(parser, SUFFIXES[command], 'the model is printed')
+    if command == 'urdf':
+        parser.add_argument(
+            '--onto',
+            type=Path,
+            metavar='URDF',
+            help='the robot that the linkage was imported from: keep it as it is, and add only '
+            'what closes the loops',
+        )
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """Write the model."""
+    write = WRITERS[arguments.command]
+    if arguments.command == 'urdf' and arguments.onto:
+        write = _writer_onto(arguments.onto)
+    write_or_print(model_of(arguments.file, write), arguments.output)
+    return 0
+
+
+def _writer_onto(file: Path) -> Write:
+    """Return a writer that keeps a robot as it is, and adds what closes the loops."""
+    data = read_urdf_file(file)
+    robot = read_urdf(data, str(file))
+
+    def write(_: str, parts: Sequence[ModelPart]) -> bytes:
+        return urdf_onto(robot, data, parts)
+
+    return write
+
+
+def model_of(named: str, write: Write) -> bytes:
+    """
+    Return the model of a linkage or scene, given by its file or its shipped name.
+
+    Linkages of a scene are those that the node would solve, with the deviations of their parts.
+    """
+    file = named_file(named, 'linkages', 'scenes')
+    content, _ = read_yaml(file)
+    if kind_of(content) == 'scene':
+        from linkage_ros.description.scene_file import load_scene
+        from linkage_ros.tick.pipeline import Pipeline
+
+        scene = load_scene(file)
+        return scene_model(scene, Pipeline(scene).closures, write)
+    try:
+        return write(file.stem, [ModelPart(read_closure(content))])
+    except PartError as error:
+        raise content.error(error.where, error.reason, error.remedy) from None
+
+
+def write_or_print(data: bytes, output: Path | None) -> None:
+    """Write a model to a file and say so, or print it."""
+    if output is None:
+        sys.stdout.write(data.decode())
+    else:
+        atomic_write(output, data)
+        print(output)

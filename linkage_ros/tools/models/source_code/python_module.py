@@ -1,0 +1,108 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A linkage as a Python module that needs only `math`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from linkage_ros.kinematics.compiling.tape import Operation
+from linkage_ros.tools.models.source_code.source import (
+    GIVEN,
+    Language,
+    RETURNED,
+    STATUSES,
+    Subject,
+    WIDTH,
+)
+
+_NOTES = (
+    '',
+    'It returns the status and a tuple for each group of values, empty where the status has none.',
+)
+
+_CODING = '# -*- coding: utf-8 -*-'
+"""First line: Python looks for an encoding in the second, which holds a name, only without it."""
+
+_IMPORTS = 'from math import atan2, copysign, cos, inf, isfinite, sin, sqrt'
+
+
+class PythonModule(Language):
+    """Python; the function gives a number of derivatives."""
+
+    infinity = 'inf'
+    finite = 'isfinite'
+    nearest = 'round'
+    comment = '# {}'
+    conjunction = 'and'
+    disjunction = 'or'
+
+    def __init__(self, derivatives: int) -> None:
+        self._groups = 1 + derivatives
+
+    def write_call(self, operation: Operation, parts: list[str]) -> str:
+        if operation.name == '**':
+            return f'(({parts[0]}) ** {parts[1]})'
+        if operation.name == 'hypot':
+            # The root that C's hypot() gives; the last digits of math.hypot() differ.
+            return f'abs(complex({parts[0]}, {parts[1]}))'
+        return super().write_call(operation, parts)
+
+    def write_choice(self, condition: str, one: str, other: str) -> str:
+        return f'{one} if {condition} else {other}'
+
+    def negate(self, condition: str) -> str:
+        return f'not {condition}' if condition.isidentifier() else f'not ({condition})'
+
+    def write_below(self, number: str, most: str) -> str:
+        return f'-{most} < {number} < {most}'  # takes half the time of a call
+
+    def write_block(self, condition: str, lines: Sequence[str]) -> list[str]:
+        return [f'if {condition}:', *(f'    {line}' for line in lines)]
+
+    def wrap_line(self, line: str) -> list[str]:
+        if len(line) > WIDTH:
+            name, equals, text = line.partition(' = ')
+            if equals:
+                line = f'{name} = ({text})'
+            elif line.lstrip().startswith('if '):
+                indent, _, condition = line.partition('if ')
+                line = f'{indent}if ({condition[:-1]}):'
+        return super().wrap_line(line)
+
+    def assign(self, name: str, text: str, truth: bool = False) -> str:
+        return f'{name} = {text}'
+
+    def return_status(self, status: str) -> str:
+        return f'return ({", ".join([status, *["()"] * self._groups])})'
+
+    def return_solution(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
+        tuples = (f'({", ".join(group)},)' for group in groups)
+        return [f'return ({", ".join([status, *tuples])})']
+
+    def scale_rates(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+        names = RETURNED[: self._groups]
+        arguments = ''.join(f', ({", ".join(group)},)' for group in given)
+        tuples = (
+            f', tuple({"map(up.__mul__, " * order}{name}{")" * order})'
+            for order, name in enumerate(names[1:], 1)
+        )
+        return [
+            f'status, {", ".join(names)} = {self.function_name(len(given))}(inputs{arguments})',
+            f'return (status, {names[0]}{"".join(tuples)})',
+        ]
+
+    def whole_source(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+        name = self.function_name(subject.derivatives)
+        lines = [
+            _CODING, *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', _IMPORTS, '',
+            *(f'{status} = {index}' for index, status in enumerate(STATUSES)), '', '',
+            f'def {name}({", ".join(GIVEN[: self._groups])}):', *body,
+        ]  # fmt: skip
+        return '\n'.join([*lines, ''])

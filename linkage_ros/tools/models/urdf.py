@@ -1,0 +1,431 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+A linkage as URDF: the tree of its published joints, and frames where pins close its loops.
+
+The root is the ground. If several linkages share a model, the root is a frame without a body that
+holds their grounds, since a scene does not position them.
+"""
+
+from __future__ import annotations
+
+from cmath import phase
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
+import re
+from typing import NamedTuple
+from xml.etree import ElementTree as ET
+
+from linkage_ros.errors import DefinitionError, quote
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Limits,
+    Linkage,
+    links_by_point,
+    Mass,
+    NO_LIMITS,
+    Ratio,
+    RevoluteJoint,
+)
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.tools.models.bodies import link_bodies, LinkBody
+from linkage_ros.tools.models.orientation import AngleSpan, joint_spans, named_joints
+from linkage_ros.tools.models.part import ModelPart, PartError, prefix_names, PrefixedNames
+from linkage_ros.tools.models.tree import grow_tree, Tree, TreeJoint
+from linkage_ros.tools.models.xml import (
+    format_number,
+    format_numbers,
+    format_rough,
+    xml_comment,
+    xml_document,
+)
+
+# The loop joints: pins and sliders that the tree leaves open, as pairs of frames.
+#
+# Frames named PIN_on_LINK mark the pin on each of its links: in a correct model they coincide. So
+# do those of a slider whose slide is published; otherwise the x axis of SLIDER_line_on_LINK lies
+# along the line.
+
+
+class LoopJoint(NamedTuple):
+    """A pin or slider that the tree leaves open."""
+
+    # ``pin``, ``slide`` (the frames coincide as well) or ``line`` (the second lies on the x axis
+    # of the first).
+    kind: str
+    name: str  # Name of the point or slider
+    frames: tuple[str, ...]  # Two or more
+
+
+def add_frames(tree: Tree, names: PrefixedNames) -> list[LoopJoint]:
+    """Add frames of all cuts, of joints that attach no link, and of traced points to a tree."""
+    adding = _FrameAdding(tree, names)
+    cuts = [*adding.cut_pins(), *adding.cut_sliders()]
+    adding.add_spare()
+    adding.add_traced()
+    return cuts
+
+
+class _FrameAdding:
+    def __init__(self, tree: Tree, names: PrefixedNames) -> None:
+        self._tree = tree
+        self._names = names
+        self._joints = named_joints(tree.linkage)
+        self._spare = list(tree.spare)
+
+    def cut_pins(self) -> list[LoopJoint]:
+        cuts = []
+        for point, links in links_by_point(self._tree.linkage.links).items():
+            apart = {link: link for link in links}
+            for pin, on, link in self._tree.pins:
+                if pin == point:
+                    joined, kept = apart[link], apart[on]
+                    apart = {a: kept if of == joined else of for a, of in apart.items()}
+            # The first link of each connected part represents it.
+            ends = list({of: link for link, of in reversed(apart.items())}.values())[::-1]
+            if len(ends) > 1:
+                frames = tuple(self._add_fixed(point, link, point) for link in ends)
+                cuts.append(LoopJoint('pin', point, frames))
+        return cuts
+
+    def cut_sliders(self) -> list[LoopJoint]:
+        linkage, cuts = self._tree.linkage, []
+        links = links_by_point(linkage.links)
+        for name, slider in linkage.sliders.items():
+            if name in self._tree.slides:
+                continue
+            shown = f'{name}_slider' if name in links else name
+            end = slider.block or links[slider.point][0]
+            slides = [s for s in self._spare if getattr(self._joints[s], 'slider', '') == name]
+            if slides:
+                self._spare.remove(slides[0])
+                line = self._add_slide(slides[0], self._names.frame_on(shown, slider.along))
+            else:
+                turn = phase(complex(*slider.direction))
+                line = self._add_fixed(f'{shown}_line', slider.along, slider.through, turn)
+            frames = (line, self._add_fixed(shown, end, slider.point))
+            cuts.append(LoopJoint('slide' if slides else 'line', name, frames))
+        return cuts
+
+    def add_spare(self) -> None:
+        """Give a frame to every published joint that attaches no link."""
+        links, names = self._tree.linkage.links, self._names
+        for name in self._spare:
+            frame, joint = names.free_frame(f'{name}_frame'), self._joints[name]
+            if isinstance(joint, RevoluteJoint):
+                pins = [p for p in links[joint.parent] if p in links[joint.child]]
+                place = self._tree.point_position(joint.parent, pins[0]) if pins else 0j
+                parent = names.own_name(joint.parent)
+                self._add_joint(TreeJoint(names.own_name(name), 'revolute', parent, frame, place))
+            else:
+                self._add_slide(name, frame)
+
+    def add_traced(self) -> None:
+        links = links_by_point(self._tree.linkage.links)
+        there = {joint.child for joint in self._tree.joints}
+        for point in self._tree.linkage.traced:
+            if not any(self._names.text_on(point, link) in there for link in links[point]):
+                self._add_fixed(point, links[point][0], point)
+
+    def _add_slide(self, name: str, frame: str) -> str:
+        joint = self._joints[name]
+        assert not isinstance(joint, RevoluteJoint)
+        slider = self._tree.linkage.sliders[joint.slider]
+        place = self._tree.point_position(slider.along, slider.through)
+        parent = self._names.own_name(slider.along)
+        own = self._names.own_name(name)
+        return self._add_joint(TreeJoint(own, 'prismatic', parent, frame, place, 0.0, slider.unit))
+
+    def _add_fixed(self, name: str, link: str, point: str, turn: float = 0.0) -> str:
+        frame = self._names.frame_on(name, link)
+        joint = self._names.free_joint(f'{name}_on_{link}_fixed')
+        place = self._tree.point_position(link, point)
+        return self._add_joint(
+            TreeJoint(joint, 'fixed', self._names.own_name(link), frame, place, turn)
+        )
+
+    def _add_joint(self, joint: TreeJoint) -> str:
+        self._tree.joints.append(joint)
+        return joint.child
+
+
+EFFORT, VELOCITY = 1000.0, 100.0
+"""Limits that URDF requires but are unknown, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
+
+FARTHEST = 1e9
+"""Stands for the missing limit of an angle that is limited on one side only, in [rad]."""
+
+_ROOT = 'world'
+
+_EXPRESSION = re.compile(r'\$[{(]')
+"""Text that xacro evaluates (https://wiki.ros.org/xacro)."""
+
+
+class _Model(NamedTuple):
+    """A linkage with its tree, ready to be written."""
+
+    part: ModelPart
+    names: PrefixedNames
+    tree: Tree
+    cuts: Sequence[LoopJoint]
+    spans: Mapping[str, AngleSpan]
+    bodies: Mapping[str, LinkBody]
+
+
+def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
+    """
+    Return a robot model.
+
+    Parameters
+    ----------
+    name
+        Name of the robot.
+    parts
+        Its linkages.
+
+    Raises
+    ------
+    PartError
+        If the published joints of a linkage do not determine all its links, or xacro would
+        evaluate one of its names.
+
+    """
+    names, own = prefix_names([(part.prefix, part.closure.linkage) for part in parts])
+    models = []
+    layers = 0
+    for count, (part, its) in enumerate(zip(parts, own, strict=True)):
+        try:
+            tree = grow_tree(part.closure.linkage, its)
+        except DefinitionError as error:
+            raise PartError(count, error.where, error.reason, error.remedy) from None
+        cuts = add_frames(tree, its)
+        ranges = joint_spans(part.closure)
+        models.append(
+            _Model(part, its, tree, cuts, ranges, link_bodies(part.closure, ranges, layers))
+        )
+        layers += len(part.closure.linkage.links)
+    robot = ET.Element('robot', name=name)
+    robot.append(xml_comment(list(_head_lines(models))))
+    if len(models) > 1:
+        root = names.free_frame(_ROOT)
+        ET.SubElement(robot, 'link', name=root)
+        for model in models:
+            mount = TreeJoint(
+                model.names.free_joint('mount'), 'fixed', root, model.names.own_name(GROUND), 0j
+            )
+            add_joint(robot, mount, None, NO_LIMITS)
+    _refuse_expressions(0, robot, of_linkage=False)
+    for count, model in enumerate(models):
+        before = len(robot)
+        _write_linkage(robot, model)
+        for element in robot[before:]:
+            _refuse_expressions(count, element)
+    return xml_document(robot)
+
+
+def _refuse_expressions(number: int, element: ET.Element, *, of_linkage: bool = True) -> None:
+    """
+    Refuse names that xacro would evaluate.
+
+    A launch file may read a URDF with or without xacro: a name that is escaped for one is a
+    different name for the other.
+    """
+    for each in element.iter():
+        for text in each.attrib.values():
+            if _EXPRESSION.search(text):
+                raise PartError(
+                    number,
+                    '',
+                    f'xacro would evaluate the name {quote(text)}',
+                    'choose a name without ${ and $(',
+                    of_linkage=of_linkage,
+                )
+
+
+def _head_lines(models: Sequence[_Model]) -> Iterator[str]:
+    yield from _HEAD.splitlines()
+    if len(models) > 1:
+        yield 'A scene does not say where its linkages stand. Change the origin of NAME_mount.'
+    if any(joint.mimics for model in models for joint in model.tree.joints):
+        yield 'Frames without a body between joints at one pin turn with joints that they mimic,'
+        yield 'so that a published joint starts from the link that it is measured from.'
+    for model in models:
+        yield ''
+        if not model.cuts:
+            yield 'Nothing is cut.'
+        for cut in model.cuts:
+            first, *others = cut.frames
+            met = ' and '.join(others)
+            what = 'pin' if cut.kind == 'pin' else 'slider'
+            line = f'{met} is on the x axis of {first}'
+            how = line if cut.kind == 'line' else f'{first} meets {met}'
+            yield f'{what} {cut.name} is cut, {how}'
+        if spare := ', '.join(map(model.names.own_name, model.tree.spare)):
+            yield f'no link hangs by {spare}'
+
+
+_HEAD = f"""\
+A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are those of
+the published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
+Links are bars in layers, of no particular shape; those with a mass are thin plates, with ixx =
+iyy = izz/2.
+A limit is as the linkage gives it; else what the joint comes to over the range of the input that
+the linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
+angles, the reach for slides. An angle that passes pi has none either, since it is published as it
+begins in (-pi, pi], or wrapped. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
+
+
+def _write_linkage(robot: ET.Element, model: _Model) -> None:
+    names, linkage = model.names, model.part.closure.linkage
+    for link in linkage.links:
+        element = ET.SubElement(robot, 'link', name=names.own_name(link))
+        origin = model.tree.origins[link]
+        mass = linkage.masses.get(link)
+        if mass and mass.mass:  # without an inertial a link is massless
+            _write_inertial(element, mass, origin)
+        _write_visuals(element, names.own_name(link), model.bodies[link], origin)
+    links = {names.own_name(link) for link in linkage.links}
+    for joint in model.tree.joints:
+        if joint.child not in links:
+            ET.SubElement(robot, 'link', name=joint.child)
+    ranges = {names.own_name(name): span for name, span in model.spans.items()}
+    given = {names.own_name(name): limits for name, limits in linkage.limits.items()}
+    computed: dict[str, dict[str, str]] = {}
+    followed = {names.own_name(name): of for name, of in _following_joints(linkage, names)}
+    for joint in model.tree.joints:
+        of = joint.mimics or joint.name
+        limits = given.get(of, NO_LIMITS)
+        mimic = followed.get(of, Ratio(of, 1.0) if joint.mimics else None)
+        computed[of] = add_joint(robot, joint, ranges.get(of), limits, model.part.wrapped, mimic)
+    start = start_element(model.part.closure, names, computed)
+    if start is not None:
+        robot.append(start)
+
+
+def _following_joints(linkage: Linkage, names: PrefixedNames) -> Iterator[tuple[str, Ratio]]:
+    """Yield the joints that follow an input, perhaps by others, with its name in the model."""
+    for name, given in linkage.ratios.items():
+        of, ratio, offset = given.of, given.ratio, given.offset
+        while of in linkage.ratios:
+            before = linkage.ratios[of]
+            of, offset = before.of, offset + ratio * before.offset
+            ratio *= before.ratio
+        if of in (driven.joint for driven in linkage.inputs):
+            yield name, Ratio(names.own_name(of), ratio, offset)
+
+
+def _write_inertial(link: ET.Element, mass: Mass, origin: complex) -> None:
+    inertial = ET.SubElement(link, 'inertial')
+    _write_origin(inertial, complex(*mass.center) - origin)
+    ET.SubElement(inertial, 'mass', value=format_number(mass.mass))
+    flat, about = format_number(0.5 * mass.inertia), format_number(mass.inertia)
+    ET.SubElement(inertial, 'inertia', ixx=flat, ixy='0', ixz='0', iyy=flat, iyz='0', izz=about)
+
+
+def _write_visuals(link: ET.Element, name: str, body: LinkBody, origin: complex) -> None:
+    for count, solid in enumerate(body.solids):
+        visual = ET.SubElement(link, 'visual')
+        if solid.name and solid.kind in ('disc', 'block'):
+            visual.set('name', solid.name)
+        centre = solid.centre - origin
+        seen = {
+            'xyz': format_rough(centre.real, centre.imag, solid.z),
+            'rpy': format_rough(0, 0, solid.angle),
+        }
+        ET.SubElement(visual, 'origin', seen)
+        geometry = ET.SubElement(visual, 'geometry')
+        if solid.kind == 'disc':
+            radius = format_rough(0.5 * solid.width)
+            ET.SubElement(geometry, 'cylinder', radius=radius, length=format_rough(solid.height))
+        else:
+            size = format_rough(solid.length, solid.width, solid.height)
+            ET.SubElement(geometry, 'box', size=size)
+        material = ET.SubElement(visual, 'material', name=f'colour of {name}')
+        if not count:
+            ET.SubElement(material, 'color', rgba=format_numbers(*body.colour))
+
+
+def add_joint(
+    robot: ET.Element,
+    joint: TreeJoint,
+    span: AngleSpan | None,
+    limits: Limits,
+    wrapped: bool = False,
+    mimic: Ratio | None = None,
+) -> dict[str, str]:
+    """Write a joint; return the limits that were made up because the linkage has none."""
+    kind: str = joint.kind
+    if kind == 'revolute' and span is not None:
+        # A wrapped angle that passes π is on both sides.
+        passing = wrapped and AngleSpan(limits.low, limits.high).passes_pi
+        if passing if limits.is_bounded else not span.limited:
+            kind = 'continuous'
+    element = ET.SubElement(robot, 'joint', name=joint.name, type=kind)
+    _write_origin(element, joint.place, joint.turn)
+    ET.SubElement(element, 'parent', link=joint.parent)
+    ET.SubElement(element, 'child', link=joint.child)
+    if joint.kind == 'fixed':
+        return {}
+    assert span is not None, 'all that moves is published'
+    if joint.kind == 'revolute':
+        axis = format_numbers(0.0, 0.0, joint.axis.real)
+    else:
+        axis = format_numbers(joint.axis.real, joint.axis.imag, 0.0)
+    ET.SubElement(element, 'axis', xyz=axis)
+    # A continuous angle that is limited on one side only gets a far limit on the other.
+    lowest, highest = (span.lowest, span.highest) if span.limited else (-FARTHEST, FARTHEST)
+    known = {
+        'lower': (limits.low, lowest),
+        'upper': (limits.high, highest),
+        'effort': (limits.effort, EFFORT),
+        'velocity': (limits.velocity, VELOCITY),
+    }
+    if kind == 'continuous':
+        del known['lower'], known['upper']
+    written = {
+        key: format_number(given if isfinite(given) else ours)
+        for key, (given, ours) in known.items()
+    }
+    ET.SubElement(element, 'limit', written)
+    if mimic:
+        multiplier, offset = format_number(mimic.ratio), format_number(mimic.offset)
+        ET.SubElement(element, 'mimic', joint=mimic.of, multiplier=multiplier, offset=offset)
+    return {key: written[key] for key, (given, _) in known.items() if not isfinite(given)}
+
+
+def _write_origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
+    xyz, rpy = format_numbers(place.real, place.imag, 0.0), format_numbers(0.0, 0.0, turn)
+    ET.SubElement(element, 'origin', xyz=xyz, rpy=rpy)
+
+
+def start_element(
+    closure: Closure, names: PrefixedNames, computed: Mapping[str, Mapping[str, str]]
+) -> ET.Element | None:
+    """
+    Return the data that URDF has no elements for: the inputs, and a pose that closes the loops.
+
+    It also tells which joint limits were made up. Readers of URDF ignore unknown elements;
+    ``linkage import`` reads these. None if several inputs do not close where each is in range.
+    """
+    inputs = usual_inputs(closure)
+    given = zip(closure.linkage.inputs, inputs, strict=True)
+    values = {driven.joint: value for driven, value in given}
+    position = closure.position(*inputs)
+    if not position.joints:
+        return None
+    values |= dict(zip(closure.linkage.joints, position.joints, strict=True))
+    element = ET.Element('linkage_start')
+    for name in named_joints(closure.linkage):
+        kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'
+        named = names.own_name(name)
+        joint = ET.SubElement(element, kind, name=named, value=format_number(values[name]))
+        if named in computed:
+            ET.SubElement(joint, 'computed', dict(computed[named]))
+    return element

@@ -1,0 +1,448 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Read a URDF: links and joints by name, each joint checked against the rules of URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import inf, isfinite
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree as ET
+
+from linkage_ros.description.file_access import read_regular
+from linkage_ros.description.file_kinds import kind_of_bytes, kind_of_folder
+from linkage_ros.errors import FileError, LinkageError, list_names, quote
+from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
+
+# The content of a URDF: links and joints by name.
+
+Vector = tuple[float, float, float]
+
+MOVING = ('revolute', 'continuous', 'prismatic')
+
+
+class Inertial(NamedTuple):
+    """Mass [kg], its centre [m], rotation of its axes [rad], and ixx ixy ixz iyy iyz izz."""
+
+    mass: float
+    xyz: Vector
+    rpy: Vector
+    tensor: tuple[float, float, float, float, float, float]
+
+
+class UrdfLink(NamedTuple):
+    """A link."""
+
+    inertial: Inertial | None  # Its inertial data, or None
+    bodied: bool  # Whether it has a shape or a mass
+    marks: tuple[tuple[str, Vector], ...]  # Names of its visuals, with their positions, in [m]
+
+
+class UrdfJoint(NamedTuple):
+    """A joint."""
+
+    # As in the file.
+    name: str
+    kind: str
+    # Links.
+    parent: str
+    child: str
+    # Child's frame in the parent's with the joint at 0, in [m] and [rad].
+    xyz: Vector
+    rpy: Vector
+    axis: Vector  # In the child's frame, of any length except 0
+    # The joint that it follows, '' if none, with factor and offset.
+    mimics: str
+    multiplier: float
+    offset: float
+    limits: Limits  # As in ``<limit>``, without those that ``linkage urdf`` made up
+
+
+class UrdfFile(NamedTuple):
+    """A robot."""
+
+    file: str  # Name of the file, for messages
+    name: str  # Name of the robot
+    root: str  # The link that is no joint's child
+    links: Mapping[str, UrdfLink]  # Links by name
+    joints: Mapping[str, UrdfJoint]  # Joints by name, parents first
+    order: tuple[str, ...]  # Names of the joints in the order of the file
+    inputs: tuple[str, ...]  # Names of driven joints, if ``linkage urdf`` wrote the file
+    # Values of joints in a pose in which all loops close, if ``linkage urdf`` wrote the file.
+    start: Mapping[str, float]
+    # Places that meet, LINK.x,y,z, as tags say by which simulators close loops.
+    closings: tuple[tuple[str, str], ...]
+    # Places, LINK.x,y,z, that meet a link where they are with all joints at 0, as Gazebo says.
+    pinned: tuple[tuple[str, str], ...]
+    unread: tuple[str, ...]  # Tags that may close loops and are not read, in words
+
+
+_KINDS = (*MOVING, 'fixed', 'floating', 'planar')
+_FARTHEST = 1e9
+
+_LOOP_TAGS = {
+    'loop_joint': (('link1', 'link1'), ('link2', 'link2')),
+    'loop_constraint': (('parent', 'parent_origin'), ('child', 'child_origin')),
+}
+"""Tags outside of URDF that close loops: for both ends the tags with ``link`` and ``xyz``."""
+
+_PINS = ('', 'revolute', 'continuous', 'spherical')
+"""Types of a loop joint that are a pin in the plane; without a type it is one."""
+
+_USUAL_TAGS = (
+    'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
+    *_LOOP_TAGS,
+)  # fmt: skip
+
+
+_LARGEST_FILE = 10_000_000
+
+
+def read_urdf_file(file: Path) -> bytes:
+    """Return the content of a URDF; a LinkageError has the reason why it cannot be read."""
+    try:
+        data = read_regular(file, _LARGEST_FILE)
+    except IsADirectoryError:
+        reason = f'is {kind_of_folder(file).noun}, and no URDF'
+        raise LinkageError(file, reason, 'name a URDF file') from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise LinkageError(file, f'cannot be read ({reason})', 'name a URDF file') from None
+    if len(data) > _LARGEST_FILE:
+        raise LinkageError(file, f'is larger than {_LARGEST_FILE} bytes', 'name a URDF file')
+    return data
+
+
+def read_urdf(data: bytes, file: str) -> UrdfFile:
+    """Read a URDF; a FileError has file, link or joint, and remedy."""
+    try:
+        root = ET.fromstring(data)
+    except ET.ParseError as error:
+        noun = kind_of_bytes(data).noun
+        if noun not in ('a URDF', 'an XML file'):
+            raise FileError(file, '', f'is {noun}, and no URDF', 'name a URDF file') from None
+        line, _ = error.position
+        raise FileError(file, '', f'is no XML ({error})', 'name a URDF file', line) from None
+    except (ValueError, LookupError) as error:  # unknown encoding in the XML declaration
+        raise FileError(file, '', f'is no XML ({error})', 'name a URDF file') from None
+    return _Reader(file).read(root)
+
+
+class _Reader:
+    def __init__(self, file: str) -> None:
+        self._file = file
+
+    def read(self, root: ET.Element) -> UrdfFile:
+        if root.tag != 'robot':
+            raise self._file_error('', f'holds <{root.tag}>, not <robot>', 'name a URDF file')
+        for element in root.iter():
+            if 'ros.org/wiki/xacro' in element.tag or '${' in ''.join(element.attrib.values()):
+                raise self._file_error(
+                    '', 'is written in xacro', 'run first: xacro FILE > FILE.urdf'
+                )
+        links: dict[str, UrdfLink] = {}
+        for element in root.findall('link'):
+            name = self._checked_name(element, links, 'link')
+            links[name] = self._read_link(element, f'link {name}')
+        if not links:
+            raise self._file_error('', 'has no link', 'name a URDF file')
+        start = root.find('linkage_start')
+        made_up = {} if start is None else {each.get('name', ''): _made_up(each) for each in start}
+        joints: dict[str, UrdfJoint] = {}
+        for element in root.findall('joint'):
+            name = self._checked_name(element, joints, 'joint')
+            limits = NO_LIMITS
+            if name not in made_up or made_up[name] is not None:
+                limits = self._read_limits(element, name, made_up.get(name))
+            joints[name] = self._read_joint(element, name, links)._replace(limits=limits)
+        self._check_mimics(joints)
+        base, ordered = self._order_joints(links, joints)
+        said = [] if start is None else [each for each in start if each.get('name') in joints]
+        return UrdfFile(
+            self._file,
+            root.get('name', ''),
+            base,
+            links,
+            {joint.name: joint for joint in ordered},
+            tuple(joints),
+            tuple(each.get('name', '') for each in said if each.tag == 'input'),
+            {
+                each.get('name', ''): self._read_value(each, 'value', 'linkage_start')
+                for each in said
+            },
+            self._read_closings(root, links),
+            tuple(self._pinned_places(root, links)),
+            tuple(_unread_tags(root)),
+        )
+
+    def _read_closings(
+        self, root: ET.Element, links: Mapping[str, UrdfLink]
+    ) -> tuple[tuple[str, str], ...]:
+        """Return the pairs of places that loop tags join; a pair that two tags name, once."""
+        found: dict[frozenset[str], tuple[str, str]] = {}
+        for element in root:
+            if element.tag in _LOOP_TAGS and element.get('type', '') in _PINS:
+                where = f'{element.tag} {element.get("name", "")}'.rstrip()
+                one, other = (
+                    self._read_place(element, link, place, where, links)
+                    for link, place in _LOOP_TAGS[element.tag]
+                )
+                found.setdefault(frozenset((one, other)), (one, other))
+        return tuple(found.values())
+
+    def _pinned_places(
+        self, root: ET.Element, links: Mapping[str, UrdfLink]
+    ) -> Iterator[tuple[str, str]]:
+        """Yield places on links, and the links that joints of <gazebo> pin them to."""
+        for joint in filter(_is_pin_of_gazebo, root.findall('gazebo/joint')):
+            where = f'joint {joint.get("name", "")} of <gazebo>'
+            parent, child = ((joint.findtext(end) or '').strip() for end in ('parent', 'child'))
+            for end, link in (('parent', parent), ('child', child)):
+                if link not in links:
+                    raise self._file_error(
+                        where, f'its {end} {quote(link)} is no link', 'name a link'
+                    )
+            pose = {'pose': joint.findtext('pose') or '0 0 0 0 0 0'}
+            values = self._read_values(ET.Element('joint', pose), 'pose', where, 6, '')
+            yield f'{child}.{",".join(map(repr, values[:3]))}', parent
+
+    def _read_place(
+        self, element: ET.Element, link: str, place: str, where: str, links: Mapping[str, UrdfLink]
+    ) -> str:
+        name = self._read_end(element, link, where, links)
+        xyz = self._read_vector(element.find(place), 'xyz', where, '0 0 0')
+        return f'{name}.{",".join(map(repr, xyz))}'
+
+    def _file_error(self, key: str, reason: str, remedy: str) -> FileError:
+        return FileError(self._file, key, reason, remedy)
+
+    def _checked_name(self, element: ET.Element, taken: Mapping[str, object], kind: str) -> str:
+        name = element.get('name', '')
+        if not name or not name.isprintable():
+            raise self._file_error('', f'a {kind} has the name {quote(name)}', 'give it a name')
+        if name in taken:
+            raise self._file_error(f'{kind} {name}', 'is a duplicate name', 'rename one')
+        return name
+
+    def _read_value(self, element: ET.Element, key: str, where: str, default: str = '') -> float:
+        (value,) = self._read_values(element, key, where, 1, default)
+        return value
+
+    def _read_values(
+        self, element: ET.Element | None, key: str, where: str, count: int, default: str
+    ) -> tuple[float, ...]:
+        text = default if element is None else element.get(key, default)
+        try:
+            values = tuple(map(float, text.split()))
+        except ValueError:
+            values = ()
+        if len(values) != count or not all(isfinite(v) and abs(v) <= _FARTHEST for v in values):
+            numbers = 'a finite number' if count == 1 else f'{count} finite numbers'
+            raise self._file_error(where, f'{key}={quote(text)} is not {numbers}', 'correct it')
+        return values
+
+    def _read_vector(
+        self, element: ET.Element | None, key: str, where: str, default: str
+    ) -> Vector:
+        x, y, z = self._read_values(element, key, where, 3, default)
+        return x, y, z
+
+    def _read_link(self, element: ET.Element, where: str) -> UrdfLink:
+        seen = [*element.findall('visual'), *element.findall('collision')]
+        marks = tuple(
+            (each.get('name', ''), self._read_vector(each.find('origin'), 'xyz', where, '0 0 0'))
+            for each in seen
+            if each.get('name')
+        )
+        inertial = element.find('inertial')
+        weighed = self._read_inertial(inertial, where) if inertial is not None else None
+        return UrdfLink(weighed, bool(seen) or weighed is not None, marks)
+
+    def _read_inertial(self, element: ET.Element, where: str) -> Inertial | None:
+        mass = element.find('mass')
+        if mass is None:
+            return None
+        weight = self._read_value(mass, 'value', where)
+        origin, tensor = element.find('origin'), element.find('inertia')
+        keys = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+        ixx, ixy, ixz, iyy, iyz, izz = (
+            self._read_values(tensor, key, where, 1, '0')[0] for key in keys
+        )
+        if weight <= 0.0:
+            return None  # some exporters write frames this way
+        return Inertial(
+            weight,
+            self._read_vector(origin, 'xyz', where, '0 0 0'),
+            self._read_vector(origin, 'rpy', where, '0 0 0'),
+            (ixx, ixy, ixz, iyy, iyz, izz),
+        )
+
+    def _read_joint(
+        self, element: ET.Element, name: str, links: Mapping[str, UrdfLink]
+    ) -> UrdfJoint:
+        where, kind = f'joint {name}', element.get('type', '')
+        if kind not in _KINDS:
+            raise self._file_error(
+                where,
+                f'type={quote(kind)} is not a joint type',
+                f'write {list_names(MOVING)} or fixed',
+            )
+        if kind in ('floating', 'planar'):
+            raise self._file_error(
+                where,
+                f'is {kind}, which no pin or slider of a planar linkage is',
+                f'write {list_names(MOVING)} or fixed, or leave it out with what hangs on it',
+            )
+        parent, child = (self._read_end(element, end, where, links) for end in ('parent', 'child'))
+        axis = self._read_vector(element.find('axis'), 'xyz', where, '1 0 0')
+        if kind in MOVING and axis == (0.0, 0.0, 0.0):
+            raise self._file_error(where, 'its axis is 0 0 0', 'write 0 0 1, for example')
+        origin, mimic = element.find('origin'), element.find('mimic')
+        return UrdfJoint(
+            name,
+            kind,
+            parent,
+            child,
+            xyz=self._read_vector(origin, 'xyz', where, '0 0 0'),
+            rpy=self._read_vector(origin, 'rpy', where, '0 0 0'),
+            axis=axis,
+            mimics='' if mimic is None else mimic.get('joint', ''),
+            multiplier=self._read_values(mimic, 'multiplier', where, 1, '1')[0],
+            offset=self._read_values(mimic, 'offset', where, 1, '0')[0],
+            limits=NO_LIMITS,
+        )
+
+    def _read_limits(
+        self, joint: ET.Element, name: str, made_up: Mapping[str, str] | None
+    ) -> Limits:
+        """
+        Return the usable limits of ``<limit>``.
+
+        Not used are numbers that ``linkage urdf`` made up, bounds of a continuous joint, two
+        bounds of 0, and a velocity or an effort of 0, which some exporters write for unknown.
+        """
+        limit, where = joint.find('limit'), f'joint {name}'
+        if limit is None or joint.get('type') not in MOVING:
+            return NO_LIMITS
+        told = {
+            key: self._read_value(limit, key, where, default='0')
+            for key in ('lower', 'upper', 'velocity', 'effort')
+        }
+        book = dict(made_up or {})
+        if any(book.get(key, limit.get(key)) != limit.get(key) for key in ('lower', 'upper')):
+            # A user has corrected one of the two and left the other.
+            book = {key: text for key, text in book.items() if key not in ('lower', 'upper')}
+        for key, text in book.items():
+            if key in told and text == limit.get(key):
+                del told[key]
+        low, high = told.get('lower', -inf), told.get('upper', inf)
+        if joint.get('type') == 'continuous' or low == high == 0.0:
+            low, high = -inf, inf
+        if low >= high:
+            raise self._file_error(
+                where,
+                f'its limits, {low:g} to {high:g}, leave nothing between them',
+                'put <limit> right, or import with --no-limits',
+            )
+        rates = [told.get(key, 0.0) for key in ('velocity', 'effort')]
+        velocity, effort = (value if value > 0.0 else inf for value in rates)
+        return Limits(low, high, velocity, effort)
+
+    def _read_end(
+        self, element: ET.Element, end: str, where: str, links: Mapping[str, UrdfLink]
+    ) -> str:
+        found = element.find(end)
+        link = found.get('link', '') if found is not None else ''
+        if link not in links:
+            raise self._file_error(where, f'its {end} {quote(link)} is no link', 'name a link')
+        return link
+
+    def _check_mimics(self, joints: Mapping[str, UrdfJoint]) -> None:
+        for joint in joints.values():
+            if not joint.mimics:
+                continue
+            if joint.mimics not in joints:
+                raise self._file_error(
+                    f'joint {joint.name}',
+                    f'mimics {quote(joint.mimics)}, which is no joint',
+                    'name a joint',
+                )
+            if joints[joint.mimics].mimics or joints[joint.mimics].kind not in MOVING:
+                raise self._file_error(
+                    f'joint {joint.name}',
+                    f'mimics {quote(joint.mimics)}, which does not move by itself',
+                    'name the joint that it follows in the end',
+                )
+
+    def _order_joints(
+        self, links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint]
+    ) -> tuple[str, list[UrdfJoint]]:
+        held: dict[str, UrdfJoint] = {}
+        for joint in joints.values():
+            if joint.child in held:
+                raise self._file_error(
+                    f'link {joint.child}',
+                    f'is the child of two joints, {held[joint.child].name} and {joint.name}',
+                    'end one of them in a frame of its own, and close it by --close',
+                )
+            held[joint.child] = joint
+        roots = [link for link in links if link not in held]
+        if len(roots) != 1:
+            reason = f'has {len(roots)} roots ({list_names(roots)})' if roots else 'has no root'
+            raise self._file_error(
+                '', reason, 'join all links by joints to one that is held by none'
+            )
+        ordered = list(_joints_below(roots[0], joints))
+        for joint in joints.values():
+            if joint not in ordered:
+                raise self._file_error(
+                    f'joint {joint.name}',
+                    'is in a ring of joints',
+                    'close it by --close instead',
+                )
+        return roots[0], ordered
+
+
+def _made_up(joint: ET.Element) -> Mapping[str, str] | None:
+    """Return the limits of a joint that ``linkage urdf`` made up; None if it noted none."""
+    computed = joint.find('computed')
+    return None if computed is None else computed.attrib
+
+
+def _is_pin_of_gazebo(joint: ET.Element) -> bool:
+    """Return whether a joint of SDF is a pin whose pose is in the frame of its child."""
+    pose = joint.find('pose')
+    relative = '' if pose is None else pose.get('relative_to', '')
+    in_child = relative in ('', joint.get('name'), (joint.findtext('child') or '').strip())
+    return in_child and joint.get('type', '') in ('revolute', 'continuous', 'ball')
+
+
+def _unread_tags(root: ET.Element) -> Iterator[str]:
+    """Yield the tags that may close loops and are not read, in words."""
+    for joint in root.findall('gazebo/joint'):
+        if _is_pin_of_gazebo(joint):
+            continue
+        ends = f'{joint.findtext("parent", "")} and {joint.findtext("child", "")}'
+        yield f'joint {joint.get("name", "")} of <gazebo>, between {ends}'
+    for element in root:
+        if element.tag in _LOOP_TAGS and element.get('type', '') not in _PINS:
+            yield f'<{element.tag}> {element.get("name", "")}, which is no pin'
+        elif isinstance(element.tag, str) and element.tag not in _USUAL_TAGS:
+            yield f'<{element.tag}>'
+
+
+def _joints_below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJoint]:
+    """Yield joints, parents before children."""
+    reached = [root]
+    for link in reached:
+        for joint in joints.values():
+            if joint.parent == link:
+                yield joint
+                reached.append(joint.child)

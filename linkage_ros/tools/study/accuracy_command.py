@@ -1,0 +1,224 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Say where the error of the published joints comes from, what each digit costs, what to write.
+
+The first lines answer; the table has a row for each source of error and for what the scene makes
+different on purpose, with its price and its next settings. A bag stands for its scene, moved as
+it was recorded. docs/accuracy/method.md says how it is measured.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import json
+from pathlib import Path
+from threading import Event
+from typing import NamedTuple
+
+from linkage_ros.cli.arguments import add_output, add_set, bounded_number, LINKAGES, output_path
+from linkage_ros.cli.bag_reading import open_bag, scene_of
+from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
+from linkage_ros.description.file_access import atomic_write
+from linkage_ros.description.scene import Scene
+from linkage_ros.description.scene_file import load_scene
+from linkage_ros.errors import did_you_mean, LinkageError, list_names
+from linkage_ros.tools.study.budget import Budget, NeedAnswer
+from linkage_ros.tools.study.budget_text import (
+    budget_json,
+    closing_lines,
+    heads_of,
+    lead_lines,
+    rows_of,
+)
+from linkage_ros.tools.study.measure import EFFECTS, measure_budget, PARTS, RECORDING
+from linkage_ros.tools.study.need import answer_need, answers_of
+from linkage_ros.tools.study.page import budget_html
+from linkage_ros.tools.study.picture import budget_svg
+from linkage_ros.tools.study.tuned_scene import tuned_scene
+
+EXAMPLE = 'linkage accuracy slider_crank --need 1e-3 --quick'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        'scene',
+        metavar='SCENE',
+        help='scene file or linkage file, a name of linkage gallery, or a bag: its scene and '
+        'its motion',
+    )
+    add_set(parser)
+    parser.add_argument(
+        '--need',
+        type=bounded_number(1e-15, 10.0),
+        metavar='RAD',
+        help='say the cheapest settings with no more error than this, or what stands in the way',
+    )
+    add_output(parser, LINKAGES, 'the lines are printed; with it, the scene that meets --need')
+    parser.add_argument(
+        '--horizon',
+        type=bounded_number(0.1, 1000.0),
+        default=10.0,
+        metavar='S',
+        help='how long the motion is followed, in s; errors that grow are those at its end '
+        '(default: 10)',
+    )
+    parser.add_argument(
+        '--like',
+        metavar='sine|BAG',
+        help='what the crank of a topic drive does: a sine, or as a bag has it',
+    )
+    parser.add_argument(
+        '--only',
+        default=','.join(PARTS),
+        metavar='PARTS',
+        help=f'parts to measure, separated by commas, of {list_names(PARTS)}',
+    )
+    parser.add_argument(
+        '--quick', action='store_true', help='take 20 s at most, and say what is left out'
+    )
+    parser.add_argument('--json', action='store_true', help='the same as JSON, in rad and µs')
+    parser.add_argument(
+        '--page',
+        type=output_path(('.html', '.htm')),
+        metavar='OUTPUT',
+        help='write a page for the browser, OUTPUT.html',
+    )
+    parser.add_argument(
+        '--picture',
+        type=output_path(('.svg',)),
+        metavar='OUTPUT',
+        help='draw error against cost, OUTPUT.svg',
+    )
+
+
+class _StudyStoppedError(Exception):
+    """A stop was requested."""
+
+
+class _StudySource(NamedTuple):
+    """What is measured: a scene, and what its motion is like."""
+
+    scene: Scene
+    like: str | None
+    is_bag: bool
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Measure and answer; return 1 if stopped, or if nothing measured meets the need."""
+    parts = _read_parts(arguments.only)
+    _check_options(arguments, parts)
+    scene, like, is_bag = _load_source(arguments, stop)
+    _check_content(scene, parts)
+    if is_bag and arguments.output:
+        raise LinkageError('-o', 'the scene is in a bag', 'write the lines into its file by hand')
+    try:
+        with show_progress(f'accuracy of {scene.name}, percent') as advance:
+
+            def report_progress(share: float) -> None:
+                if stop.is_set():
+                    raise _StudyStoppedError
+                advance(round(100.0 * share), 100)
+
+            budget = measure_budget(
+                scene,
+                horizon=arguments.horizon,
+                like=like,
+                quick=arguments.quick,
+                parts=parts,
+                progress=report_progress,
+            )
+    except _StudyStoppedError:
+        return 1
+    answer = None if arguments.need is None else answer_need(budget, arguments.need)
+    _write_files(arguments, scene, budget, answer)
+    if arguments.json:
+        said = budget_json(budget)
+        if answer is not None:
+            said['need'] = {
+                'rad': arguments.need,
+                'is_met': answer.is_met,
+                'error': answer.error,
+                'write': dict(answer.changes),
+                'answer': answer.text,
+            }
+        print(json.dumps(said, indent=2, allow_nan=False))
+    else:
+        _print_answer(budget, answer)
+    return 0 if answer is None or answer.is_met else 1
+
+
+def _read_parts(text: str) -> list[str]:
+    parts = [part.strip() for part in text.split(',')]
+    for part in parts:
+        if part not in PARTS:
+            remedy = did_you_mean(part, PARTS, f'known: {list_names(PARTS)}')
+            raise LinkageError(f'--only {part}', 'there is no such part', remedy)
+    return parts
+
+
+def _check_options(arguments: argparse.Namespace, parts: Sequence[str]) -> None:
+    """Raise if options do not fit together, before anything is measured."""
+    if arguments.output and arguments.need is None:
+        raise LinkageError('-o', 'is the scene that meets a need', 'say it: --need 1e-3')
+    if arguments.need is not None and 'errors' not in parts:
+        raise LinkageError('--need', 'is for errors', f'write --only errors,{arguments.only}')
+
+
+def _check_content(scene: Scene, parts: Sequence[str]) -> None:
+    """Raise if a scene has nothing of what alone is to be measured."""
+    has_effects = scene.faults or any(scene_linkage.effects for scene_linkage in scene.linkages)
+    if parts == [EFFECTS] and not has_effects:
+        raise LinkageError('--only effects', 'the scene has none, and no fault', 'leave it out')
+    if parts == [RECORDING] and scene.record is None:
+        raise LinkageError(
+            '--only recording', 'the scene records no bag', 'add --set record.directory=runs'
+        )
+
+
+def _load_source(arguments: argparse.Namespace, stop: Event) -> _StudySource:
+    """Return the scene of a file, or of a bag with its motion."""
+    path = Path(arguments.scene)
+    is_bag = path.suffix == '.mcap' or any(path.glob('*.mcap')) if path.exists() else False
+    if not is_bag:
+        return _StudySource(
+            load_scene(arguments.scene, arguments.set), arguments.like, is_bag=False
+        )
+    if arguments.like:
+        raise LinkageError('--like', 'the bag itself has the motion', 'leave one of them out')
+    scene = scene_of(open_bag(path, stop), trust_effects=False, settings=arguments.set)
+    return _StudySource(scene, arguments.scene, is_bag=True)
+
+
+def _write_files(
+    arguments: argparse.Namespace, scene: Scene, budget: Budget, answer: NeedAnswer | None
+) -> None:
+    """Write the files that were asked for."""
+    if arguments.output and answer is not None and answer.is_met:
+        folder = arguments.output.resolve().parent
+        text = tuned_scene(scene, arguments.scene, answer.changes, folder)
+        atomic_write(arguments.output, text)
+    if arguments.page:
+        atomic_write(arguments.page, budget_html(budget, answers_of(budget)).encode())
+    if arguments.picture:
+        svg = budget_svg(budget)
+        if not svg:
+            raise LinkageError('--picture', 'shows errors, and none were measured', 'leave it out')
+        atomic_write(arguments.picture, svg.encode())
+
+
+def _print_answer(budget: Budget, answer: NeedAnswer | None) -> None:
+    if answer is not None:
+        print(answer.text)
+    print(*lead_lines(budget), sep='\n')
+    print()
+    print_tables(TerminalTable('', heads_of(budget), rows_of(budget)))
+    print(*closing_lines(budget), sep='\n')

@@ -1,0 +1,209 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Measure a scene: where its errors come from, what each digit costs, what it does on purpose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from math import floor
+from pathlib import Path
+from time import process_time
+
+from linkage_ros.description.scene import Scene
+from linkage_ros.errors import FileError
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tools.study.age import measure_age_in_use, measure_age_of_command
+from linkage_ros.tools.study.budget import Budget, Knob, RecordingLoss, Setting
+from linkage_ros.tools.study.deliberate import measure_deliberate
+from linkage_ros.tools.study.measuring import describe_machine, Progress
+from linkage_ros.tools.study.member_motion import cranks_at, LinkageMotion, scene_key
+from linkage_ros.tools.study.motion_feed import feed_of
+from linkage_ros.tools.study.prices import add_prices, change_scene, Feed, tick_price, USUAL_RATE
+from linkage_ros.tools.study.scene_motion import motions_of
+
+ERRORS, EFFECTS, RECORDING = 'errors', 'effects', 'recording'
+PARTS = (ERRORS, EFFECTS, RECORDING)
+"""The parts of a measurement."""
+
+_SHARES = {ERRORS: 0.7, EFFECTS: 0.2, RECORDING: 0.1}
+
+_QUICK_LEFT_OUT = '--quick: steps of a drive beyond its half and double, some rates, repetitions'
+
+_QUICK_RUN = 0.9
+"""Longest time that one run of the torque drives may take in a quick measurement, in [s]."""
+
+
+def measure_budget(
+    scene: Scene,
+    *,
+    horizon: float = 10.0,
+    like: str | None = None,
+    quick: bool = False,
+    parts: Sequence[str] = PARTS,
+    folder: Path | None = None,
+    progress: Progress = lambda _: None,
+) -> Budget:
+    """
+    Measure a scene on this machine.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    horizon
+        How long its motion is followed, in [s].
+    like
+        What a topic drive's crank does, or which commands a torque drive gets: 'sine', or the path
+        of a bag.
+    quick
+        Whether to take less than 20 s, with fewer settings.
+    parts
+        What to measure, of `PARTS`.
+    folder
+        Folder on the disk on which recording is measured; the present one by default.
+    progress
+        Called now and then with the fraction that is done; an exception from it ends the
+        measurement.
+
+    Raises
+    ------
+    LinkageError
+        The scene has no motion, it runs away before the horizon, its loops do not close, or a
+        package is not installed.
+
+    """
+    left_out: list[str] = [_QUICK_LEFT_OUT] if quick else []
+    motions = motions_of(scene, like, horizon) if ERRORS in parts or like else []
+    horizon = min([horizon, *(motion.length for motion in motions)])
+    if quick and ERRORS in parts and (followed := _affordable_horizon(motions, horizon)) < horizon:
+        horizon = followed
+        left_out.append(f'--quick: what comes after {horizon:g} s')
+    feed = feed_of(motions)
+    done, whole = 0.0, sum(_SHARES[part] for part in parts)
+
+    def part_progress(part: str) -> Progress:
+        begin, share = done, _SHARES[part] / whole
+        return lambda fraction: progress(min(1.0, begin + share * fraction))
+
+    knobs: list[Knob] = []
+    if ERRORS in parts:
+        found, more = _measure_errors(scene, motions, horizon, quick, feed, part_progress(ERRORS))
+        knobs += sorted(found, key=lambda knob: knob.own_setting.error.worst, reverse=True)
+        left_out += more
+        done += _SHARES[ERRORS] / whole
+    if EFFECTS in parts:
+        knobs += measure_deliberate(
+            scene, quick=quick, horizon=horizon, feed=feed, progress=part_progress(EFFECTS)
+        )
+        done += _SHARES[EFFECTS] / whole
+    losses: list[RecordingLoss] = []
+    if RECORDING in parts:
+        from linkage_ros.tools.study.recording import (
+            measure_recording,  # local import: it needs a disk
+        )
+
+        losses = measure_recording(
+            scene, folder or Path(), quick=quick, feed=feed, progress=part_progress(RECORDING)
+        )
+    tick = tick_price(scene, 0.5 if quick else 3.0, feed)
+    progress(1.0)
+    today = datetime.now().astimezone().date().isoformat()
+    return Budget(
+        scene.name,
+        scene.rate or USUAL_RATE,
+        tick,
+        knobs,
+        losses,
+        [('measured', today), *describe_machine()],
+        left_out,
+    )
+
+
+def _affordable_horizon(motions: Sequence[LinkageMotion], horizon: float) -> float:
+    """Return how much of the motion a quick measurement has time to follow, in [s]."""
+    sample = min(0.2, horizon)
+    begun = process_time()
+    for motion in motions:
+        if motion.path is None:
+            cranks_at(motion, [round(sample * NANOSECONDS)])
+    speed = (process_time() - begun) / sample
+    return min(horizon, max(1.0, floor(_QUICK_RUN / speed))) if speed else horizon
+
+
+def _measure_errors(
+    scene: Scene,
+    motions: Sequence[LinkageMotion],
+    horizon: float,
+    quick: bool,
+    feed: Feed,
+    progress: Progress,
+) -> tuple[list[Knob], list[str]]:
+    """Return the knobs of all errors with their prices, and what was left out."""
+    rate = scene.rate or USUAL_RATE
+    knobs: list[Knob] = [measure_age_in_use(scene, motions, horizon, quick=quick)]
+    left_out: list[str] = []
+    integrated = sum(motion.path is None for motion in motions)
+    progress(0.1)
+    for motion in motions:
+        if motion.scene_linkage.drive[0] == 'torque':
+            from linkage_ros.tools.study.drive_step import (
+                measure_drive_step,  # local import: few scenes have forces
+            )
+
+            knob, missing = measure_drive_step(
+                motion,
+                rate,
+                horizon,
+                key=scene_key(motion.scene_linkage, 'drive') + '.torque',
+                quick=quick,
+                seconds=(6.0 if quick else 60.0) / integrated,
+                progress=lambda share: progress(0.1 + 0.4 * share),
+            )
+            left_out += missing
+        else:
+            found = measure_age_of_command(motion, scene, horizon, quick=quick)
+            if found is None:
+                continue
+            knob = found
+        of = f' of {motion.scene_linkage.name}' if motion.scene_linkage.name else ''
+        knobs.append(knob._replace(name=knob.name + of))
+    progress(0.5)
+    if any(motion.closure.linkage.ratios for motion in motions):
+        left_out.append('solving: the reference knows no ratios')
+    else:
+        from linkage_ros.tools.study.solving import (
+            measure_solving,  # local import: optional dependencies
+        )
+
+        seconds = 1.0 if quick else 8.0
+        knobs.append(measure_solving(motions, rate, horizon, quick=quick, seconds=seconds))
+    progress(0.7)
+    knobs = [_accepted_settings(scene, knob) for knob in knobs]
+    seconds = 3.0 if quick else 30.0
+    priced = add_prices(scene, knobs, seconds, feed, lambda share: progress(0.7 + 0.3 * share))
+    return priced, left_out
+
+
+def _accepted_settings(scene: Scene, knob: Knob) -> Knob:
+    """Return a knob without the settings that the scene refuses."""
+    own = knob.own_setting
+    kept = [each for each in knob.settings if each is own or _is_accepted(scene, each)]
+    return knob._replace(settings=kept, chosen=kept.index(own))
+
+
+def _is_accepted(scene: Scene, setting: Setting) -> bool:
+    if not any(key.rpartition('.')[0].endswith('torque') for key, _ in setting.changes or ()):
+        return True
+    try:
+        Pipeline(change_scene(scene, setting.changes or ()))
+    except FileError:
+        return False
+    return True

@@ -1,0 +1,144 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+What one linkage of a scene does: its inputs at any time, and the commands that move it.
+
+Whatever noise, delay or fault the scene adds is no part of its motion: that is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import inf, pi
+from typing import Any, NamedTuple
+
+from linkage_ros.description.scene import SceneLinkage
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_state import EffortCommand
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.stages.drives import torque
+from linkage_ros.stages.drives.drive import Context, CrankState
+
+BEGIN = NANOSECONDS
+"""Time of the first tick, in [ns]."""
+
+_LOOK = 2e-3
+"""Time between two looks at a torque drive, in [s], or its step if that is longer."""
+
+_BEYOND = 0.5 * pi
+"""A step over more than this, in [rad], follows no motion: the input runs away."""
+
+Crank = tuple[tuple[float, ...], tuple[float, ...]]
+"""Values and rates of the inputs."""
+
+Path = Callable[[int], Crank | None]
+"""Values and rates of the inputs at a time since the first tick, in [ns]."""
+
+
+class Command(NamedTuple):
+    """A command of a torque drive, in the unit that it takes."""
+
+    time: int  # Arrival after the first tick, in [ns]
+    effort: float
+
+
+class LinkageMotion(NamedTuple):
+    """What one linkage of a scene does."""
+
+    scene_linkage: SceneLinkage
+    closure: Closure  # The closed form of its linkage, with the deviations of its parts
+    context: Context
+    solution: Closure  # What the scene solves it with: the same, or another solver
+    path: Path | None  # Its inputs at any time; None for a torque drive
+    commands: Sequence[Command] = ()
+    # When the samples of a topic drive are taken and when they come, after the first tick, in
+    # [ns]; () if they come at the rate of `sample_rate`, at once.
+    samples: Sequence[tuple[int, int]] = ()
+    sample_rate: float = 0.0  # Samples of a topic drive per second; 0 for other drives
+    length: float = inf  # How long it is known, in [s]
+    note: str = ''  # What is assumed of it, in a sentence; '' for nothing
+
+
+def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> list[Crank | None]:
+    """
+    Return the crank at some times since the first tick, in [ns] and in order.
+
+    Parameters
+    ----------
+    motion
+        What the linkage does.
+    times
+        The times.
+    **changes
+        Parameters of a torque drive that differ from the scene's: its method, or its step.
+
+    Raises
+    ------
+    LinkageError
+        The input runs away before the last time.
+
+    """
+    if motion.path is not None:
+        return [motion.path(time) for time in times]
+    drive = build_drive(motion, **changes)
+    step = changes.get('step', motion.scene_linkage.drive[1].step)
+    look = max(1, round(_LOOK / step)) * round(step * NANOSECONDS)
+    commands, number = motion.commands, 0
+    passed = 0
+    drive.state(BEGIN)
+    found: list[Crank | None] = []
+    for time in times:
+        # A drive that is asked too seldom leaves time out, and a runaway is to be seen early.
+        for stop in (*range(passed - passed % look + look, time, look), time):
+            while number < len(commands) and commands[number].time <= stop:
+                arrival, effort = commands[number]
+                drive.offer(EffortCommand(0, effort), BEGIN + arrival)
+                number += 1
+            crank = drive.state(BEGIN + stop)
+            _check_bounded(crank, stop, step)
+        passed = time
+        found.append((crank.angles, crank.rates))
+    return found
+
+
+def tick_times(rate: float, horizon: float, most: int) -> list[int]:
+    """Return the times of some ticks up to the horizon, in [ns], the last one too."""
+    count = max(1, int(horizon * rate * (1.0 + 1e-12)))
+    chosen = sorted({round(count * k / most) for k in range(1, most + 1)} - {0})
+    return [round(number * NANOSECONDS / rate) for number in chosen]
+
+
+def scene_key(scene_linkage: SceneLinkage, key: str) -> str:
+    """Return where a key of a linkage stands in its scene: in its own entry, or for all."""
+    own = scene_linkage.name and key in scene_linkage.content
+    return f'linkages.{scene_linkage.name}.{key}' if own else key
+
+
+def refuse_horizon(time: float, why: str) -> LinkageError:
+    """Return the error of a motion that has no end at the horizon; the time is in [s]."""
+    return LinkageError(
+        '--horizon',
+        f'lies beyond the motion: after {time:.3g} s {why}',
+        f'take less: --horizon {0.5 * time:.2g}',
+    )
+
+
+def _check_bounded(crank: CrankState, time: int, step: float) -> None:
+    """Refuse a rate that is too fast for the step."""
+    passed = abs(crank.rates[0]) * step
+    if not passed <= _BEYOND:
+        why = f'the input runs away and passes {passed:.2g} rad in a step'
+        raise refuse_horizon(time * 1e-9, why)
+
+
+def build_drive(motion: LinkageMotion, **changes: Any) -> torque.TorqueDrive:
+    """Return the torque drive at its start, with other parameters."""
+    return torque.build(replace(motion.scene_linkage.drive[1], **changes), motion.context)

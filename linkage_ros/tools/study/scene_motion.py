@@ -1,0 +1,219 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+The motion that a scene makes.
+
+A drive that computes its crank is asked itself. A `topic` drive has no motion of its own: it is
+said what its crank does, by a sine or by the samples of a bag. To a `torque` drive commands come:
+those of a bag, or a sine of effort; without either it moves by its start, weight and loads alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, pi, sin, tau
+
+from linkage_ros.bag.reader import Bag, read_bag
+from linkage_ros.description.scene import Scene
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.stages.drives.drive import CrankState
+from linkage_ros.tick.pipeline import LinkagePipeline, Pipeline
+from linkage_ros.tools.study.member_motion import (
+    BEGIN,
+    build_drive,
+    Command,
+    Crank,
+    LinkageMotion,
+    Path,
+)
+from linkage_ros.tools.study.prices import USUAL_RATE
+from linkage_ros.tools.study.recorded_motion import follow_commands, follow_samples
+
+SINE = 'sine'
+"""What ``like`` is for a sine; anything else is the path of a bag."""
+
+COMMAND_PERIOD = 0.05
+"""Longest time between two commands of a torque drive, in [s]."""
+
+_FREQUENCY, _AMPLITUDE, _PART = 0.5, pi, 0.4
+"""
+Of the sine of a crank, in [Hz] and [rad]; for a limited one, as a fraction of its range.
+
+So a crank that turns passes through all its poses, some 1.6 turns a second at most.
+"""
+
+_LOOK = 0.1
+"""Time between two looks whether anything moves, in [s]."""
+
+_STANDS = 1e-9
+"""Motions smaller than this, in [rad] or [m], are none."""
+
+
+def motions_of(scene: Scene, like: str | None, horizon: float) -> list[LinkageMotion]:
+    """
+    Return what the linkages of a scene do.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    like
+        `SINE`, or the path of a bag with the samples or commands; None for the scene's own.
+    horizon
+        How long it is looked at, in [s].
+
+    Raises
+    ------
+    LinkageError
+        A topic drive has no motion; a bag cannot be read or has no samples.
+
+    """
+    scene = without_deliberate(scene)
+    pipeline = Pipeline(scene)
+    bag = None if like in (None, SINE) else read_bag(str(like))
+    return [_linkage_motion(scene, linkage, like, bag, horizon) for linkage in pipeline.linkages]
+
+
+def without_deliberate(scene: Scene) -> Scene:
+    """Return a scene without recording, faults and what its sensors and wear change."""
+    members = []
+    for scene_linkage in scene.linkages:
+        forced = scene_linkage.drive[0] == 'torque'
+        kept = {'velocity', 'tolerance', *(('friction',) if forced else ())}
+        effects = {name: use for name, use in scene_linkage.effects.items() if name in kept}
+        loads = scene_linkage.loads if forced else None
+        members.append(replace(scene_linkage, effects=effects, loads=loads))
+    return replace(scene, linkages=tuple(members), faults={}, record=None)
+
+
+def _linkage_motion(
+    scene: Scene, linkage: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
+) -> LinkageMotion:
+    scene_linkage, context = linkage.scene_linkage, linkage.context
+    closure = linkage.closure
+    if type(closure) is not Closure:
+        closure = Closure(closure.linkage)
+    motion = LinkageMotion(scene_linkage, closure, context, linkage.closure, None)
+    drive, parameters = scene_linkage.drive
+    if drive == 'torque':
+        return _commanded_motion(motion, like, bag, horizon)
+    if drive == 'bag':
+        opened = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
+        fast = scene.rate if parameters.pace == 'fast' else 0.0
+        return follow_samples(motion, opened, parameters.topic, fast)
+    if drive != 'topic':
+        return motion._replace(path=_path_of(linkage))
+    if bag is not None:
+        return follow_samples(motion, bag)
+    if like is None:
+        raise scene_linkage.content.error(
+            'drive',
+            'topic has no motion of its own',
+            'say what its crank does: --like sine, or --like BAG with its samples',
+        )
+    return motion._replace(
+        path=_sine_path(closure),
+        sample_rate=scene.rate or USUAL_RATE,
+        note=f'the crank moves by a sine of {_FREQUENCY:g} Hz',
+    )
+
+
+def _path_of(linkage: LinkagePipeline) -> Path:
+    """Return the path of a drive that computes its crank as a function of the time."""
+    drive = linkage.drive
+    drive.state(BEGIN)
+
+    def crank_at(time: int) -> Crank | None:
+        crank: CrankState | None = drive.state(BEGIN + time)
+        return None if crank is None else (crank.angles, crank.rates)
+
+    return crank_at
+
+
+def _sine_path(closure: Closure) -> Path:
+    """Return sines of all inputs, within the range where the loops close."""
+    speed = tau * _FREQUENCY
+    centers = usual_inputs(closure)
+    sizes = [0.01 * (closure.scale if each.slider else 1.0) for each in closure.linkage.inputs]
+    if len(centers) == 1:
+        widest = InputSweep(closure).widest_range
+        assert widest is not None, 'reading the file has proved that it closes somewhere'
+        sizes = [_AMPLITUDE]
+        if not widest.is_whole:
+            centers = (0.5 * (widest.lowest + widest.highest),)
+            sizes = [min(_AMPLITUDE, _PART * (widest.highest - widest.lowest))]
+
+    def crank_at(time: int) -> Crank:
+        s, c = sin(speed * time * 1e-9), cos(speed * time * 1e-9)
+        values = tuple(at + size * s for at, size in zip(centers, sizes, strict=True))
+        return values, tuple(size * speed * c for size in sizes)
+
+    return crank_at
+
+
+def _commanded_motion(
+    motion: LinkageMotion, like: str | None, bag: Bag | None, horizon: float
+) -> LinkageMotion:
+    """Return the motion of a torque drive, with the commands that come to it."""
+    if bag is not None:
+        return follow_commands(motion, bag)
+    if like is None and moves_without_commands(motion, horizon):
+        return motion._replace(note='no command comes')
+    effort = _usual_effort(motion)
+    timeout = motion.scene_linkage.drive[1].timeout
+    period = round(min(COMMAND_PERIOD, 0.5 * timeout) * NANOSECONDS)
+    commands = [
+        Command(time, effort * sin(0.5 * tau * time * 1e-9))
+        for time in range(period, round(horizon * NANOSECONDS), period)
+    ]
+    motor = motion.scene_linkage.drive[1].motor
+    slides = motion.closure.linkage.inputs[0].slider
+    units = {'effort': 'N' if slides else 'N·m', 'current': 'A', 'voltage': 'V'}
+    unit = units[motor.command if motor else 'effort']
+    note = f'commands are a sine of 0.5 Hz and {effort:.3g} {unit}, {1e9 / period:g} a second'
+    if like is None:
+        note += ', since nothing moves without'
+    return motion._replace(commands=commands, note=note)
+
+
+def moves_without_commands(motion: LinkageMotion, horizon: float) -> bool:
+    """Return whether a torque drive moves without commands."""
+    drive = build_drive(motion)
+    begin = drive.state(BEGIN).angles[0]
+    for index in range(1, 2 + int(horizon / _LOOK)):
+        time = BEGIN + round(index * _LOOK * NANOSECONDS)
+        if abs(drive.state(time).angles[0] - begin) > _STANDS:
+            return True
+    return False
+
+
+def _usual_effort(motion: LinkageMotion) -> float:
+    """Return the amplitude of the commands: they pass friction and a fifth of the weight."""
+    equation = motion.context.mechanics.motion_equation
+    drive = build_drive(motion)
+    start = motion.scene_linkage.drive[1].start
+    low, high = (
+        min(max(end, start - tau), start + tau) for end in drive.actuation_for(None)[0].stops
+    )
+    found = [terms for k in range(90) if (terms := equation(low + (high - low) * k / 90.0))]
+    least = min(terms.inertia for terms in found)
+    friction = max(terms.coulomb + terms.breakaway for terms in found)
+    weight = max(abs(terms.potential_slope) for terms in found)
+    unit = motion.closure.scale if motion.closure.linkage.inputs[0].slider else 1.0
+    effort = friction + 0.2 * weight + 2.0 * unit * least
+    motor = motion.scene_linkage.drive[1].motor
+    if motor is None or motor.command == 'effort':
+        return effort
+    current: float = effort / (motor.torque_constant * motor.ratio * motor.efficiency)
+    if motor.command == 'current':
+        return current
+    voltage: float = motor.resistance * current + motor.torque_constant * motor.ratio * unit
+    return voltage

@@ -1,0 +1,350 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+The error of solving the loops, and what other ways to solve them cost.
+
+The exact joints are those of `linkage_ros.tools.study.enclosure`: balls that are proved to hold
+the solution. The states are those of the scene's own motion. What a scene cannot ask for stands
+beside the closed form for comparison: numbers of 32 bits, the textbook form, Newton's method, a
+spline through a table, thirty digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
+from math import inf, sqrt
+from typing import Any, NamedTuple
+
+from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.errors import check_installed, LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint
+from linkage_ros.kinematics.ranges import slide_bound
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.resources import shipped_path
+from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
+from linkage_ros.tools.study.budget_text import error_text
+from linkage_ros.tools.study.four_bar_formulas import (
+    plain_four_bar,
+    Solve,
+    solve_by_textbook,
+    solve_in_single_precision,
+)
+from linkage_ros.tools.study.joint_errors import size_of
+from linkage_ros.tools.study.measuring import Candidate, Progress, time_in_turn
+from linkage_ros.tools.study.member_motion import cranks_at, LinkageMotion, tick_times
+from linkage_ros.tools.study.newton import solve_by_newton
+import numpy as np
+
+NAME = 'solving'
+
+CLOSED_FORM, ITERATED = 'closed form', 'iterated'
+
+_STATES, _QUICK_STATES = 48, 12
+_TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
+_KNOTS = (64, 1024, 16_384)
+_BITS = 104
+"""Precision of thirty digits."""
+
+_FAR = 0.1
+"""Larger errors, in [rad], are those of another pose: the method has failed."""
+
+DISTANCES = tuple(10.0 ** (-k / 2.0) for k in range(4, 19))
+"""Distances of hard cases from a toggle or change point: 1e-2 to 1e-9."""
+
+
+class SolvingMethod(NamedTuple):
+    """A way to solve a linkage."""
+
+    label: str
+    solve: Solve
+
+
+def measure_solving(
+    motions: Sequence[LinkageMotion],
+    rate: float,
+    horizon: float,
+    *,
+    quick: bool = False,
+    seconds: float = 2.0,
+    progress: Progress = lambda _: None,
+) -> Knob:
+    """
+    Return the error of solving the linkages of a scene along their motion.
+
+    Parameters
+    ----------
+    motions
+        What the linkages do; the comparisons are those of the first.
+    rate
+        Ticks per second.
+    horizon
+        How long they move, in [s].
+    quick
+        Whether to take fewer states.
+    seconds
+        Time for the prices, in [s].
+    progress
+        Called with the fraction that is done.
+
+    Raises
+    ------
+    LinkageError
+        A package for the proof is missing, or nothing can be proved of the motion.
+
+    """
+    check_installed('flint')
+    count = _QUICK_STATES if quick else _STATES
+    times = tick_times(rate, horizon, count)
+    errors: list[JointError] = []
+    candidates: list[tuple[str, JointError, Candidate]] = []
+    unproved = 0
+    for index, motion in enumerate(motions):
+        linkage = motion.closure.linkage
+        states = [
+            crank[0]
+            for crank in cranks_at(motion, times)
+            if crank is not None and motion.closure.position(*crank[0]).joints
+        ]
+        known, exact = exact_joints(linkage, states)
+        unproved += len(states) - len(known)
+        if not known:
+            continue
+        own = _scene_solver(motion.solution)
+        errors.append(compare_solver(linkage, own.solve, known, exact)[0])
+        progress(0.2)
+        if index:
+            continue
+        candidates.append((own.label, errors[0], _timed_candidate(own.solve, known)))
+        for solver in comparison_solvers(motion.closure):
+            error, failed = compare_solver(linkage, solver.solve, known, exact)
+            if not failed:
+                candidates.append((solver.label, error, _timed_candidate(solver.solve, known)))
+    if not candidates:
+        raise LinkageError(
+            'solving',
+            'nothing can be proved along the motion: it stays at a toggle or a change point',
+            'move it, or leave the errors out: --only effects',
+        )
+    worst = JointError(
+        sqrt(sum(e.rms**2 for e in errors) / len(errors)), max(e.worst for e in errors)
+    )
+    times_of = time_in_turn([one for _, _, one in candidates], seconds, progress)
+    settings = [
+        Setting(label, error, Price(spread.scale(1e6), rate), None)
+        for (label, error, _), spread in zip(candidates, times_of, strict=True)
+    ]
+    settings[0] = settings[0]._replace(error=worst, changes=())
+    note = f'{unproved} states too near a toggle or change point to be proved' if unproved else ''
+    return Knob(NAME, settings, 0, note=note)
+
+
+def exact_joints(
+    linkage: Linkage, states: Sequence[Sequence[float]]
+) -> tuple[list[Sequence[float]], list[Sequence[Any]]]:
+    """Return the states at which joints can be proved, and their balls."""
+    from linkage_ros.tools.study.enclosure import (
+        prove,  # local import: an optional dependency
+        SingularError,
+    )
+
+    known: list[Sequence[float]] = []
+    exact: list[Sequence[Any]] = []
+    for state in states:
+        try:
+            proof = prove(linkage, state)
+        except (SingularError, ValueError):
+            continue
+        known.append(state)
+        exact.append(proof.joints)
+    return known, exact
+
+
+def compare_solver(
+    linkage: Linkage,
+    solve: Solve,
+    states: Sequence[Sequence[float]],
+    exact: Sequence[Sequence[Any]],
+    far: Sequence[float] | None = None,
+) -> tuple[JointError, int]:
+    """Return the error of a method, and at how many states it has no answer or a wrong one."""
+    limits = far or [_FAR] * len(states)
+    found: list[float] = []
+    for state, balls, limit in zip(states, exact, limits, strict=True):
+        joints = solve(*state)
+        error = largest_distance(linkage, joints, balls) if len(joints) else inf
+        if error <= limit:
+            found.append(error)
+    if not found:
+        return JointError(inf, inf), len(states)
+    rms = sqrt(sum(error * error for error in found) / len(found))
+    return JointError(rms, max(found)), len(states) - len(found)
+
+
+def largest_distance(linkage: Linkage, joints: Sequence[Any], balls: Sequence[Any]) -> float:
+    """Return the greatest distance of joints from balls, slides in parts of the size."""
+    from flint import arb, ctx  # local import: an optional dependency
+
+    before, ctx.prec = ctx.prec, 512
+    try:
+        worst = 0.0
+        for joint, value, ball in zip(linkage.joints.values(), joints, balls, strict=True):
+            apart = (value if isinstance(value, arb) else arb(float(value))) - ball
+            if isinstance(joint, RevoluteJoint):
+                turn = 2 * arb.pi()
+                apart -= turn * round(float((apart / turn).mid()))
+                worst = max(worst, abs(float(apart.mid())))
+            else:
+                worst = max(worst, abs(float(apart.mid())) / size_of(linkage))
+    finally:
+        ctx.prec = before
+    return worst
+
+
+def _scene_solver(closure: Closure) -> SolvingMethod:
+    """Return what a scene solves with, as a tick does."""
+    if type(closure) is not Closure:
+        kind = type(closure).__name__.removesuffix('Closure').lower()
+        return SolvingMethod(kind, lambda *inputs: closure.position(*inputs).joints)
+    compiled = closure.compile_linkage(0)
+    fast, plain = compiled.fast, compiled.run_interpreted
+
+    def position(*inputs: float) -> Sequence[Any]:
+        (joints,) = fast(*inputs) or plain(*inputs).values or ((),)
+        return joints
+
+    return SolvingMethod(CLOSED_FORM if closure.by_steps else ITERATED, position)
+
+
+def comparison_solvers(closure: Closure) -> Iterator[SolvingMethod]:
+    """Yield ways to solve a linkage which no scene can ask for."""
+    linkage = closure.linkage
+    shape = plain_four_bar(linkage)
+    if shape is not None:
+        yield SolvingMethod('float32', solve_in_single_precision(shape))
+        yield SolvingMethod('textbook form', solve_by_textbook(shape))
+    for tolerance in _TOLERANCES:
+        yield SolvingMethod(
+            f'Newton to {error_text(tolerance)}', solve_by_newton(linkage, tolerance)
+        )
+    if len(linkage.inputs) == 1 and find_spec('scipy') is not None:
+        for knots in _KNOTS:
+            spline = _solve_by_spline(closure, knots)
+            if spline is not None:
+                yield SolvingMethod(f'spline, {knots:,} knots', spline)
+    yield SolvingMethod('30 digits', _solve_to_digits(linkage))
+
+
+def _solve_to_digits(linkage: Linkage) -> Solve:
+    from linkage_ros.tools.study import enclosure  # local import: an optional dependency
+
+    def position(*inputs: float) -> Sequence[Any]:
+        try:
+            return enclosure.solve(linkage, inputs, _BITS)
+        except (enclosure.SingularError, ValueError):
+            return ()
+
+    return position
+
+
+def _solve_by_spline(closure: Closure, knots: int) -> Solve | None:
+    """Return a cubic spline through states over the widest range; None if it does not close."""
+    from scipy.interpolate import CubicSpline  # local import: an optional dependency
+
+    interval = InputSweep(closure).widest_range
+    if interval is None:
+        return None
+    low, width = interval.lowest, interval.highest - interval.lowest
+    places = np.linspace(low, low + width, knots + 1)
+    inner = 1e-9 * width
+    places[0], places[-1] = places[0] + inner, places[-1] - inner
+    joints = closure.solve(places, derivatives=0).positions
+    if not np.all(np.isfinite(joints)):
+        return None
+    for row, joint in zip(joints, closure.linkage.joints.values(), strict=True):
+        if isinstance(joint, RevoluteJoint):
+            row[:] = np.unwrap(row)
+    spline = CubicSpline(places, joints.T)
+    whole = interval.is_whole
+
+    def position(value: float) -> Sequence[Any]:
+        if whole:
+            value = low + (value - low) % width
+        elif interval.turning:
+            value += interval.shift(value)
+        joints: Sequence[Any] = spline(value)
+        return joints
+
+    return position
+
+
+def _timed_candidate(solve: Solve, states: Sequence[Sequence[float]]) -> Candidate:
+    # In an order that ends next to the first, so that a method finds its start near by.
+    forward_and_backward = [*states[::2], *states[1::2][::-1]]
+
+    def run() -> None:
+        for state in forward_and_backward:
+            solve(*state)
+
+    return Candidate(run, len(forward_and_backward))
+
+
+class HardCase(NamedTuple):
+    """How a way to solve does next to a singular pose."""
+
+    place: str  # 'toggle of double_rocker'
+    solver: str
+    worst: float  # Greatest error where it answers, in [rad]
+    failed: int  # States without an answer, or with that of another pose
+    states: int  # All states, `DISTANCES` from the singular pose
+
+
+def compare_hard_cases() -> Iterator[HardCase]:
+    """Yield who fails next to a toggle and at a change point, on linkages of the package."""
+    check_installed('flint')
+    for name, place, near in (
+        ('double_rocker', 'toggle', _near_toggle),
+        ('parallelogram', 'change point', _near_change_point),
+    ):
+        linkage = read_linkage(read_yaml(shipped_path(f'linkages/{name}.yaml'))[0])
+        closure = Closure(linkage)
+        states, distances = near(closure)
+        known, exact = exact_joints(linkage, states)
+        # Next to a change point the other assembly is as near as the change point itself.
+        limits = [0.1 * distances[states.index(tuple(state))] for state in known]
+        far = limits if place == 'change point' else None
+        for solver in (_scene_solver(closure), *comparison_solvers(closure)):
+            error, failed = compare_solver(linkage, solver.solve, known, exact, far)
+            yield HardCase(f'{place} of {name}', solver.label, error.worst, failed, len(known))
+
+
+Near = Callable[[Closure], 'tuple[list[tuple[float, ...]], list[float]]']
+
+
+def _near_toggle(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]]:
+    interval = InputSweep(closure).widest_range
+    assert interval is not None, 'it has one'
+    unit = 1.0 if interval.turning else slide_bound(closure)
+    return _closing_states(closure, interval.highest, [-unit * distance for distance in DISTANCES])
+
+
+def _near_change_point(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]]:
+    places = [x.value for x in closure.singular_inputs if x.status is Status.CHANGE_POINT]
+    offsets = [*(-distance for distance in DISTANCES), *reversed(DISTANCES)]
+    return _closing_states(closure, min(places, key=abs), offsets)
+
+
+def _closing_states(
+    closure: Closure, place: float, offsets: Sequence[float]
+) -> tuple[list[tuple[float, ...]], list[float]]:
+    kept = [o for o in offsets if closure.position(place + o).status is Status.CLOSED]
+    return [(place + offset,) for offset in kept], [abs(offset) for offset in kept]

@@ -1,0 +1,91 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Animate a linkage through the range of its first input, or a recorded run, beside its joints.
+
+A turn begins at the usual pose; a limited range is shown there and back. Of a run the first
+linkage is shown, each link where its recorded joint puts it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from threading import Event
+
+from linkage_ros.bag.contents import layout_of
+from linkage_ros.bag.other_formats import is_bag_name
+from linkage_ros.cli.arguments import add_output, output_or
+from linkage_ros.cli.bag_reading import open_bag
+from linkage_ros.cli.terminal import show_progress
+from linkage_ros.description.linkage_file import load
+from linkage_ros.kinematics.pose_view import prepare_view
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.signals import StoppedError
+from linkage_ros.tools.drawing.animation import (
+    animate,
+    AnimatedMotion,
+    check_kind,
+    KINDS,
+    range_motion,
+)
+from linkage_ros.tools.view.part_of_run import add_window, read_part, window_of
+from linkage_ros.tools.view.report.run_motion import run_motion
+
+_TURN = 4.0
+"""How long a range is shown, in [s]."""
+
+EXAMPLE = 'linkage animate jansen_leg -o leg.gif'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        'file', metavar='FILE|BAG', help='linkage file, a name of linkage gallery, or a bag'
+    )
+    add_output(parser, KINDS, 'FILE.gif in this folder')
+    parser.add_argument(
+        '--seconds',
+        type=float,
+        metavar='SECONDS',
+        help=f'how long it lasts; without it {_TURN:g} s, or as long as the run, up to 10 s',
+    )
+    add_window(parser)
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Animate it."""
+    given = Path(arguments.file)
+    file = output_or(arguments, Path(f'{given.stem}.gif'))
+    check_kind(file)
+    motion = _load_motion(arguments, given, stop)
+    with show_progress('pictures') as advance:
+
+        def report_picture(done: int, of: int) -> None:
+            if stop.is_set():
+                raise StoppedError
+            advance(done, of)
+
+        animate(motion, file, report_picture)
+    print(file)
+    return 0
+
+
+def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> AnimatedMotion:
+    if is_bag_name(given):
+        window = window_of(arguments.since, arguments.until)
+        bag = open_bag(given, stop)
+        layouts = [layout_of(path) for path in bag.files]
+        trusted = arguments.trust_effects
+        found, scene, _ = read_part(bag, layouts, window, stop, trust_effects=trusted)
+        return run_motion(found, scene.name if scene else given.name, arguments.seconds)
+    closure = load(arguments.file)
+    shown = prepare_view(closure, usual_inputs(closure))
+    seconds = _TURN if arguments.seconds is None else arguments.seconds
+    return range_motion(shown, given.stem, seconds)

@@ -1,0 +1,261 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Compare two runs: the differences of their joints over the time, in numbers and as a picture.
+
+The runs begin at their first joint states. The second is interpolated at the times of the first,
+as long as both last. A difference is no failure.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping
+import json
+from math import nan, pi, remainder, tau
+from pathlib import Path
+from threading import Event
+from typing import Any, NamedTuple
+
+from linkage_ros.bag.reader import Bag
+from linkage_ros.cli.arguments import add_output, PICTURES
+from linkage_ros.cli.bag_reading import BagReading, open_bag, run_or_blank
+from linkage_ros.cli.replay import deviations_account, joints_table
+from linkage_ros.cli.terminal import print_tables
+from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
+from linkage_ros.messages.joint_values import JOINT_STATE, Key, MessageValues, POSITION
+from linkage_ros.replay.compare import Deviation, TickPlace
+from linkage_ros.replay.replay import recorded_scene
+from linkage_ros.replay.verify import turning_joints
+from linkage_ros.tools.view.report.decimation import DecimatedCurves
+import numpy as np
+
+EXAMPLE = 'linkage compare my_bag other_bag -o difference.png'
+
+_INTERVALS = 1000
+"""Least number of intervals of a picture; it shows the least and the greatest value of each."""
+
+_ROWS = 1024
+
+
+class TimedState(NamedTuple):
+    """A joint state of a run."""
+
+    time: int  # Since the first one, in [ns]
+    values: Mapping[Key, float]
+
+
+class BagDifferences:
+    """The differences of two runs: by joint and quantity, and of positions over the time."""
+
+    def __init__(self, turning: Mapping[str, bool], *, wrapped: bool) -> None:
+        self.deviations: dict[Key, Deviation] = {}
+        self.compared = 0
+        """Joint states of the first run that the second has a value for."""
+        self.end = 0
+        """Time of the last of them, in [ns]."""
+        self.positions: list[str] = []
+        """The joints of `difference_curves`, once a state was compared."""
+        self._turning, self._wrapped = turning, wrapped
+        self._curves: DecimatedCurves | None = None
+        self._rows: list[tuple[int, list[float]]] = []
+
+    def add_states(
+        self, time: int, first: Mapping[Key, float], second: Mapping[Key, float]
+    ) -> None:
+        """Add two states of one time, in [ns]."""
+        self.compared += 1
+        self.end = time
+        for key, a in first.items():
+            b = second.get(key)
+            if b is None:
+                continue
+            if self._wrapped and self._is_angle(key):
+                b = a + remainder(b - a, tau)
+            deviation = self.deviations.setdefault(key, Deviation())
+            deviation.compared += 1
+            if a != b:
+                deviation.add_difference(a, b, TickPlace(self.compared, time))
+        if not self.positions:
+            self.positions = [
+                name for name, what in first if what == POSITION and (name, what) in second
+            ]
+            self._curves = DecimatedCurves(len(self.positions), _INTERVALS)
+        row = []
+        for name in self.positions:
+            key = (name, POSITION)
+            apart = second.get(key, nan) - first.get(key, nan)
+            row.append(remainder(apart, tau) if self._wrapped and self._is_angle(key) else apart)
+        self._rows.append((time, row))
+        if len(self._rows) == _ROWS:
+            self._flush_rows()
+
+    def difference_curves(self) -> tuple[Any, Any, Any]:
+        """Return times in [s], and the least and greatest difference in each interval."""
+        self._flush_rows()
+        assert self._curves is not None
+        found = self._curves.build_intervals()
+        lows, highs = np.fmin(found.first, found.second), np.fmax(found.first, found.second)
+        return found.begins * 1e-9, lows, highs
+
+    def interpolate(self, before: TimedState, after: TimedState, time: int) -> Mapping[Key, float]:
+        """Return the values at a time between two states, in [ns]."""
+        if after.time == time or after.time == before.time:
+            return after.values
+        share = (time - before.time) / (after.time - before.time)
+        found = {}
+        for key, value in before.values.items():
+            step = after.values.get(key, nan) - value
+            if self._wrapped and self._is_angle(key) and abs(step) > pi:
+                step = remainder(step, tau)
+            found[key] = value + share * step
+        return found
+
+    def _is_angle(self, key: Key) -> bool:
+        return key[1] == POSITION and self._turning.get(key[0], True)
+
+    def _flush_rows(self) -> None:
+        if self._rows and self._curves is not None:
+            times, rows = zip(*self._rows, strict=True)
+            self._curves.add(np.array(times, np.int64), np.array(rows, float))
+            self._rows.clear()
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    for name, what in (('bag', 'the first bag'), ('other', 'the second bag')):
+        parser.add_argument(
+            name, type=Path, metavar=name.upper(), help=f'{what}: its folder or its .mcap file'
+        )
+    add_output(parser, PICTURES, 'no picture is written')
+    parser.add_argument('--json', action='store_true', help='the same as JSON')
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Compare; return 1 if it was stopped, or a bag is damaged."""
+    bags = [open_bag(path, stop) for path in (arguments.bag, arguments.other)]
+    scenes = [_find_wrapping(bag) for bag in bags]
+    turning = scenes[0][0] | scenes[1][0]
+    differences = BagDifferences(turning, wrapped=scenes[0][1] or scenes[1][1])
+    readings = [BagReading(bag, stop) for bag in bags]
+    with readings[0].with_progress() as first, readings[1].with_progress() as second:
+        _compare_states(differences, _read_states(bags[0], first), _read_states(bags[1], second))
+    if not differences.deviations:
+        raise LinkageError(
+            arguments.other,
+            f'has no joint in common with {arguments.bag}',
+            'name two runs of one linkage',
+        )
+    account = {
+        'bag': str(arguments.bag),
+        'other': str(arguments.other),
+        'compared': differences.compared,
+        'seconds': differences.end * 1e-9,
+        'damage': [each.damage for each in readings if each.damage],
+        'stopped': stop.is_set(),
+        'joints': deviations_account(differences.deviations, turning),
+    }
+    if arguments.output is not None:
+        _draw_differences(differences, turning, arguments.output)
+    if arguments.json:
+        print(json.dumps(account, indent=1, allow_nan=False))
+    else:
+        print(
+            f'{account["other"]} against {account["bag"]}: {account["compared"]} joint states, '
+            f'{account["seconds"]:.3f} s\n'
+        )
+        print_tables(joints_table(account, 0))
+        if arguments.output is not None:
+            print(arguments.output)
+    return int(stop.is_set() or bool(account['damage']))
+
+
+def _find_wrapping(bag: Bag) -> tuple[dict[str, bool], bool]:
+    """Return which joints turn, and whether angles are wrapped; without a scene they may be."""
+    try:
+        scene = recorded_scene(bag)
+    except LinkageError:
+        return {}, True
+    return turning_joints(scene), scene.wrapped
+
+
+def _read_states(bag: Bag, messages: Iterator[Any]) -> Iterator[TimedState]:
+    """Yield the joint states of a bag whose time goes on."""
+    held = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
+    topic = run_or_blank(bag).joint_states_topic or '/joint_states'
+    if topic not in held:
+        raise BagError(
+            bag.path,
+            f'holds no {topic} of {JOINT_STATE}',
+            f'it holds {list_names(held) or "none"}',
+        )
+    read = MessageValues(JOINT_STATE).read
+    begin = last = None
+    for name, _, publish_time, data in messages:
+        if name != topic:
+            continue
+        values = read(data)
+        if isinstance(values, str):
+            continue
+        time = values.stamp or publish_time
+        begin = time if begin is None else begin
+        if last is None or time > last:
+            last = time
+            yield TimedState(time - begin, dict(zip(values.keys, values.numbers, strict=True)))
+
+
+def _compare_states(
+    differences: BagDifferences, first: Iterator[TimedState], second: Iterator[TimedState]
+) -> None:
+    before = after = next(second, None)
+    for time, values in first:
+        while after is not None and after.time < time:
+            before, after = after, next(second, None)
+        if before is None or after is None:
+            return
+        differences.add_states(time, values, differences.interpolate(before, after, time))
+
+
+def _draw_differences(
+    differences: BagDifferences, turning: Mapping[str, bool], file: Path
+) -> None:
+    from linkage_ros.tools.drawing.painting import (  # local import: only for a picture
+        picture_settings,
+        save_picture,
+    )
+
+    context = picture_settings()
+    from matplotlib.figure import Figure
+
+    times, lows, highs = differences.difference_curves()
+    kinds = [(True, '°', 180.0 / pi), (False, 'mm', 1e3)]
+    panels = [
+        (unit, scale, columns)
+        for turns, unit, scale in kinds
+        if (
+            columns := [
+                index
+                for index, name in enumerate(differences.positions)
+                if turning.get(name, True) == turns
+            ]
+        )
+    ]
+    with context:
+        figure = Figure(figsize=(8.0, 0.8 + 2.8 * len(panels)), dpi=120, layout='constrained')
+        for place, (unit, scale, columns) in enumerate(panels, 1):
+            axes = figure.add_subplot(len(panels), 1, place)
+            for column in columns:
+                name = escape_unprintable(differences.positions[column]).replace('$', r'\$')
+                low, high = lows[:, column] * scale, highs[:, column] * scale
+                (line,) = axes.plot(times, (low + high) / 2.0, label=name, linewidth=0.8)
+                axes.fill_between(times, low, high, color=line.get_color(), alpha=0.4, linewidth=0)
+            axes.set_ylabel(f'difference [{unit}]')
+            axes.legend(loc='upper right', fontsize=7)
+        axes.set_xlabel('time [s]')
+        save_picture(figure, file)

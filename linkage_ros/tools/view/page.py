@@ -1,0 +1,191 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The page of `linkage view`: the linkage under the hand, its curves, its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from html import escape
+from typing import Any
+
+from linkage_ros.errors import escape_unprintable
+from linkage_ros.kinematics.shapes import COLOURS, FACES, INK
+from linkage_ros.tools.view.pages.document import html_document, POLICY
+
+SERVED_POLICY = POLICY.replace(
+    "script-src 'unsafe-inline'",
+    # The program of the linkage; and the server that has sent this page.
+    "script-src 'unsafe-inline' 'unsafe-eval'; connect-src ws://127.0.0.1:* ws://localhost:*",
+).replace('img-src data:', 'img-src data: blob:')
+"""Content policy of a page that asks the server which has sent it."""
+
+_PACKAGE = 'linkage_ros.tools.view'
+_SCRIPTS = ('linkage', 'board', 'hand', 'talk', 'edits', 'over_input', 'view')
+_SHARED = ('angles', 'curves', 'looks', 'picture')
+
+_DOWNLOADS = {
+    'svg': 'drawing, SVG',
+    'png': 'drawing, PNG',
+    'gif': 'animation, GIF',
+    'dxf': 'links with holes, DXF',
+    'yaml': 'linkage file',
+    'c': 'C',
+    'py': 'Python',
+    'js': 'JavaScript',
+}
+_TOOLS = {
+    'shape': 'move pins',
+    'turn': 'turn the crank',
+    'trace': 'trace a point',
+    'input': 'choose the input',
+}
+_QUALITY = {'#d55e00': 'below 30°', '#e6b422': '30 to 45°', '#009e73': 'above 45°'}
+"""Colour of a transmission angle."""
+
+_CURVES = {
+    'joints': 'Joints',
+    'rates': 'Rates',
+    'accelerations': 'Accelerations, at a constant input rate',
+}
+
+
+def page_html(
+    model: Mapping[str, Any],
+    *,
+    mode: str,
+    can_save: bool = False,
+    scene: str | None = None,
+    node: str | None = None,
+) -> str:
+    """
+    Return the page.
+
+    Parameters
+    ----------
+    model
+        The linkage; see `linkage_ros.tools.view.model`.
+    mode
+        ``edit`` beside a server, ``still`` without one, ``live`` beside a node.
+    can_save
+        Whether the server may save the user's file.
+    scene, node
+        Name of the scene whose sensors are read, and of the node; None without one.
+
+    Raises
+    ------
+    LinkageError
+        If plotly is not installed.
+
+    """
+    data = {
+        'mode': mode,
+        'model': model,
+        'colours': COLOURS,
+        'faces': {**FACES, 'edge': INK},
+        'server': mode != 'still',
+        'can_save': can_save,
+        'scene': scene,
+        'node': node,
+    }
+    title = escape_unprintable(node or model['name'])
+    scripts = [('linkage_ros.tools.view.pages', f'{name}.js') for name in _SHARED]
+    scripts += [(_PACKAGE, f'{name}.js') for name in _SCRIPTS]
+    styles = [(_PACKAGE, 'view.css')]
+    body = _page_body(title, mode, can_save)
+    return html_document(title, body, data, styles, scripts, policy=SERVED_POLICY)
+
+
+def _page_body(title: str, mode: str, can_save: bool) -> Iterator[str]:
+    editing = mode == 'edit'
+    yield from _header(title, editing, can_save)
+    yield '<p id="lost" role="status" hidden>Not connected: <span id="lost-why"></span>. '
+    yield 'The linkage still moves; it is tried again.</p>'
+    yield '<p id="wrong" role="alert" hidden></p>'
+    yield '<noscript><p class="warnings">This page needs JavaScript.</p></noscript>'
+    yield '<main><section class="player" aria-label="The linkage">'
+    yield from _player()
+    if editing:
+        yield from _tool_choice()
+    yield '<dl class="readout" id="readout" aria-live="off"></dl>'
+    yield '<ul class="warnings" id="warnings" hidden></ul>'
+    yield '</section><section>'
+    yield from _plots()
+    yield '<div class="forms"><div><h2>Lengths [<span id="unit-of-length"></span>]</h2>'
+    yield '<table><tbody id="lengths"></tbody></table></div>'
+    yield '<div><h2>Assembly</h2><table><tbody id="choices"></tbody></table></div>'
+    yield '<div><h2>Traced points</h2><div id="traced"></div></div></div>'
+    yield '</section></main>'
+
+
+def _header(title: str, editing: bool, can_save: bool) -> Iterator[str]:
+    yield '<header class="bar">'
+    yield f'<h1 id="title">{escape(title)}</h1>'
+    if editing:
+        yield '<button type="button" id="undo" title="Undo (Ctrl+Z)">Undo</button>'
+        yield '<button type="button" id="redo" title="Redo (Ctrl+Y)">Redo</button>'
+        if can_save:
+            yield '<button type="button" id="save" title="Save (Ctrl+S)">Save</button>'
+        yield '<select id="open" class="edit" aria-label="New from a shipped linkage">'
+        yield '<option value="">New from …</option></select>'
+        yield '<select id="download" class="edit" aria-label="Download">'
+        yield '<option value="">Download …</option>'
+        for kind, what in _DOWNLOADS.items():
+            yield f'<option value="{kind}">{what}</option>'
+        yield '</select>'
+    yield '</header>'
+
+
+def _player() -> Iterator[str]:
+    """Yield the drawing and its controls."""
+    yield '<figure><canvas id="drawing" tabindex="0" role="application" aria-label="The linkage; '
+    yield 'n and p choose a pin, the arrows move it, or turn the crank"></canvas></figure>'
+    yield '<p id="status" role="status"></p>'
+    yield '<div class="controls"><button type="button" id="play" aria-label="Play">▶</button>'
+    yield '<label>angles in <select id="angles"><option value="degrees">degrees</option>'
+    yield '<option value="radians">radians</option></select></label>'
+    yield '<label>ω <input type="number" id="rate" step="any" value="1" aria-label="rate of the '
+    yield 'first input"> <span id="rate-unit"></span></label>'
+    for what, checked in {
+        'names': 'names', 'ghosts': 'other assemblies', 'centres': 'instant centres'
+    }.items():  # fmt: skip
+        on = '' if what == 'centres' else ' checked'
+        yield f'<label><input type="checkbox" id="{what}"{on}> {checked}</label>'
+    yield '</div><div id="inputs"></div>'
+
+
+def _tool_choice() -> Iterator[str]:
+    """Yield the choice of what the hand does on the drawing."""
+    yield '<div class="controls"><fieldset><legend hidden>tool</legend>'
+    for tool, what in _TOOLS.items():
+        on = ' checked' if tool == 'shape' else ''
+        yield f'<label><input type="radio" name="tool" class="edit" value="{tool}"{on}> '
+        yield f'{what}</label>'
+    yield '</fieldset><label>snap to <select id="snap" class="edit">'
+    yield '<option value="0">nothing</option>'
+    for step in ('0.001', '0.005', '0.01', '0.1', '1', '5', '10'):
+        yield f'<option>{step}</option>'
+    yield '</select></label></div>'
+
+
+def _plots() -> Iterator[str]:
+    """Yield the figures of the curves over the input."""
+    yield '<div id="plots">'
+    for key, what in _CURVES.items():
+        yield f'<figure data-key="{key}"><figcaption>{what}</figcaption><div class="plot"></div>'
+        yield '</figure>'
+        if key == 'joints':
+            yield '<figure class="band"><figcaption>Transmission angle '
+            yield '<span class="key">'
+            for colour, of in _QUALITY.items():
+                yield f'<span><i style="background:{colour}"></i>{of}</span>'
+            yield '; the line is the singularity margin, from 0 at a singularity to 1</span>'
+            yield '</figcaption>'
+            yield '<div><canvas id="band" role="img" aria-label="transmission angle over the '
+            yield 'input"></canvas></div></figure>'
+    yield '</div>'

@@ -1,0 +1,180 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+A self-contained page: style, script, data and plotting library in one file.
+
+Its content policy forbids the browser all requests, whatever the page holds.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from importlib.resources import files
+import json
+from typing import Any
+
+from linkage_ros.errors import check_installed, escape_unprintable
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
+    "base-uri 'none'; form-action 'none'"
+)
+
+_HERE = 'linkage_ros.tools.view.pages'
+
+Parts = Sequence[tuple[str, str]]
+"""Files of one page: each with its package and its name."""
+
+
+def html_document(
+    title: str,
+    body: Iterable[str],
+    data: Any,
+    styles: Parts,
+    scripts: Parts,
+    *,
+    policy: str = POLICY,
+    has_plots: bool = True,
+) -> str:
+    """
+    Return a page.
+
+    Parameters
+    ----------
+    title
+        Title of the window.
+    body
+        Lines of HTML.
+    data
+        Data of the script, as JSON holds them; numbers are finite.
+    styles, scripts
+        Files of this page beside those of all pages, in their order.
+    policy
+        Content policy; a page with a server must be allowed to ask it.
+    has_plots
+        Whether its scripts draw with Plotly, which is then part of the page.
+
+    Raises
+    ------
+    LinkageError
+        If plotly is needed and not installed.
+
+    """
+    plotting = [f'<script>{_within_script(plotting_library())}</script>'] if has_plots else []
+    return '\n'.join(
+        [
+            '<!doctype html>',
+            '<html lang="en">',
+            '<head>',
+            '<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="color-scheme" content="light dark">',
+            # Without an icon, a browser asks the server for one.
+            '<link rel="icon" href="data:,">',
+            f'<title>{escape(escape_unprintable(title))}</title>',
+            f'<style>\n{_join_files("page.css", styles)}</style>',
+            '</head>',
+            '<body>',
+            '<button type="button" id="scheme" class="no-print" hidden></button>',
+            _clean_lines('\n'.join(body)),
+            f'<script type="application/json" id="data">{_script_json(data)}</script>',
+            *plotting,
+            f'<script>\n{_join_files("page.js", scripts)}</script>',
+            '</body>',
+            '</html>',
+            '',
+        ]
+    )
+
+
+def svg_data_url(svg: bytes) -> str:
+    """Return an SVG as a data URL."""
+    return f'data:image/svg+xml;base64,{b64encode(svg).decode()}'
+
+
+def plotting_library() -> str:
+    """Return the script of Plotly; a LinkageError if it is not installed."""
+    check_installed('plotly')
+    from plotly.offline import get_plotlyjs  # local import: an optional dependency, slow to load
+
+    return str(get_plotlyjs())
+
+
+def _join_files(name: str, parts: Parts) -> str:
+    """Return the file that all pages share, followed by those of this page."""
+    texts = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
+    return '\n'.join(file.read_text('utf-8') for file in texts)
+
+
+def _script_json(data: Any) -> str:
+    # No text may end the script element or open a comment.
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
+    text = text.replace('<', r'\u003c')
+    # Names that the script shows are cleaned here, too; json has escaped the rest.
+    return _escape_letters(
+        {letter for letter in set(text) if not letter.isprintable()}, text, '\\'
+    )
+
+
+def _clean_lines(text: str) -> str:
+    return _escape_letters(
+        {letter for letter in set(text) - {'\n'} if not letter.isprintable()}, text
+    )
+
+
+def _escape_letters(letters: set[str], text: str, before: str = '') -> str:
+    for letter in letters:
+        text = text.replace(letter, before + escape_unprintable(letter))
+    return text
+
+
+def _within_script(text: str) -> str:
+    return text.replace('</script', r'<\/script')
+
+
+_LONG = 28
+"""Length from which the text of a cell may be broken into lines."""
+
+
+def table_html(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[bool]
+) -> Iterator[str]:
+    """
+    Yield a table within a figure, which the caller closes; columns of numbers align to the right.
+
+    If all headings are empty, none is written.
+    """
+    yield f'<figure><figcaption>{escape(title)}</figcaption>'
+    yield '<div class="scroll" tabindex="0"><table>'
+    if any(columns):
+        yield f'<thead><tr>{"".join(map(_head_cell, columns, numbers))}</tr></thead>'
+    yield '<tbody>'
+    for row in rows:
+        yield f'<tr>{"".join(map(_body_cell, row, numbers))}</tr>'
+    yield '</tbody></table></div>'
+
+
+def facts_html(facts: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Yield facts, each with its name."""
+    yield '<dl class="facts">'
+    for name, value in facts:
+        yield f'<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>'
+    yield '</dl>'
+
+
+def _head_cell(column: str, number: bool) -> str:
+    return f'<th{" class=number" if number else ""}>{escape(column)}</th>'
+
+
+def _body_cell(text: str, number: bool) -> str:
+    kind = ' class=number' if number else ' class=long' if len(text) >= _LONG else ''
+    return f'<td{kind}>{escape(text)}</td>'

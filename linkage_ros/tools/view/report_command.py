@@ -1,0 +1,165 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Write a run as one HTML page that needs nothing else: its linkage moving, plots, events, counts.
+
+The page makes no request to anywhere. Of a long run it holds intervals with their least and
+greatest values; --since and --until show a part of it in full. A bag that is damaged or not
+finished is told as far as it goes; of one without a scene of ours, its joint states alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+import os
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from linkage_ros.bag.contents import layout_of
+from linkage_ros.bag.reader import Bag
+from linkage_ros.cli.arguments import add_bag, add_output, DEGREES, output_or
+from linkage_ros.cli.bag_reading import (
+    bag_json,
+    describe_gaps,
+    open_bag,
+    path_beside,
+    scene_json,
+)
+from linkage_ros.cli.info import bag_tables
+from linkage_ros.description.file_access import atomic_write
+from linkage_ros.description.scene import Scene
+from linkage_ros.errors import check_installed, LinkageError
+from linkage_ros.signals import StoppedError
+from linkage_ros.tools.view.part_of_run import add_window, read_part, window_of
+from linkage_ros.tools.view.report.html import ReportHeader, run_html, TableOf
+from linkage_ros.tools.view.report.labels import seconds_text
+from linkage_ros.tools.view.report.run import ReportedRun, Window
+
+EXAMPLE = 'linkage report my_bag -o my_bag.html'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_bag(parser)
+    add_output(parser, ('.html', '.htm'), 'BAG.html')
+    add_window(parser)
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Write the page."""
+    file = output_or(arguments, path_beside(arguments.bag, '.html'))
+    check_page(file)
+    window = window_of(arguments.since, arguments.until)
+    write_page(file, bag_page(arguments.bag, window, stop, trust_effects=arguments.trust_effects))
+    return 0
+
+
+def write_page(file: Path, page: str) -> None:
+    """Write a page, and say how large it is."""
+    # Undecodable bytes, of a file name for example, are written as escapes.
+    data = page.encode('utf-8', 'backslashreplace')
+    atomic_write(file, data)
+    print(f'{file}: {len(data) / 1e6:.1f} MB')
+
+
+def bag_page(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool = False) -> str:
+    """
+    Return the page of a bag, or of a window of it; memory does not grow with the bag.
+
+    ``trust_effects`` lets the scene's effects be imported. A LinkageError says that the bag cannot
+    be read, or that plotly is not installed; a StoppedError that the event was set.
+    """
+    bag = open_bag(bag_path, stop)
+    layouts = [layout_of(path) for path in bag.files]
+    found, scene, missing = read_part(bag, layouts, window, stop, trust_effects=trust_effects)
+    account = bag_json(bag, layouts, found.contents)
+    account |= {'scene': None, 'scene_missing': None, 'replay': None}
+    # A page is passed on to others: it shows the bag's name, not its path.
+    if account['damage']:
+        where, _, damage = account['damage'].partition(': ')
+        account['damage'] = f'{Path(where).name}: {damage}'
+    if scene is not None:
+        account['scene'] = scene_json(scene)
+    name = scene.name if scene is not None else bag_path.resolve().name
+    page = run_html(
+        found,
+        ReportHeader(
+            title=f'Run of {name}',
+            facts=list(_run_facts(account, found, scene)),
+            warnings=list(_find_warnings(bag, account, found, scene, missing)),
+            tables=_page_tables(account),
+            wrapped=scene is not None and scene.wrapped,
+        ),
+    )
+    _raise_if_stopped(stop)
+    return page
+
+
+def _raise_if_stopped(stop: Event) -> None:
+    if stop.is_set():
+        raise StoppedError
+
+
+def _page_tables(account: dict[str, Any]) -> list[TableOf]:
+    bag, *others = (TableOf(*table) for table in bag_tables(account, DEGREES))
+    return [bag._replace(title='Bag'), *others]
+
+
+def _run_facts(
+    account: dict[str, Any], found: ReportedRun, scene: Scene | None
+) -> Iterator[tuple[str, str]]:
+    yield 'bag', Path(account['bag']).resolve().name
+    if account['begin']:
+        yield 'begun', account['begin']
+        yield 'duration', f'{account["duration_ns"] / 1e9:.6f} s'
+    since, until = found.window
+    if since > 0 or until < found.end:
+        yield 'part', f'{seconds_text(since)} s to {seconds_text(min(until, found.end))} s'
+    yield 'messages', f'{account["messages"]:,}'
+    if scene is not None:
+        yield 'ticks', f'{scene.rate:g} a second' if scene.rate else 'one a sample'
+    version = account['versions']['linkage_ros']
+    if version:
+        yield 'recorded by', f'linkage_ros {version}'
+
+
+def _find_warnings(
+    bag: Bag, account: dict[str, Any], found: ReportedRun, scene: Scene | None, missing: str
+) -> Iterator[str]:
+    """Yield the missing or damaged parts of a run."""
+    if missing and scene is None:
+        yield f'No scene of linkage_ros, so no linkage: {missing}.'
+    elif missing:
+        yield f'The scene was not run again, so no linkage: {missing}.'
+    if not account['messages']:
+        yield 'The bag holds no messages.'
+    if account['damage']:
+        yield f'Damaged: {account["damage"]}; what lies before is told.'
+    if account['unfinished']:
+        yield f'Unfinished: {account["unfinished"]}; what it holds is told.'
+    if account['recording_failure']:
+        yield f'The recording failed: {account["recording_failure"]}.'
+    if account['beginning_missing']:
+        yield f'Not from the beginning: {account["beginning_missing"]}.'
+    for gap in describe_gaps(bag):
+        yield f'{gap[:1].upper()}{gap[1:]}.'
+    if account['messages'] and found.window.since > found.end:
+        yield f'The part begins after the end of the run, at {seconds_text(found.end)} s.'
+
+
+def check_page(file: Path) -> None:
+    """Raise if a page could not be written, before it is made."""
+    check_installed('plotly')
+    # `Path.is_dir` raises for a name that is too long.
+    if os.path.isdir(file):  # noqa: PTH112
+        raise LinkageError(file, 'is a folder', 'name another file with -o')
+    if not os.path.isdir(file.absolute().parent):  # noqa: PTH112
+        raise LinkageError(file, 'lies in no folder that there is', 'name another file with -o')
