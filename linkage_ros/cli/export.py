@@ -32,7 +32,7 @@ from linkage_ros.cli.arguments import add_bag, add_output
 from linkage_ros.cli.bag_reading import open_bag, run_or_blank, unfinished_text
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description.scene import Scene
-from linkage_ros.description.tables import block_rows, check_kind, KINDS, table_file
+from linkage_ros.description.tables import block_rows, check_kind, table_file, TABLE_KINDS
 from linkage_ros.errors import BagError, did_you_mean, escape_unprintable, LinkageError, list_names
 from linkage_ros.messages.joint_values import (
     FORCE_X,
@@ -223,7 +223,7 @@ EXAMPLE = 'linkage export my_bag -o my_bag.csv'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_bag(parser)
-    add_output(parser, KINDS)
+    add_output(parser, TABLE_KINDS)
     parser.add_argument('--topic', help='a topic to write alone, a row for each message')
 
 

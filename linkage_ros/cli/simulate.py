@@ -33,7 +33,7 @@ from linkage_ros.description.file_access import check_output_name, remove_bag
 from linkage_ros.description.notes import scene_notes
 from linkage_ros.description.scene import Scene
 from linkage_ros.description.scene_file import load_scene
-from linkage_ros.description.tables import check_kind, KINDS, table_file
+from linkage_ros.description.tables import check_kind, table_file, TABLE_KINDS
 from linkage_ros.errors import escape_unprintable, LinkageError
 from linkage_ros.messages.joint_values import EFFORT, POSITION, RATE, UNITS
 from linkage_ros.replay.finished_runs import FinishedRuns
@@ -112,7 +112,7 @@ def _read_output(text: str) -> Path:
     """Read the name of a folder, which has no suffix, or of a table or picture."""
     file = Path(text)
     if file.suffix:
-        check_output_name(file, (*KINDS, *PICTURES))
+        check_output_name(file, (*TABLE_KINDS, *PICTURES))
     return file
 
 
@@ -130,7 +130,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             raise LinkageError(option, 'is for a study', 'add --seeds or --sweep')
     output: Path = arguments.output
     if output.suffix:
-        check_output_name(output, KINDS)
+        check_output_name(output, TABLE_KINDS)
         check_kind(output)
     scene = _load_scene(arguments)
     ticks = check_simulated(scene, arguments.seconds)
@@ -192,14 +192,16 @@ def _run_study(
 ) -> int:
     """Run a study; return 1 if a signal stopped it, or no run succeeded."""
     output: Path = arguments.output
-    check_output_name(output, (*KINDS, *PICTURES))  # not a folder
-    pictures = [file for file in (output, arguments.picture) if file and file.suffix not in KINDS]
+    check_output_name(output, (*TABLE_KINDS, *PICTURES))  # not a folder
+    pictures = [
+        file for file in (output, arguments.picture) if file and file.suffix not in TABLE_KINDS
+    ]
     if pictures:
         check_output_name(pictures[-1], PICTURES)
         find_tool(
             'spread'
         ).picture_settings()  # without matplotlib, say so before the study is run
-    if output.suffix in KINDS:
+    if output.suffix in TABLE_KINDS:
         check_kind(output)
     scene = _load_scene(arguments)
     ticks = check_simulated(scene, arguments.seconds)
@@ -244,7 +246,7 @@ def _write_results(
     if len(failed) == len(runs):
         finished.remove_file()
         return 1
-    if output.suffix in KINDS:
+    if output.suffix in TABLE_KINDS:
         heads, rows = _runs_table(scene, runs, found)
         with table_file(output, heads, _WHOLE) as write:
             write(rows)

@@ -49,7 +49,7 @@ def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterat
     try:
         if target.exists() and not target.is_file():
             raise LinkageError(str(file), 'exists, and is no file', 'name another file')
-        kind = KINDS[file.suffix.lower()]
+        kind = TABLE_KINDS[file.suffix.lower()]
         with replace_file(target) as stream, kind(stream, heads, whole) as write:
             yield write
     except OSError as error:
@@ -68,7 +68,7 @@ def check_kind(file: Path) -> None:
         Its suffix is unknown, or the library for it is not installed or does not run here.
 
     """
-    check_output_name(file, KINDS)
+    check_output_name(file, TABLE_KINDS)
     if file.suffix.lower() == '.parquet':
         _check_pyarrow()
 
@@ -126,7 +126,7 @@ def _open_parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) 
         yield write_rows
 
 
-KINDS: dict[
+TABLE_KINDS: dict[
     str, Callable[[BinaryIO, Sequence[str], Sequence[str]], AbstractContextManager[Write]]
 ] = {'.csv': _open_csv, '.parquet': _open_parquet}
 """Writer for each suffix of a file."""

@@ -292,7 +292,7 @@ def _telling_text(plan: SolvedLinks, dyad: Dyad, states: Sequence[LinkState]) ->
     return f'{point or f"the angle of {link}"}: {texts[0]} or {texts[1]}'
 
 
-def drawn_pose(closure: LoopClosure, position: Position) -> AssemblyPose:
+def read_drawn_pose(closure: LoopClosure, position: Position) -> AssemblyPose:
     """
     Return the pose that tells the assembly of a position.
 

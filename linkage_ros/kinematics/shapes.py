@@ -207,7 +207,7 @@ class LinkFrame(NamedTuple):
     angle: float
 
 
-def link_frames(closure: Closure, position: Position) -> dict[str, LinkFrame]:
+def frames_of_links(closure: Closure, position: Position) -> dict[str, LinkFrame]:
     """Return the frames of the links, and of the blocks of sliders that are not links."""
     frames = closure.link_frames
     moving = zip(frames.links, frames.frames_at(position), strict=True)

@@ -18,11 +18,11 @@ from linkage_ros.cli.main import main
 from linkage_ros.description.linkage_file import load
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.shapes import link_frames
+from linkage_ros.kinematics.shapes import frames_of_links
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.tools.drawing.animation import animate, check_kind, range_motion, RATE
 from linkage_ros.tools.view.report.run import Window
-from linkage_ros.tools.view.report.run_motion import run_motion
+from linkage_ros.tools.view.report.run_motion import find_run_motion
 import numpy as np
 import pytest
 
@@ -48,7 +48,7 @@ def test_links_are_where_the_closure_has_them(name):
     closure = motion.view.closure
     assert len(motion.x) == RATE
     for x, frames in zip(motion.x, motion.frames, strict=True):
-        found = link_frames(closure, closure.position(x))
+        found = frames_of_links(closure, closure.position(x))
         for link, (px, py, angle) in zip(motion.links, frames, strict=True):
             assert hypot(px - found[link].place.real, py - found[link].place.imag) < 1e-12
             assert cos(angle - found[link].angle) == pytest.approx(1.0)
@@ -88,7 +88,7 @@ def test_keyframes_of_an_svg_put_links_where_the_closure_has_them(tmp_path, name
     file = tmp_path / 'x.svg'
     animate(motion, file)
     found = rules(file)
-    made = link_frames(motion.view.closure, motion.view.position)
+    made = frames_of_links(motion.view.closure, motion.view.position)
     # Pixels per metre, from the farthest places of the first link that changes its place.
     scales = set()
     for index, link in enumerate(motion.links):
@@ -151,7 +151,7 @@ def gapped(tmp_path_factory):
 
 def test_links_of_a_run_are_where_their_recorded_joints_put_them(gapped):
     found = read(gapped)
-    motion = run_motion(found, 'run', 1.0)
+    motion = find_run_motion(found, 'run', 1.0)
     crank = motion.links.index('crank')
     rocker = motion.links.index('rocker')
     for time, frames, values in zip(motion.x, motion.frames, motion.values, strict=True):
@@ -165,7 +165,7 @@ def test_links_of_a_run_are_where_their_recorded_joints_put_them(gapped):
 
 
 def test_a_gap_hides_the_linkage_and_interrupts_the_curves(gapped, tmp_path):
-    motion = run_motion(read(gapped), 'run', 1.0)
+    motion = find_run_motion(read(gapped), 'run', 1.0)
     within = (motion.x > 0.41) & (motion.x < 0.69)
     assert within.any()
     assert np.isnan(motion.frames[within]).all()
@@ -188,7 +188,7 @@ def test_a_gap_hides_the_linkage_and_interrupts_the_curves(gapped, tmp_path):
 
 
 def test_a_part_of_a_run_begins_and_ends_as_named(gapped):
-    motion = run_motion(read(gapped, Window(100_000_000, 300_000_000)), 'run', None)
+    motion = find_run_motion(read(gapped, Window(100_000_000, 300_000_000)), 'run', None)
     assert motion.x[0] == pytest.approx(0.1, abs=2e-3)
     assert motion.x[-1] == pytest.approx(0.3, abs=0.02)
     assert motion.title == 'run, 0.2 times as fast'  # the shortest picture takes a second
@@ -196,7 +196,7 @@ def test_a_part_of_a_run_begins_and_ends_as_named(gapped):
 
 def test_a_part_without_joint_states_is_refused(gapped):
     with pytest.raises(LinkageError, match='holds no joint states in this part'):
-        run_motion(read(gapped, Window(450_000_000, 600_000_000)), 'run', 1.0)
+        find_run_motion(read(gapped, Window(450_000_000, 600_000_000)), 'run', 1.0)
 
 
 @pytest.mark.parametrize('seconds', ['0', '-1', '31', 'nan'])

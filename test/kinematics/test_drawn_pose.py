@@ -24,7 +24,7 @@ from typing import NamedTuple
 from linkage_ros.description.linkage_file import load
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.drawn_pose import drawn_pose
+from linkage_ros.kinematics.drawn_pose import read_drawn_pose
 from linkage_ros.kinematics.linkage import (
     AssemblyPose,
     Input,
@@ -206,7 +206,7 @@ def test_the_pose_to_copy_leads_back_and_sides_are_those_of_the_drawing(seed, dy
     places = {name: place for (_, name), place in drawn.places.items() if name in drawn.tells}
     closure = posed(drawn, places, {})
     position = closure.position(drawn.at)
-    again = Closure(replace(drawn.linkage, pose=drawn_pose(closure, position)))
+    again = Closure(replace(drawn.linkage, pose=read_drawn_pose(closure, position)))
     assert again.position(drawn.at).joints == position.joints
     sides = sides_at(closure, position)
     by_sides = Closure(replace(drawn.linkage, assembly=sides, pose=AssemblyPose((drawn.at,), {})))

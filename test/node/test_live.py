@@ -27,7 +27,7 @@ from urllib.request import urlopen
 from linkage_ros import load
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.shapes import link_frames
+from linkage_ros.kinematics.shapes import frames_of_links
 from linkage_ros.tools.view.live import add_live, live_page
 from linkage_ros.tools.view.live_bridge import LiveBridge
 import pytest
@@ -112,7 +112,7 @@ def test_the_linkage_comes_from_the_node_and_a_hand_turns_its_crank(graph, start
         assert list(cranks[-1].position) == pytest.approx([ANGLE], abs=1e-9)
         assert list(cranks[-1].velocity) == pytest.approx([0.0], abs=1e-6)
         assert state['inputs'] == pytest.approx([ANGLE], abs=1e-6)
-        frames = link_frames(closure, wanted)
+        frames = frames_of_links(closure, wanted)
         expected = [
             number
             for link in model['links']

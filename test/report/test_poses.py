@@ -19,7 +19,7 @@ from linkage_ros.description.scene_file import load_scene
 from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.shapes import carried_shapes, Circle, draw_shapes, link_frames
+from linkage_ros.kinematics.shapes import carried_shapes, Circle, draw_shapes, frames_of_links
 from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.resources import shipped_path
@@ -86,7 +86,7 @@ def test_shapes_in_frames_are_those_of_the_drawing(file):
     closure = closure_of(file)
     shown = prepare_view(closure, usual_inputs(closure))
     data = drawn_in_frames(shown)
-    frames = {**link_frames(closure, shown.position), 'ground': (0j, 0.0)}
+    frames = {**frames_of_links(closure, shown.position), 'ground': (0j, 0.0)}
     size = data['size']
     drawn = carried_shapes(closure, shown.position, size, shown.sweep.travels)
     assert len(data['shapes']) == len(
@@ -143,7 +143,7 @@ def test_where_joints_do_not_tell_of_a_link_the_loops_are_closed_at_the_input():
     assert 'coupler' in found.reason
     assert np.isnan(found.frames[1]).all()
     for i in (0, 2):
-        frames = link_frames(whole, whole.position(*inputs[i]))
+        frames = frames_of_links(whole, whole.position(*inputs[i]))
         for index, link in enumerate(found.links):
             x, y, angle = found.frames[i, index]
             assert abs(complex(x, y) - frames[link].place) < 1e-12

@@ -18,7 +18,7 @@ from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
-from linkage_ros.tools.models.from_urdf import from_urdf
+from linkage_ros.tools.models.from_urdf import linkage_from_urdf
 from linkage_ros.tools.models.planar import find_pinned
 from linkage_ros.tools.models.urdf_file import read_urdf
 import numpy as np
@@ -97,7 +97,7 @@ GRIPPER = f"""<robot name="gripper">
 
 def gripper(**options):
     options = {'close': [('bar_end', 'finger_end')], 'inputs': ['motor_joint'], **options}
-    return from_urdf(read_urdf(GRIPPER.encode(), 'g.urdf'), **options)
+    return linkage_from_urdf(read_urdf(GRIPPER.encode(), 'g.urdf'), **options)
 
 
 def test_a_gripper_on_an_arm():
@@ -158,8 +158,8 @@ def test_a_pose_says_the_side():
     file = read_urdf(turned.encode(), 'g.urdf')
     options = {'close': [('bar_end', 'finger_end')], 'inputs': ['motor_joint']}
     with pytest.raises(FileError, match='m apart where all joints are 0; give a pose'):
-        from_urdf(file, **options)
-    made = from_urdf(file, at={'finger_joint': 0.5}, **options)
+        linkage_from_urdf(file, **options)
+    made = linkage_from_urdf(file, at={'finger_joint': 0.5}, **options)
     again, first = Closure(made.linkage), Closure(gripper().linkage)
     assert again.linkage.pose.inputs == (0.0,)
     for angle in (0.1, -0.2):
@@ -182,7 +182,7 @@ def folded(crank, arm, **options):
         frame('arm', 'arm_end', '0.1 0 0'),
     ]
     urdf = read_urdf(FOLDED.format(''.join(parts)).encode(), 'r.urdf')
-    return from_urdf(urdf, [('rod_end', 'arm_end')], ['crank_joint'], **options)
+    return linkage_from_urdf(urdf, [('rod_end', 'arm_end')], ['crank_joint'], **options)
 
 
 def test_a_start_in_which_two_assemblies_meet():
@@ -267,8 +267,8 @@ def closed_values(crank):
 )
 def test_loop_tags_close_as_places_do(tags):
     at = closed_values(0.5)
-    asked = from_urdf(read_urdf(robot(TREE).encode(), 'r'), [PLACES], ['crank_joint'], at)
-    found = from_urdf(read_urdf(robot(TREE, tags).encode(), 'r'), (), ['crank_joint'], at)
+    asked = linkage_from_urdf(read_urdf(robot(TREE).encode(), 'r'), [PLACES], ['crank_joint'], at)
+    found = linkage_from_urdf(read_urdf(robot(TREE, tags).encode(), 'r'), (), ['crank_joint'], at)
     assert found.left_out == ()
     for crank in (0.5, 1.1, 2.0):
         joints = Closure(found.linkage).position(crank)
@@ -308,15 +308,15 @@ UNREAD = {
 @pytest.mark.parametrize('tags', UNREAD)
 def test_tags_that_are_not_read_are_named(tags):
     urdf = read_urdf(robot(TREE, tags).encode(), 'r')
-    made = from_urdf(urdf, [PLACES], ['crank_joint'], closed_values(0.5))
+    made = linkage_from_urdf(urdf, [PLACES], ['crank_joint'], closed_values(0.5))
     assert made.left_out == (f'{UNREAD[tags]}: close loops by --close',)
     with pytest.raises(FileError, match=f'closes no loop; not read: {UNREAD[tags]}; name'):
-        from_urdf(urdf, (), ['crank_joint'])
+        linkage_from_urdf(urdf, (), ['crank_joint'])
 
 
 def test_usual_tags_are_no_loops():
     tags = '<material name="m"/><transmission name="t"/><gazebo reference="crank"/><!-- -->'
-    made = from_urdf(
+    made = linkage_from_urdf(
         read_urdf(robot(TREE, tags, LOOP_CONSTRAINT).encode(), 'r'), (), ['crank_joint'],
         closed_values(0.5),
     )  # fmt: skip
@@ -447,7 +447,7 @@ BAD = {
 def test_what_is_no_linkage(name):
     text, message, *close = BAD[name]
     with pytest.raises(FileError) as caught:
-        from_urdf(read_urdf(text.encode(), 'x.urdf'), *(close or [CLOSED]), ['j'])
+        linkage_from_urdf(read_urdf(text.encode(), 'x.urdf'), *(close or [CLOSED]), ['j'])
     assert '\n' not in str(caught.value)
     assert str(caught.value).startswith(message)
 

@@ -17,7 +17,7 @@ from linkage_ros.description.linkage_file import load
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits
-from linkage_ros.tools.models.from_urdf import from_urdf
+from linkage_ros.tools.models.from_urdf import linkage_from_urdf
 from linkage_ros.tools.models.mjcf import mujoco_model
 from linkage_ros.tools.models.part import ModelPart
 from linkage_ros.tools.models.urdf import urdf_model
@@ -58,14 +58,16 @@ GIVEN = {
 @pytest.mark.parametrize('name', GIVEN)
 def test_the_same_limits_come_back(name):
     linkage = closed(GIVEN[name]).linkage
-    made = from_urdf(read_urdf(urdf_model('it', [ModelPart(Closure(linkage))]), 'it.urdf')).linkage
+    made = linkage_from_urdf(
+        read_urdf(urdf_model('it', [ModelPart(Closure(linkage))]), 'it.urdf')
+    ).linkage
     assert made.limits == linkage.limits
 
 
 @pytest.mark.parametrize('name', [*ONE_INPUT, 'five_bar'])
 def test_what_gives_none_comes_back_with_none(name):
     closure = load(LINKAGES / f'{name}.yaml')
-    made = from_urdf(read_urdf(urdf_model('it', [ModelPart(closure)]), 'it.urdf')).linkage
+    made = linkage_from_urdf(read_urdf(urdf_model('it', [ModelPart(closure)]), 'it.urdf')).linkage
     assert made.limits == closure.linkage.limits
 
 
@@ -77,7 +79,9 @@ WIDTH = st.floats(0.5, 3.0)
 def test_any_limits_of_the_input_come_back(low, width, rate):
     said = f'limits: [{low!r}, {low + width!r}]' + (f', velocity: {rate!r}' if rate else '')
     linkage = closed(f', input: {{{said}}}').linkage
-    made = from_urdf(read_urdf(urdf_model('it', [ModelPart(Closure(linkage))]), 'it.urdf')).linkage
+    made = linkage_from_urdf(
+        read_urdf(urdf_model('it', [ModelPart(Closure(linkage))]), 'it.urdf')
+    ).linkage
     assert made.limits == linkage.limits
 
 
@@ -103,13 +107,13 @@ def test_what_somebody_has_changed_is_kept():
     for joint in robot.findall('joint'):
         if joint.get('name') == 'rocker_joint':
             joint.find('limit').set('upper', '2.0')
-    made = from_urdf(read_urdf(ET.tostring(robot), 'it.urdf')).linkage
+    made = linkage_from_urdf(read_urdf(ET.tostring(robot), 'it.urdf')).linkage
     assert made.limits == {'rocker_joint': Limits(float(limit['lower']), 2.0)}
     for joint in robot.findall('joint'):
         if joint.get('name') == 'rocker_joint':
             joint.find('limit').set('lower', '1.0')
             joint.find('limit').set('velocity', '3')
-    made = from_urdf(read_urdf(ET.tostring(robot), 'it.urdf')).linkage
+    made = linkage_from_urdf(read_urdf(ET.tostring(robot), 'it.urdf')).linkage
     assert made.limits == {'rocker_joint': Limits(1.0, 2.0, velocity=3.0)}
     assert limit['upper'] != '2.0'
 
@@ -125,7 +129,7 @@ def without_book(data):
 
 def test_a_urdf_of_ours_without_a_book_has_none():
     data = without_book(urdf_model('it', [ModelPart(closed(''))]))
-    assert from_urdf(read_urdf(data, 'it.urdf')).linkage.limits == {}
+    assert linkage_from_urdf(read_urdf(data, 'it.urdf')).linkage.limits == {}
 
 
 def test_a_urdf_of_others_says_limits():
@@ -137,10 +141,10 @@ def test_a_urdf_of_others_says_limits():
             joint.find('limit').attrib.update(lower='-0.5', upper='1.5', effort='4', velocity='0')
     data = ET.tostring(robot)
     at = dict(zip(('coupler_joint', 'rocker_joint'), closed('').position(0.0).joints, strict=True))
-    made = from_urdf(read_urdf(data, 'it.urdf'), (), ['crank_joint'], at)
+    made = linkage_from_urdf(read_urdf(data, 'it.urdf'), (), ['crank_joint'], at)
     assert made.linkage.limits['crank_joint'] == Limits(-0.5, 1.5, effort=4.0)
     assert made.linkage.limits['rocker_joint'].velocity == 100.0
-    none = from_urdf(read_urdf(data, 'it.urdf'), (), ['crank_joint'], at, limits=False)
+    none = linkage_from_urdf(read_urdf(data, 'it.urdf'), (), ['crank_joint'], at, limits=False)
     assert none.linkage.limits == {}
 
 

@@ -15,7 +15,7 @@ from linkage_ros.cli.main import main
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import RevoluteJoint
-from linkage_ros.tools.models.from_urdf import from_urdf
+from linkage_ros.tools.models.from_urdf import linkage_from_urdf
 from linkage_ros.tools.models.onto import urdf_onto
 from linkage_ros.tools.models.part import ModelPart
 from linkage_ros.tools.models.urdf_file import read_urdf
@@ -45,7 +45,7 @@ def added_to(name):
     """Return a robot, the linkage imported from it, and the robot with what closes its loops."""
     text, *options = ROBOTS[name]
     urdf = read_urdf(text.encode(), 'r.urdf')
-    linkage = from_urdf(urdf, *options).linkage
+    linkage = linkage_from_urdf(urdf, *options).linkage
     return text, linkage, urdf_onto(urdf, text.encode(), [ModelPart(Closure(linkage))]).decode()
 
 
@@ -54,7 +54,7 @@ def test_the_robot_stays_and_the_frames_say_the_loops(name):
     """Imported again without any option, the linkage is the same."""
     before, linkage, after = added_to(name)
     assert after.startswith(before.removesuffix('</robot>'))
-    again = from_urdf(read_urdf(after.encode(), 'r.urdf')).linkage
+    again = linkage_from_urdf(read_urdf(after.encode(), 'r.urdf')).linkage
     one, other = Closure(linkage), Closure(again)
     assert one.linkage.joints.keys() == other.linkage.joints.keys()
     for value in np.linspace(0.4, 0.6, 5):
@@ -94,7 +94,7 @@ def test_a_published_joint_that_the_robot_lacks_is_added():
     """Its frame turns with the child, as seen from the parent, both walked by yourdfpy."""
     text, *options = ROBOTS['a gripper on an arm']
     urdf = read_urdf(text.encode(), 'r.urdf')
-    linkage = from_urdf(urdf, *options).linkage
+    linkage = linkage_from_urdf(urdf, *options).linkage
     joints = {**linkage.joints, 'lean': RevoluteJoint('ground', 'bar')}
     closure = Closure(replace(linkage, joints=joints))
     data = urdf_onto(urdf, text.encode(), [ModelPart(closure)])

@@ -15,7 +15,7 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Ratio
 from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs
-from linkage_ros.tools.models.from_urdf import from_urdf, ImportedLinkage
+from linkage_ros.tools.models.from_urdf import ImportedLinkage, linkage_from_urdf
 from linkage_ros.tools.models.mjcf import mujoco_model
 from linkage_ros.tools.models.part import ModelPart
 from linkage_ros.tools.models.urdf import urdf_model
@@ -59,7 +59,7 @@ def hand(random: Random, multiplier: float, offset: float, axis: str) -> tuple[s
 def imported(text: str, places: list[str], **options: object) -> ImportedLinkage:
     close = list(zip(places[::2], places[1::2], strict=True))
     urdf_file = read_urdf(text.encode(), 'h.urdf')
-    return from_urdf(urdf_file, close, ['left_joint'], **options)  # type: ignore[arg-type]
+    return linkage_from_urdf(urdf_file, close, ['left_joint'], **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize('axis', ['0 0 1', '0 0 -1'])
@@ -111,7 +111,7 @@ def test_mimic_alone_needs_no_loop() -> None:
         + joint('rack_joint', 'base', 'rack', '0 0.012 0', '', 'prismatic', '1 0 0', mimic)
         + '</robot>'
     ).replace('rpy=""', '')
-    made = from_urdf(read_urdf(text.encode(), 'r.urdf'), [], ['pinion_joint'])
+    made = linkage_from_urdf(read_urdf(text.encode(), 'r.urdf'), [], ['pinion_joint'])
     assert Closure(made.linkage).position(2.0)['rack_joint'] == pytest.approx(0.025, rel=1e-15)
 
 
@@ -136,7 +136,7 @@ def test_urdf_there_and_back(name: str) -> None:
     """The ratio is a mimic, and the joints come back the same."""
     closure = Closure(SHAPES[name]())
     data = urdf_model('r', [ModelPart(closure)])
-    again = Closure(from_urdf(read_urdf(data, 'r.urdf')).linkage)
+    again = Closure(linkage_from_urdf(read_urdf(data, 'r.urdf')).linkage)
     assert again.linkage.ratios == closure.linkage.ratios
     for interval in InputSweep(closure).ranges:
         for value in sample_inputs(interval, 24)[1:-1]:

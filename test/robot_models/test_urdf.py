@@ -20,10 +20,10 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tools.models.from_urdf import from_urdf
+from linkage_ros.tools.models.from_urdf import linkage_from_urdf
 from linkage_ros.tools.models.part import ModelPart, PartError
 from linkage_ros.tools.models.robot_model_command import model_of
-from linkage_ros.tools.models.scene_model import scene_model
+from linkage_ros.tools.models.scene_model import make_scene_model
 from linkage_ros.tools.models.urdf import urdf_model
 from linkage_ros.tools.models.urdf_file import read_urdf
 import pytest
@@ -149,7 +149,7 @@ def test_no_state_of_the_whole_range_lies_beyond_the_limits(name, angles):
     text = ODD[name].encode() if name in ODD else (LINKAGES / f'{name}.yaml').read_bytes()
     scene = from_topic(text, angles)
     closures = Pipeline(scene).closures
-    limits = limits_of(scene_model(scene, closures, urdf_model))
+    limits = limits_of(make_scene_model(scene, closures, urdf_model))
     (given,) = closures[0].linkage.inputs
     interval = InputSweep(closures[0]).range_about(*usual_inputs(closures[0]))
     values = sample_inputs(interval, 300)
@@ -180,7 +180,7 @@ def test_given_limits_that_a_wrapped_angle_leaves(angles, limits, kind):
     crank = f'input: {{limits: {limits}, effort: 2}}'
     text = f'four_bar: {{a: 0.04, b: 0.12, c: 0.08, d: 0.1, {crank}}}'
     scene = from_topic(text.encode(), angles)
-    model = scene_model(scene, Pipeline(scene).closures, urdf_model)
+    model = make_scene_model(scene, Pipeline(scene).closures, urdf_model)
     found, limit = limits_of(model)['crank_joint']
     assert found == kind
     assert limit.get('effort') == '2'
@@ -281,7 +281,7 @@ WITHIN = 1e-12
 
 def back(closure):
     """Return a linkage that went through URDF and through the text of a linkage file."""
-    made = from_urdf(read_urdf(urdf_model('it', [ModelPart(closure)]), 'it.urdf'))
+    made = linkage_from_urdf(read_urdf(urdf_model('it', [ModelPart(closure)]), 'it.urdf'))
     text = linkage_text(made.linkage)
     return Closure(linkage_of(text))
 

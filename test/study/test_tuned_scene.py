@@ -14,7 +14,7 @@ from pathlib import Path
 
 from linkage_ros.description.scene_file import load_scene
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.study.tuned_scene import tuned_scene
+from linkage_ros.tools.study.tuned_scene import tune_scene
 import pytest
 
 from ..cli.recorded import Recorded, scene_file
@@ -41,7 +41,7 @@ def test_it_loads_from_another_folder(
     monkeypatch.chdir(tmp_path)
     scene = load_scene(NAMED[what])
     (other / 'tuned.yaml').write_bytes(
-        tuned_scene(scene, NAMED[what], [('rate', 250.0), ('seed', 7)], other)
+        tune_scene(scene, NAMED[what], [('rate', 250.0), ('seed', 7)], other)
     )
     tuned = load_scene(other / 'tuned.yaml')
     assert (tuned.rate, tuned.seed) == (250.0, 7)
@@ -59,7 +59,7 @@ def test_the_bag_of_a_drive_is_found_from_there(tmp_path: Path) -> None:
     deep = tmp_path / 'deep'
     deep.mkdir()
     (deep / 'x.yaml').write_bytes(
-        tuned_scene(scene, tmp_path / 'play.yaml', [('rate', 25.0)], deep)
+        tune_scene(scene, tmp_path / 'play.yaml', [('rate', 25.0)], deep)
     )
     file = Path(load_scene(deep / 'x.yaml').linkages[0].drive[1].file)
     assert file.resolve() == (tmp_path / 'bag').resolve()

@@ -16,7 +16,7 @@ from typing import Any
 import linkage_ros as lr
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.shapes import link_frames
+from linkage_ros.kinematics.shapes import frames_of_links
 from linkage_ros.resources import shipped_path
 from linkage_ros.tools.view import requests
 from linkage_ros.tools.view.requests import LARGEST, read_request, RequestError, RequestHandler
@@ -117,7 +117,7 @@ def test_nothing_but_a_shipped_linkage_is_opened(name: Any) -> None:
 def frames_of(closure: Closure, position: Position) -> list[tuple[float, float, float]]:
     return [
         (frame.place.real, frame.place.imag, frame.angle)
-        for link, frame in link_frames(closure, position).items()
+        for link, frame in frames_of_links(closure, position).items()
         if link != 'ground'
     ]
 

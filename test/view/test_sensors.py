@@ -17,7 +17,7 @@ from pathlib import Path
 import linkage_ros as lr
 from linkage_ros.description.scene_file import load_scene, SCENE_FILE
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.shapes import link_frames
+from linkage_ros.kinematics.shapes import frames_of_links
 from linkage_ros.resources import scene_names, shipped_path
 from linkage_ros.tools.view.sensors import SceneFiles, Sensors
 import pytest
@@ -76,7 +76,7 @@ def test_a_delay_reads_what_was(closure: Closure) -> None:
 
 def test_frames_are_where_the_readings_put_the_links(closure: Closure) -> None:
     found = sensors('{}', '60').read(0.0, [1.0], [0.0])['frames']
-    frames = link_frames(closure, closure.position(1.0))
+    frames = frames_of_links(closure, closure.position(1.0))
     expected = [
         value
         for link, frame in frames.items()

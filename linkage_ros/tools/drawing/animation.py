@@ -34,7 +34,7 @@ from linkage_ros.kinematics.shapes import (
     bounding_corners,
     carried_shapes,
     COLOURS,
-    link_frames,
+    frames_of_links,
     Shape,
     shape_outline,
 )
@@ -147,13 +147,15 @@ def range_motion(shown: LinkageView, title: str, seconds: float) -> AnimatedMoti
     else:
         x = [low + (high - low) * 0.5 * (1.0 - cos(2.0 * pi * i / count)) for i in range(count)]
     way = InputSweep(shown.closure, shown.inputs)
-    links = tuple(link for link in link_frames(shown.closure, shown.position) if link != GROUND)
+    links = tuple(
+        link for link in frames_of_links(shown.closure, shown.position) if link != GROUND
+    )
     frames = np.full((count, len(links), 3), nan)
     for i, value in enumerate(x):
         position = way.position_at(min(max(value, low), high))
         if not position.joints:
             continue
-        found = link_frames(shown.closure, position)
+        found = frames_of_links(shown.closure, position)
         for index, link in enumerate(links):
             place, angle = found[link]
             frames[i, index] = place.real, place.imag, angle
@@ -274,7 +276,7 @@ class _MovingPicture:
         label_joints(self.panels, motion.joints, lines)
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine('none')  # the same places in all pictures
-        frames = link_frames(shown.closure, shown.position)
+        frames = frames_of_links(shown.closure, shown.position)
         self.origin = {link: frames[link] for link in motion.links}
         moving = [artist for _, artist in self.parts] + self.marks + self.dots
         self._front = [
@@ -344,7 +346,7 @@ def _motion_bounds(
     motion: AnimatedMotion, drawn: Sequence[tuple[str, Shape]]
 ) -> tuple[complex, complex]:
     """Return the corners of everything that the motion reaches, in [m]."""
-    made = link_frames(motion.view.closure, motion.view.position)
+    made = frames_of_links(motion.view.closure, motion.view.position)
     places = [place for path in motion.view.sweep.paths.values() for place in path]
     for link, shape in drawn:
         edge = np.array(shape_outline(shape))

@@ -33,7 +33,7 @@ from linkage_ros.description.linkage_writer import pose_text
 from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.drawn_pose import drawn_pose
+from linkage_ros.kinematics.drawn_pose import read_drawn_pose
 from linkage_ros.kinematics.pose_view import prepare_view
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.resources import named_file
@@ -115,7 +115,7 @@ def _draw_assemblies(arguments: argparse.Namespace) -> int:
     content, _ = read_yaml(named_file(arguments.file, 'linkages'))
     written_linkage(content)  # it sets the units
     texts = [
-        pose_text(one.closure.linkage, drawn_pose(one.closure, one.position), content.units)
+        pose_text(one.closure.linkage, read_drawn_pose(one.closure, one.position), content.units)
         for one in views
     ]
     assemblies_picture(dict(zip(texts, views, strict=True)), file)

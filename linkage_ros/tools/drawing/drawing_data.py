@@ -22,7 +22,7 @@ from linkage_ros.kinematics.shapes import (
     bounding_corners,
     carried_shapes,
     Circle,
-    link_frames,
+    frames_of_links,
     LinkFrame,
     Segment,
     Shape,
@@ -76,7 +76,7 @@ def pose_in_frames(closure: Closure, position: Position, size: float) -> dict[st
 def _carried_shapes(
     closure: Closure, position: Position, size: float, drawn: Sequence[tuple[str, Shape]]
 ) -> dict[str, Any]:
-    frames = link_frames(closure, position)
+    frames = frames_of_links(closure, position)
     return {
         'size': _round_digits(size),
         'shapes': [_shape_data(link, shape, frames) for link, shape in drawn],

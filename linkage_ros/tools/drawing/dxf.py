@@ -27,7 +27,7 @@ from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import links_by_point
 from linkage_ros.kinematics.pose_view import LinkageView, prepare_view, symbol_size
-from linkage_ros.kinematics.shapes import bounding_corners, convex_hull, link_frames
+from linkage_ros.kinematics.shapes import bounding_corners, convex_hull, frames_of_links
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.names import dxf_text
 
@@ -99,7 +99,7 @@ def links_dxf(closure: Closure, *, width: float | None = None, hole: float | Non
     # Below the parts, as the linkage stands.
     low, top = bounding_corners([place * _MM for place in closure.points(shown.position).values()])
     below = complex(0.0, place.imag - 2.0 * wide) - complex(low.real, top.imag + wide)
-    frames = link_frames(closure, shown.position)
+    frames = frames_of_links(closure, shown.position)
     for part in parts:
         frame = frames[part.name]
         _draw_part(space, part, below + frame.place * _MM, frame.angle, wide, bore, 'ASSEMBLY')

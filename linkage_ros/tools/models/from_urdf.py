@@ -167,7 +167,7 @@ class ImportedLinkage(NamedTuple):
     left_out: tuple[str, ...]
 
 
-def from_urdf(
+def linkage_from_urdf(
     urdf: UrdfFile,
     close: Sequence[tuple[str, str]] = (),
     inputs: Sequence[str] = (),

@@ -26,7 +26,7 @@ from linkage_ros.cli.arguments import add_output, LINKAGES
 from linkage_ros.description.linkage_file import read_linkage
 from linkage_ros.description.linkage_writer import linkage_text
 from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.tools.models.from_urdf import from_urdf
+from linkage_ros.tools.models.from_urdf import linkage_from_urdf
 from linkage_ros.tools.models.robot_model_command import write_or_print
 from linkage_ros.tools.models.urdf_file import read_urdf, read_urdf_file
 
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Write the linkage file; say what it leaves out."""
     file = arguments.file
-    made = from_urdf(
+    made = linkage_from_urdf(
         read_urdf(read_urdf_file(file), str(file)),
         arguments.close,
         arguments.input,

@@ -30,7 +30,7 @@ from linkage_ros.resources import named_file
 from linkage_ros.tools.models.mjcf import mujoco_model
 from linkage_ros.tools.models.onto import urdf_onto
 from linkage_ros.tools.models.part import ModelPart, PartError
-from linkage_ros.tools.models.scene_model import scene_model, Write
+from linkage_ros.tools.models.scene_model import make_scene_model, Write
 from linkage_ros.tools.models.urdf import urdf_model
 from linkage_ros.tools.models.urdf_file import read_urdf, read_urdf_file
 
@@ -94,7 +94,7 @@ def model_of(named: str, write: Write) -> bytes:
         from linkage_ros.tick.pipeline import Pipeline
 
         scene = load_scene(file)
-        return scene_model(scene, Pipeline(scene).closures, write)
+        return make_scene_model(scene, Pipeline(scene).closures, write)
     try:
         return write(file.stem, [ModelPart(read_closure(content))])
     except PartError as error:

@@ -23,10 +23,10 @@ Write = Callable[[str, Sequence[ModelPart]], bytes]
 
 def scene_urdf(scene: Scene, closures: Sequence[Closure]) -> bytes:
     """Return the URDF of a scene; see `scene_model`."""
-    return scene_model(scene, closures, urdf_model)
+    return make_scene_model(scene, closures, urdf_model)
 
 
-def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> bytes:
+def make_scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> bytes:
     """
     Return the robot model of a scene, with joint names as in its messages.
 

@@ -42,7 +42,7 @@ from linkage_ros.tools.study.measure import EFFECTS, measure_budget, PARTS, RECO
 from linkage_ros.tools.study.need import answer_need, answers_of
 from linkage_ros.tools.study.page import budget_html
 from linkage_ros.tools.study.picture import budget_svg
-from linkage_ros.tools.study.tuned_scene import tuned_scene
+from linkage_ros.tools.study.tuned_scene import tune_scene
 
 EXAMPLE = 'linkage accuracy slider_crank --need 1e-3 --quick'
 
@@ -204,7 +204,7 @@ def _write_files(
     """Write the files that were asked for."""
     if arguments.output and answer is not None and answer.is_met:
         folder = arguments.output.resolve().parent
-        text = tuned_scene(scene, arguments.scene, answer.changes, folder)
+        text = tune_scene(scene, arguments.scene, answer.changes, folder)
         atomic_write(arguments.output, text)
     if arguments.page:
         atomic_write(arguments.page, budget_html(budget, answers_of(budget)).encode())

@@ -24,7 +24,7 @@ from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.tools.study.prices import Change, settings_of
 
 
-def tuned_scene(
+def tune_scene(
     scene: Scene, named: str | os.PathLike[str], changes: Sequence[Change], folder: Path
 ) -> bytes:
     """

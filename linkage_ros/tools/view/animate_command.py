@@ -36,7 +36,7 @@ from linkage_ros.tools.drawing.animation import (
     range_motion,
 )
 from linkage_ros.tools.view.part_of_run import add_window, read_part, window_of
-from linkage_ros.tools.view.report.run_motion import run_motion
+from linkage_ros.tools.view.report.run_motion import find_run_motion
 
 _TURN = 4.0
 """How long a range is shown, in [s]."""
@@ -84,7 +84,7 @@ def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> Ani
         layouts = [layout_of(path) for path in bag.files]
         trusted = arguments.trust_effects
         found, scene, _ = read_part(bag, layouts, window, stop, trust_effects=trusted)
-        return run_motion(found, scene.name if scene else given.name, arguments.seconds)
+        return find_run_motion(found, scene.name if scene else given.name, arguments.seconds)
     closure = load(arguments.file)
     shown = prepare_view(closure, usual_inputs(closure))
     seconds = _TURN if arguments.seconds is None else arguments.seconds

@@ -34,7 +34,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.link_frames import separate_blocks
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.shapes import COLOURS, FACES, INK, link_frames
+from linkage_ros.kinematics.shapes import COLOURS, FACES, frames_of_links, INK
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.tools.drawing.drawing_data import drawn_in_frames
 from linkage_ros.tools.models.part import prefix_names
@@ -163,7 +163,7 @@ def _by_closing(closure: Closure, inputs: Sequence[Numbers]) -> _Found:
         position = closure.position(*given)
         if not position.joints:
             continue
-        for link, frame in link_frames(closure, position).items():
+        for link, frame in frames_of_links(closure, position).items():
             place, way = found[link]
             place[i], way[i] = frame.place, np.exp(1j * frame.angle)
     return found

@@ -24,7 +24,7 @@ _SECONDS = 10.0
 """A longer part of a run is shown faster, in this time, if no other is named."""
 
 
-def run_motion(run: ReportedRun, name: str, seconds: float | None) -> AnimatedMotion:
+def find_run_motion(run: ReportedRun, name: str, seconds: float | None) -> AnimatedMotion:
     """
     Return the motion of the first linkage of a run.
 
